@@ -41,10 +41,10 @@ def checked(
     """
     solid = without_cavities(one_solid(name, without_slack(shape)))
     mesh = closed_mesh(name, solid, mesh_mm)
-    found = properties(solid)
-    check_volume(name, found.volume, expected)
+    solid_properties = properties(solid)
+    check_volume(name, solid_properties.volume, expected)
     check_pads(name, solid, contacts, radius)
-    return solid, mesh, found
+    return solid, mesh, solid_properties
 
 
 def without_slack(shape: TopoDS_Shape) -> TopoDS_Shape:

@@ -34,8 +34,8 @@ class SolidProperties:
         x, y, z = self.centroid
         return SolidProperties(self.volume, self.area, (-x, y, z))
 
-    def moved(self, axes: Floats) -> "SolidProperties":
-        """Those of the solid turned about 0: axes (3, 3) are what x, y and z become, as rows."""
+    def rotated(self, axes: Floats) -> "SolidProperties":
+        """Those of the solid rotated about 0: axes (3, 3) are what x, y and z become, as rows."""
         x, y, z = (np.array(self.centroid) @ axes).tolist()
         return SolidProperties(self.volume, self.area, (x, y, z))
 

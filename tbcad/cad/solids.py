@@ -80,7 +80,7 @@ def _closed_wire(points: Floats) -> TopoDS_Wire:
     return wire.Wire()
 
 
-def rounded(middle: Floats, step: Floats, radius: float, normal: Floats) -> TopoDS_Face:
+def slot_face(middle: Floats, step: Floats, radius: float, normal: Floats) -> TopoDS_Face:
     """Plane face between two half circles about the points (3,) a step from its middle, mm."""
     wire, across = BRepBuilderAPI_MakeWire(), radius * unit(np.cross(normal, step))
     for to_end, side in ((step, across), (-step, -across)):
@@ -115,19 +115,19 @@ def prism(face: TopoDS_Face, along: Floats) -> TopoDS_Shape:
 
 def cylinder(start: Floats, axis: Floats, radius: float, length: float) -> TopoDS_Shape:
     """Solid cylinder from a point along a unit axis."""
-    frame = gp_Ax2(gp_Pnt(*start.tolist()), gp_Dir(*axis.tolist()))
+    frame = gp_Ax2(_point(start), gp_Dir(*axis.tolist()))
     return BRepPrimAPI_MakeCylinder(frame, radius, length).Shape()
 
 
 def sphere(centre: Floats, radius: float) -> TopoDS_Solid:
     """A ball about a point (3,), mm."""
-    return one_solid("sphere", BRepPrimAPI_MakeSphere(gp_Pnt(*centre.tolist()), radius).Shape())
+    return one_solid("sphere", BRepPrimAPI_MakeSphere(_point(centre), radius).Shape())
 
 
 def pyramid(apex: Floats, corners: Floats) -> TopoDS_Solid:
     """The pyramid between a point (3,) and a plane polygon (n, 3), mm."""
     loft = BRepOffsetAPI_ThruSections(True, True)
-    loft.AddVertex(BRepBuilderAPI_MakeVertex(gp_Pnt(*apex.tolist())).Vertex())
+    loft.AddVertex(BRepBuilderAPI_MakeVertex(_point(apex)).Vertex())
     loft.AddWire(_closed_wire(corners))
     return one_solid("pyramid", loft.Shape())
 
@@ -235,7 +235,7 @@ def wires(face: TopoDS_Face) -> list[TopoDS_Wire]:
     return [TopoDS.Wire_s(wire) for wire in _parts(face, TopAbs_WIRE)]
 
 
-def turned(faces: Iterable[TopoDS_Face]) -> list[TopoDS_Face]:
+def reversed_faces(faces: Iterable[TopoDS_Face]) -> list[TopoDS_Face]:
     """The same faces with the material on their other side."""
     return [TopoDS.Face_s(face.Reversed()) for face in faces]
 

@@ -95,7 +95,7 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         arrangement = _with_drive(arrangement, drive)
         disc = _disc(arrangement)
     frame, gauge = arrangement.frame, _gauge(spec, layout, base, arrangement.frame)
-    half = len(frame.printed) // 2
+    half = len(frame.printed) // 2  # the other process is idle: coupons and stage are built
     rest = submit(parts_or_error, _placed, frame.printed[half:], spec)
     on_frame = _placed(frame.printed[:half], spec)
     tools = [gauge.component] if gauge else []

@@ -7,7 +7,7 @@ import numpy as np
 
 from tbcad.cad.brep import Maker, Solid
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import one_solid, turned
+from tbcad.cad.solids import one_solid, reversed_faces
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
@@ -65,7 +65,7 @@ def mandrel_solid(
     front = front_edges(maker, cells)
     closing = closing_faces(front, mandrel or design_mandrel(design))
     names = [*array.ids, *wall_names(array.ids, cells)]
-    mirrors_and_walls = turned([*front.faces(), *front.walls()])
+    mirrors_and_walls = reversed_faces([*front.faces(), *front.walls()])
     faces = [*zip(names, mirrors_and_walls, strict=True), *closing]
     solid = maker.solid([face for _, face in faces])
     return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))

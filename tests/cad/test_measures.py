@@ -11,7 +11,7 @@ from tbcad.cad.measures import (
     properties,
     volume,
 )
-from tbcad.cad.solids import cylinder, faces, polygon, prism, sphere
+from tbcad.cad.solids import cylinder, faces, moved, polygon, prism, sphere
 from tbcad.geometry.primitives import rectangle
 
 START, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
@@ -33,6 +33,14 @@ def test_a_sphere() -> None:
 def test_a_mirror_image_has_its_centroid_on_the_other_side() -> None:
     found = SolidProperties(1.0, 2.0, (3.0, 4.0, 5.0)).mirrored()
     assert found == SolidProperties(1.0, 2.0, (-3.0, 4.0, 5.0))
+
+
+def test_a_rotated_solid_has_its_centroid_where_the_kernel_finds_it() -> None:
+    solid, axes = cylinder(START, UP, 2.0, 5.0), np.roll(np.eye(3), 1, axis=1)
+    found, expected = properties(solid).rotated(axes), properties(moved(solid, axes, np.zeros(3)))
+    assert found.centroid == pytest.approx((5.5, 1.0, 2.0), abs=1e-12)
+    assert found.centroid == pytest.approx(expected.centroid, abs=1e-12)
+    assert (found.volume, found.area) == pytest.approx((expected.volume, expected.area))
 
 
 @pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (10.0, -4.0, 2.0)])

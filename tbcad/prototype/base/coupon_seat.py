@@ -20,8 +20,8 @@ from tbcad.cad.solids import (
     moved,
     polygon,
     prism,
+    reversed_faces,
     revolved_polygon,
-    turned,
 )
 from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.base.coupon_pose import SeatPose
@@ -64,8 +64,8 @@ def with_pads(
     Face by face: seats of one size are then cut out once for all offsets. What bounds the body
     bounds, turned round, the room in it.
     """
-    posted = with_posts(turned(faces(body)), seats, k, offset, pose.axes)
-    return Maker(mirrored=False).solid(turned(posted))
+    posted = with_posts(reversed_faces(faces(body)), seats, k, offset, pose.axes)
+    return Maker(mirrored=False).solid(reversed_faces(posted))
 
 
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:

@@ -57,12 +57,12 @@ def carrier_parts(
         SpecError: when a piece does not fit; it says how large the bed must be.
         InvalidSolidError: when the kernel fails.
     """
-    solid, mesh, found = carrier_solid(base, mesh_mm, split)
+    solid, mesh, properties = carrier_solid(base, mesh_mm, split)
     if split.joints:
         return carrier_pieces(base, split, solid, printer, mesh_mm)
     directions = downward_directions(base, split.pieces[0])
     pads = base.local_seats.pad_normals.reshape(-1, 3)
-    return [placed_on_bed("carrier", solid, mesh, found, directions, base.axes, printer, pads)]
+    return [placed_on_bed("carrier", solid, mesh, properties, directions, base.axes, printer, pads)]
 
 
 def carrier_solid(

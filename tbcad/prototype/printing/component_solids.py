@@ -18,7 +18,7 @@ from tbcad.cad.solids import (
     polygon,
     prism,
     revolved_polygon,
-    rounded,
+    slot_face,
 )
 from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
@@ -35,7 +35,7 @@ def primitive_solid(body: Primitive) -> TopoDS_Shape:
     if isinstance(body, Revolved):
         return moved(revolved_polygon(body.profile, 0.0, 2 * np.pi), body.axes, body.start)
     if isinstance(body, Slot):
-        return prism(rounded(body.middle, body.step, body.radius, body.along), body.along)
+        return prism(slot_face(body.middle, body.step, body.radius, body.along), body.along)
     return prism(polygon(_outward(body)), body.along)
 
 
@@ -66,8 +66,8 @@ def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float)
         InvalidSolidError: when the kernel fails.
     """
     solid, name = component_solid(component), component.name
-    made = solid, closed_mesh(name, solid, mesh_mm), properties(solid)
-    return placed_on_bed(name, *made, component.downs, np.eye(3), printer)
+    mesh, downs = closed_mesh(name, solid, mesh_mm), component.downs
+    return placed_on_bed(name, solid, mesh, properties(solid), downs, np.eye(3), printer)
 
 
 def placed_components(

@@ -115,7 +115,7 @@ def placed_on_bed(
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
     solid = solids(moved(shape, axes, np.zeros(3)))[0]
     in_place = Mesh(mesh.vertices @ axes, mesh.triangles)
-    return PlacedSolid(name, solid, in_place, properties.moved(axes), axes.T @ best, origin)
+    return PlacedSolid(name, solid, in_place, properties.rotated(axes), axes.T @ best, origin)
 
 
 def _overhang(mesh: Mesh, orientation: Floats) -> float:

@@ -666,6 +666,10 @@ def test_a_lost_pad_is_noticed(base: BaseLayout) -> None:
     damaged = cut(whole, [cylinder(contacts[1] + 0.5 * UP, UP, 1.0, 5.0)])
     with pytest.raises(InvalidSolidError, match="the kernel lost pad 2"):
         check_pads("seat", damaged, contacts, pads)
+    inward = -seats.local_normals[0][2]
+    pierced = cut(whole, [cylinder(contacts[2] - 0.5 * inward, inward, 0.2, 1.0)])
+    with pytest.raises(InvalidSolidError, match="the kernel lost pad 3"):
+        check_pads("seat", pierced, contacts, pads)
     with pytest.raises(InvalidSolidError, match="the kernel lost pad 1"):
         check_pads("seat", seat_solids.boss_solid(seats, 0), contacts, pads)
     check_pads("seat", whole, contacts[:0], pads[:0])

@@ -348,7 +348,7 @@ def test_quick_looks_at_the_swing_change_nothing(
 
     quick = swept()
     monkeypatch.setattr(swing, "_boxes_apart", lambda one, two: False)
-    monkeypatch.setattr(swing, "_facets_apart", lambda one, two: 0.0)
+    monkeypatch.setattr(swing, "_facet_box_distance", lambda one, two: 0.0)
     monkeypatch.setattr(swing, "_box_inside", lambda inner, outer: True)
     monkeypatch.setattr(swing, "GRAINS_MM", swing.GRAINS_MM[-1:])
     monkeypatch.setattr(swing, "GROWTH", np.inf)
@@ -367,14 +367,14 @@ def test_boxes_of_facets_are_no_farther_apart_than_points(measured: MeasuredProt
     one, two = (
         swing.axial_solid(measured, "solid", solid.transform(place)) for solid in (tube, rod)
     )
-    apart = swing._facets_apart(one, two)
+    apart = swing._facet_box_distance(one, two)
     many = [solid.solid.refine_to_length(0.5).to_mesh64().vert_properties for solid in (one, two)]
     along = [points[:, :3] @ measured.context.frame[0] for points in many]
     out = [np.linalg.norm(points[:, :3] @ measured.context.frame[1:].T, axis=1) for points in many]
     profile = [np.stack(pair, axis=1) for pair in zip(along, out, strict=True)]
     assert swing._boxes_apart(one, two) is False
     assert 0 < apart <= cdist(*profile).min() < apart + 10
-    assert apart == swing._facets_apart(two, one)
+    assert apart == swing._facet_box_distance(two, one)
 
 
 def stepped(folder: Path, low: list[float], high: list[float]) -> Path:

@@ -6,8 +6,7 @@ Their shapes are those of the assembly's GLB, whose bodies are compared with the
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -61,16 +60,13 @@ class AssembledBodies:
 
     context: PrototypeContext
     drawn: Mapping[str, Shape]
+    _scenes: dict[tuple[str, ...], BodyScene] = field(default_factory=dict, init=False, repr=False)
 
     def scene(self, names: tuple[str, ...]) -> BodyScene:
-        """Some of them, made ready for rays once: most checks have the same that turn."""
-        if names not in self._by_names:
-            self._by_names[names] = _scene({name: self.drawn[name] for name in names})
-        return self._by_names[names]
-
-    @cached_property
-    def _by_names(self) -> dict[tuple[str, ...], BodyScene]:
-        return {}
+        """Some of the bodies, prepared for rays once: most checks trace the same that turn."""
+        if names not in self._scenes:
+            self._scenes[names] = _scene({name: self.drawn[name] for name in names})
+        return self._scenes[names]
 
     def without(self, names: Iterable[str]) -> Bodies:
         """All but some that are named."""
@@ -103,12 +99,12 @@ class Bodies:
         """The record."""
         return self.assembly.context
 
-    @cached_property
+    @property
     def turning(self) -> BodyScene:
-        """Those that turn; made ready for rays when the first are followed."""
+        """Those that turn, prepared for rays when the first are traced."""
         return self.assembly.scene(self.moving)
 
-    @cached_property
+    @property
     def still(self) -> BodyScene:
         """The others."""
         return self.assembly.scene(self.fixed)

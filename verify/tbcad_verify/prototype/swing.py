@@ -325,18 +325,18 @@ def axial_solid(measured: MeasuredPrototype, name: str, solid: Any) -> AxialSoli
 
 def _boxes_apart(one: AxialSolid, two: AxialSolid) -> bool:
     """Whether two solids are farther apart at any angle than points of them are searched for."""
-    return bool(_between(one.box, two.box) > SEARCH_MM + BETWEEN_MM)
+    return bool(_box_distance(one.box, two.box) > SEARCH_MM + BETWEEN_MM)
 
 
-def _facets_apart(one: AxialSolid, two: AxialSolid) -> float:
-    """Distance that two solids keep at any angle at least, mm: of facets from the other's box."""
-    from_two = _between(one.facet_boxes, two.box[:, :, None]).min(initial=np.inf)
-    from_one = _between(two.facet_boxes, one.box[:, :, None]).min(initial=np.inf)
+def _facet_box_distance(one: AxialSolid, two: AxialSolid) -> float:
+    """Lower bound of their distance at any angle, mm: of one's facets from the other's box."""
+    from_two = _box_distance(one.facet_boxes, two.box[:, :, None]).min(initial=np.inf)
+    from_one = _box_distance(two.facet_boxes, one.box[:, :, None]).min(initial=np.inf)
     return float(max(from_two, from_one))
 
 
-def _between(one: Floats, two: Floats) -> Any:
-    """Distances of boxes (2, 2, ...) about the axis, mm."""
+def _box_distance(one: Floats, two: Floats) -> Any:
+    """Distances of boxes as of `AxialSolid.box` or `facet_boxes`, mm."""
     return np.hypot(*np.maximum(one[0] - two[1], two[0] - one[1]).clip(min=0))
 
 
@@ -348,13 +348,12 @@ def _distance_at_any_angle(one: AxialSolid, two: AxialSolid) -> float:
 def _bound_at_any_angle(one: AxialSolid, two: AxialSolid) -> tuple[float, bool]:
     """The same, or where it is `CLEAR_MM` or more a bound below it; and whether it is a bound.
 
-    Boxes of facets tell most pairs apart that are far from each other, and need no points. Few
-    points are within the grain of the many, and so tell mostly on which side of `CLEAR_MM` the
-    distance is. They are asked for more than `SEARCH_MM`: where they find nothing, neither would
-    the many.
+    For most pairs that are far apart, boxes of facets show it without any points. Few points are
+    within the grain of the many, and so mostly show on which side of `CLEAR_MM` the distance
+    is. They are asked for more than `SEARCH_MM`: where they find nothing, neither would the many.
     """
     off = 2 * OFF_SURFACE * GRAIN_MM
-    apart = _facets_apart(one, two)
+    apart = _facet_box_distance(one, two)
     if apart > SEARCH_MM + BETWEEN_MM:
         return np.inf, False
     if apart - off >= CLEAR_MM:
