@@ -11,9 +11,12 @@ from pathlib import Path
 
 from timing import Figure, Row, at_most
 
-COMMAND = "import sys; from tbcad.cli import run; sys.exit(run(sys.argv[1:]))"
+COMMAND = "from tbcad.cli import main; main()"  # what the installed program does
 ENDS = {0: "done", 1: "done, the verification fails"}
 REFUSED = 2
+INSTALLED = {"PYTHONSAFEPATH": "1"}
+"""Environment in which the interpreter's own tbcad is found, not that of the working directory."""
+CRASHED = b"Traceback (most recent call last)"  # ends with 1, too
 MEGABYTE = 1e6
 
 
@@ -55,7 +58,7 @@ def run(
     start = time.perf_counter()
     answered = None
     with (folder / "log.txt").open("w+b") as log:
-        variables = {**os.environ, **(environment or {})}
+        variables = os.environ | INSTALLED | (environment or {})
         process = subprocess.Popen(command, stdout=log, stderr=subprocess.PIPE, env=variables)
         for line in process.stderr or ():
             log.write(line)
@@ -64,10 +67,12 @@ def run(
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode not in ({REFUSED} if refused else ENDS):
-            log.seek(0)
-            words = log.read().decode()
-            raise RuntimeError(f"{' '.join(command)}: exit code {process.returncode}\n{words}")
+        log.seek(0)
+        words = log.read()
+    expected = process.returncode in ({REFUSED} if refused else ENDS)
+    if not expected or CRASHED in words:
+        code = process.returncode
+        raise RuntimeError(f"{' '.join(command)}: exit code {code}\n{words.decode()}")
     cpu = used.ru_utime + used.ru_stime
     verdict = ENDS.get(process.returncode, "refused")
     return Build(seconds, cpu, used.ru_maxrss * 1024 / 1e9, verdict, answered)

@@ -150,7 +150,7 @@ def known(file: Path, code: str) -> dict[str, Any] | None:
 def digest(python: Path) -> str:
     """Of both packages' modules, as an interpreter finds them."""
     answer = subprocess.run(
-        [python, "-c", PACKAGES], capture_output=True, encoding="utf-8", check=True
+        [python, "-P", "-c", PACKAGES], capture_output=True, encoding="utf-8", check=True
     )
     modules = (
         module for line in answer.stdout.splitlines() for module in Path(line).parent.rglob("*.py")
