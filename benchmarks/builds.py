@@ -16,7 +16,7 @@ ENDS = {0: "done", 1: "done, the verification fails"}
 REFUSED = 2
 INSTALLED = {"PYTHONSAFEPATH": "1"}
 """Environment in which the interpreter's own tbcad is found, not that of the working directory."""
-CRASHED = b"Traceback (most recent call last)"  # ends with 1, too
+CRASHED = b"Traceback (most recent call last)"  # a crash exits with 1, too
 MEGABYTE = 1e6
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -20,7 +21,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from builds import Build, run
+from builds import INSTALLED, Build, run
 from circumstances import RESULTS, circumstances
 
 FILE = RESULTS / "commands.json"
@@ -150,7 +151,11 @@ def known(file: Path, code: str) -> dict[str, Any] | None:
 def digest(python: Path) -> str:
     """Of both packages' modules, as an interpreter finds them."""
     answer = subprocess.run(
-        [python, "-P", "-c", PACKAGES], capture_output=True, encoding="utf-8", check=True
+        [python, "-c", PACKAGES],
+        env=os.environ | INSTALLED,
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
     )
     modules = (
         module for line in answer.stdout.splitlines() for module in Path(line).parent.rglob("*.py")

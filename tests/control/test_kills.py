@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from tbcad.cli import run as tbcad
-from tests.control.rig import Rig
+from tests.control.rig import Rig, until
 from tests.control.run_checks import check_every_photograph, content, journal
 
 PER_STOP = 12
 SETTLED = 12  # lines before the first photograph of a process
 PHOTOGRAPH = 4  # lines
-WAIT_S = 20.0
 DELAY_S = 0.008  # in which a photograph comes from the camera to the disk
 
 
@@ -39,24 +38,21 @@ def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
     So a command that is faster than the process that kills it gets no farther.
     """
     end = len(rig.controller.lines) + lines
-    reached, killed = Event(), Event()
+    killed = Event()
 
     def hold(number: int) -> None:
-        if number == end:
-            reached.set()
-        elif number > end:
+        if number > end:
             killed.wait()
 
     rig.controller.on_line = hold
     process = rig.start(words)
-    came = reached.wait(WAIT_S)
+    until(lambda: len(rig.controller.lines) >= end or process.poll() is not None)
     sleep(delay_s)
     code = process.poll()
     process.kill()
     output = process.communicate()
     rig.controller.on_line = lambda number: None
     killed.set()
-    assert came, output
     assert code is None, output
 
 

@@ -61,11 +61,11 @@ def with_pads(
 ) -> TopoDS_Solid:
     """A seat's body with its pads, moved off the ball by an offset, mm.
 
-    Face by face: seats of one size are then cut out once for all offsets. What bounds the body
-    bounds, turned round, the room in it.
+    Face by face: seats of one size are then cut out once for all offsets. The body's faces,
+    reversed, bound the room in it.
     """
-    posted = with_posts(reversed_faces(faces(body)), seats, k, offset, pose.axes)
-    return Maker(mirrored=False).solid(reversed_faces(posted))
+    room = with_posts(reversed_faces(faces(body)), seats, k, offset, pose.axes)
+    return Maker(mirrored=False).solid(reversed_faces(room))
 
 
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:

@@ -63,7 +63,7 @@ class AssembledBodies:
     _scenes: dict[tuple[str, ...], BodyScene] = field(default_factory=dict, init=False, repr=False)
 
     def scene(self, names: tuple[str, ...]) -> BodyScene:
-        """Some of the bodies, prepared for rays once: most checks trace the same that turn."""
+        """Some of the bodies, prepared for rays once: most checks trace the same ones."""
         if names not in self._scenes:
             self._scenes[names] = _scene({name: self.drawn[name] for name in names})
         return self._scenes[names]

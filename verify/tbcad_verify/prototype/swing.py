@@ -349,8 +349,8 @@ def _bound_at_any_angle(one: AxialSolid, two: AxialSolid) -> tuple[float, bool]:
     """The same, or where it is `CLEAR_MM` or more a bound below it; and whether it is a bound.
 
     For most pairs that are far apart, boxes of facets show it without any points. Few points are
-    within the grain of the many, and so mostly show on which side of `CLEAR_MM` the distance
-    is. They are asked for more than `SEARCH_MM`: where they find nothing, neither would the many.
+    within the grain of the many, and so mostly show on which side of `CLEAR_MM` the distance is.
+    They are searched farther than `SEARCH_MM`: what they do not find, the many would not find.
     """
     off = 2 * OFF_SURFACE * GRAIN_MM
     apart = _facet_box_distance(one, two)
