@@ -105,6 +105,7 @@ def simulate_run(
     Raises:
         InputError: export, process or object cannot be read, or the folder cannot be written.
     """
+    from tbcad.output.inputs import files_named
     from tbcad.runs.photographs import read_run
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulated_run.options import RunOptions
@@ -112,7 +113,7 @@ def simulate_run(
     from tbcad.tolerance.process.process import load_process, process_errors
 
     folder = Path(out)
-    check_is_free(folder)
+    check_is_free(folder, (exports, object_file, *files_named(process)))
     errors = process_errors(load_process(process))
     progress("build and object")
     export = read_export(Path(exports))
@@ -223,17 +224,19 @@ def merge(
     from tbcad.merged_run.corrections import Options as MergeOptions
     from tbcad.merged_run.files import write_merge
     from tbcad.merged_run.merge import prepared_merge
-    from tbcad.output.folder import replacing
+    from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
-    progress("run and calibration")
-    known = Path(calibration)
+    known, chosen = Path(calibration), options or MergeOptions()
     built = export_of(known) if exports is None else Path(exports)
-    prepared = prepared_merge(Path(run), known, built, options or MergeOptions())
+    inputs = (run, known, built, *chosen.flat)
+    check_replaceable(Path(out), "merged run", force, inputs)
+    progress("run and calibration")
+    prepared = prepared_merge(Path(run), known, built, chosen)
     progress("photographs and light field")
-    with replacing(Path(out), force) as folder:
+    with replacing(Path(out), "merged run", force, inputs) as folder:
         record = write_merge(folder, prepared, detail)
-        write_manifest(folder)
+        write_manifest(folder, "merged run")
     return record
 
 
@@ -261,15 +264,16 @@ def as_built(
         InputError: one cannot be read, they do not belong together, or out cannot be replaced.
     """
     from tbcad.machine.calibrated_export import export_of
-    from tbcad.output.folder import replacing
+    from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
     known = Path(calibration)
     built = export_of(known) if exports is None else Path(exports)
+    check_replaceable(Path(out), "as-built", force, (known, built))
     progress("solids")
     with large_libraries():
         from tbcad.as_built.export import as_built as write_files
-    with replacing(Path(out), force) as folder:
+    with replacing(Path(out), "as-built", force, (known, built)) as folder:
         record = write_files(known, built, folder)
-        write_manifest(folder)
+        write_manifest(folder, "as-built")
     return record

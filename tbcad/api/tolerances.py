@@ -85,15 +85,17 @@ def inspect(
     """
     from tbcad.tolerance.wanted_yield import check_yield
 
+    from tbcad.output.folder import check_replaceable, replacing
+    from tbcad.output.manifest import write_manifest
+
     check_yield(wanted)
+    check_replaceable(Path(out), "inspection", force, (exports,))
     with large_libraries():
         from tbcad.inspection.inspect import checked_export
         from tbcad.inspection.inspect import inspect as write_files
-        from tbcad.output.folder import replacing
-        from tbcad.output.manifest import write_manifest
 
     export = checked_export(Path(exports))
-    with replacing(Path(out), force) as folder:
+    with replacing(Path(out), "inspection", force, (exports,)) as folder:
         record = write_files(export, wanted, folder, progress)
-        write_manifest(folder)
+        write_manifest(folder, "inspection")
     return record

@@ -67,9 +67,7 @@ def merge(
         check_is_export(exports)
     from tbcad.api import merge as merged
     from tbcad.merged_run.corrections import Options
-    from tbcad.output.folder import check_replaceable
 
-    check_replaceable(out, force)
     options = Options(vignetting, tuple(flat or ()), encoding, brightness)
     with stages(2) as screen:
         record = merged(

@@ -96,9 +96,10 @@ def capture(
     check_is_object(object_file)
     from tbcad.api import WantedFrames, WantedLamps, photograph, write_photographs
     from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import files_named
 
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
-    check_replaceable(out, force)
+    check_replaceable(out, "capture", force, (folder, object_file, *files_named(lights)))
     with stages(3 + (lights is not None) + (frames is not None)) as screen:
         photographs = photograph(
             folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
