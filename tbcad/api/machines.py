@@ -141,7 +141,7 @@ def calibrate(
         exports: folder that `build` wrote.
         options: the process that made the machine, measured radii, the camera's lens.
         out: folder to write the calibration to.
-        force: keep files in the folder that tbcad did not write.
+        force: replace an earlier one, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
 
@@ -210,7 +210,7 @@ def merge(
         exports: folder that `build` wrote; by default the one that the calibration names.
         options: how the photographs are corrected.
         out: folder to write pictures and light field to, as of a capture.
-        force: keep files in the folder that tbcad did not write.
+        force: replace an earlier one, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
 

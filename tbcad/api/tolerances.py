@@ -83,10 +83,9 @@ def inspect(
         InputError: the export has no shells, their mirrors are planar or may not be off at all,
             the share is not between 0 and 1, or out cannot be replaced.
     """
-    from tbcad.tolerance.wanted_yield import check_yield
-
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
+    from tbcad.tolerance.wanted_yield import check_yield
 
     check_yield(wanted)
     check_replaceable(Path(out), "inspection", force, (exports,))

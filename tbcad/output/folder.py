@@ -49,9 +49,7 @@ def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Sourc
 
 
 @contextmanager
-def replacing(
-    out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()
-) -> Iterator[Path]:
+def replacing(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> Iterator[Path]:
     """Give a folder to write content into, which replaces out when the block ends well.
 
     Args:

@@ -216,7 +216,10 @@ class TestReplacing:
 
     def test_a_file_that_comes_while_building_is_not_lost(self, out: Path) -> None:
         export(out, 1)
-        with pytest.raises(InputError, match=r"late\.txt"), replacing(out, "build", force=False) as new:
+        with (
+            pytest.raises(InputError, match=r"late\.txt"),
+            replacing(out, "build", force=False) as new,
+        ):
             fill_late(new, out)
         assert version_of(out) == 1
         assert (out / "late.txt").read_text() == "mine"
@@ -305,7 +308,10 @@ class TestParents:
 
     def test_are_removed_again_on_failure(self, tmp_path: Path) -> None:
         (tmp_path / "a").mkdir()
-        with pytest.raises(ZeroDivisionError), replacing(tmp_path / "a/b/c/exports", "build", False) as new:
+        with (
+            pytest.raises(ZeroDivisionError),
+            replacing(tmp_path / "a/b/c/exports", "build", False) as new,
+        ):
             fill(new, 1 // 0)
         assert list(tmp_path.rglob("*")) == [tmp_path / "a"]
 
