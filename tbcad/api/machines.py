@@ -165,6 +165,7 @@ def solve_intrinsics(
     size_mm: float,
     *,
     out: Path | str | None = None,
+    force: bool = False,
     detail: Progress = silent,
 ) -> SolvedLens:
     """Solve the lens of a camera from photographs of a checkerboard.
@@ -174,15 +175,19 @@ def solve_intrinsics(
         squares: columns and rows of the board.
         size_mm: width of a square.
         out: file to write, as OpenCV's YAML; None: none.
+        force: replace a file that exists.
         detail: called with the name of each photograph.
 
     Raises:
-        InputError: too few boards are found, or the file cannot be written.
+        InputError: too few boards are found, or the file cannot be written or exists.
     """
     from tbcad.atomic_files import replace_files
     from tbcad.calibration.intrinsics.checkerboard import solve_lens
     from tbcad.calibration.intrinsics.opencv import opencv_text
+    from tbcad.output.single_files import check_file
 
+    if out is not None:
+        check_file(Path(out), force, Path(folder).iterdir())
     solved = solve_lens(Path(folder), squares, size_mm, detail)
     if out is not None:
         file = Path(out)

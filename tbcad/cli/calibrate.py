@@ -128,13 +128,16 @@ def intrinsics(
     columns, rows = parse_squares(squares)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; name one with photographs of a checkerboard")
-    if out.exists() and not force:
-        raise InputError(f"{out} exists: choose another name, or replace it with --force")
     from tbcad.api import solve_intrinsics
+    from tbcad.output.single_files import check_file
+
+    check_file(out, force, folder.iterdir())
 
     with stages(1) as screen:
         screen.stage("corners of checkerboards")
-        solved = solve_intrinsics(folder, (columns, rows), size, out=out, detail=screen.detail)
+        solved = solve_intrinsics(
+            folder, (columns, rows), size, out=out, force=force, detail=screen.detail
+        )
     if json:
         print_json(_lens_record(solved, out))
         return 0

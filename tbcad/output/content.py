@@ -68,7 +68,7 @@ def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> No
         raise InputError(f"{out} is a run, and photographs are not replaced: name another folder")
     if present != kind:
         raise InputError(
-            f"{out} is {_words(present)}, which {_words(kind)} does not replace: name another "
+            f"{out} is {words(present)}, which {words(kind)} does not replace: name another "
             "folder, or remove that one"
         )
     _refuse_inner(out, target)
@@ -76,7 +76,7 @@ def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> No
         return
     if kind in COSTLY:
         raise InputError(
-            f"{out} is {_words(kind)} already: name another folder, or replace it with --force"
+            f"{out} is {words(kind)} already: name another folder, or replace it with --force"
         )
     if kind == "build" and (run := next(_runs_of(target), None)):
         raise InputError(
@@ -93,7 +93,7 @@ def refuse_inside(out: Path, target: Path) -> None:
     """
     for above in target.parents:
         if (outer := kind_of(above)) is not None:
-            raise InputError(f"{out} is inside {above}, {_words(outer)}: name a folder outside it")
+            raise InputError(f"{out} is inside {above}, {words(outer)}: name a folder outside it")
 
 
 def _refuse_inner(out: Path, target: Path) -> None:
@@ -104,7 +104,7 @@ def _refuse_inner(out: Path, target: Path) -> None:
         if (kind := kind_of(inner)) is not None:
             name = inner.relative_to(target)
             raise InputError(
-                f"{out} holds {name}, {_words(kind)}: name another folder, such as {out / 'new'}"
+                f"{out} holds {name}, {words(kind)}: name another folder, such as {out / 'new'}"
             )
 
 
@@ -144,5 +144,6 @@ def _record(path: Path) -> dict[str, Any]:
     return record if isinstance(record, dict) else {}
 
 
-def _words(kind: str) -> str:
+def words(kind: str) -> str:
+    """Return a kind with its article."""
     return WORDS.get(kind, f"a {kind}")

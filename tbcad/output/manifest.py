@@ -46,7 +46,7 @@ class Entry(BaseModel):
 
 
 class Manifest(BaseModel):
-    """What is read of manifest.json: the kind of content, "" where it is not told, and the files."""
+    """What is read of manifest.json: the kind of content, "" if it is not told, and the files."""
 
     kind: str = ""
     schema_name: str = Field(pattern="^tbcad-manifest/", alias="schema")

@@ -121,7 +121,7 @@ class TestInputs:
             lambda path: path,
             lambda path: path.parent / "work" / ".." / path.name,
             lambda path: Path(os.path.relpath(path)),
-            lambda path: link(path),
+            lambda path: link(path),  # noqa: PLW0108 - defined below
         ],
         ids=["absolute", "dots", "relative", "link"],
     )
@@ -147,7 +147,7 @@ class TestInputs:
         alias = tmp_path / "alias.ply"
         alias.symlink_to(mesh)
         for source in (mesh, alias):
-            with pytest.raises(InputError, match="holds .* which this command reads"):
+            with pytest.raises(InputError, match=r"holds .* which this command reads"):
                 check_replaceable(folder, "capture", True, (source,))
 
     def test_neighbours_are_apart(self, tmp_path: Path) -> None:
