@@ -85,7 +85,7 @@ def _meshes(
     """Seconds a machine, and the largest difference from the fast model, mm."""
     folder.mkdir(parents=True, exist_ok=True)
     write_record(folder, made, shells=True)
-    write_manifest(folder)
+    write_manifest(folder, "build")
     record, count = read_record(folder), len(draws[0])
     found = np.empty((count, 2 * len(made.arrays[0]) - int(edge_models[0].halved.sum())))
 

@@ -131,5 +131,6 @@ def pause() -> Iterator[None]:
 def end_with_parent() -> None:
     """End with the process that waits, also when that is killed; leave interrupts to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # which a command takes for an interrupt
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -51,7 +51,7 @@ def build_files(
     """
     with verification_process(needed=verify) as verify_files:
         mirrors = ahead.mirrors(detail)
-        with replacing(out, force) as folder:
+        with replacing(out, "build", force) as folder:
             with background_process() as submit:
                 simulated = submit(_as_made, mirrors) if verify and SHELL in parts else None
                 export = write_export(

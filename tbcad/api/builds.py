@@ -69,7 +69,7 @@ def build(
         out: folder to write.
         parts: "shell", "prototype" or both; None: both, but no prototype where none can be made.
         verify: verify the files before they replace those of an earlier build.
-        force: keep files in the folder that tbcad did not write, instead of refusing.
+        force: replace a build that a run photographed, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
 
@@ -79,12 +79,14 @@ def build(
     with large_libraries():
         from tbcad.design_process import design_process
         from tbcad.output.folder import check_replaceable
+        from tbcad.output.inputs import design_files
         from tbcad.output.parts import PROTOTYPE, default_parts
         from tbcad.prototype.purchased.prices import load_prices
 
     chosen, out = chosen_spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
-    check_replaceable(out, force)
+    inputs = design_files(chosen, None if isinstance(spec, Spec) else spec)
+    check_replaceable(out, "build", force, inputs)
     if PROTOTYPE in asked:
         load_prices(chosen.prototype.prices)  # a wrong list is no reason to leave parts out
     started = monotonic()

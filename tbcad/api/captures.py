@@ -47,7 +47,7 @@ def capture(
             y_mm, z_mm; "mirrors" for a lamp in the place of each virtual camera; or "projectors"
             for the light that each mirror throws of a projector in its camera's place.
         every: one lamp of so many, of "mirrors" or "projectors".
-        force: keep files in the folder that tbcad did not write.
+        force: replace an earlier capture, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
 
@@ -57,10 +57,14 @@ def capture(
     Raises:
         InputError: export, object or lamps cannot be read, or the folder cannot be replaced.
     """
+    from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import files_named
     from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 
     if lights is not None and out is None:
         raise InputError("a reflectance field is written beside the light field: give out")
+    if out is not None:
+        check_replaceable(Path(out), "capture", force, (exports, object_file, *files_named(lights)))
 
     photographs = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
     if out is not None:
@@ -81,12 +85,14 @@ class Photographs:
         subject: the object before the cameras.
         capture_mm: diameter of the capture sphere.
         facts: how they are taken: design, n, geometry, samples.
+        sources: files and folders that they are made from.
     """
 
     cameras: CameraPhotographs
     subject: SceneObject
     capture_mm: float
     facts: dict[str, Any]
+    sources: tuple[Path | str | None, ...] = ()
 
 
 def photograph(
@@ -119,7 +125,7 @@ def photograph(
         "geometry": geometry,
         "samples": samples,
     } | ({"light": "lamps of the prototype"} if lamps else {})
-    return Photographs(cameras, subject, export.capture_mm, facts)
+    return Photographs(cameras, subject, export.capture_mm, facts, (exports, object_file))
 
 
 @dataclass(frozen=True)
@@ -159,12 +165,14 @@ def write_photographs(
 ) -> dict[str, Any]:
     """Take both photographs and replace a folder by their files; return the record of them."""
     from tbcad.output.folder import replacing
+    from tbcad.output.inputs import files_named
     from tbcad.output.manifest import write_manifest
     from tbcad.simulate.capture.files import write_capture
 
     write_field = None if lamps is None else _field_writer(photographs, lamps)
+    sources = (*photographs.sources, *files_named(lamps.lights if lamps else None))
     progress("photographs and light field")
-    with replacing(out, force) as folder:
+    with replacing(out, "capture", force, sources) as folder:
         record = write_capture(
             folder,
             photographs.cameras,
@@ -178,7 +186,7 @@ def write_photographs(
         if frames is not None:
             progress("a photograph for each frame")
             record["sequence"] = _write_frames(folder, photographs, frames, detail)
-        write_manifest(folder)
+        write_manifest(folder, "capture")
     return record
 
 

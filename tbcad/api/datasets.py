@@ -65,21 +65,14 @@ def export(
             else f"--exports {exports} is for --to mitsuba: leave it out"
         )
     options, place = ExportOptions(to, every, cameras, size), Path(capture)
-    _check_apart(place, Path(out))
-    check_replaceable(Path(out), force)
+    inputs = (place if place.is_dir() else place.parent, exports)
+    check_replaceable(Path(out), "dataset", force, inputs)
     known = (place / OBJECT).is_file()
-    with LightField.open(place) as source, replacing(Path(out), force) as folder:
+    with LightField.open(place) as source, replacing(Path(out), "dataset", force, inputs) as folder:
         scene = prepared_scene(read_object(place)) if known else None
         if exports is not None:
             record = write_scene(folder, source, scene, Path(exports), progress)
         else:
             record = write_dataset(folder, source, scene, options, progress, detail)
-        write_manifest(folder)
+        write_manifest(folder, "dataset")
     return record
-
-
-def _check_apart(capture: Path, out: Path) -> None:
-    """Refuse to replace a capture by its own export."""
-    folder = capture if capture.is_dir() else capture.parent
-    if out.resolve() == folder.resolve():
-        raise InputError(f"{out} is the capture itself and would be replaced: name another folder")

@@ -105,6 +105,7 @@ def simulate_run(
     Raises:
         InputError: export, process or object cannot be read, or the folder cannot be written.
     """
+    from tbcad.output.inputs import files_named
     from tbcad.runs.photographs import read_run
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulated_run.options import RunOptions
@@ -112,7 +113,7 @@ def simulate_run(
     from tbcad.tolerance.process.process import load_process, process_errors
 
     folder = Path(out)
-    check_is_free(folder)
+    check_is_free(folder, (exports, object_file, *files_named(process)))
     errors = process_errors(load_process(process))
     progress("build and object")
     export = read_export(Path(exports))
@@ -140,7 +141,7 @@ def calibrate(
         exports: folder that `build` wrote.
         options: the process that made the machine, measured radii, the camera's lens.
         out: folder to write the calibration to.
-        force: keep files in the folder that tbcad did not write.
+        force: replace an earlier one, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
 
@@ -166,6 +167,7 @@ def solve_intrinsics(
     charuco: str | None = None,
     marker_mm: float | None = None,
     out: Path | str | None = None,
+    force: bool = False,
     detail: Progress = silent,
 ) -> SolvedLens:
     """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
@@ -177,16 +179,20 @@ def solve_intrinsics(
         charuco: dictionary of a ChArUco board's markers, such as "4x4_50".
         marker_mm: width of its markers.
         out: file to write, as OpenCV's YAML; None: none.
+        force: replace a file that exists.
         detail: called with the name of each photograph.
 
     Raises:
-        InputError: too few boards are found, or the file cannot be written.
+        InputError: too few boards are found, or the file cannot be written or exists.
     """
     from tbcad.atomic_files import replace_files
     from tbcad.calibration.intrinsics.boards import Board, parse_dictionary
     from tbcad.calibration.intrinsics.checkerboard import solve_lens
     from tbcad.calibration.intrinsics.opencv import opencv_text
+    from tbcad.output.single_files import check_file
 
+    if out is not None:
+        check_file(Path(out), force, Path(folder).iterdir())
     dictionary = None if charuco is None else parse_dictionary(charuco)
     solved = solve_lens(Path(folder), Board(squares, size_mm, dictionary, marker_mm), detail)
     if out is not None:
@@ -215,7 +221,7 @@ def merge(
         exports: folder that `build` wrote; by default the one that the calibration names.
         options: how the photographs are corrected.
         out: folder to write pictures and light field to, as of a capture.
-        force: keep files in the folder that tbcad did not write.
+        force: replace an earlier one, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
 
@@ -229,17 +235,19 @@ def merge(
     from tbcad.merged_run.corrections import Options as MergeOptions
     from tbcad.merged_run.files import write_merge
     from tbcad.merged_run.merge import prepared_merge
-    from tbcad.output.folder import replacing
+    from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
-    progress("run and calibration")
-    known = Path(calibration)
+    known, chosen = Path(calibration), options or MergeOptions()
     built = export_of(known) if exports is None else Path(exports)
-    prepared = prepared_merge(Path(run), known, built, options or MergeOptions())
+    inputs = (run, known, built, *chosen.flat)
+    check_replaceable(Path(out), "merged run", force, inputs)
+    progress("run and calibration")
+    prepared = prepared_merge(Path(run), known, built, chosen)
     progress("photographs and light field")
-    with replacing(Path(out), force) as folder:
+    with replacing(Path(out), "merged run", force, inputs) as folder:
         record = write_merge(folder, prepared, detail)
-        write_manifest(folder)
+        write_manifest(folder, "merged run")
     return record
 
 
@@ -267,15 +275,16 @@ def as_built(
         InputError: one cannot be read, they do not belong together, or out cannot be replaced.
     """
     from tbcad.machine.calibrated_export import export_of
-    from tbcad.output.folder import replacing
+    from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
     known = Path(calibration)
     built = export_of(known) if exports is None else Path(exports)
+    check_replaceable(Path(out), "as-built", force, (known, built))
     progress("solids")
     with large_libraries():
         from tbcad.as_built.export import as_built as write_files
-    with replacing(Path(out), force) as folder:
+    with replacing(Path(out), "as-built", force, (known, built)) as folder:
         record = write_files(known, built, folder)
-        write_manifest(folder)
+        write_manifest(folder, "as-built")
     return record

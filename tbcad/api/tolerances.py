@@ -83,17 +83,18 @@ def inspect(
         InputError: the export has no shells, their mirrors are planar or may not be off at all,
             the share is not between 0 and 1, or out cannot be replaced.
     """
+    from tbcad.output.folder import check_replaceable, replacing
+    from tbcad.output.manifest import write_manifest
     from tbcad.tolerance.wanted_yield import check_yield
 
     check_yield(wanted)
+    check_replaceable(Path(out), "inspection", force, (exports,))
     with large_libraries():
         from tbcad.inspection.inspect import checked_export
         from tbcad.inspection.inspect import inspect as write_files
-        from tbcad.output.folder import replacing
-        from tbcad.output.manifest import write_manifest
 
     export = checked_export(Path(exports))
-    with replacing(Path(out), force) as folder:
+    with replacing(Path(out), "inspection", force, (exports,)) as folder:
         record = write_files(export, wanted, folder, progress)
-        write_manifest(folder)
+        write_manifest(folder, "inspection")
     return record

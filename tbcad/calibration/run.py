@@ -1,6 +1,7 @@
 """`tbcad calibrate`: from a run's folder to the folder of its calibration."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from tbcad.machine.designed import dome_radius
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import TRUTH, read_machine
 from tbcad.output.folder import check_replaceable, replacing
+from tbcad.output.inputs import Source, files_named
 from tbcad.runs.photographs import Run, read_run
 from tbcad.runs.same_export import check_same_export
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
@@ -82,8 +84,9 @@ def calibrate_run(
     run = read_run(folder)
     check_same_export(run, exports)
     machines = {name: run.of_frames(frames) for name, frames in run.record.machines.items()}
+    inputs = (folder, exports, options.intrinsics, *files_named(options.process))
     for name in machines:
-        check_replaceable(out / name, force)
+        check_replaceable(out / name, "calibration", force, inputs)
     export = read_export(exports)
     setups = [_setup(one, export, options) for one in machines.values()]
     truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
@@ -102,6 +105,7 @@ def calibrate_run(
             truth,
             out / name,
             _basis(one, result.setup, options, process),
+            inputs,
             force,
             options.plot,
         )
@@ -122,11 +126,12 @@ def _written(
     truth: Machine | None,
     out: Path,
     basis: dict[str, Any],
+    inputs: Iterable[Source],
     force: bool,
     plot: PlotFormat,
 ) -> WrittenCalibration:
     judged = verdict(result)
-    with replacing(out, force) as new:
+    with replacing(out, "calibration", force, inputs) as new:
         record = write_calibration(new, result, judged, basis, plot)
         texts = [] if truth is None else [write_recovered(new, result, truth, plot)]
     text = "\n".join([verdict_text(result, judged), *texts])

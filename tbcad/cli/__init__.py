@@ -35,18 +35,19 @@ from tbcad.cli import view as _view  # noqa: F401 - adds its command
 from tbcad.cli.app import app
 from tbcad.cli.examples import add_examples
 from tbcad.cli.help_order import order_help
+from tbcad.cli.stopping import signals_as_interrupt
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
 
 order_help(app)
 add_examples(app)
 
-INTERRUPTED = 130  # exit code of a command that is stopped from the keyboard
+INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
 
 
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code; bad input is told in one line on stderr."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), signals_as_interrupt():
         warnings.simplefilter("always", PlausibilityWarning)
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
         return _run(arguments)

@@ -31,9 +31,7 @@ def as_built(
     if exports is not None:
         check_is_export(exports)
     from tbcad.api import as_built as written
-    from tbcad.output.folder import check_replaceable
 
-    check_replaceable(out, force)
     with stages(1) as screen:
         record = written(calibration, exports, out=out, force=force, progress=screen.stage)
     if json:

@@ -136,9 +136,10 @@ def intrinsics(
     columns, rows = parse_squares(squares)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; name one with photographs of a board")
-    if out.exists() and not force:
-        raise InputError(f"{out} exists: choose another name, or replace it with --force")
     from tbcad.api import solve_intrinsics
+    from tbcad.output.single_files import check_file
+
+    check_file(out, force, folder.iterdir())
 
     with stages(1) as screen:
         screen.stage("corners of boards")
@@ -149,6 +150,7 @@ def intrinsics(
             charuco=charuco,
             marker_mm=marker,
             out=out,
+            force=force,
             detail=screen.detail,
         )
     if json:

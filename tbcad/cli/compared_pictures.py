@@ -16,13 +16,15 @@ if TYPE_CHECKING:
 WIDEST_DEG = 170
 
 
-def check_pictures(capture: Path, out: Path, force: bool) -> None:
-    """Refuse, before any work, pictures that cannot be written or that exist."""
+def check_pictures(capture: Path, out: Path, force: bool, *inputs: Path | None) -> None:
+    """Refuse, before any work, pictures that cannot be written, that exist, or that are read."""
+    from tbcad.output.single_files import check_file
     from tbcad.simulate.image_files import check_image_path
 
     compared = compared_files(out) if has_object(capture) else []
     for file in (out, *compared):
         check_image_path(file, force)
+        check_file(file, force, (capture, *inputs))
 
 
 def compared_files(out: Path) -> list[Path]:

@@ -46,10 +46,10 @@ def init(
     if design not in shipped_designs():
         known = ", ".join(shipped_designs())
         raise InputError(f"--from is {design!r}, allowed is one of {known}: change it")
-    from tbcad.atomic_files import refuse_existing, replace_files, write_errors_as_input_errors
+    from tbcad.atomic_files import replace_files
+    from tbcad.output.single_files import check_file
 
-    with write_errors_as_input_errors(file):
-        refuse_existing(file, force)
+    check_file(file, force)
     from tbcad.reference.template import design_template
 
     replace_files(file.parent, {file.name: design_template(design).encode()})

@@ -32,9 +32,7 @@ def inspection(
     """
     check_is_export(folder)
     from tbcad.api import inspect
-    from tbcad.output.folder import check_replaceable
 
-    check_replaceable(out, force)
     with stages(3) as screen:
         record = inspect(folder, out=out, wanted=share, force=force, progress=screen.stage)
     if json:

@@ -12,12 +12,12 @@ from tbcad.cli.options import (
     ExportsOption,
     Force,
     JsonResult,
-    OutReplaced,
     RunFolder,
 )
 from tbcad.cli.output_mode import print_result
 from tbcad.screen import stages
 
+CAPTURES = Path("captures")
 FEW_NAMES = 6  # of missing mirrors in a line
 
 
@@ -26,7 +26,15 @@ def merge(
     run: RunFolder,
     calibration: CalibrationFolder = Path("calibration"),
     exports: ExportsOption = None,
-    out: OutReplaced = Path("captures"),
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for all files; replaced as a whole or not at all. By default captures/ "
+            "with the name of the run, such as captures/first.",
+        ),
+    ] = None,
     vignetting: Annotated[
         Literal["off", "cos4"],
         typer.Option(
@@ -67,9 +75,8 @@ def merge(
         check_is_export(exports)
     from tbcad.api import merge as merged
     from tbcad.merged_run.corrections import Options
-    from tbcad.output.folder import check_replaceable
 
-    check_replaceable(out, force)
+    out = out or CAPTURES / run.resolve().name
     options = Options(vignetting, tuple(flat or ()), encoding, brightness)
     with stages(2) as screen:
         record = merged(

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.atomic_files import refuse_existing, replace_files, write_errors_as_input_errors
+from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.cli.app import app
 from tbcad.cli.options import ForceFile, JsonResult, PlotFormatOption, Scheduler, Settings
 from tbcad.cli.output_mode import print_json
@@ -87,7 +87,7 @@ def optimize(
     wanted = parse_objectives(objectives or DEFAULTS)
     _check_numbers(candidates, max_size_mm, max_view_angle_deg)
     spec = load_spec(Path(design) if design else None, settings or ())
-    _check_files(out, store, resume, force)
+    _check_files(out, store, design, plot, resume, force)
     with stages(2) as screen:
         screen.stage("optimize: candidates")
         asked = Search(spec, wanted, candidates, max_size_mm, max_view_angle_deg, front)
@@ -116,13 +116,18 @@ def _check_numbers(candidates: int, size_mm: float | None, angle_deg: float | No
             raise InputError(f"{option} is {number:g}, allowed is more than 0: change it")
 
 
-def _check_files(out: Path, store: Path, resume: bool, force: bool) -> None:
+def _check_files(
+    out: Path, store: Path, design: str | None, plot: str, resume: bool, force: bool
+) -> None:
     """Refuse, before any work, what would be lost."""
+    from tbcad.output.single_files import check_file
+
+    inputs = (Path(design) if design else None,)
     with write_errors_as_input_errors(out):
         if out.is_dir():
             raise InputError(f"{out} is a folder: name a TOML file with --out")
-        if not resume:
-            refuse_existing(out, force)
+        for file in (out, out.with_name(f"{out.stem}-candidates.csv"), out.with_suffix(f".{plot}")):
+            check_file(file, force or resume, inputs)
         if store.exists() and not (resume or force):
             raise InputError(f"{store} exists: go on with --resume, or begin anew with --force")
         out.parent.mkdir(parents=True, exist_ok=True)

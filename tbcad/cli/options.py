@@ -32,7 +32,10 @@ JsonResult = Annotated[
 Force = Annotated[
     bool,
     typer.Option(
-        "--force", help="Keep files in the folder that tbcad did not write, instead of refusing."
+        "--force",
+        help="Replace what may have cost hours (a capture, a merged run, a calibration, a build "
+        "that a run photographed), and keep files in the folder that tbcad did not write, instead "
+        "of refusing.",
     ),
 ]
 ForceFile = Annotated[

@@ -8,6 +8,7 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.compared_pictures import (
     check_pictures,
+    compared_files,
     scene_of,
     true_picture,
     viewpoint_of,
@@ -83,6 +84,7 @@ def refocus(
     check_is_capture(capture_folder)
     if all_in_focus and sweep is not None:
         raise InputError("--all-in-focus has no focus to move: leave out --sweep")
+    from tbcad.output.single_files import check_file
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
@@ -91,6 +93,9 @@ def refocus(
     check_pictures(capture_folder, out, force)
     if sweep is not None:
         check_image_path(sweep, force, ANIMATED_SUFFIXES)
+        check_file(sweep, force, (capture_folder,))
+        if sweep in (out, *compared_files(out)):
+            raise InputError(f"--sweep {sweep}: a picture of this command: choose another name")
     names = ("69 pinholes", "pinhole" if all_in_focus else "real lens")
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")

@@ -2,10 +2,7 @@
 
 import re
 import shlex
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -18,7 +15,6 @@ from tbcad.errors import InputError
 
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16
-_STOPPING = ("SIGTERM", "SIGHUP")
 
 
 @app.command()
@@ -135,23 +131,22 @@ def run(
     from tbcad.control.verdict import outcome_lines
     from tbcad.screen import stages
 
-    with _signals_as_interrupt():
-        outcome = photograph(
-            folder,
-            out,
-            port=port,
-            ask=_yes if yes else _asked,
-            camera=camera,
-            phases=phases,
-            stops=stops,
-            runs=runs,
-            size_px=size_px,
-            resume=resume,
-            send_settings=send_settings,
-            timeout_s=timeout,
-            show=stages,
-            progress=_note,
-        )
+    outcome = photograph(
+        folder,
+        out,
+        port=port,
+        ask=_yes if yes else _asked,
+        camera=camera,
+        phases=phases,
+        stops=stops,
+        runs=runs,
+        size_px=size_px,
+        resume=resume,
+        send_settings=send_settings,
+        timeout_s=timeout,
+        show=stages,
+        progress=_note,
+    )
     for line in outcome_lines(outcome, _resuming(folder, port, camera, out)):
         typer.echo(line)
     return 0 if outcome.complete else 1
@@ -191,17 +186,3 @@ def _yes(question: str) -> bool:
 
 def _note(text: str) -> None:
     typer.echo(text, err=True)
-
-
-@contextmanager
-def _signals_as_interrupt() -> Iterator[None]:
-    """A closed terminal or a kill ends the run as Ctrl-C does: lights off, base held."""
-    wanted = [getattr(signal, name) for name in _STOPPING if hasattr(signal, name)]
-    before: dict[int, Callable[..., object] | int | None] = {}
-    for number in wanted:
-        before[number] = signal.signal(number, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

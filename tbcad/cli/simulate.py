@@ -7,7 +7,7 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_export, check_is_object
-from tbcad.cli.options import Exports, Force, JsonResult, ObjectFile, OutReplaced, PaintOption
+from tbcad.cli.options import Exports, Force, JsonResult, ObjectFile, PaintOption
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
 from tbcad.screen import stages
@@ -16,13 +16,22 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.geometry import Geometry
 
 MOST_SAMPLES = 8
+CAPTURES, BUILT_IN = Path("captures"), "knot"
 
 
 @app.command()
 def capture(
     folder: Exports,
     object_file: ObjectFile = None,
-    out: OutReplaced = Path("captures"),
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for all files; replaced as a whole or not at all. By default captures/ "
+            "with the name of the object, such as captures/knot.",
+        ),
+    ] = None,
     fit: Annotated[
         bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
     ] = False,
@@ -96,9 +105,11 @@ def capture(
     check_is_object(object_file)
     from tbcad.api import WantedFrames, WantedLamps, photograph, write_photographs
     from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import files_named
 
+    out = out or CAPTURES / (object_file.stem if object_file else BUILT_IN)
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
-    check_replaceable(out, force)
+    check_replaceable(out, "capture", force, (folder, object_file, *files_named(lights)))
     with stages(3 + (lights is not None) + (frames is not None)) as screen:
         photographs = photograph(
             folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail

@@ -112,8 +112,8 @@ def view(
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
-    check_pictures(capture_folder, out, force)
-    _check_depth(files, out, choice, force)
+    check_pictures(capture_folder, out, force, light)
+    _check_depth(files, out, choice, force, (capture_folder, light))
     if frame is not None and (light is not None or surface == "object"):
         raise InputError("--frame has its own light and place: leave out --light and --surface")
     if light is None and light_turn:
@@ -225,13 +225,17 @@ def _choice(method: str | None, surface: Surface | None) -> _Choice:
     return _Choice("depth", "depth", reason)
 
 
-def _check_depth(files: list[Path], out: Path, choice: _Choice, force: bool) -> None:
+def _check_depth(
+    files: list[Path], out: Path, choice: _Choice, force: bool, inputs: tuple[Path | None, ...]
+) -> None:
+    from tbcad.output.single_files import check_file
     from tbcad.simulate.image_files import check_image_path
 
     if choice.surface != "depth" and files:
         raise InputError(f"--depth {files[0]}: no depth is looked for: add --method depth")
     for k, file in enumerate(files):
         check_image_path(file, force, (".png", ".ply"))
+        check_file(file, force, inputs)
         if file in (out, *compared_files(out), *files[:k]):
             raise InputError(f"--depth {file}: another file of this command: choose another name")
 

@@ -24,6 +24,8 @@ from tbcad.control.port import SerialPort
 from tbcad.control.selection import chosen_frames, chosen_phases
 from tbcad.control.session import Ask, RunOptions, Session, Show
 from tbcad.errors import InputError
+from tbcad.output.content import refuse_inside
+from tbcad.output.inputs import refuse_inputs
 from tbcad.runs.exposure import exposure_name
 from tbcad.runs.photographs import read_run
 from tbcad.runs.record import RunRecord, read_record
@@ -181,6 +183,8 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
     frames = chosen_frames(plan, request.stops, request.runs or "ab")
     size = request.size_px or plan.size_px
     if not request.resume:
+        refuse_inputs(request.out, (request.exports,))
+        refuse_inside(request.out, request.out.resolve())
         check_new(request.out)
         return plan, RunOptions(frames, phases, size, send_settings)
     record = read_record(request.out)

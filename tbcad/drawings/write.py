@@ -10,12 +10,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from tbcad.atomic_files import refuse_existing, replace_files, write_errors_as_input_errors
+from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.background import end_with_parent
 from tbcad.drafting.sheet import Sheet, paper_name, scale_text
 from tbcad.drawings.export import Export, read_export
 from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
 from tbcad.errors import InputError
+from tbcad.output.single_files import check_file
 from tbcad.schedule import cores
 from tbcad.types import Progress
 
@@ -90,14 +91,14 @@ def write_drawings(
     jobs = [_job(export, name) for name in names]
     for job in jobs:
         for suffix in SUFFIXES:
-            refuse_existing(out / f"{job.name}{suffix}", force)
+            check_file(out / f"{job.name}{suffix}", force)
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
         drawings = _drawn(jobs, Path(place), progress, workers or cores())
         files = sorted(Path(place).iterdir())
         for file in files:
-            refuse_existing(out / file.name, force)
+            check_file(out / file.name, force)
         replace_files(out, {file.name: file.read_bytes() for file in files})
     return drawings
 

@@ -90,7 +90,7 @@ def write_export(
     mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
     write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
     progress("manifest")
-    write_manifest(folder)
+    write_manifest(folder, "build")
     return export
 
 

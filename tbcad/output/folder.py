@@ -1,56 +1,63 @@
-"""The output folder, replaced as a whole or not at all.
+"""The output folder, replaced as a whole or not at all, and only by content of the same kind.
 
-A new export is written into a hidden folder beside the old one, `.tbcad-<digest>-<pid>.new`, which
-its writer locks; then both are exchanged by one system call. Where a system has no such call, the
-old one is first moved aside, as `.old`; a kill between the two moves is repaired when the folder is
-next used. Hidden folders of killed writers are removed then too. POSIX only.
+New content is written into a hidden folder beside the old one, which its writer locks; then both
+are exchanged by one system call. Where a system has no such call, the old one is first moved aside,
+as `.old`; a kill between the two moves is repaired when the folder is next used. Hidden folders of
+killed writers are removed then too. POSIX only. Which content replaces which: docs/conventions.md.
 """
 
 import ctypes
 import errno
-import fcntl
 import os
 import shutil
-import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from tbcad.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
+from tbcad.output.content import refuse_other_content
 from tbcad.output.foreign_files import foreign_files, is_always_kept, keep_files
-from tbcad.output.manifest import is_file
+from tbcad.output.inputs import Source, refuse_inputs
+from tbcad.output.manifest import Kind, is_file
+from tbcad.output.writers import clear, discard, locked, new_folder
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 _MAX_NAMES = 3  # of foreign files in an error
 
 
-def check_replaceable(out: Path, force: bool) -> None:
+def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> None:
     """Check, before any work, that a folder can be replaced.
 
     Args:
         out: the folder, which need not exist.
-        force: whether files that tbcad did not write may be in it.
+        kind: of the content that is to be written.
+        force: whether content that costs hours may be in it, and files that tbcad did not write.
+        inputs: files and folders that are read for it.
 
     Raises:
         InputError: it cannot; the text says why and what to do.
     """
     with write_errors_as_input_errors(out):
         target = _target(out)
+        refuse_inputs(out, inputs)
         if target.parent.is_dir():
-            with _locked(target.parent):
-                _clear(out, target)
-        _files_to_keep(out, target, force)
+            with locked(target.parent):
+                clear(out, target)
+        _files_to_keep(out, target, kind, force)
 
 
 @contextmanager
-def replacing(out: Path, force: bool) -> Iterator[Path]:
-    """Give a folder to write an export into, which replaces out when the block ends well.
+def replacing(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> Iterator[Path]:
+    """Give a folder to write content into, which replaces out when the block ends well.
 
     Args:
         out: the folder to be replaced, which need not exist; missing parents are made.
-        force: keep the files in it that tbcad did not write; without, they are refused.
+        kind: of the content.
+        force: replace content that costs hours, and keep the files that tbcad did not write;
+            without, both are refused.
+        inputs: files and folders that are read for it.
 
     Raises:
         InputError: out cannot be replaced; it is then as before.
@@ -58,8 +65,9 @@ def replacing(out: Path, force: bool) -> Iterator[Path]:
     with ExitStack() as undo:
         with write_errors_as_input_errors(out):
             target = _target(out)
+            refuse_inputs(out, inputs)
             _make_parents(target.parent, undo)
-            new = _open_new(out, target, force, undo)
+            new = _open_new(out, target, kind, force, undo)
         try:
             yield new
         except OSError as error:
@@ -69,7 +77,7 @@ def replacing(out: Path, force: bool) -> Iterator[Path]:
                 "folder; nothing was changed"
             ) from error
         with write_errors_as_input_errors(out):
-            _finish(out, new, force)
+            _finish(out, new, kind, force)
 
 
 def _target(out: Path) -> Path:
@@ -104,8 +112,9 @@ def _check_writable(out: Path, target: Path) -> None:
             )
 
 
-def _files_to_keep(out: Path, target: Path, force: bool) -> list[Path]:
+def _files_to_keep(out: Path, target: Path, kind: Kind, force: bool) -> list[Path]:
     """Return the user's files in a folder; without force, all but a few names are refused."""
+    refuse_other_content(out, target, kind, force)
     foreign = foreign_files(target) if target.is_dir() else []
     refused = [] if force else [path for path in foreign if not is_always_kept(path)]
     if refused:
@@ -130,98 +139,25 @@ def _remove_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _open_new(out: Path, target: Path, force: bool, undo: ExitStack) -> Path:
+def _open_new(out: Path, target: Path, kind: Kind, force: bool, undo: ExitStack) -> Path:
     """Make the folder for the new export; undo unlocks and removes it."""
-    with _locked(target.parent):
-        _clear(out, target)
-        _files_to_keep(out, target, force)
-        new = target.parent / f"{_prefix(target)}{os.getpid()}.new"
+    with locked(target.parent):
+        clear(out, target)
+        _files_to_keep(out, target, kind, force)
+        new = new_folder(target)
         new.mkdir()
-        undo.callback(_discard, new)  # the old export, once both are exchanged
-        undo.enter_context(_locked(new))
+        undo.callback(discard, new)  # the old export, once both are exchanged
+        undo.enter_context(locked(new))
     return new
 
 
-def _prefix(target: Path) -> str:
-    # A digest, since the folder's own name may be as long as names can be.
-    return f".tbcad-{zlib.crc32(os.fsencode(target.name)):08x}-"
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    _LOCKS.add(descriptor)
-    try:
-        with suppress(OSError):  # a file system without locks: see _is_written
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        _LOCKS.discard(descriptor)
-        os.close(descriptor)
-
-
-def _leave_locks() -> None:
-    """In a copy of this process: a lock must end with the process that took it."""
-    for descriptor in _LOCKS:
-        os.close(descriptor)
-    _LOCKS.clear()
-
-
-_LOCKS: set[int] = set()  # descriptors of locked folders
-os.register_at_fork(after_in_child=_leave_locks)
-
-
-def _clear(out: Path, target: Path) -> None:
-    """Repair and remove what killed writers left; refuse when another one is at work."""
-    hidden = [
-        path
-        for path in target.parent.glob(f"{_prefix(target)}*")
-        if path.is_dir() and not path.is_symlink()
-    ]
-    if any(_is_written(path) for path in hidden):
-        raise InputError(f"{out} is being written by another tbcad: wait for it to end")
-    moved_aside = [path for path in hidden if path.suffix == ".old"]
-    if moved_aside and not target.exists():
-        moved_aside[0].rename(target)
-    for path in hidden:
-        _discard(path)
-
-
-def _is_written(folder: Path) -> bool:
-    """Tell whether the writer of a hidden folder is alive."""
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:  # a file system without locks
-        return _runs(folder.stem.rpartition("-")[2])
-    finally:
-        os.close(descriptor)
-    return False
-
-
-def _runs(process: str) -> bool:
-    """Tell whether a process of this number runs."""
-    try:
-        os.kill(int(process), 0)
-    except (ProcessLookupError, ValueError, OverflowError):
-        return False
-    except PermissionError:  # it is another user's
-        return True
-    return True
-
-
-def _finish(out: Path, new: Path, force: bool) -> None:
+def _finish(out: Path, new: Path, kind: Kind, force: bool) -> None:
     target = _target(out)  # again: the user may have been at work since
-    keep_files(_files_to_keep(out, target, force), new)
+    keep_files(_files_to_keep(out, target, kind, force), new)
     if target.is_dir():
         shutil.copymode(target, new)
     _sync(new)
-    with _locked(target.parent):
+    with locked(target.parent):
         if not target.exists():
             new.rename(target)
         elif not _exchange(new, target):
@@ -267,11 +203,4 @@ def _move_both(new: Path, target: Path) -> None:
         if not target.exists():
             old.rename(target)
         raise
-    _discard(old)
-
-
-def _discard(folder: Path) -> None:
-    for inner, _, _ in os.walk(folder):
-        with suppress(OSError):
-            Path(inner).chmod(0o700)
-    shutil.rmtree(folder, ignore_errors=True)
+    discard(old)

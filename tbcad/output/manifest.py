@@ -6,7 +6,7 @@ import platform
 import stat
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -19,6 +19,11 @@ UNLISTED = (MANIFEST, VERDICT, REPORT)
 REPORT_BEGIN = "<!doctype html>\n<!-- tbcad report -->"
 SCHEMA = "tbcad-manifest/1"
 LIBRARIES = ("cadquery-ocp", "numpy", "scipy", "manifold3d", "lib3mf", "trimesh")
+
+Kind = Literal[
+    "build", "capture", "merged run", "run", "calibration", "dataset", "inspection", "as-built"
+]
+"""What a folder holds that a command writes; a run has no manifest, since it grows."""
 
 _MAX_MANIFEST_BYTES = 4_000_000
 _MAX_FILES = 30_000  # three for each of 6578 mirrors at n = 36, and more
@@ -41,13 +46,14 @@ class Entry(BaseModel):
 
 
 class Manifest(BaseModel):
-    """What is read of manifest.json: the files by name."""
+    """What is read of manifest.json: the kind of content, "" if it is not told, and the files."""
 
+    kind: str = ""
     schema_name: str = Field(pattern="^tbcad-manifest/", alias="schema")
     files: dict[Annotated[str, AfterValidator(_plain_name)], Entry] = Field(max_length=_MAX_FILES)
 
 
-def write_manifest(folder: Path) -> None:
+def write_manifest(folder: Path, kind: Kind) -> None:
     """Write manifest.json over all files of the folder but itself, the verdict and the page.
 
     Files in folders of the folder are listed with their path: images/a0001.png.
@@ -57,6 +63,7 @@ def write_manifest(folder: Path) -> None:
     versions = {"tbcad": __version__, **{name: version(name) for name in LIBRARIES}}
     document = {
         "schema": SCHEMA,
+        "kind": kind,
         "files": {name: fingerprint(folder / name) for name in names},
         "versions": {**versions, "python": platform.python_version()},
     }

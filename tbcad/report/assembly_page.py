@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from tbcad.atomic_files import refuse_existing, replace_files, write_errors_as_input_errors
+from tbcad.atomic_files import replace_files, write_errors_as_input_errors
+from tbcad.output.single_files import check_file
 from tbcad.prototype.assembly_steps.machine import RESISTORS, Machine
 from tbcad.prototype.assembly_steps.steps import Step
 from tbcad.report.drawing import check_prototype_files, draw_apart
@@ -87,7 +88,7 @@ def write_page(
     Raises:
         InputError: the page exists, a file cannot be read or written, or drawing fails.
     """
-    refuse_existing(out / NAME, force)
+    check_file(out / NAME, force)
     drawn = _drawn(folder) if pictures else {}
     text = page(machine, steps, drawn)
     with write_errors_as_input_errors(out):

@@ -7,9 +7,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tbcad.atomic_files import refuse_existing
 from tbcad.errors import InputError
 from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
+from tbcad.output.single_files import check_file
 
 SHELL = "shell"
 PROTOTYPE = ("rig", "sides", "base", "seat", "exploded")
@@ -38,7 +38,7 @@ def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False)
     _check_files(folder, subject)
     if file.suffix.lower() != ".png" or not file.parent.is_dir():
         raise InputError(f"{file}: name a .png file in a folder that exists")
-    refuse_existing(file, force)
+    check_file(file, force)
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=".tbcad-picture-") as place:
         drawn = Path(place) / "picture.png"
         _run(child_command(folder, drawn, subject))

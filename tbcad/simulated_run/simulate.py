@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-import shutil
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -20,6 +20,8 @@ from tbcad.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.machine.designed import designed_prototype, dome_radius
 from tbcad.machine.record import truth_file, write_machine
 from tbcad.machine.shells import perfect_half, random_half, shell_frame
+from tbcad.output.folder import check_replaceable, replacing
+from tbcad.output.inputs import Source
 from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
@@ -149,30 +151,27 @@ def write_run(
     Raises:
         InputError: the folder cannot be written.
     """
-    check_is_free(out)
-    with write_errors_as_input_errors(out):
-        new = out.resolve().with_name(f".{out.resolve().name}.new")
-        shutil.rmtree(new, ignore_errors=True)
-        (new / PHOTOGRAPHS).mkdir(parents=True)
-        try:
-            record = _record(runs, phases, export)
-            _write_json(new / RECORD, {"schema": RUN_SCHEMA, **record.model_dump(mode="json")})
-            for name, run in zip(record.machines, runs, strict=True):
-                write_machine(new / truth_file(name), run.built.machine, run.frames)
-                _write_frames(run, phases, new / PHOTOGRAPHS, progress)
-            if out.is_dir():
-                out.rmdir()
-            new.rename(out)
-        finally:
-            shutil.rmtree(new, ignore_errors=True)
+    check_is_free(out, (export,))
+    with replacing(out, "run", force=False, inputs=(export,)) as new:
+        (new / PHOTOGRAPHS).mkdir()
+        record = _record(runs, phases, export)
+        _write_json(new / RECORD, {"schema": RUN_SCHEMA, **record.model_dump(mode="json")})
+        for name, run in zip(record.machines, runs, strict=True):
+            write_machine(new / truth_file(name), run.built.machine, run.frames)
+            _write_frames(run, phases, new / PHOTOGRAPHS, progress)
 
 
-def check_is_free(out: Path) -> None:
+def check_is_free(out: Path, inputs: Iterable[Source] = ()) -> None:
     """Refuse a folder that holds something: photographs are never overwritten.
 
+    Args:
+        out: folder of the run.
+        inputs: files and folders that are read for it.
+
     Raises:
-        InputError: it does.
+        InputError: it does, or it is not apart from what is read.
     """
+    check_replaceable(out, "run", force=False, inputs=inputs)
     with write_errors_as_input_errors(out):
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError(f"{out} holds files, and photographs are not replaced: name another")

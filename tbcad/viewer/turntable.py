@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tbcad.atomic_files import refuse_existing, replace_files
+from tbcad.atomic_files import replace_files
 from tbcad.depth.plane_sweep import QUICK
 from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
+from tbcad.output.single_files import check_file
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
@@ -63,7 +64,7 @@ def check_turntable_path(file: Path, force: bool) -> None:
     """
     if file.suffix.lower() != ".html" or not file.parent.is_dir() or file.is_dir():
         raise InputError(f"{file}: give a file that ends in .html, in a folder that exists")
-    refuse_existing(file, force)
+    check_file(file, force)
 
 
 def write_turntable(

@@ -155,7 +155,7 @@ def export(folder: Path, carrier: Solid) -> Export:
     }
     balls: list[Row] = [{"number": 1, **cap}, {"number": 2, **ball}]
     write_table(folder / "balls.csv", tuple(balls[0]), balls)
-    write_manifest(folder)
+    write_manifest(folder, "build")
     pads = np.array([[4.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 4.5, 0.0]])
     seat = {"axis": [0.0, 0.0, -1.0], "pad_diameter_mm": 3.0}
     magnet = {"along": [0, 0, 1], "through": ["carrier"]}

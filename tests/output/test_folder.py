@@ -37,7 +37,7 @@ def fill_late(new: Path, out: Path) -> None:
 
 
 def export(out: Path, version: int, *, force: bool = False) -> None:
-    with replacing(out, force) as new:
+    with replacing(out, "build", force) as new:
         fill(new, version)
 
 
@@ -45,10 +45,10 @@ def export_with_folders(
     out: Path, monkeypatch: pytest.MonkeyPatch, text: str, *, force: bool = False
 ) -> None:
     monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
-    with replacing(out, force) as new:
+    with replacing(out, "build", force) as new:
         (new / "images" / "deep").mkdir(parents=True)
         (new / "images" / "deep" / "a.png").write_text(text)
-        write_manifest(new)
+        write_manifest(new, "build")
 
 
 def version_of(out: Path) -> int:
@@ -98,13 +98,13 @@ class TestReplacing:
 
     def test_leaves_no_file_of_the_old_export(self, out: Path) -> None:
         export(out, 1)
-        with replacing(out, force=False) as new:
+        with replacing(out, "build", force=False) as new:
             (new / "other.txt").write_text("new")
         assert [path.name for path in out.iterdir()] == ["other.txt"]
 
     def test_an_error_leaves_the_old_export(self, out: Path) -> None:
         export(out, 1)
-        with pytest.raises(ZeroDivisionError), replacing(out, force=False) as new:
+        with pytest.raises(ZeroDivisionError), replacing(out, "build", force=False) as new:
             (new / "design.json").write_text(f"version {2 // 0}")
         assert version_of(out) == 1
         assert hidden(out.parent) == []
@@ -216,7 +216,10 @@ class TestReplacing:
 
     def test_a_file_that_comes_while_building_is_not_lost(self, out: Path) -> None:
         export(out, 1)
-        with pytest.raises(InputError, match=r"late\.txt"), replacing(out, force=False) as new:
+        with (
+            pytest.raises(InputError, match=r"late\.txt"),
+            replacing(out, "build", force=False) as new,
+        ):
             fill_late(new, out)
         assert version_of(out) == 1
         assert (out / "late.txt").read_text() == "mine"
@@ -305,12 +308,15 @@ class TestParents:
 
     def test_are_removed_again_on_failure(self, tmp_path: Path) -> None:
         (tmp_path / "a").mkdir()
-        with pytest.raises(ZeroDivisionError), replacing(tmp_path / "a/b/c/exports", False) as new:
+        with (
+            pytest.raises(ZeroDivisionError),
+            replacing(tmp_path / "a/b/c/exports", "build", False) as new,
+        ):
             fill(new, 1 // 0)
         assert list(tmp_path.rglob("*")) == [tmp_path / "a"]
 
     def test_a_check_makes_nothing(self, tmp_path: Path) -> None:
-        check_replaceable(tmp_path / "a" / "b", force=False)
+        check_replaceable(tmp_path / "a" / "b", "build", force=False)
         assert list(tmp_path.iterdir()) == []
 
 
@@ -418,10 +424,10 @@ class TestRefused:
         assert version_of(out) == 2
 
     def test_a_second_writer(self, out: Path, refuse: Callable[..., None]) -> None:
-        with replacing(out, force=False) as new:
+        with replacing(out, "build", force=False) as new:
             fill(new, 1)
             self.refused(out, refuse, "another tbcad")
-            check_replaceable(out.parent / "elsewhere", force=False)
+            check_replaceable(out.parent / "elsewhere", "build", force=False)
         assert version_of(out) == 1
         export(out, 2)
         assert version_of(out) == 2
@@ -429,7 +435,7 @@ class TestRefused:
     def refused(self, out: Path, refuse: Callable[..., None], words: str) -> None:
         before = tree(self.tmp_path)
         with pytest.raises(InputError, match=words) as error:
-            refuse(out, False) if refuse is check_replaceable else export(out, 9)
+            refuse(out, "build", False) if refuse is check_replaceable else export(out, 9)
         assert "\n" not in str(error.value)
         assert tree(self.tmp_path) == before
 
@@ -442,11 +448,11 @@ def test_the_manifest_that_tbcad_writes_is_known(
     out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
-    with replacing(out, force=False) as new:
+    with replacing(out, "build", force=False) as new:
         (new / "shell_a.stl").write_text("solid")
-        write_manifest(new)
+        write_manifest(new, "build")
         (new / "verify.json").write_text("{}")
-    check_replaceable(out, force=False)
+    check_replaceable(out, "build", force=False)
 
 
 KILLED = '''
@@ -472,7 +478,7 @@ def dies_at(limit):
         calls += 1
         if calls == limit:
             os.kill(os.getpid(), signal.SIGKILL)
-    with replacing(out, True) as new:
+    with replacing(out, "build", True) as new:
         fill(new, 2)
         sys.setprofile(count)
     os._exit(0)
@@ -483,7 +489,7 @@ export(out, 1)
 while dies_at(limit):
     if {moves} and not out.exists():
         seen.add("missing")
-        check_replaceable(out, True)
+        check_replaceable(out, "build", True)
     seen.add(version_of(out))
     assert (out / "mine").read_text() == "mine"
     export(out, 1, force=True)

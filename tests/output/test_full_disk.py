@@ -34,7 +34,9 @@ def test_what_does_not_fit_leaves_everything_as_it_was(tmp_path: Path, largest: 
     """At these sizes the record, the STEP file or the STL is the first that does not fit."""
     folder = tmp_path / "out"
     folder.mkdir()
-    (folder / "manifest.json").write_text('{"schema": "tbcad-manifest/1", "files": {}}')
+    (folder / "manifest.json").write_text(
+        '{"schema": "tbcad-manifest/1", "kind": "build", "files": {}}'
+    )
     before = contents(folder)
     done = build(folder, largest)
     *progress, last = done.stderr.splitlines()

@@ -199,7 +199,7 @@ def record(small: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Exp
     """The record as the verification reads it; its meshes are then replaced."""
     folder = tmp_path_factory.mktemp("made")
     write_record(folder, small, shells=True)
-    write_manifest(folder)
+    write_manifest(folder, "build")
     return read_record(folder)
 
 

@@ -281,7 +281,7 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
     """The record as the verification reads it; its meshes are then replaced."""
     folder = tmp_path_factory.mktemp("made")
     write_record(folder, small_design, shells=True)
-    write_manifest(folder)
+    write_manifest(folder, "build")
     return read_record(folder)
 
 

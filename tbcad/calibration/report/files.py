@@ -70,7 +70,7 @@ def write_calibration(
     (folder / COVARIANCE).write_bytes(covariance_bytes(result, known))
     for name, data in plots(result, sphere_covariances(result, known), plot).items():
         (folder / name).write_bytes(data)
-    write_manifest(folder)
+    write_manifest(folder, "calibration")
     return record
 
 
@@ -92,7 +92,7 @@ def write_recovered(
     (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
     drawn = figure_file(lambda figure: draw_recovered(figure, kinds), INCHES, plot)
     (folder / f"recovered.{plot}").write_bytes(drawn)
-    write_manifest(folder)
+    write_manifest(folder, "calibration")
     return _recovered_text(result, truth, kinds, plot)
 
 

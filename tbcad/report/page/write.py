@@ -20,6 +20,7 @@ from tbcad.output.manifest import (
     is_report,
     read_manifest,
 )
+from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom_view import read_parts_list
 from tbcad.report.page import bodies, mirrors
 from tbcad.report.page.packing import PackedArrays
@@ -89,6 +90,7 @@ def check_writable(file: Path, force: bool) -> None:
         raise InputError(f"{file}: name a .html file in a folder that exists")
     if file.is_dir():
         raise InputError(f"{file} is a folder: choose another name")
+    refuse_member(file)
     if file.exists() and not is_report(file) and not force:
         raise InputError(
             f"{file} exists and tbcad did not write it: choose another name with --out, or replace "

@@ -31,7 +31,7 @@ def written(folder: Path, mirrors: MirrorDesign) -> Export:
     folder.mkdir()
     write_camera_sheet(folder, mirrors.arrays[0], mirrors.spec.optics.capture_diameter_mm / 2)
     write_record(folder, mirrors, shells=True)
-    write_manifest(folder)
+    write_manifest(folder, "build")
     return read_export(folder)
 
 

@@ -19,7 +19,7 @@ from tbcad.spec.load import load_spec
 def record(folder: Path, rule: str, *more: str) -> Export:
     options = ["n=4", f"radius_rule={rule}", "camera.width_px=416", "camera.height_px=310", *more]
     write_record(folder, design(load_spec(None, options)), shells=True)
-    write_manifest(folder)
+    write_manifest(folder, "build")
     return read_export(folder)
 
 

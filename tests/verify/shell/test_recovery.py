@@ -253,7 +253,7 @@ def test_a_long_mirror_is_found_where_its_camera_sees_its_apex(tmp_path: Path) -
         (tmp_path / f"shell_{half}.step").touch()
         (tmp_path / f"shell_{half}.3mf").touch()
     write_record(tmp_path, designed, shells=True)
-    write_manifest(tmp_path)
+    write_manifest(tmp_path, "build")
     setup = optical_setup_of(tmp_path)
     mirror = setup.export.mirrors.ids.index("a0022")
     middles = setup.recovery.fits.middle[:, setup.match.segment]

@@ -6,6 +6,7 @@ Only requirements and poses are taken from here. What the mirrors are is measure
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,16 @@ from tbcad_verify.types import Floats
 SCHEMA, MANIFEST_SCHEMA = "tbcad-design/2", "tbcad-manifest/1"
 DESIGN, MIRRORS, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
 TEXTS = (DESIGN, MIRRORS, MANIFEST)
+GIVE = "give the folder that `tbcad build` wrote"
+# By what else a folder of tbcad is known, and what it is.
+OTHER_RECORDS = {
+    "run.json": "a run of photographs",
+    "calibration.json": "a calibration",
+    "capture.json": "a capture or a merged run",
+    "dataset.json": "a dataset",
+    "inspection.json": "an inspection",
+    "as_built.json": "a prototype as built",
+}
 MOST = 1000  # cameras or parts
 MOST_FILES = 10_000
 MAX_SIDE_PX = 65536
@@ -216,6 +227,37 @@ class Export:
         return min(self.spec.mesh.largest_mm, LARGEST_MESH_ERROR_MM)
 
 
+def listed_names(folder: Path) -> frozenset[str]:
+    """Names of all files that belong to an export, by its manifest alone.
+
+    Raises:
+        BadExport: the folder is no export, which is told at once however much is in it.
+    """
+    root = open_folder(folder)
+    _refuse_other_folders(root)
+    text = read(root, MANIFEST, MAX_TEXT_BYTES)
+    manifest = validated(MANIFEST, Manifest, parse_json(text, MANIFEST_SCHEMA))
+    return frozenset({*manifest.files, *TEXTS})
+
+
+def _refuse_other_folders(root: Path) -> None:
+    """Refuse what is no build by the first files that there would be.
+
+    Raises:
+        BadExport: it is something else that tbcad wrote, or nothing of tbcad.
+    """
+    there = {name for name in (DESIGN, MANIFEST, *OTHER_RECORDS) if os.path.lexists(root / name)}
+    if {DESIGN, MANIFEST} <= there:
+        return
+    others = [words for name, words in OTHER_RECORDS.items() if name in there]
+    if not others and there:
+        return  # a build without one of its files, which its reader names
+    told = others[0] if others else "a folder without design.json and manifest.json"
+    if not others and not any(root.iterdir()):
+        told = "an empty folder"
+    raise BadExport(f"{root} is {told}, no build: {GIVE}")
+
+
 def read_export(folder: Path) -> Export:
     """Read design.json, mirrors.csv, manifest.json and what describes a prototype, strictly.
 
@@ -223,6 +265,7 @@ def read_export(folder: Path) -> Export:
         BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
     root = open_folder(folder)
+    _refuse_other_folders(root)
     texts = {name: read(root, name, MAX_TEXT_BYTES) for name in TEXTS}
     design = validated(DESIGN, Design, parse_json(texts[DESIGN], SCHEMA))
     manifest = validated(MANIFEST, Manifest, parse_json(texts[MANIFEST], MANIFEST_SCHEMA))

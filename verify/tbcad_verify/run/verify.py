@@ -18,8 +18,8 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, ListedPrint, check_with_programs
 from tbcad_verify.prototype.step_files import part_step_checks
-from tbcad_verify.record.export import TEXTS, Export, read_export
-from tbcad_verify.record.files import listing, open_folder, stamps
+from tbcad_verify.record.export import TEXTS, Export, listed_names, read_export
+from tbcad_verify.record.files import open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.report import NAME, Report
@@ -95,7 +95,7 @@ def verify(
     for name in options.printers:
         load(name)
     started, root = time.monotonic(), open_folder(Path(folder))
-    before = stamps(root, listing(root))
+    before = stamps(root, listed_names(root))
     export = read_export(root)
     results = CollectedResults(progress=progress)
     _run(export, options, results)

@@ -1,0 +1,60 @@
+"""What a command reads and what it writes are apart: no result replaces its own source."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TypeAlias
+
+from tbcad.errors import InputError
+from tbcad.spec.design import Spec
+
+Source: TypeAlias = Path | str | None
+"""A file or folder that a command reads; None, and what is not there, are left out."""
+
+_Place: TypeAlias = tuple[int, int]
+
+
+def refuse_inputs(out: Path, inputs: Iterable[Source]) -> None:
+    """Refuse, before any work, an output that is an input, is inside one, or has one inside.
+
+    Files are compared by device and inode, so by whatever name and link they are called.
+
+    Args:
+        out: file or folder to write, which need not exist.
+        inputs: files and folders that are read.
+
+    Raises:
+        InputError: as said.
+    """
+    target = out.resolve()
+    above = _places(target)
+    for source in inputs:
+        path = None if source is None else Path(source)
+        if path is None or not path.exists():
+            continue
+        place, *outer = _places(path.resolve())
+        if target.exists() and place == above[0]:
+            raise InputError(f"{out} is read by this command: write to another place with --out")
+        if place in above:
+            raise InputError(
+                f"{out} is inside {path}, which this command reads: write to a place outside it"
+            )
+        if target.exists() and above[0] in outer:
+            raise InputError(
+                f"{out} holds {path}, which this command reads: write to another folder"
+            )
+
+
+def files_named(*texts: Path | str | None) -> list[Path]:
+    """Return the files among texts that may also be words, as a built-in process or "mirrors"."""
+    return [Path(text) for text in texts if text is not None and Path(text).is_file()]
+
+
+def design_files(spec: Spec, file: Path | str | None) -> list[Path]:
+    """Return the files that a design is read from: its own, catalogues and prices."""
+    return files_named(file, *spec.prototype.catalogues, *spec.prototype.prices)
+
+
+def _places(path: Path) -> list[_Place]:
+    """Return device and inode of a path and of all folders above it, those that exist."""
+    found = [one.stat() for one in (path, *path.parents) if one.exists()]
+    return [(one.st_dev, one.st_ino) for one in found]

@@ -1,0 +1,188 @@
+"""Which content replaces which, over all pairs of kinds; and what is read is not replaced."""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.output.content import COSTLY, RECORDS, kind_of
+from tbcad.output.folder import check_replaceable, replacing
+from tbcad.output.manifest import Kind, fingerprint, write_manifest
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+ASKED = ("capture", "merged run", "calibration")
+SCHEMAS = {"as-built": "tbcad-as-built/1", "merged run": "tbcad-capture/1"}
+
+
+@pytest.fixture(autouse=True)
+def _versions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+
+
+def fake(folder: Path, kind: Kind, *, told: bool = True) -> Path:
+    """A folder of a kind with its record; with a manifest that tells the kind, or not."""
+    folder.mkdir(parents=True)
+    record: dict[str, object] = {"schema": SCHEMAS.get(kind, f"tbcad-{kind}/1")}
+    if kind == "merged run":
+        record["based_on"] = {}
+    name = RECORDS["capture" if kind == "merged run" else kind]
+    (folder / name).write_text(json.dumps(record))
+    if kind != "run":
+        write_manifest(folder, kind)
+    if kind != "run" and not told:
+        manifest = json.loads((folder / "manifest.json").read_text())
+        assert manifest.pop("kind") == kind
+        (folder / "manifest.json").write_text(json.dumps(manifest))
+    return folder
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["kind told", "older manifest"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_is_known(tmp_path: Path, kind: Kind, told: bool) -> None:
+    assert kind_of(fake(tmp_path / "it", kind, told=told)) == kind
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("present", KINDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_only_the_same_kind_is_replaced(
+    tmp_path: Path, kind: Kind, present: Kind, force: bool
+) -> None:
+    """And what cost hours only with force; photographs never."""
+    folder = fake(tmp_path / "it", present)
+    before = tree(tmp_path)
+    if kind == present and kind != "run" and (force or kind not in ASKED):
+        check_replaceable(folder, kind, force)
+    else:
+        words = "--force" if kind == present != "run" else "name another folder"
+        with pytest.raises(InputError, match=words) as error:
+            check_replaceable(folder, kind, force)
+        assert "\n" not in str(error.value)
+        with pytest.raises(InputError), replacing(folder, kind, force):
+            pytest.fail("work began")
+    assert tree(tmp_path) == before
+    assert COSTLY == ASKED
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("outer", KINDS)
+def test_nothing_is_written_into_what_tbcad_wrote(tmp_path: Path, outer: Kind, kind: Kind) -> None:
+    inner = fake(tmp_path / "it", outer) / "deep" / "new"
+    with pytest.raises(InputError, match="is inside"):
+        check_replaceable(inner, kind, True)
+
+
+@pytest.mark.parametrize("inner", KINDS)
+def test_a_folder_of_folders_is_not_replaced(tmp_path: Path, inner: Kind) -> None:
+    """The message tells what is in it, and where else to write."""
+    fake(tmp_path / "captures" / "knot", inner)
+    with pytest.raises(InputError, match=r"holds knot, an? .*|holds knot, solids") as error:
+        check_replaceable(tmp_path / "captures", "capture", True)
+    assert "did not write" not in str(error.value)
+    check_replaceable(tmp_path / "captures" / "other", "capture", False)
+
+
+def test_content_of_an_unknown_kind_is_not_replaced(tmp_path: Path) -> None:
+    folder = tmp_path / "it"
+    folder.mkdir()
+    (folder / "notes").write_text("mine")
+    write_manifest(folder, "build")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    for kind in ("", "hologram"):
+        (folder / "manifest.json").write_text(json.dumps(manifest | {"kind": kind}))
+        assert kind_of(folder) == kind
+        with pytest.raises(InputError, match="does not replace"):
+            check_replaceable(folder, "build", True)
+
+
+def test_a_foreign_record_is_no_content_of_tbcad(tmp_path: Path) -> None:
+    for name in RECORDS.values():
+        (tmp_path / name).write_text('{"schema": "somebody else"}')
+    assert kind_of(tmp_path) is None
+    (tmp_path / "run.json").write_text("[" * 100_000)
+    assert kind_of(tmp_path) is None
+
+
+class TestInputs:
+    @pytest.mark.parametrize("kind", KINDS)
+    @pytest.mark.parametrize(
+        "called",
+        [
+            lambda path: path,
+            lambda path: path.parent / "work" / ".." / path.name,
+            lambda path: Path(os.path.relpath(path)),
+            lambda path: link(path),  # noqa: PLW0108 - defined below
+        ],
+        ids=["absolute", "dots", "relative", "link"],
+    )
+    def test_are_not_replaced(
+        self, tmp_path: Path, kind: Kind, called: Callable[[Path], Path]
+    ) -> None:
+        source = fake(tmp_path / "it", kind)
+        before = tree(tmp_path)
+        for out in (called(source), called(source) / "inner", called(source) / "a" / "b"):
+            with pytest.raises(InputError, match="this command"):
+                check_replaceable(out, kind, True, (None, "", tmp_path / "none", source))
+            with pytest.raises(InputError, match="this command"):
+                check_replaceable(out, kind, True, (called(source),))
+        with pytest.raises(InputError, match=r"work.*holds|folder you are in|above your work"):
+            check_replaceable(source.parent, kind, True, (source,))
+        assert tree(tmp_path) == before
+
+    def test_a_file_in_the_output_is_not_replaced(self, tmp_path: Path) -> None:
+        folder = fake(tmp_path / "it", "capture")
+        mesh = folder / "deep" / "my.ply"
+        mesh.parent.mkdir()
+        mesh.touch()
+        alias = tmp_path / "alias.ply"
+        alias.symlink_to(mesh)
+        for source in (mesh, alias):
+            with pytest.raises(InputError, match=r"holds .* which this command reads"):
+                check_replaceable(folder, "capture", True, (source,))
+
+    def test_neighbours_are_apart(self, tmp_path: Path) -> None:
+        source = fake(tmp_path / "captures" / "knot", "capture")
+        check_replaceable(tmp_path / "captures" / "knot2", "capture", False, (source,))
+        check_replaceable(tmp_path / "new" / "deep", "capture", False, (source,))
+
+
+def link(path: Path) -> Path:
+    alias = path.parent / "alias"
+    if not alias.is_symlink():
+        alias.symlink_to(path)
+    return alias
+
+
+class TestBuildOfARun:
+    def photographed(self, run: Path, build: Path) -> None:
+        fake(run, "run")
+        digests = {"design.json": fingerprint(build / "design.json")["sha256"]}
+        (run / "run.json").write_text(
+            json.dumps({"schema": "tbcad-run/1", "export_sha256": digests})
+        )
+
+    @pytest.mark.parametrize("run", ["run", "runs/first", "work/run", "work/runs/first"])
+    def test_is_replaced_with_force_only(self, tmp_path: Path, run: str) -> None:
+        build = fake(tmp_path / "builds" / "it", "build")
+        place = tmp_path if run.startswith("work") else tmp_path / "builds"
+        self.photographed(place / run, build)
+        with pytest.raises(InputError, match=f"{run}.*--force"):
+            check_replaceable(build, "build", False)
+        check_replaceable(build, "build", True)
+
+    def test_another_build_is_replaced_unasked(self, tmp_path: Path) -> None:
+        build, other = fake(tmp_path / "it", "build"), fake(tmp_path / "other", "build")
+        (other / "design.json").write_text('{"schema": "tbcad-design/2", "n": 3}')
+        write_manifest(other, "build")
+        self.photographed(tmp_path / "run", other)
+        check_replaceable(build, "build", False)

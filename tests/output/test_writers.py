@@ -1,0 +1,136 @@
+"""What killed writers leave is removed, and what is being written is not."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.output import writers
+from tbcad.output.folder import check_replaceable, replacing
+
+ROOT = Path(__file__).parents[2]
+DEAD = 2**22 + 1  # past the largest number of a process
+OLD = 1_600_000_000
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Of another target than the one that is written."""
+    return writers.new_folder(tmp_path / "captures" / "knot")
+
+
+def left(folder: Path, process: int | str = "", start: str = "", host: str = "") -> Path:
+    """A hidden folder as its writer left it; what is not given is as of this process."""
+    begin, digest, *own = folder.stem.split("-")
+    told = [str(given or mine) for given, mine in zip((process, start, host), own, strict=True)]
+    path = folder.with_name("-".join([begin, digest, *told]) + ".new")
+    path.mkdir(parents=True)
+    (path / "half.h5").touch()
+    return path
+
+
+@pytest.fixture(params=["locks", "no locks"])
+def locks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "no locks":
+        monkeypatch.setattr(writers, "fcntl", None)
+    return str(request.param)
+
+
+@pytest.mark.usefixtures("locks")
+@pytest.mark.parametrize("out", ["captures/bunny", "captures", "captures/knot"])
+def test_of_a_dead_writer_are_removed(tmp_path: Path, folder: Path, out: str) -> None:
+    """Also where another process has its number now."""
+    dead, reused = left(folder, DEAD), left(folder, start="7")
+    check_replaceable(tmp_path / out, "capture", False)
+    assert not dead.exists()
+    assert not reused.exists()
+
+
+def test_a_name_that_tbcad_does_not_give_is_the_users(tmp_path: Path) -> None:
+    mine = tmp_path / "captures" / ".tbcad-a.new"
+    mine.mkdir(parents=True)
+    with pytest.raises(InputError, match=r"did not write \(\.tbcad-a\.new\)"):
+        check_replaceable(tmp_path / "captures", "capture", False)
+    assert mine.exists()
+
+
+def test_of_an_earlier_name_are_removed(tmp_path: Path) -> None:
+    old = tmp_path / f".tbcad-0123abcd-{DEAD}.new"
+    old.mkdir()
+    check_replaceable(tmp_path / "it", "build", False)
+    assert not old.exists()
+
+
+def test_that_are_locked_stay(tmp_path: Path) -> None:
+    with replacing(tmp_path / "captures" / "knot", "capture", False) as new:
+        (new / "half.h5").touch()
+        check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
+        with pytest.raises(InputError, match="another tbcad writes"):
+            check_replaceable(tmp_path / "captures", "capture", True)
+        assert (new / "half.h5").exists()
+    assert [path.name for path in (tmp_path / "captures").iterdir()] == ["knot"]
+
+
+def test_without_locks_those_of_a_living_process_stay(
+    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writers, "fcntl", None)
+    living = left(folder)
+    check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
+    assert living.exists()
+    with pytest.raises(InputError, match="being written by another tbcad"):
+        check_replaceable(tmp_path / "captures" / "knot", "capture", False)
+
+
+@pytest.mark.usefixtures("locks")
+def test_of_another_host_stay_while_they_change(tmp_path: Path, folder: Path) -> None:
+    """Its processes and its locks may not be seen from here."""
+    far = left(folder, DEAD, host="00000000")
+    check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
+    assert far.exists()
+    for path in (far / "half.h5", far):
+        os.utime(path, (OLD, OLD))
+    check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
+    assert not far.exists()
+
+
+HANGS = """
+import signal, sys
+sys.path[:0] = [{root!r}]
+from pathlib import Path
+from tbcad.cli import app, run
+from tbcad.output.folder import replacing
+
+@app.command()
+def hang():
+    with replacing(Path({out!r}), "build", False) as new:
+        (new / "half.h5").touch()
+        print("at work", flush=True)
+        signal.pause()
+
+sys.exit(run(["hang"]))
+"""
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_stopped_command_leaves_nothing(tmp_path: Path, kind: signal.Signals) -> None:
+    script = HANGS.format(root=str(ROOT), out=str(tmp_path / "deep" / "it"))
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"at work\n"
+        process.send_signal(kind)
+        _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert told == b"tbcad: stopped; nothing was changed\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_tbcad_can_be_imported_without_fcntl() -> None:
+    script = "import sys; sys.modules['fcntl'] = None; import tbcad, tbcad.output.folder"
+    subprocess.run([sys.executable, "-c", script], check=True, cwd=ROOT, timeout=60)
