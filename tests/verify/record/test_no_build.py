@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 
 import pytest
-
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.export import OTHER_RECORDS, read_export
 from tbcad_verify.run.verify import verify
