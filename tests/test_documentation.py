@@ -188,6 +188,7 @@ PICTURES = ["--width", "96", "--height", "72"]
 # simulated ones, which take minutes: these commands have tests of their own.
 NOT_RUN = ("--scheduler", "--clients", "--port", "boards/", "captures/real", "simulate-run")
 NOT_RUN += ("runs/first", "calibration/", "calibration", "captures/first")
+NOT_RUN += ("calibration-shell/",)
 NOT_RUN += ("show",)  # goes on until it is stopped: tests/viewer
 OF_THEIR_OWN = ("docs/tour.md",)  # documents whose commands have a test of their own
 SAMPLE = ROOT / "docs" / "sample"

@@ -192,7 +192,7 @@ def solve_intrinsics(
     from tbcad.output.single_files import check_file
 
     if out is not None:
-        check_file(Path(out), force, Path(folder).iterdir())
+        check_file(Path(out), force, Path(folder).glob("*"))
     dictionary = None if charuco is None else parse_dictionary(charuco)
     solved = solve_lens(Path(folder), Board(squares, size_mm, dictionary, marker_mm), detail)
     if out is not None:

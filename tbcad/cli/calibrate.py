@@ -139,7 +139,7 @@ def intrinsics(
     from tbcad.api import solve_intrinsics
     from tbcad.output.single_files import check_file
 
-    check_file(out, force, folder.iterdir())
+    check_file(out, force, folder.glob("*"))
 
     with stages(1) as screen:
         screen.stage("corners of boards")

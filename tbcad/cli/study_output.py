@@ -20,8 +20,10 @@ def run_study(
     out: Path, json: bool, plot: "PlotFormat", work: "Callable[[Progress], Study]"
 ) -> int:
     """Make a study, write its files, and show its figures next to the paper's."""
+    from tbcad.output.single_files import check_tables
     from tbcad.simulate.study.study import check_study_folder, write_study
 
+    check_tables(out)
     check_study_folder(out)
     with stages(2) as screen:
         screen.stage("study: mirrors and rays")

@@ -65,6 +65,9 @@ def tolerance(
 
     Writes tolerance.json, which --json prints too, tables, notes and plots.
     """
+    from tbcad.output.single_files import check_tables
+
+    check_tables(out)
     if as_built is not None:
         if process or margins or settings:
             raise InputError(

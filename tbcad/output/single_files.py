@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tbcad.atomic_files import refuse_existing, write_errors_as_input_errors
 from tbcad.errors import InputError
-from tbcad.output.content import kind_of, words
+from tbcad.output.content import kind_of, refuse_inside, words
 from tbcad.output.manifest import MANIFEST, VERDICT, read_manifest
 
 
@@ -29,6 +29,16 @@ def check_file(file: Path, force: bool, inputs: Iterable[Path | None] = ()) -> N
                     raise InputError(f"{file} is read by this command: choose another name")
         refuse_member(file)
         refuse_existing(file, force)
+
+
+def check_tables(out: Path) -> None:
+    """Refuse, before any work, to write tables and plots into what tbcad wrote as a whole.
+
+    Raises:
+        InputError: as said.
+    """
+    with write_errors_as_input_errors(out):
+        refuse_inside(out, out.resolve() / "table")
 
 
 def refuse_member(file: Path) -> None:

@@ -21,7 +21,7 @@ from tbcad.machine.designed import designed_prototype, dome_radius
 from tbcad.machine.record import truth_file, write_machine
 from tbcad.machine.shells import perfect_half, random_half, shell_frame
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.inputs import Source
+from tbcad.output.inputs import Source, refuse_inputs
 from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
@@ -171,10 +171,11 @@ def check_is_free(out: Path, inputs: Iterable[Source] = ()) -> None:
     Raises:
         InputError: it does, or it is not apart from what is read.
     """
-    check_replaceable(out, "run", force=False, inputs=inputs)
     with write_errors_as_input_errors(out):
+        refuse_inputs(out, inputs)
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError(f"{out} holds files, and photographs are not replaced: name another")
+    check_replaceable(out, "run", force=False)
 
 
 def _write_frames(

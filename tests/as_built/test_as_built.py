@@ -83,8 +83,9 @@ class TestFiles:
     def test_same_bytes_again(
         self, written: Path, export: ExportedDesign, plan: Plan, built: Machine, tmp_path: Path
     ) -> None:
-        write_machine(tmp_path / "machine.json", built, frames_of(plan))
-        as_built(tmp_path, export.folder, out=tmp_path / "again")
+        (tmp_path / "known").mkdir()
+        write_machine(tmp_path / "known" / "machine.json", built, frames_of(plan))
+        as_built(tmp_path / "known", export.folder, out=tmp_path / "again")
         for name in ("as_built.step", "deviations.csv", "legend.png"):
             assert (tmp_path / "again" / name).read_bytes() == (written / name).read_bytes()
 
@@ -138,9 +139,10 @@ class TestRefused:
         self, export: ExportedDesign, plan: Plan, built: Machine, tmp_path: Path
     ) -> None:
         few = replace(built, centre=built.centre[1:], radius=built.radius[1:])
-        write_machine(tmp_path / "machine.json", few, frames_of(plan))
+        (tmp_path / "known").mkdir()
+        write_machine(tmp_path / "known" / "machine.json", few, frames_of(plan))
         with pytest.raises(InputError, match=r"has 4 balls, .* has 5"):
-            as_built(tmp_path, export.folder, out=tmp_path / "out")
+            as_built(tmp_path / "known", export.folder, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
     def test_a_calibration_that_names_no_export(

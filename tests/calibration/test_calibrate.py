@@ -205,7 +205,7 @@ def test_command(
     assert record["exports"] == str(setup.export.folder.resolve())
     assert record["process"]["name"] == "fdm"
     assert record["photographs"]["usable"] == len(setup.frames)
-    assert command([*words, "--measured", "9=20"]) == 2
+    assert command([*words, "--force", "--measured", "9=20"]) == 2
     assert re.search("allowed is ball 1 to 5", capsys.readouterr().err)
     assert {file.name for file in out.iterdir()} == FILES
 
@@ -234,6 +234,8 @@ def test_a_simulated_run_is_compared_with_its_build(
     assert all(file.read_text().startswith("<?xml") for file in out.glob("*.svg"))
     write_machine(run / TRUTH, built.machine, setup.frames[::-1])
     assert command(words) == 2
+    assert "is a calibration already" in capsys.readouterr().err
+    assert command([*words, "--force"]) == 2
     assert "truth.json is of another run" in capsys.readouterr().err
 
 

@@ -139,7 +139,7 @@ def test_a_capture_is_not_replaced_by_its_export(
     before = files(captured)
     for name in (str(captured), "knot/lightfield.h5"):
         assert run(["export", name, "--to", "rays", "--out", "knot"]) == 2
-        assert "is the capture itself" in capsys.readouterr().err
+        assert "is read by this command" in capsys.readouterr().err
     assert files(captured) == before
 
 

@@ -44,7 +44,7 @@ def test_does_not_overwrite_unless_told_to(capsys: pytest.CaptureFixture[str]) -
     ("words", "reason"),
     [
         ([], "FILE is missing"),
-        (["."], "exists"),
+        (["."], "is a folder"),
         (["no/such/folder.toml"], "cannot be written"),
         (["x" * 300], "cannot be written"),
         (["my.toml", "--from", "turtle"], "allowed is one of turtleback, afternoon-print"),

@@ -34,20 +34,55 @@ def copied(captured: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(captured, tmp_path / "copy"))
 
 
-def test_capture_repeats_and_replaces(copied: Path, record: Path) -> None:
+def test_capture_repeats_and_replaces_with_force_only(
+    copied: Path, record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = contents(copied)
-    assert run(["capture", str(record), "--out", str(copied)]) == 0
+    assert run(["capture", str(record), "--out", str(copied)]) == 2
+    assert "is a capture already: name another folder" in capsys.readouterr().err
+    assert run(["capture", str(record), "--out", str(copied), "--force"]) == 0
     assert contents(copied) == before
 
 
-def test_capture_keeps_what_is_not_its_own(
-    copied: Path, record: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_capture_keeps_what_is_not_its_own(copied: Path, record: Path) -> None:
     mine = copied / "notes.txt"
     mine.write_text("mine")
-    assert run(["capture", str(record), "--out", str(copied)]) == 2
-    assert "notes.txt" in capsys.readouterr().err
+    assert run(["capture", str(record), "--out", str(copied), "--force"]) == 0
     assert mine.read_text() == "mine"
+
+
+def test_capture_replaces_no_build(
+    record: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Neither another nor the one that it reads; and nothing is written into one."""
+    build, other = tmp_path / "build", tmp_path / "other"
+    shutil.copytree(record, build)
+    shutil.copytree(record, other)
+    monkeypatch.chdir(tmp_path)
+    before = contents(build), contents(other)
+    for out, words in (
+        ("other", "is a build, which a capture does not replace"),
+        ("build", "is read by this command"),
+        ("build/captures/knot", "is inside build"),
+        (".", "the folder you are in"),
+    ):
+        assert run(["capture", "build", "--out", out, "--force"]) == 2
+        assert words in capsys.readouterr().err
+    assert (contents(build), contents(other)) == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["build", "other"]
+
+
+def test_capture_is_named_after_its_object(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box((10, 10, 10)).export("my box.stl")
+    for words in ([], ["--object", "my box.stl"]):
+        assert run(["capture", str(record), *words]) == 0
+    assert sorted(path.name for path in Path("captures").iterdir()) == ["knot", "my box"]
 
 
 def test_capture_of_a_mesh_that_is_too_large(

@@ -142,7 +142,7 @@ SPARSE = tuple(
 FILES: tuple[Mutation, ...] = (
     refused("no such folder", "folder", no_folder, "no such folder"),
     refused("a file for a folder", "folder", no_longer_a_folder, "not a folder"),
-    refused("an empty folder", "folder", emptied, "design.json: missing"),
+    refused("an empty folder", "folder", emptied, "an empty folder, no build"),
     refused("no design.json", "folder", gone("design.json"), "design.json: missing"),
     refused("no mirrors.csv", "folder", gone("mirrors.csv"), "mirrors.csv: missing"),
     refused("no manifest", "folder", gone(MANIFEST), "manifest.json: missing"),

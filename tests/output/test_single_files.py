@@ -1,0 +1,88 @@
+"""Files that a command writes among those of the user."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tbcad.cli import run
+from tbcad.errors import InputError
+from tbcad.output.manifest import write_manifest
+from tbcad.output.single_files import check_file
+
+
+@pytest.fixture
+def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
+    folder = tmp_path / "it"
+    (folder / "images").mkdir(parents=True)
+    for name in ("design.json", "images/a.png"):
+        (folder / name).write_text("{}")
+    write_manifest(folder, "build")
+    return folder
+
+
+@pytest.mark.parametrize("name", ["design.json", "images/a.png", "manifest.json", "verify.json"])
+def test_one_of_a_build_is_not_replaced(build: Path, name: str) -> None:
+    with pytest.raises(InputError, match=r"belongs to .*it, a build"):
+        check_file(build / name, force=True)
+    (build / name).unlink(missing_ok=True)
+    if name != "manifest.json":
+        with pytest.raises(InputError, match="belongs to"):
+            check_file(build / "images" / ".." / name, force=False)
+
+
+def test_another_file_may_be_beside_them(build: Path) -> None:
+    check_file(build / "shell.png", force=False)
+    (build / "shell.png").touch()
+    with pytest.raises(InputError, match=r"exists: .*--force"):
+        check_file(build / "shell.png", force=False)
+    check_file(build / "shell.png", force=True)
+
+
+def test_a_photograph_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "photographs").mkdir()
+    (tmp_path / "run.json").write_text(json.dumps({"schema": "tbcad-run/1"}))
+    taken = tmp_path / "photographs" / "a.png"
+    taken.touch()
+    with pytest.raises(InputError, match="a run: choose another name"):
+        check_file(taken, force=True)
+    check_file(tmp_path / "photographs" / "b.png", force=False)
+
+
+def test_one_that_is_read_is_not_replaced(tmp_path: Path) -> None:
+    light, alias, twin = (tmp_path / name for name in ("sky.png", "alias.png", "twin.png"))
+    light.touch()
+    alias.symlink_to(light)
+    twin.hardlink_to(light)
+    for file in (light, alias, twin, tmp_path / "none" / ".." / "sky.png"):
+        (tmp_path / "none").mkdir(exist_ok=True)
+        with pytest.raises(InputError, match="is read by this command"):
+            check_file(file, force=True, inputs=(None, tmp_path / "missing", light))
+    with pytest.raises(InputError, match="is a folder"):
+        check_file(tmp_path / "none", force=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["init", "it/design.json", "--force"],
+        ["optimize", "--out", "my.toml", "my.toml", "--force"],
+        ["tolerance", "it", "--out", "it"],
+        ["study", "elevation", "--out", "it/study"],
+        ["assembly", "it", "--out", "it/design.json/"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_commands_refuse(
+    build: Path,
+    words: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(build.parent)
+    Path("my.toml").write_text("optics.n = 3\n", encoding="utf-8")
+    before = {path: path.read_bytes() for path in build.parent.rglob("*") if path.is_file()}
+    assert run(words) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert before == {p: p.read_bytes() for p in build.parent.rglob("*") if p.is_file()}
