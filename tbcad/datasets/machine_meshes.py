@@ -69,12 +69,15 @@ def _separate(count: int) -> Ints:
 
 
 def object_mesh(scene: Scene) -> Mesh:
-    """The object with the colours that a capture shows, light included: what it sends out."""
+    """The object with the colours that a capture shows, light included: what it sends out.
+
+    Its facets are seen from where their corners go round to the left, as of the outside.
+    """
     subject = scene.subject
     facet, weight, faces = _divided(subject)
-    hits = SurfaceHits(np.arange(len(facet)), np.zeros(len(facet)), facet, weight)
-    spots = hits.spots(subject)
-    light = (scene.shade[subject.faces[facet]] * weight).sum(axis=1)
+    inward = -_facet_normals(subject.points[subject.faces])[facet]
+    hits = SurfaceHits(np.arange(len(facet)), np.zeros(len(facet)), facet, weight, inward)
+    spots, light = hits.spots(subject), hits.light(subject, scene.shade)
     return Mesh(spots.place, spots.normal, faces, hits.albedo(subject) * light[:, None])
 
 

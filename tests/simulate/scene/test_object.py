@@ -9,7 +9,8 @@ from PIL import Image
 
 from tbcad.errors import InputError
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.scene.object import SceneObject, built_in_object, load_object, pattern
+from tbcad.simulate.scene.object import SceneObject, built_in_object, pattern
+from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import (
     LAMP_LIGHT,
     LAMPS,
@@ -100,7 +101,7 @@ def test_paint_pattern(tmp_path: Path) -> None:
     mesh.visual.vertex_colors = np.full((8, 4), 255, dtype=np.uint8)
     mesh.export(tmp_path / "box.ply")
     assert not load_object(tmp_path / "box.ply", CAPTURE_MM).patterned
-    subject = load_object(tmp_path / "box.ply", CAPTURE_MM, paint="pattern")
+    subject = load_object(tmp_path / "box.ply", CAPTURE_MM, ObjectOptions(paint="pattern"))
     assert subject.patterned
     colour = from_above(subject, 1, 2).colour[0] / 255
     shown = pattern(np.array([[1.0, 2.0, 10.0 - 1e-9]]))[0]
@@ -109,7 +110,7 @@ def test_paint_pattern(tmp_path: Path) -> None:
 
 def test_paint_plain(tmp_path: Path) -> None:
     box().export(tmp_path / "box.stl")
-    subject = load_object(tmp_path / "box.stl", CAPTURE_MM, paint="plain")
+    subject = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(paint="plain"))
     colours = from_above(subject, 1, 2).colour[0]
     assert not subject.patterned
     assert np.ptp(colours) == 0 < colours[0]
@@ -119,7 +120,7 @@ def test_too_large_names_the_size(tmp_path: Path) -> None:
     box(50).export(tmp_path / "box.stl")
     with pytest.raises(InputError, match=r"50 x 50 x 50 mm and reaches 43\.3 mm .* 30"):
         load_object(tmp_path / "box.stl", CAPTURE_MM)
-    assert load_object(tmp_path / "box.stl", CAPTURE_MM, fit=True).radius == pytest.approx(30)
+    assert load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True)).radius == pytest.approx(30)
 
 
 def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
@@ -128,7 +129,7 @@ def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
     mesh.export(tmp_path / "box.stl")
     with pytest.raises(InputError, match="does not fit the capture sphere"):
         load_object(tmp_path / "box.stl", CAPTURE_MM)
-    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, fit=True)
+    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True))
     assert fitted.points.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-3)
 
 

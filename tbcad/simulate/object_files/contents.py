@@ -1,0 +1,100 @@
+"""The contents of an object's file, whatever its format."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.types import Bytes, Floats, Ints
+
+Up = Literal["y", "z"]
+UNITS_MM = {"um": 0.001, "mm": 1.0, "cm": 10.0, "in": 25.4, "ft": 304.8, "m": 1000.0}
+
+
+@dataclass(frozen=True)
+class Part:
+    """Triangles with colours of one kind.
+
+    Attributes:
+        points: corners, in the unit and the axes of the file, (v, 3).
+        faces: corners of the facets, (f, 3).
+        normals: at the corners, as the file has them, (v, 3); None where it has none.
+        colours: at each facet's corners, 0 to 1 as shown (sRGB), (f, 3, 3); None: it has none.
+        uv: where each facet's corners lie on `picture`, 0 to 1 from its lower left, (f, 3, 2).
+        picture: (h, w, 3).
+        source: what the colours are, for the user; "" where there are none.
+    """
+
+    points: Floats
+    faces: Ints
+    normals: Floats | None = None
+    colours: Floats | None = None
+    uv: Floats | None = None
+    picture: Bytes | None = None
+    source: str = ""
+
+    def moved(self, matrix: Floats) -> "Part":
+        """The part moved by a matrix (4, 4); normals follow its inverse."""
+        points = self.points @ matrix[:3, :3].T + matrix[:3, 3]
+        if self.normals is None:
+            return replace(self, points=points)
+        cofactors = np.stack([np.cross(matrix[(k + 1) % 3, :3], matrix[(k + 2) % 3, :3])
+                              for k in range(3)])  # fmt: skip
+        return replace(self, points=points, normals=self.normals @ cofactors.T)
+
+    def flat(self) -> "Part":
+        """The part with corners of their own for each facet, which is then shaded flat."""
+        faces = np.arange(self.faces.size).reshape(-1, 3)
+        return replace(self, points=self.points[self.faces].reshape(-1, 3), faces=faces)
+
+
+class ObjectFile(NamedTuple):
+    """A file as it is read.
+
+    Attributes:
+        parts: its triangles.
+        notes: what it names that was not found, not understood or left out.
+        unit: key of UNITS_MM; None where the file does not say.
+        up: the axis that points up; None where the file does not say.
+    """
+
+    parts: Sequence[Part]
+    notes: Sequence[str] = ()
+    unit: str | None = None
+    up: Up | None = None
+
+
+def shown_shares(values: NDArray[Any]) -> Floats:
+    """Colours from 0 to 1 of numbers of a type: whole ones of 8, 16 or 32 bits, or real ones.
+
+    Whole numbers of other types and real ones over 1 are taken for bytes where they are in range.
+
+    Raises:
+        InputError: they are out of range.
+    """
+    largest = {"|u1": 255, "u1": 255, "u2": 65535}.get(values.dtype.str[-2:])
+    if largest is None:
+        largest = 255 if values.dtype.kind in "iu" or (values.size and values.max() > 1) else 1
+    share = values.astype(np.float64) / largest
+    if not ((share >= 0) & (share <= 1)).all():
+        raise InputError("colours are out of range: allowed is 0 to 1, 0 to 255 or 16 bits")
+    return share
+
+
+def srgb(linear: Floats) -> Floats:
+    """Light from 0 to 1 as the number that shows it (IEC 61966-2-1)."""
+    low = np.clip(linear, 0, 1)
+    return np.where(low <= 0.0031308, 12.92 * low, 1.055 * low ** (1 / 2.4) - 0.055)
+
+
+def linear_light(shown: Floats) -> Floats:
+    """Light from 0 to 1 that a number shows (IEC 61966-2-1)."""
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
+def even(colour: Sequence[float] | Floats, facets: int) -> Floats:
+    """One colour (3,) at all corners of facets, (f, 3, 3)."""
+    return np.broadcast_to(np.asarray(colour, dtype=np.float64), (facets, 3, 3)).copy()
