@@ -92,9 +92,7 @@ def tolerance(
         builds, seed, share, calibrated_mrad / 1000, scheduler, margins=margins
     )
     check_is_export(folder)
-    check_is_object(
-        object_file, up, unit
-    )  # as all before, refused before the heavy libraries are loaded
+    check_is_object(object_file, up, unit)  # as all before, before heavy libraries are loaded
     from tbcad.api import analyse
     from tbcad.simulate.study.study import check_study_folder, write_study
     from tbcad.tolerance.report import json_text, summary_text, tolerance_study

@@ -7,7 +7,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import srgb
+from tbcad.srgb import srgb
 from tbcad.types import Bytes
 
 MAX_BYTES = 1 << 30
@@ -45,8 +45,8 @@ def _without_case(folder: Path, file: Path) -> Path | None:
     if (folder / file).is_file():
         return folder / file
     parent = (folder / file).parent
-    same = (p for p in sorted(parent.iterdir()) if p.name.casefold() == file.name.casefold())
-    return next(same, None) if parent.is_dir() else None
+    here = sorted(parent.iterdir()) if parent.is_dir() else []
+    return next((p for p in here if p.name.casefold() == file.name.casefold()), None)
 
 
 def texture_beside(mesh: Path, name: str, notes: list[str]) -> Bytes | None:
@@ -80,5 +80,5 @@ def shown_bytes(picture: np.ndarray) -> Bytes:  # type: ignore[type-arg]
     if picture.dtype == np.uint16:
         picture = np.rint(picture / 257).astype(np.uint8)
     elif picture.dtype != np.uint8:
-        picture = np.rint(255 * srgb(picture.astype(np.float64))).astype(np.uint8)
+        picture = np.rint(255 * srgb(picture.astype(np.float64).clip(0, 1))).astype(np.uint8)
     return np.ascontiguousarray(np.dstack([picture] * 3) if picture.ndim == 2 else picture)

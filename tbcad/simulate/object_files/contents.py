@@ -84,17 +84,16 @@ def shown_shares(values: NDArray[Any]) -> Floats:
     return share
 
 
-def srgb(linear: Floats) -> Floats:
-    """Light from 0 to 1 as the number that shows it (IEC 61966-2-1)."""
-    low = np.clip(linear, 0, 1)
-    return np.where(low <= 0.0031308, 12.92 * low, 1.055 * low ** (1 / 2.4) - 0.055)
-
-
-def linear_light(shown: Floats) -> Floats:
-    """Light from 0 to 1 that a number shows (IEC 61966-2-1)."""
-    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
-
-
 def even(colour: Sequence[float] | Floats, facets: int) -> Floats:
     """One colour (3,) at all corners of facets, (f, 3, 3)."""
     return np.broadcast_to(np.asarray(colour, dtype=np.float64), (facets, 3, 3)).copy()
+
+
+def without_facets(points: int) -> InputError:
+    """The error of a file that has nothing to see."""
+    if points == 0:
+        return InputError("it is empty: name a mesh with facets")
+    return InputError(
+        f"it has {points} points and no facets: name a triangle mesh; MeshLab makes one of a cloud "
+        "of points (screened Poisson)"
+    )

@@ -9,7 +9,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.beside import uri_bytes
-from tbcad.simulate.object_files.contents import ObjectFile
+from tbcad.simulate.object_files.contents import ObjectFile, without_facets
 from tbcad.simulate.object_files.gltf_geometry import Accessors, primitive_part
 from tbcad.simulate.object_files.gltf_materials import Materials
 from tbcad.types import Floats
@@ -45,7 +45,7 @@ def read_gltf(path: Path) -> ObjectFile:
             if part is not None:
                 parts.append(part.moved(matrix))
     if not parts:
-        raise InputError("it has no triangles in its scene")
+        raise without_facets(0)
     _note_motion(document, notes)
     return ObjectFile(parts, list(dict.fromkeys(notes)), "m", "y")
 
@@ -63,7 +63,10 @@ def _document(path: Path) -> tuple[dict[str, Any], bytes]:
             chunks.setdefault(kind, data[at + 8 : at + 8 + size])
             at += 8 + size
         data, binary = chunks.get(JSON_CHUNK, b""), chunks.get(BINARY_CHUNK, b"")
-    document = json.loads(data.decode("utf-8-sig"))
+    try:
+        document = json.loads(data.decode("utf-8-sig"))
+    except ValueError:
+        raise InputError("it is no glTF") from None
     if not isinstance(document, dict) or "asset" not in document:
         raise InputError("it is no glTF")
     return document, binary

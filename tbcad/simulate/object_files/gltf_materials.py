@@ -8,8 +8,9 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.beside import texture, uri_bytes
-from tbcad.simulate.object_files.contents import Part, even, linear_light, srgb
+from tbcad.simulate.object_files.contents import Part, even
 from tbcad.simulate.object_files.gltf_geometry import Accessors
+from tbcad.srgb import srgb, srgb_light
 from tbcad.types import Bytes, Floats
 
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
@@ -46,16 +47,16 @@ class Materials:
         if picture is not None and texture_of is not None:
             uv = self._coordinates(texture_of, attributes, part)
             if uv is not None:
-                shares = None if corner is None else srgb(corner[:, :3])[part.faces]
+                shares = None if corner is None else srgb(corner[:, :3].clip(0, 1))[part.faces]
                 name = self._image_name(texture_of)
                 return replace(part, uv=uv, picture=picture, colours=shares,
                                source=f"texture {name}")  # fmt: skip
         if corner is not None:
-            shares = srgb(corner[:, :3] * factor[:3])[part.faces]
+            shares = srgb((corner[:, :3] * factor[:3]).clip(0, 1))[part.faces]
             return replace(part, colours=shares, source="vertex colours")
         if number is None:
             return part
-        shares = even(srgb(factor[:3]), len(part.faces))
+        shares = even(srgb(factor[:3].clip(0, 1)), len(part.faces))
         return replace(part, colours=shares, source="colours of materials (baseColorFactor)")
 
     def _base(self, material: dict[str, Any]) -> tuple[Floats, dict[str, Any] | None]:
@@ -85,8 +86,8 @@ class Materials:
         if key not in self._pictures:
             found = self._image(reference)
             if found is not None and (factor != 1).any():
-                light = linear_light(np.arange(256) / 255)[:, None] * factor
-                curve = np.rint(255 * srgb(light)).astype(np.uint8)
+                light = srgb_light(np.arange(256) / 255)[:, None] * factor
+                curve = np.rint(255 * srgb(light.clip(0, 1))).astype(np.uint8)
                 found = np.stack([curve[found[..., k], k] for k in range(3)], axis=-1)
             self._pictures[key] = found
         return self._pictures[key]

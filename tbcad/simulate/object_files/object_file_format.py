@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part, shown_shares
+from tbcad.simulate.object_files.contents import ObjectFile, Part, shown_shares, without_facets
 from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Floats, Ints
 
@@ -33,7 +33,7 @@ def read_off(path: Path) -> ObjectFile:
     if len(rows) < count + facets:
         raise InputError("it is cut off: copy it again")
     if facets == 0:
-        raise InputError(f"it has {count} points and no facets")
+        raise without_facets(count)
     return _contents(rows[:count], rows[count:], bool(match[2]), bool(match[3]))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.beside import texture_beside
-from tbcad.simulate.object_files.contents import ObjectFile, Part, shown_shares
+from tbcad.simulate.object_files.contents import ObjectFile, Part, shown_shares, without_facets
 from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Bytes, Floats, Ints
 
@@ -224,8 +224,7 @@ def _contents(path: Path, tables: dict[str, dict[str, Any]], textures: list[str]
     points = _stack(vertex, tuple("xyz"))
     corners = next((face[name] for name in CORNERS if isinstance(face.get(name), _List)), None)
     if corners is None or len(corners.counts) == 0:
-        more = " but triangle strips" if "tristrips" in tables else ""
-        raise InputError(f"it has {len(points)} points and no facets{more}")
+        raise without_facets(len(points))
     index = _checked(corners.values, len(points))
     cut, polygon = triangles(corners.counts, points[index])
     faces = index[cut]

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part
+from tbcad.simulate.object_files.contents import ObjectFile, Part, without_facets
 from tbcad.types import Floats
 
 HEADER_BYTES = 80
@@ -28,7 +27,7 @@ def read_stl(path: Path) -> ObjectFile:
     solids = found["geometry"].values() if "geometry" in found else [found]
     parts = [_part(data[:HEADER_BYTES], solid) for solid in solids if "faces" in solid]
     if not parts:
-        raise InputError("it has no facets")
+        raise without_facets(0)
     return ObjectFile(parts)
 
 

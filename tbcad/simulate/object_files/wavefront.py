@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.beside import file_beside, texture_beside
-from tbcad.simulate.object_files.contents import ObjectFile, Part, even, shown_shares
+from tbcad.simulate.object_files.contents import (
+    ObjectFile,
+    Part,
+    even,
+    shown_shares,
+    without_facets,
+)
 from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Floats, Ints
 
@@ -51,19 +57,17 @@ def read_obj(path: Path) -> ObjectFile:
     lines = _lines(path.read_bytes().decode("utf-8", "replace"))
     notes = [f"its {what} are left out" for what in sorted(lines.left_out)]
     if not lines.facets:
-        raise InputError(f"it has {len(lines.v)} points and no facets")
+        raise without_facets(len(lines.v))
     vertices = _table(lines.v, "v", 3)
     points, colours = vertices[:, :3], _vertex_colours(vertices)
     counts, index = _corners(lines)
     faces, polygon = triangles(counts, points[index[:, 0]])
     materials = _materials(path, lines.libraries, notes)
     names, which = np.unique(np.array([m or "" for m in lines.material]), return_inverse=True)
-    parts = [
-        _part(
-            path, lines, points, colours, index[faces[which[polygon] == k]], name, materials, notes
-        )  # fmt: skip
-        for k, name in enumerate(names.tolist())
-    ]
+    parts = []
+    for k, name in enumerate(names.tolist()):
+        own = index[faces[which[polygon] == k]]
+        parts.append(_part(path, lines, points, colours, own, name, materials, notes))
     return ObjectFile([part for part in parts if len(part.faces)], list(dict.fromkeys(notes)))
 
 
@@ -112,16 +116,28 @@ def _corners(lines: _Lines) -> tuple[Ints, Ints]:
     """
     split = [line.split() for line in lines.facets]
     counts = np.array([len(corners) for corners in split], dtype=np.int64)
-    tokens = [token.split("/") for corners in split for token in corners]
-    index = np.array(
-        [[int(part or 0) for part in (*token, "", "")[:3]] for token in tokens], dtype=np.int64
-    ).reshape(-1, 3)
+    index = _index([token for corners in split for token in corners])
     known = np.repeat(np.array(lines.known, dtype=np.int64), counts, axis=0)
     index = np.where(index > 0, index - 1, np.where(index < 0, known + index, -1))
     limits = np.array([len(lines.v), len(lines.vt), len(lines.vn)])
     if (index[:, 0] < 0).any() or (index >= limits).any() or (index < -1).any():
         raise InputError("its facets name corners that do not exist: it is damaged")
     return counts, index
+
+
+def _index(tokens: list[str]) -> Ints:
+    """Numbers (c, 3) of corners as 1/2/3, 1//3, 1/2 or 1; 0 where there is none."""
+    slashes = {token.count("/") for token in tokens}
+    numbers = " ".join(tokens).replace("//", "/0/").replace("/", " ").split()
+    index = np.zeros((len(tokens), 3), dtype=np.int64)
+    width = 1 + max(slashes, default=0)
+    if len(slashes) == 1 and len(numbers) == width * len(tokens) and width <= 3:
+        index[:, :width] = np.array(list(map(int, numbers))).reshape(-1, width)
+        return index
+    for row, token in enumerate(tokens):
+        parts = token.split("/")[:3]
+        index[row, : len(parts)] = [int(part or 0) for part in parts]
+    return index
 
 
 def _part(

@@ -10,7 +10,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.geometry.smallest_sphere import smallest_sphere
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.object_files.contents import UNITS_MM, ObjectFile, Part, Up
+from tbcad.simulate.object_files.contents import UNITS_MM, ObjectFile, Part, Up, without_facets
 from tbcad.simulate.object_files.normals import (
     corner_normals,
     facet_vectors,
@@ -88,9 +88,11 @@ def load_object(
             what was not found or is left out.
     """
     asked = options or ObjectOptions()
-    found = read_object_file(path)
-    unit, up = asked.unit or found.unit or "mm", asked.up or found.up or "z"
-    mesh = _Mesh.of(path, [_in_frame(part, UNITS_MM[unit], up) for part in found.parts])
+    with np.errstate(all="ignore"):  # what is not finite is refused, in words
+        found = read_object_file(path)
+        unit, up = asked.unit or found.unit or "mm", asked.up or found.up or "z"
+        parts = [_in_frame(part, UNITS_MM[unit], up) for part in found.parts]
+    mesh = _Mesh.of(path, parts)
     points = _fitted(mesh.points, capture_mm) if asked.fit else mesh.points
     _check_size(path, points, capture_mm, unit)
     colours, notes = _painted(path, mesh, found, asked.paint)
@@ -159,10 +161,9 @@ class _Mesh:
 
 def _check(path: Path, parts: Sequence[Part]) -> None:
     count = sum(len(part.faces) for part in parts)
-    if sum(len(part.points) for part in parts) == 0:
-        raise InputError(f"{path} is empty: name a mesh with facets")
     if count == 0:
-        raise InputError(f"{path} has points but no facets: name a triangle mesh")
+        points = sum(len(part.points) for part in parts)
+        raise InputError(f"{path} cannot be read as a mesh: {without_facets(points)}")
     if count > MAX_FACETS:
         raise InputError(f"{path} has {count} facets, allowed are {MAX_FACETS}: reduce it")
     for part in parts:

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from tbcad.errors import InputError
+from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.simulate.capture.files import read_object, write_object
 from tbcad.simulate.scene.object import SceneObject, built_in_object, pattern
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
@@ -41,7 +41,7 @@ def light_on_top(normal: np.ndarray) -> float:
 def test_file_formats(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"box.{kind}"
     box().export(path)
-    subject = load_object(path, CAPTURE_MM)
+    subject = load_object(path, CAPTURE_MM, ObjectOptions(unit="mm"))
     assert subject.patterned
     assert subject.radius == pytest.approx(10 * np.sqrt(3))
     assert from_above(subject, 1, 2).depth == pytest.approx([90])
@@ -78,7 +78,7 @@ def test_texture_is_shown(tmp_path: Path) -> None:
     corners = [[0, 0], [1, 0], [1, 1], [0, 1]]
     mesh.visual = trimesh.visual.TextureVisuals(uv=corners, image=Image.fromarray(picture))
     mesh.export(tmp_path / "square.glb")
-    subject = load_object(tmp_path / "square.glb", CAPTURE_MM)
+    subject = load_object(tmp_path / "square.glb", CAPTURE_MM, ObjectOptions(up="z", unit="mm"))
     assert subject.texture is not None
     left, right = (from_above(subject, x, 1).colour[0] for x in (-5, 5))
     assert left[0] > 100 > left[1] == 0
@@ -93,7 +93,8 @@ def test_texture_outside_of_its_folder_is_not_read(tmp_path: Path) -> None:
     (inside / "a.obj").write_text(
         "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
     )
-    assert load_object(inside / "a.obj", CAPTURE_MM).texture is None
+    with pytest.warns(PlausibilityWarning, match=r"secret\.png is not in the folder"):
+        assert load_object(inside / "a.obj", CAPTURE_MM).texture is None
 
 
 def test_paint_pattern(tmp_path: Path) -> None:
@@ -120,7 +121,8 @@ def test_too_large_names_the_size(tmp_path: Path) -> None:
     box(50).export(tmp_path / "box.stl")
     with pytest.raises(InputError, match=r"50 x 50 x 50 mm and reaches 43\.3 mm .* 30"):
         load_object(tmp_path / "box.stl", CAPTURE_MM)
-    assert load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True)).radius == pytest.approx(30)
+    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True))
+    assert fitted.radius == pytest.approx(30)
 
 
 def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
