@@ -1,7 +1,7 @@
 """Photographs as three channels of 8 or 16 bits, of whatever the reader of pictures gives."""
 
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ def decoded_image(data: bytes, name: str) -> Image16:
 
 
 def _three_channels(picture: Picture, name: str) -> Image16:
-    whole = _in_16_bits(picture, name) if picture.dtype == np.float32 else picture
+    whole: NDArray[Any] = _in_16_bits(picture, name) if picture.dtype == np.float32 else picture
     return whole if whole.ndim == 3 else np.repeat(whole[..., None], 3, axis=2)
 
 
