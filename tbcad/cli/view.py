@@ -1,5 +1,6 @@
 """Synthesise views from a light field."""
 
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
@@ -155,7 +156,9 @@ def view(
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
     write_compared(out, picture, truth, (choice.method, "ray-traced"))
     if same_lamps is not None:
-        typer.echo(f"SSIM {_ssim(same_lamps, picture):.4f} against one lit by the same lamps")
+        ssim = _ssim(same_lamps, picture)
+        if not isnan(ssim):
+            typer.echo(f"SSIM {ssim:.4f} against one lit by the same lamps")
     for file in files:
         typer.echo(f"{file}: depth")
     return 0
