@@ -11,6 +11,7 @@ from tbcad.api.arguments import silent
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
+    from tbcad.reflectance.light_directions import LightFormat
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.object_files.contents import Up
@@ -238,14 +239,22 @@ def _field_writer(
     return write
 
 
-def relight(capture_folder: Path | str, light: Path | str, *, turn_deg: float = 0.0) -> LightField:
+def relight(
+    capture_folder: Path | str,
+    light: Path | str,
+    *,
+    turn_deg: float = 0.0,
+    light_format: LightFormat | None = None,
+) -> LightField:
     """A light field in the light of its surroundings, as `tbcad view --light` shows it.
 
     Args:
         capture_folder: that `capture` wrote with lights.
-        light: picture of the surroundings by direction, Radiance's format (.hdr): longitude along
-            the rows, the zenith at the top, +x in the middle.
+        light: picture of the surroundings by direction, +x in the middle: Radiance (.hdr), OpenEXR
+            (.exr) or TIFF in floating point.
         turn_deg: turns it about z.
+        light_format: of that picture, "latlong", "angular", "mirror-ball" or "cross"; None:
+            latlong, if it is twice as wide as high.
 
     Returns:
         The light field in memory, with other colours.
@@ -260,6 +269,9 @@ def relight(capture_folder: Path | str, light: Path | str, *, turn_deg: float = 
     from tbcad.reflectance.relit import relit
     from tbcad.simulate.capture.light_field import LightField
 
-    folder, environment = Path(capture_folder), read_environment(Path(light), radians(turn_deg))
+    folder, environment = (
+        Path(capture_folder),
+        read_environment(Path(light), radians(turn_deg), light_format),
+    )
     with open_reflectance(folder) as reflectance:
         return relit(LightField.read(folder), reflectance, environment).field

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.formats.pixels import Picture, check_pixels, damaged, import_of_machine
+from tbcad.errors import InputError
+from tbcad.formats.pixels import Picture, check_pixels, import_of_machine
 
 RAW_SUFFIXES = (
     *(".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dcr", ".dng", ".erf", ".iiq", ".kdc", ".mef"),
@@ -30,8 +31,12 @@ def raw_picture(data: bytes, name: str) -> Picture:
             check_pixels(name, raw.sizes.width, raw.sizes.height)
             pixels = raw.postprocess(_linear(rawpy))
     except rawpy.LibRawError as error:
-        reason = error.args[0] if error.args else error
-        raise damaged(name, reason.decode() if isinstance(reason, bytes) else reason) from None
+        reason = error.args[0] if error.args else ""
+        words = reason.decode("ascii", "replace") if isinstance(reason, bytes) else reason
+        raise InputError(
+            f"{name} is damaged, or of a camera that LibRaw does not know: {words}: save it as DNG "
+            "or as TIFF of 16 bits"
+        ) from None
     return np.asarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels)
 
 

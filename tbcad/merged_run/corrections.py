@@ -108,7 +108,7 @@ def flat_field_gain(files: Sequence[Path], encoding: Encoding, camera: LensCamer
     size = camera.height_px, camera.width_px
     total = np.zeros((*size, 3), dtype=np.float32)
     for file in files:
-        image = read_image(file, "photograph an even surface again")
+        image = read_image(file)
         if image.shape[:2] != size:
             raise InputError(
                 f"{file} is {image.shape[1]} x {image.shape[0]} pixels, the run's photographs are "
