@@ -7,6 +7,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.formats.pictures import Picture, picture_of
 from tbcad.srgb import srgb
 from tbcad.types import Bytes
 
@@ -61,8 +62,6 @@ def texture_beside(mesh: Path, name: str, notes: list[str]) -> Bytes | None:
 
 def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:
     """The picture of a texture, as bytes (h, w, 3); None, and a note, where it cannot be read."""
-    from tbcad.formats.pictures import picture_of
-
     try:
         try:
             return shown_bytes(picture_of(data, name))
@@ -75,7 +74,7 @@ def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:
         return None
 
 
-def shown_bytes(picture: np.ndarray) -> Bytes:  # type: ignore[type-arg]
+def shown_bytes(picture: Picture) -> Bytes:
     """A picture (h, w) or (h, w, 3) as bytes (h, w, 3); real numbers are light."""
     if picture.dtype == np.uint16:
         picture = np.rint(picture / 257).astype(np.uint8)

@@ -31,7 +31,7 @@ class Accessors:
         """The bytes of a buffer view."""
         view = self._document["bufferViews"][number]
         start = view.get("byteOffset", 0)
-        data = self._buffers[view["buffer"]][start : start + view["byteLength"]]
+        data: bytes = self._buffers[view["buffer"]][start : start + view["byteLength"]]
         if len(data) < view["byteLength"]:
             raise InputError("one of its buffers is cut off: copy it again")
         return data

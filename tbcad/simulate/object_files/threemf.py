@@ -84,7 +84,7 @@ def _part(model: Any, mesh: Any, notes: list[str]) -> Part:
 def _colours(model: Any, mesh: Any, facets: int, notes: list[str]) -> Floats | None:
     """Colours (f, 3, 3) of a mesh's triangles, else of the whole; None where it has none."""
     keys = [(one.ResourceID, tuple(one.PropertyIDs)) for one in mesh.GetAllTriangleProperties()]
-    *_, resource, number, whole = (None, *mesh.GetObjectLevelProperty())
+    resource, number, whole = mesh.GetObjectLevelProperty()
     fallback = _colour(model, resource, number, notes) if whole else None
     known = {(r, p): _colour(model, r, p, notes) for r, three in set(keys) if r for p in three}
     if fallback is None and not any(colour is not None for colour in known.values()):

@@ -156,7 +156,7 @@ class _Mesh:
         """Values (k, 3, ...) at the corners of some facets of a part, as they go in the mesh."""
         own = values[self.kept[facets]]
         turned = self.turned[facets].reshape(-1, *[1] * (own.ndim - 1))
-        return np.where(turned, own[:, ::-1], own)
+        return np.asarray(np.where(turned, own[:, ::-1], own), dtype=np.float64)
 
 
 def _check(path: Path, parts: Sequence[Part]) -> None:
