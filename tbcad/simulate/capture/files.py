@@ -107,7 +107,7 @@ def _subject(arrays: dict[str, Any]) -> SceneObject:
     if faces.min() < 0 or faces.max() >= v or not np.isfinite(points).all():
         raise ValueError("facets have corners that do not exist")
     light, tiles = arrays.get("light"), arrays.get("tiles")
-    if light is not None and light.ndim == 1:  # before 1.4 backs had the light of the front
+    if light is not None and light.ndim == 1:  # of older captures: backs had the front's
         light = np.column_stack([light, light])
     if texture is not None and tiles is None:  # and the only texture was not multiplied
         tiles, albedo = np.tile([0, *texture.shape[:2]], (f, 1)), np.ones_like(albedo)

@@ -11,6 +11,8 @@ from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats, Ints
 
 Up = Literal["y", "z"]
+# Real colours of at least so much in one file are bytes; those over 1 and below are refused.
+LEAST_OF_BYTES, ROUNDING = 2.0, 1e-3
 UNITS_MM = {"um": 0.001, "mm": 1.0, "cm": 10.0, "in": 25.4, "ft": 304.8, "m": 1000.0}
 
 
@@ -70,18 +72,28 @@ class ObjectFile(NamedTuple):
 def shown_shares(values: NDArray[Any]) -> Floats:
     """Colours from 0 to 1 of numbers of a type: whole ones of 8, 16 or 32 bits, or real ones.
 
-    Whole numbers of other types and real ones over 1 are taken for bytes where they are in range.
+    Whole numbers of other types are taken for bytes, and real ones if the largest is at least 2.
 
     Raises:
         InputError: they are out of range.
     """
-    largest = {"|u1": 255, "u1": 255, "u2": 65535}.get(values.dtype.str[-2:])
+    largest = {"u1": 255, "u2": 65535}.get(values.dtype.str[-2:])
     if largest is None:
-        largest = 255 if values.dtype.kind in "iu" or (values.size and values.max() > 1) else 1
+        bytes_as_reals = values.size and values.max() >= LEAST_OF_BYTES
+        largest = 255 if values.dtype.kind in "iu" or bytes_as_reals else 1
     share = values.astype(np.float64) / largest
-    if not ((share >= 0) & (share <= 1)).all():
-        raise InputError("colours are out of range: allowed is 0 to 1, 0 to 255 or 16 bits")
-    return share
+    if not ((share >= 0) & (share <= 1 + ROUNDING)).all():
+        raise InputError(
+            "its colours are out of range: allowed is 0 to 1, 0 to 255, or 0 to 65535 as ushort"
+        )
+    return share.clip(0, 1)
+
+
+def text_of(data: bytes) -> str:
+    """A text file of UTF-8, or of UTF-16 with its mark; what is neither becomes a question mark."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", "replace")
+    return data.decode("utf-8-sig", "replace")
 
 
 def even(colour: Sequence[float] | Floats, facets: int) -> Floats:

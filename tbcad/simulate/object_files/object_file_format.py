@@ -7,7 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part, shown_shares, without_facets
+from tbcad.simulate.object_files.contents import (
+    ObjectFile,
+    Part,
+    shown_shares,
+    text_of,
+    without_facets,
+)
 from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Floats, Ints
 
@@ -20,7 +26,7 @@ def read_off(path: Path) -> ObjectFile:
     Raises:
         InputError: it is no OFF file of text in three dimensions, or cut off.
     """
-    text = path.read_bytes().decode("utf-8", "replace")
+    text = text_of(path.read_bytes())
     lines = [line.partition("#")[0].strip() for line in text.splitlines()]
     lines = [line for line in lines if line]
     match = HEADER.match(lines[0]) if lines else None

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.errors import InputError
 from tbcad.simulate.object_files.contents import ObjectFile, Part, without_facets
 from tbcad.types import Floats
 
@@ -27,6 +28,8 @@ def read_stl(path: Path) -> ObjectFile:
     solids = found["geometry"].values() if "geometry" in found else [found]
     parts = [_part(data[:HEADER_BYTES], solid) for solid in solids if "faces" in solid]
     if not parts:
+        if len(data) > HEADER_BYTES + 4:
+            raise InputError("its length is not what its number of facets says: copy it again")
         raise without_facets(0)
     return ObjectFile(parts)
 

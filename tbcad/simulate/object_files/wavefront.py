@@ -15,6 +15,7 @@ from tbcad.simulate.object_files.contents import (
     Part,
     even,
     shown_shares,
+    text_of,
     without_facets,
 )
 from tbcad.simulate.object_files.polygons import triangles
@@ -54,7 +55,7 @@ def read_obj(path: Path) -> ObjectFile:
     Raises:
         InputError: it is no OBJ file, or its facets name corners that do not exist.
     """
-    lines = _lines(path.read_bytes().decode("utf-8", "replace"))
+    lines = _lines(text_of(path.read_bytes()))
     notes = [f"its {what} are left out" for what in sorted(lines.left_out)]
     if not lines.facets:
         raise without_facets(len(lines.v))
@@ -207,7 +208,7 @@ def _materials(path: Path, libraries: list[str], notes: list[str]) -> dict[str, 
 
 def _read_materials(file: Path, found: dict[str, _Material], notes: list[str]) -> None:
     material = _Material()
-    for line in file.read_bytes().decode("utf-8", "replace").splitlines():
+    for line in text_of(file.read_bytes()).splitlines():
         key, _, rest = line.strip().replace("\t", " ").partition(" ")
         key, rest = key.lower(), rest.strip()
         match key:
@@ -215,7 +216,7 @@ def _read_materials(file: Path, found: dict[str, _Material], notes: list[str]) -
                 material = found.setdefault(rest, _Material())
             case "kd":
                 material.colour = _colour(rest, notes)
-            case "map_kd":
+            case "map_kd" if rest:
                 options, material.picture = _picture(rest)
                 if options:
                     notes.append(f"options of a texture are left out: {options}")

@@ -71,7 +71,7 @@ def test_colours_of_all_types(write: Write, properties: str, values: str) -> Non
     assert part.colours[1, 2] == pytest.approx(ORANGE, abs=1e-6)
 
 
-@pytest.mark.parametrize("values", ["-1 0 0", "1e9 0 0", "nan 0 0"])
+@pytest.mark.parametrize("values", ["-1 0 0", "1e9 0 0", "1.5 1 0", "nan 0 0"])
 def test_colours_out_of_range(write: Write, values: str) -> None:
     path = write("a.ply", ply("float red,float green,float blue", values))
     with pytest.raises(InputError, match="out of range"):
@@ -216,6 +216,7 @@ def test_stl_with_colours(tmp_path: Path, header: bytes, word: int, wanted: list
         ("a.obj", obj("f 1 2 x"), "damaged"),
         ("a.obj", "v 1 2\nf 1 1 1\n", "fewer than 3 numbers"),
         ("a.obj", obj("p 1"), "no facets"),
+        ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\n" + 9 * "vertex 0 0 0\n", "length"),
         ("a.off", "4OFF\n1 1 0\n", "not OFF"),
         ("a.off", "OFF\n4 1 0\n0 0 0\n", "cut off"),
         ("a.3mf", "PK\3\4rubbish", "lib3mf says"),
@@ -231,3 +232,11 @@ def test_packed_whatever_its_name(tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_bytes(b"\x1f\x8b\x08\0")
     with pytest.raises(InputError, match="is packed: unpack it"):
         read_object_file(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_texts_of_other_systems(tmp_path: Path, encoding: str, ending: str) -> None:
+    text = ("# Fläche\n" + obj("f 1 2 \\\n3 4")).replace("\n", ending)
+    (tmp_path / "a.obj").write_bytes(text.encode(encoding))
+    assert area(only(read_object_file(tmp_path / "a.obj"))) == pytest.approx(4)
