@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.types import Floats, Ints
 
+SAME_PLACE = 1e-6  # of the size of an object
 LEAST = 1e-6  # of the sum of normals about a corner, as a share of the sum of their lengths
 
 
@@ -25,8 +26,18 @@ def first_of_each(faces: Ints) -> Ints:
     return np.sort(order[np.concatenate([[True], ~again])])
 
 
+def is_closed(points: Floats, faces: Ints) -> bool:
+    """Whether each edge joins two facets; corners in one place are one corner."""
+    step = SAME_PLACE * max(float(np.ptp(points, axis=0).max()), np.finfo(np.float64).tiny)
+    place = np.unique(np.rint(points / step).astype(np.int64), axis=0, return_inverse=True)[1]
+    corners = place.reshape(-1)[faces]
+    edges = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2))
+    uses = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_counts=True)[1]
+    return bool((uses == 2).all())
+
+
 def turned_alike(faces: Ints) -> NDArray[np.bool_]:
-    """Facets (f,) to turn so that neighbours are turned alike, as far as the surface allows it.
+    """Which facets (f,) to turn so that neighbours are alike, as far as the surface allows it.
 
     Facets are joined by edges of two. In the graph of all facets as they are and turned, those
     that belong together are connected.
@@ -50,7 +61,7 @@ def turned_alike(faces: Ints) -> NDArray[np.bool_]:
 
 
 def turned_outward(points: Floats, faces: Ints) -> NDArray[np.bool_]:
-    """Facets (f,) to turn so that all are alike and the volume in them is not negative."""
+    """Which facets (f,) to turn so that all are alike and the volume in them is not negative."""
     turned = turned_alike(faces)
     alike = np.where(turned[:, None], faces[:, ::-1], faces)
     middle = points[alike].mean(axis=(0, 1))

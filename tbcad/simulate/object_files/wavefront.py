@@ -3,14 +3,13 @@
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.beside import file_beside, texture_beside
 from tbcad.simulate.object_files.contents import (
+    ROUNDING,
     ObjectFile,
     Part,
     even,
@@ -253,10 +252,10 @@ def _colour(text: str, notes: list[str]) -> list[float] | None:
     """Red, green and blue; one number is grey."""
     try:
         numbers = [float(number) for number in text.partition("#")[0].split()]
-        share: NDArray[Any] = shown_shares(np.array(numbers if len(numbers) == 3 else numbers * 3))
-        if len(share) != 3:
-            raise ValueError
-    except (ValueError, InputError):
-        notes.append(f"its colour Kd {text:.40} is not understood")
+    except ValueError:
+        numbers = []
+    numbers = numbers * 3 if len(numbers) == 1 else numbers
+    if len(numbers) != 3 or not all(0 <= number <= 1 + ROUNDING for number in numbers):
+        notes.append(f"its colour Kd {text:.40} is not understood: allowed are three of 0 to 1")
         return None
-    return [float(value) for value in share]
+    return [min(number, 1.0) for number in numbers]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -52,6 +52,21 @@ class ObjectOptions:
     paint: Paint = "own"
     up: Up | None = None
     unit: Unit | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is none of these.
+
+        Raises:
+            InputError: it is not.
+        """
+        for name, value, allowed in (
+            ("paint", self.paint, get_args(Paint)),
+            ("up", self.up, (None, *get_args(Up))),
+            ("unit", self.unit, (None, *get_args(Unit))),
+        ):
+            if value not in allowed:
+                names = ", ".join(str(one) for one in allowed if one)
+                raise InputError(f"{name} {value!r} is not known: allowed is {names}")
 
 
 def load_or_built_in(

@@ -232,3 +232,9 @@ def test_objects_of_older_captures_are_read(tmp_path: Path) -> None:
     inward = -unit(np.ones((1, 3)))
     hits = surface_hits(prepared_scene(subject), -5 * inward, inward)
     assert hits.albedo(subject)[0] == pytest.approx([0.2] * 3)
+
+
+def test_options_out_of_their_range() -> None:
+    for wrong in ({"unit": "furlong"}, {"up": "x"}, {"paint": "blue"}):
+        with pytest.raises(InputError, match="is not known: allowed is"):
+            ObjectOptions(**wrong)  # type: ignore[arg-type]
