@@ -9,7 +9,7 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.types import Floats, Ints
 
 SAME_PLACE = 1e-6  # of the size of an object
-LEAST = 1e-6  # of the sum of normals about a corner, as a share of the sum of their lengths
+LEAST = 1e-6  # of the sum of normals about a corner, as a share of that of their weights
 
 
 def facet_vectors(points: Floats, faces: Ints) -> Floats:
@@ -70,12 +70,15 @@ def turned_outward(points: Floats, faces: Ints) -> NDArray[np.bool_]:
 
 
 def corner_normals(points: Floats, faces: Ints) -> Floats:
-    """Normals of smooth surfaces at their corners (v, 3): means by area; zero where they cancel."""
-    across, total = facet_vectors(points, faces), np.zeros_like(points)
+    """Normals of smooth surfaces at corners (v, 3): means by angle; zero where they cancel."""
+    across, total = unit(facet_vectors(points, faces)), np.zeros_like(points)
     size = np.zeros(len(points))
     for k in range(3):
-        np.add.at(total, faces[:, k], across)
-        np.add.at(size, faces[:, k], norm(across))
+        here, after, before = (points[faces[:, (k + j) % 3]] for j in range(3))
+        cosine = dot(unit(after - here), unit(before - here))
+        angle = np.arccos(np.clip(cosine, -1, 1))
+        np.add.at(total, faces[:, k], angle[:, None] * across)
+        np.add.at(size, faces[:, k], angle)
     return unit(np.where((norm(total) > LEAST * size)[:, None], total, 0.0))
 
 
