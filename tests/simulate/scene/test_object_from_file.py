@@ -8,7 +8,7 @@ import trimesh
 from PIL import Image
 
 from tbcad.errors import InputError, PlausibilityWarning
-from tbcad.geometry.vectors import unit
+from tbcad.geometry.vectors import norm, unit
 from tbcad.simulate.capture.files import read_object, write_object
 from tbcad.simulate.scene.lamps import Lamps, lit_by
 from tbcad.simulate.scene.object import SceneObject
@@ -105,6 +105,14 @@ def test_a_ball_is_lit_on_the_side_that_rays_meet(tmp_path: Path, kind: str) -> 
 
 
 @pytest.mark.parametrize("kind", FILES)
+def test_facets_and_normals_are_turned_outward(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "a.ply").write_bytes(FILES[kind])
+    subject = load_object(tmp_path / "a.ply", CAPTURE_MM)
+    assert trimesh.Trimesh(subject.points, subject.faces, process=False).volume > 0
+    assert ((subject.normals * subject.points).sum(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize("kind", FILES)
 def test_a_ball_under_the_prototypes_lamps(tmp_path: Path, kind: str) -> None:
     (tmp_path / "a.ply").write_bytes(FILES[kind])
     lamps = Lamps(np.array([[200.0, 0, 0]]), np.array([[-1.0, 0, 0]]), 10, 10, 100)
@@ -149,10 +157,10 @@ def test_nothing_to_see(tmp_path: Path, points: list[list[float]], wrong: str) -
     ("name", "options", "wanted"),
     [
         ("a.ply", ObjectOptions(), [1, 2, 3]),
-        ("a.ply", ObjectOptions(up="y"), [1, 3, 2]),
+        ("a.ply", ObjectOptions(up="y"), [1, -3, 2]),
         ("a.ply", ObjectOptions(unit="in"), [25.4, 50.8, 76.2]),
-        ("a.ply", ObjectOptions(unit="cm", up="y"), [10, 30, 20]),
-        ("a.glb", ObjectOptions(unit="mm"), [1, 3, 2]),
+        ("a.ply", ObjectOptions(unit="cm", up="y"), [10, -30, 20]),
+        ("a.glb", ObjectOptions(unit="mm"), [1, -3, 2]),
         ("a.glb", ObjectOptions(unit="cm", up="z"), [10, 20, 30]),
     ],
 )
@@ -160,10 +168,13 @@ def test_nothing_to_see(tmp_path: Path, points: list[list[float]], wrong: str) -
 def test_unit_and_axis(
     tmp_path: Path, name: str, options: ObjectOptions, wanted: list[float]
 ) -> None:
-    trimesh.creation.box((1, 2, 3)).export(tmp_path / name)
+    corner = np.array([1.0, 2, 3])
+    box = trimesh.creation.box(corner)
+    box.apply_translation(corner / 2)  # from the origin to a corner
+    box.export(tmp_path / name)
     told: list[str] = []
     subject = load_object(tmp_path / name, 200.0, options, told.append)
-    assert np.ptp(subject.points, axis=0) == pytest.approx(wanted)
+    assert subject.points[norm(subject.points).argmax()] == pytest.approx(wanted)
     assert subject.reading is not None
     assert told == [f"{name}: unit {subject.reading.unit}, {subject.reading.up} up, "
                     "colours: the built-in pattern, for the file has none"]  # fmt: skip
