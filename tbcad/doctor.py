@@ -190,7 +190,8 @@ def machine_libraries(installed: Iterable[tuple[str, str]]) -> Finding:
     seen = [f"{name} {present[name]}" for name in _MACHINE if name in present]
     missing = [name for name in _MACHINE if name not in present]
     detail = ", ".join([*seen, *(f"no {name}" for name in missing)])
-    remedy = f"only tbcad run and calibrate, raw files and OpenEXR need them: {_pip('install')} 'tbcad[machine]'"
+    users = "tbcad run and calibrate, raw files and OpenEXR"
+    remedy = f"only {users} need them: {_pip('install')} 'tbcad[machine]'"
     return Finding("machine (optional)", True, detail, remedy if missing else "")
 
 

@@ -71,7 +71,5 @@ def test_without_the_library_the_way_to_it_is_said(
 ) -> None:
     (tmp_path / "a.nef").write_bytes(dng(mosaic()))
     monkeypatch.setitem(sys.modules, "rawpy", None)
-    with pytest.raises(
-        InputError, match=r"a\.nef is read by rawpy.*pip install 'tbcad\[machine\]'"
-    ):
+    with pytest.raises(InputError, match=r"read by rawpy.*pip install 'tbcad\[machine\]'"):
         read_picture(tmp_path / "a.nef")
