@@ -127,6 +127,21 @@ def test_pictures_are_found_beside_the_mesh(tmp_path: Path, write: Write, name: 
     assert part.uv[0].tolist() == [[0, 0], [1, 0], [1, 1]]
 
 
+def test_pictures_that_are_transparent_or_unreadable_are_noted(
+    tmp_path: Path, write: Write
+) -> None:
+    lines = "mtllib a.mtl", "usemtl m", "vt 0 0", "f 1/1 2/1 3/1"
+    write("a.mtl", "newmtl m\nmap_Kd tex.png\n")
+    Image.new("RGBA", (2, 2), (9, 8, 7, 100)).save(tmp_path / "tex.png")
+    found = read_object_file(write("a.obj", obj(*lines)))
+    assert found.notes == ["the transparency of its texture tex.png is left out"]
+    assert only(found).picture is not None
+    write("tex.png", "rubbish")
+    found = read_object_file(write("a.obj", obj(*lines)))
+    assert "its texture tex.png is no" in found.notes[0]
+    assert only(found).picture is None
+
+
 def test_links_do_not_lead_out(tmp_path: Path, write: Write) -> None:
     inside = tmp_path / "inside"
     inside.mkdir()
