@@ -29,7 +29,7 @@ class ImageQuality:
     def words(self, other: str) -> str:
         """The figures in a line, against a picture of that name."""
         if math.isnan(self.ssim):
-            return f"nothing to compare: in it and in the {other} picture there is no light or object"
+            return f"nothing to compare: it and the {other} picture are of one colour everywhere"
         return f"PSNR {self.psnr_db:.2f} dB, SSIM {self.ssim:.4f} against the {other} picture"
 
 

@@ -108,7 +108,9 @@ def _read(path: Path) -> Picture | None:
 
 def _in_8_bits(image: Any, name: str) -> Bytes:
     pixels = decoded(image, name)
-    return np.asarray(pixels if pixels.dtype == np.uint8 else pixels >> 8)
+    return np.asarray(
+        pixels if pixels.dtype == np.uint8 else pixels.astype(np.uint16) >> 8, np.uint8
+    )
 
 
 def _on_white(image: Any) -> Any:
