@@ -19,7 +19,8 @@ from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.image_files import write_images
 from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import GREY, SceneObject, built_in_object, load_object
+from tbcad.simulate.scene.object import GREY, SceneObject, built_in_object
+from tbcad.simulate.scene.object_from_file import load_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
@@ -160,7 +161,7 @@ def all_rays(source: LightField, at: Camera) -> Every:
 def plain(subject: SceneObject) -> SceneObject:
     """The object in one grey."""
     colour = np.full((len(subject.faces), 3, 3), GREY)
-    return replace(subject, albedo=colour, uv=None, texture=None, patterned=False)
+    return replace(subject, albedo=colour, uv=None, texture=None, tiles=None, patterned=False)
 
 
 def photographed(cameras: Cameras, scene: Scene, folder: Path) -> None:

@@ -29,7 +29,10 @@ _MIN_DISK_GB = 1.0
 _NO_CORE_DUMP = "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
 
 _KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
-_MACHINE = ("pyserial", "gphoto2", "opencv-python-headless")
+_MACHINE = (
+    *("pyserial", "gphoto2", "opencv-python-headless"),
+    *("rawpy", "imagecodecs", "openexr"),
+)
 _VTKS = ("vtk", "cadquery-vtk")
 _INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
 
@@ -187,7 +190,8 @@ def machine_libraries(installed: Iterable[tuple[str, str]]) -> Finding:
     seen = [f"{name} {present[name]}" for name in _MACHINE if name in present]
     missing = [name for name in _MACHINE if name not in present]
     detail = ", ".join([*seen, *(f"no {name}" for name in missing)])
-    remedy = f"only tbcad run and calibrate need them: {_pip('install')} 'tbcad[machine]'"
+    users = "tbcad run and calibrate, raw files and OpenEXR"
+    remedy = f"only {users} need them: {_pip('install')} 'tbcad[machine]'"
     return Finding("machine (optional)", True, detail, remedy if missing else "")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +11,12 @@ from tbcad.api.arguments import silent
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
+    from tbcad.reflectance.light_directions import LightFormat
     from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.scene.object import Paint, SceneObject
+    from tbcad.simulate.object_files.contents import Up
+    from tbcad.simulate.scene.object import SceneObject
+    from tbcad.simulate.scene.object_from_file import ObjectOptions, Paint, Unit
     from tbcad.types import Progress
 
 
@@ -25,18 +28,23 @@ def capture(
     geometry: Geometry = "spheres",
     fit: bool = False,
     paint: Paint = "own",
+    up: Up | None = None,
+    unit: Unit | None = None,
     samples: int = 1,
     lights: Path | str | None = None,
     every: int = 1,
     force: bool = False,
     progress: Progress = silent,
     detail: Progress = silent,
+    answer: Progress = silent,
 ) -> LightField:
     """Simulate the photographs of both cameras through the mirrors of a build.
 
     Args:
         exports: folder that `build` wrote.
-        object_file: triangle mesh, mm, z up, about the origin; None for a built-in knot.
+        object_file: triangle mesh about the origin; None for a built-in knot.
+        up: axis of that file that points up, "y" or "z"; None: y for glTF, else z.
+        unit: of that file, "mm", "cm", "m" or "in"; None: m for glTF, what a 3MF says, else mm.
         out: folder to write photographs and light field to, as `tbcad capture` does; None: none.
         geometry: mirrors of the record ("spheres"), of the exported meshes ("mesh"), or the
             prototype's balls, stop by stop ("prototype").
@@ -50,6 +58,7 @@ def capture(
         force: replace an earlier capture, and keep files that tbcad did not write.
         progress: called with the name of each stage.
         detail: called with the state of a stage.
+        answer: called with a line that says how the object's file was taken.
 
     Returns:
         The light field, in memory: for every pixel the ray it sees along and its colour.
@@ -60,13 +69,17 @@ def capture(
     from tbcad.output.folder import check_replaceable
     from tbcad.output.inputs import files_named
     from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+    from tbcad.simulate.scene.object_from_file import ObjectOptions
 
     if lights is not None and out is None:
         raise InputError("a reflectance field is written beside the light field: give out")
     if out is not None:
         check_replaceable(Path(out), "capture", force, (exports, object_file, *files_named(lights)))
 
-    photographs = photograph(exports, object_file, geometry, fit, paint, samples, progress, detail)
+    options = ObjectOptions(fit, paint, up, unit)
+    photographs = photograph(
+        exports, object_file, geometry, options, samples, progress, detail, answer
+    )
     if out is not None:
         lamps = None if lights is None else WantedLamps(lights, every)
         write_photographs(photographs, Path(out), force, progress, detail, lamps)
@@ -99,22 +112,22 @@ def photograph(
     exports: Path | str,
     object_file: Path | str | None,
     geometry: Geometry,
-    fit: bool,
-    paint: Paint,
+    options: ObjectOptions,
     samples: int,
     progress: Progress,
     detail: Progress,
+    answer: Progress = silent,
 ) -> Photographs:
     """Prepare both photographs; arguments as for `capture`."""
     from tbcad.simulate.capture.geometry import camera_photographs
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.lamps import lit_by, read_lamps
-    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.simulate.scene.object_from_file import load_or_built_in
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
     progress("object and scene")
     export = read_export(Path(exports))
-    subject = load_or_built_in(object_file, export.capture_mm, fit, paint)
+    subject = load_or_built_in(object_file, export.capture_mm, options, answer)
     lamps = read_lamps(export.folder) if geometry == "prototype" else None
     subject = lit_by(lamps, subject) if lamps else subject
     cameras = camera_photographs(export, prepared_scene(subject), geometry, samples, detail)
@@ -125,6 +138,8 @@ def photograph(
         "geometry": geometry,
         "samples": samples,
     } | ({"light": "lamps of the prototype"} if lamps else {})
+    if subject.reading is not None:
+        facts["object_file"] = asdict(subject.reading)
     return Photographs(cameras, subject, export.capture_mm, facts, (exports, object_file))
 
 
@@ -232,14 +247,22 @@ def _field_writer(
     return write
 
 
-def relight(capture_folder: Path | str, light: Path | str, *, turn_deg: float = 0.0) -> LightField:
+def relight(
+    capture_folder: Path | str,
+    light: Path | str,
+    *,
+    turn_deg: float = 0.0,
+    light_format: LightFormat | None = None,
+) -> LightField:
     """A light field in the light of its surroundings, as `tbcad view --light` shows it.
 
     Args:
         capture_folder: that `capture` wrote with lights.
-        light: picture of the surroundings by direction, Radiance's format (.hdr): longitude along
-            the rows, the zenith at the top, +x in the middle.
+        light: picture of the surroundings by direction, +x in the middle: Radiance (.hdr), OpenEXR
+            (.exr) or TIFF in floating point.
         turn_deg: turns it about z.
+        light_format: of that picture, "latlong", "angular", "mirror-ball" or "cross"; None:
+            latlong, if it is twice as wide as high.
 
     Returns:
         The light field in memory, with other colours.
@@ -254,6 +277,9 @@ def relight(capture_folder: Path | str, light: Path | str, *, turn_deg: float = 
     from tbcad.reflectance.relit import relit
     from tbcad.simulate.capture.light_field import LightField
 
-    folder, environment = Path(capture_folder), read_environment(Path(light), radians(turn_deg))
+    folder, environment = (
+        Path(capture_folder),
+        read_environment(Path(light), radians(turn_deg), light_format),
+    )
     with open_reflectance(folder) as reflectance:
         return relit(LightField.read(folder), reflectance, environment).field

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from tbcad.control.session import Ask, Show
     from tbcad.merged_run.corrections import Options as MergeOptions
     from tbcad.runs.photographs import Run
+    from tbcad.simulate.object_files.contents import Up
+    from tbcad.simulate.scene.object_from_file import Unit
     from tbcad.simulated_run.options import RunOptions
     from tbcad.types import Progress
 
@@ -84,9 +86,12 @@ def simulate_run(
     process: str = "fdm",
     object_file: Path | str | None = None,
     *,
+    up: Up | None = None,
+    unit: Unit | None = None,
     options: RunOptions | None = None,
     progress: Progress = silent,
     detail: Progress = silent,
+    answer: Progress = silent,
 ) -> Run:
     """Simulate all photographs of a run by a random build of the prototype, or of the shell.
 
@@ -94,10 +99,13 @@ def simulate_run(
         exports: folder that `build` wrote, with a prototype.
         out: folder to write, which must not hold anything.
         process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file.
-        object_file: triangle mesh, mm, z up, about the origin; None for a built-in knot.
+        object_file: triangle mesh about the origin; None for a built-in knot.
+        up: axis of that file that points up, "y" or "z"; None: y for glTF, else z.
+        unit: of that file, "mm", "cm", "m" or "in"; None: m for glTF, what a 3MF says, else mm.
         options: seed, stops, phases, noise ...
         progress: called with the name of each stage.
         detail: called with the state of a stage.
+        answer: called with a line that says how the object's file was taken.
 
     Returns:
         The run as it is read back; the build is in its folder, as truth.json.
@@ -108,6 +116,7 @@ def simulate_run(
     from tbcad.output.inputs import files_named
     from tbcad.runs.photographs import read_run
     from tbcad.simulate.scene.exported import read_export
+    from tbcad.simulate.scene.object_from_file import ObjectOptions
     from tbcad.simulated_run.options import RunOptions
     from tbcad.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerance.process.process import load_process, process_errors
@@ -117,7 +126,7 @@ def simulate_run(
     errors = process_errors(load_process(process))
     progress("build and object")
     export = read_export(Path(exports))
-    subject = run_object(export, object_file)
+    subject = run_object(export, object_file, ObjectOptions(up=up, unit=unit), answer)
     runs, phases = prepare_run(export, errors, subject, options or RunOptions())
     progress("photographs")
     write_run(runs, phases, export.folder, folder, detail)

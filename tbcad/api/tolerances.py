@@ -11,6 +11,8 @@ from tbcad.loading import large_libraries
 from tbcad.spec.load import option_texts
 
 if TYPE_CHECKING:
+    from tbcad.simulate.object_files.contents import Up
+    from tbcad.simulate.scene.object_from_file import Unit
     from tbcad.tolerance.analysis import Analysis
     from tbcad.tolerance.options import ToleranceOptions
     from tbcad.types import Progress
@@ -21,6 +23,8 @@ def analyse(
     process: str | None = None,
     object_file: Path | str | None = None,
     *,
+    up: Up | None = None,
+    unit: Unit | None = None,
     settings: Settings = (),
     options: ToleranceOptions | None = None,
     progress: Progress = silent,
@@ -34,17 +38,20 @@ def analyse(
         process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file; by default "sla", and the
             yields of all built-in processes are compared.
         object_file: mesh that is photographed for the sharpness; None for a built-in knot.
+        up: axis of that file that points up, "y" or "z"; None: y for glTF, else z.
+        unit: of that file, "mm", "cm", "m" or "in"; None: m for glTF, what a 3MF says, else mm.
         settings: "kind=value" texts that change errors of the process.
         options: number of builds, wanted yield, seed, whether margins are searched for ...
         progress: called with the name of each stage.
         detail: called with the state of a stage.
-        answer: called with the yield, in words, as soon as it is known.
+        answer: called with how the object's file was taken, and with the yield as soon as it is
+            known, in words.
 
     Raises:
         InputError: export or process cannot be read, or mirrors are planar.
     """
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import load_or_built_in
+    from tbcad.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
     from tbcad.tolerance.analysis import analyse as analyse_export
     from tbcad.tolerance.options import ToleranceOptions
     from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
@@ -55,7 +62,8 @@ def analyse(
     made_by = load_process(process or DEFAULT_PROCESS, option_texts(settings))
     progress(RECORD)
     export = read_export(Path(exports))
-    subject = load_or_built_in(object_file, export.capture_mm)
+    options_of_object = ObjectOptions(up=up, unit=unit)
+    subject = load_or_built_in(object_file, export.capture_mm, options_of_object, answer)
     return analyse_export(export, made_by, subject, asked, progress, detail, answer)
 
 

@@ -97,8 +97,5 @@ def write_compared(
         {names[0]: picture, names[1]: truth, "difference": difference(truth, picture)}
     )
     write_images({out: picture, files[0]: truth, files[1]: sheet})
-    quality = image_quality(truth, picture)
-    typer.echo(
-        f"PSNR {quality.psnr_db:.2f} dB, SSIM {quality.ssim:.4f} against the {names[1]} picture"
-    )
+    typer.echo(image_quality(truth, picture).words(names[1]))
     typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")

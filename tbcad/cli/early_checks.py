@@ -38,12 +38,14 @@ def check_is_export(folder: Path) -> None:
         raise InputError(f"{path} is not there: name a folder that tbcad build wrote")
 
 
-def check_is_object(path: Path | None) -> None:
+def check_is_object(path: Path | None, up: str | None, unit: str | None) -> None:
     """Refuse a mesh that is no file; without one the built-in object is taken.
 
     Raises:
-        InputError: it is none.
+        InputError: it is none, or its axis or unit is given without it.
     """
+    if path is None and (up or unit):
+        raise InputError("--up and --unit are of a file: give --object too, or leave them out")
     if path is not None and not path.is_file():
         raise InputError(f"{path}: no such file; give a triangle mesh (PLY, STL, OBJ, GLB ...)")
 

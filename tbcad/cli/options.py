@@ -81,8 +81,22 @@ ObjectFile = Annotated[
     typer.Option(
         "--object",
         metavar="FILE",
-        help="Triangle mesh (PLY, STL, OBJ, GLB ...) in mm, z up, about the origin, with vertex "
-        "colours or a texture; by default a built-in knot.",
+        help="Triangle mesh (PLY, STL, OBJ, OFF, GLB, glTF, 3MF) about the origin, with its "
+        "colours or textures; by default a built-in knot.",
+    ),
+]
+UpOption = Annotated[
+    Literal["y", "z"] | None,
+    typer.Option(
+        "--up",
+        help="The axis of the object's file that points up; by default y for GLB and glTF, else z.",
+    ),
+]
+UnitOption = Annotated[
+    Literal["mm", "cm", "m", "in"] | None,
+    typer.Option(
+        "--unit",
+        help="Of the object's file; by default m for GLB and glTF, what a 3MF says, else mm.",
     ),
 ]
 PlotFormatOption = Annotated[

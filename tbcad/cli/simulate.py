@@ -7,7 +7,15 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_export, check_is_object
-from tbcad.cli.options import Exports, Force, JsonResult, ObjectFile, PaintOption
+from tbcad.cli.options import (
+    Exports,
+    Force,
+    JsonResult,
+    ObjectFile,
+    PaintOption,
+    UnitOption,
+    UpOption,
+)
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
 from tbcad.screen import stages
@@ -23,6 +31,8 @@ CAPTURES, BUILT_IN = Path("captures"), "knot"
 def capture(
     folder: Exports,
     object_file: ObjectFile = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -102,18 +112,19 @@ def capture(
     if frames is not None and (samples > 1 or prototype):
         raise InputError("--frames follows one ray a pixel: leave out --samples and --prototype")
     check_is_export(folder)
-    check_is_object(object_file)
+    check_is_object(object_file, up, unit)
     from tbcad.api import WantedFrames, WantedLamps, photograph, write_photographs
     from tbcad.output.folder import check_replaceable
     from tbcad.output.inputs import files_named
+    from tbcad.simulate.scene.object_from_file import ObjectOptions
 
     out = out or CAPTURES / (object_file.stem if object_file else BUILT_IN)
     geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     check_replaceable(out, "capture", force, (folder, object_file, *files_named(lights)))
+    options = ObjectOptions(fit, paint, up, unit)
     with stages(3 + (lights is not None) + (frames is not None)) as screen:
-        photographs = photograph(
-            folder, object_file, geometry, fit, paint, samples, screen.stage, screen.detail
-        )
+        said = screen.stage, screen.detail, screen.note
+        photographs = photograph(folder, object_file, geometry, options, samples, *said)
         lamps = None if lights is None else WantedLamps(lights, every)
         moving = None if frames is None else WantedFrames(frames, turn)
         record = write_photographs(

@@ -7,7 +7,7 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_export, check_is_object
-from tbcad.cli.options import Exports, ObjectFile
+from tbcad.cli.options import Exports, ObjectFile, UnitOption, UpOption
 from tbcad.errors import InputError
 from tbcad.screen import stages
 
@@ -29,6 +29,8 @@ def simulate_run(
         Path, typer.Option("--out", "-o", help="Folder for the run; it must not hold anything.")
     ] = Path("run"),
     object_file: ObjectFile = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     stops: Annotated[
         str | None,
         typer.Option(metavar="LIST", help="Only these stops, as 1,5,20-30; by default all."),
@@ -65,7 +67,7 @@ def simulate_run(
     these photographs should find.
     """
     check_is_export(folder)
-    check_is_object(object_file)
+    check_is_object(object_file, up, unit)
     if bits not in (8, 16):
         raise InputError(f"--bits {bits} is not written: allowed is 8 or 16")
     chosen = None if stops is None else numbers(stops)
@@ -81,9 +83,12 @@ def simulate_run(
             out,
             process,
             object_file,
+            up=up,
+            unit=unit,
             options=options,
             progress=screen.stage,
             detail=screen.detail,
+            answer=screen.note,
         )
     record = run.record
     count = len(record.frames) * len(record.phases)

@@ -8,10 +8,19 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_object
-from tbcad.cli.options import Distance, MethodOption, ObjectFile, PaintOption, Scheduler
+from tbcad.cli.options import (
+    Distance,
+    MethodOption,
+    ObjectFile,
+    PaintOption,
+    Scheduler,
+    UnitOption,
+    UpOption,
+)
 from tbcad.cli.study_command import Work, of_design, of_export
 
 if TYPE_CHECKING:
+    from tbcad.simulate.scene.object import SceneObject
     from tbcad.simulate.study.pixels import Sensor
     from tbcad.spec.design import Spec
 
@@ -107,6 +116,8 @@ def depth_command(
 def ssim_command(
     spec: "Spec",
     object_file: ObjectFile = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     paint: PaintOption = "own",
     sensors: Sensors = None,
     method: MethodOption = "nearest",
@@ -114,14 +125,13 @@ def ssim_command(
     distance: Distance = 640.0,
 ) -> Work:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
-    check_is_object(object_file)
-    from tbcad.simulate.scene.object import load_or_built_in
+    check_is_object(object_file, up, unit)
     from tbcad.simulate.study.ssim import ssim
     from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
 
     simulated = _sensors(sensors, spec)
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
-    subject = load_or_built_in(object_file, spec.optics.capture_diameter_mm, paint=paint)
+    subject = _subject(object_file, spec.optics.capture_diameter_mm, paint, up, unit)
     return partial(ssim, spec, subject, simulated, places, method)
 
 
@@ -151,6 +161,8 @@ def balance_command(
 def prototype_command(
     folder: Path,
     object_file: ObjectFile = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     paint: PaintOption = "own",
     method: MethodOption = "nearest",
     azimuths: Azimuths = 4,
@@ -160,15 +172,14 @@ def prototype_command(
     ] = 3,
 ) -> Work:
     """Compare views from the prototype's merged photographs with those of the full shell."""
-    check_is_object(object_file)
+    check_is_object(object_file, up, unit)
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.simulate.study.prototype_vs_shell import prototype_vs_shell
     from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
 
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
-    subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
+    subject = _subject(object_file, export.capture_mm, paint, up, unit)
     return partial(prototype_vs_shell, export, subject, places, method, samples)
 
 
@@ -177,6 +188,8 @@ def prototype_command(
 def low_pass_command(
     folder: Path,
     object_file: ObjectFile = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     paint: PaintOption = "own",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
@@ -201,9 +214,8 @@ def low_pass_command(
     ] = 2,
 ) -> Work:
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
-    check_is_object(object_file)
+    check_is_object(object_file, up, unit)
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object import load_or_built_in
     from tbcad.simulate.study.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass
     from tbcad.simulate.study.viewpoints import viewpoints_around
 
@@ -213,7 +225,7 @@ def low_pass_command(
     ).checked()
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
-    subject = load_or_built_in(object_file, export.capture_mm, paint=paint)
+    subject = _subject(object_file, export.capture_mm, paint, up, unit)
     return partial(low_pass, export, subject, places, options)
 
 
@@ -226,6 +238,16 @@ def calibration_command(folder: Path) -> Work:
 
     export = read_export(folder)
     return partial(calibration_study, export)
+
+
+def _subject(
+    object_file: Path | None, capture_mm: float, paint: PaintOption, up: UpOption, unit: UnitOption
+) -> "SceneObject":
+    """The object of a study; one line on stderr says how its file was taken."""
+    from tbcad.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+
+    options = ObjectOptions(paint=paint, up=up, unit=unit)
+    return load_or_built_in(object_file, capture_mm, options, partial(typer.echo, err=True))
 
 
 def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:

@@ -7,7 +7,16 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_calibration, check_is_export, check_is_object
-from tbcad.cli.options import Exports, JsonResult, ObjectFile, Out, PlotFormatOption, Scheduler
+from tbcad.cli.options import (
+    Exports,
+    JsonResult,
+    ObjectFile,
+    Out,
+    PlotFormatOption,
+    Scheduler,
+    UnitOption,
+    UpOption,
+)
 from tbcad.errors import InputError
 from tbcad.screen import paragraph, stages
 
@@ -56,6 +65,8 @@ def tolerance(
         ),
     ] = None,
     object_file: ObjectFile = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     scheduler: Scheduler = None,
     out: Out = Path("tolerance"),
     json: JsonResult = False,
@@ -84,7 +95,7 @@ def tolerance(
         builds, seed, share, calibrated_mrad / 1000, scheduler, margins=margins
     )
     check_is_export(folder)
-    check_is_object(object_file)  # as all before, refused before the heavy libraries are loaded
+    check_is_object(object_file, up, unit)  # as all before, before heavy libraries are loaded
     from tbcad.api import analyse
     from tbcad.simulate.study.study import check_study_folder, write_study
     from tbcad.tolerance.report import json_text, summary_text, tolerance_study
@@ -96,6 +107,8 @@ def tolerance(
             folder,
             process,
             object_file,
+            up=up,
+            unit=unit,
             settings=changes,
             options=options,
             progress=screen.stage,

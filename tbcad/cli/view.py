@@ -1,5 +1,6 @@
 """Synthesise views from a light field."""
 
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 LIT_SAMPLES = 2
 
 Surface = Literal["plane", "depth", "object"]
+LightFormat = Literal["latlong", "angular", "mirror-ball", "cross"]
 
 
 class _Choice(NamedTuple):
@@ -84,13 +86,20 @@ def view(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Show the object in the light of its surroundings, a picture by direction (.hdr), "
-            "by the reflectance field of tbcad capture --lights.",
+            help="Show the object in the light of its surroundings, a picture by direction (.hdr, "
+            ".exr), by the reflectance field of tbcad capture --lights.",
         ),
     ] = None,
     light_turn: Annotated[
         float, typer.Option(help="Turns that light about z, degrees, counterclockwise from above.")
     ] = 0.0,
+    light_format: Annotated[
+        LightFormat | None,
+        typer.Option(
+            help="How that picture has its directions, +x in the middle and up at the top: latlong "
+            "(the default where it is 2:1), a disc (angular, mirror-ball), or a cross of six faces."
+        ),
+    ] = None,
     frame: Annotated[
         int | None,
         typer.Option(
@@ -118,9 +127,11 @@ def view(
         raise InputError("--frame has its own light and place: leave out --light and --surface")
     if light is None and light_turn:
         raise InputError(f"--light-turn {light_turn:g} turns no light: add --light")
+    if light is None and light_format is not None:
+        raise InputError(f"--light-format {light_format} is of no light: add --light")
     if choice.surface == "object" and not has_object(capture_folder):
         raise InputError(f"{capture_folder} has no object: leave out --surface object")
-    wanted = None if light is None else _environment(light, light_turn)
+    wanted = None if light is None else _environment(light, light_turn, light_format)
     with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
         source = stored if frame is None else _frame(stored, capture_folder, frame)
@@ -145,7 +156,9 @@ def view(
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
     write_compared(out, picture, truth, (choice.method, "ray-traced"))
     if same_lamps is not None:
-        typer.echo(f"SSIM {_ssim(same_lamps, picture):.4f} against one lit by the same lamps")
+        ssim = _ssim(same_lamps, picture)
+        if not isnan(ssim):
+            typer.echo(f"SSIM {ssim:.4f} against one lit by the same lamps")
     for file in files:
         typer.echo(f"{file}: depth")
     return 0
@@ -169,12 +182,12 @@ def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["S
     return lit_when_turned(scene, angle), camera_before_turn(at, angle)
 
 
-def _environment(light: Path, turn_deg: float) -> "Environment":
+def _environment(light: Path, turn_deg: float, kind: LightFormat | None) -> "Environment":
     from math import radians
 
     from tbcad.reflectance.environment import read_environment
 
-    return read_environment(light, radians(turn_deg))
+    return read_environment(light, radians(turn_deg), kind)
 
 
 def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":

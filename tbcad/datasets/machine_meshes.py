@@ -6,6 +6,7 @@ import numpy as np
 
 from tbcad.formats.ply import mesh_ply
 from tbcad.geometry.vectors import unit
+from tbcad.simulate.object_files.normals import is_closed
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, SurfaceHits
@@ -15,6 +16,7 @@ from tbcad.types import Floats, Ints
 
 # Colours that are no function of the facets' corners, patterns and textures, are sampled so finely.
 FINEST_MM, MOST_PARTS = 1.0, 64
+BEHIND_MM = 1e-3
 
 
 class Mesh(NamedTuple):
@@ -69,13 +71,31 @@ def _separate(count: int) -> Ints:
 
 
 def object_mesh(scene: Scene) -> Mesh:
-    """The object with the colours that a capture shows, light included: what it sends out."""
+    """The object with the colours that a capture shows, light included: what it sends out.
+
+    Renderers see light on the outside of facets; one that does not enclose a body has a back too.
+    """
+    subject, divided = scene.subject, _divided(scene.subject)
+    outside = _side(scene, *divided, 1.0)
+    if is_closed(subject.points, subject.faces):
+        return outside
+    back = _side(scene, *divided, -1.0)
+    return Mesh(
+        np.concatenate([outside.points, back.points]),
+        np.concatenate([outside.normals, back.normals]),
+        np.concatenate([outside.faces, back.faces[:, ::-1] + len(outside.points)]),
+        np.concatenate([outside.colours, back.colours]),
+    )
+
+
+def _side(scene: Scene, facet: Ints, weight: Floats, faces: Ints, side: float) -> Mesh:
+    """The outside (1), or the back (-1), which is a little behind it."""
     subject = scene.subject
-    facet, weight, faces = _divided(subject)
-    hits = SurfaceHits(np.arange(len(facet)), np.zeros(len(facet)), facet, weight)
-    spots = hits.spots(subject)
-    light = (scene.shade[subject.faces[facet]] * weight).sum(axis=1)
-    return Mesh(spots.place, spots.normal, faces, hits.albedo(subject) * light[:, None])
+    toward = -side * _facet_normals(subject.points[subject.faces])[facet]
+    hits = SurfaceHits(np.arange(len(facet)), np.zeros(len(facet)), facet, weight, toward)
+    spots, light = hits.spots(subject), hits.light(subject, scene.shade)
+    place = spots.place if side > 0 else spots.place + BEHIND_MM * spots.facet_normal
+    return Mesh(place, spots.normal, faces, hits.albedo(subject) * light[:, None])
 
 
 def _divided(subject: SceneObject) -> tuple[Ints, Floats, Ints]:

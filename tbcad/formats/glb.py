@@ -10,6 +10,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from tbcad.cad.assembly import ColouredMesh, MeshGroup
+from tbcad.srgb import srgb_light
 
 # Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
 UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
@@ -38,7 +39,8 @@ def _drawn(body: ColouredMesh) -> trimesh.Trimesh:
     drawn.visual = TextureVisuals(
         material=PBRMaterial(
             name=body.name,
-            baseColorFactor=[*body.colour],
+            # light, not its code (glTF 2.0, 3.9.2)
+            baseColorFactor=[*srgb_light(np.array(body.colour[:3])), body.colour[3]],
             metallicFactor=METAL,
             roughnessFactor=ROUGH,
             alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",

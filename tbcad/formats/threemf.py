@@ -38,7 +38,7 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(DECIMALS)
     try:
-        with _same_locale():
+        with same_locale():
             writer.WriteToFile(str(path))
     except lib3mf.ELib3MFException as error:
         raise incomplete(path) from error
@@ -46,7 +46,7 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
 
 
 @contextmanager
-def _same_locale() -> Iterator[None]:
+def same_locale() -> Iterator[None]:
     """The library leaves the process in the locale C, in which Python opens texts as ASCII."""
     before = locale.setlocale(locale.LC_ALL)
     try:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.optics.lens_camera import LensCamera, vignetting
 from tbcad.runs.images import Image16, read_image
+from tbcad.srgb import srgb, srgb_light
 from tbcad.types import Bytes, Floats, Ints
 
 Vignetting = Literal["off", "cos4"]
@@ -107,7 +108,7 @@ def flat_field_gain(files: Sequence[Path], encoding: Encoding, camera: LensCamer
     size = camera.height_px, camera.width_px
     total = np.zeros((*size, 3), dtype=np.float32)
     for file in files:
-        image = read_image(file, "photograph an even surface again")
+        image = read_image(file)
         if image.shape[:2] != size:
             raise InputError(
                 f"{file} is {image.shape[1]} x {image.shape[0]} pixels, the run's photographs are "
@@ -120,16 +121,6 @@ def flat_field_gain(files: Sequence[Path], encoding: Encoding, camera: LensCamer
     share = total / full
     lit = share > LEAST_LIGHT
     return np.where(lit, 1 / np.where(lit, share, 1), 0).astype(np.float32)
-
-
-def srgb(light: Floats) -> Floats:
-    """Light, 0 to 1, as IEC 61966-2-1 encodes it, 0 to 1."""
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-
-
-def srgb_light(values: Floats) -> Floats:
-    """The inverse of `srgb`."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def _table(kind: np.dtype[np.uint8] | np.dtype[np.uint16], encoding: Encoding) -> Singles:

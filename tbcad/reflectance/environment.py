@@ -1,9 +1,4 @@
-"""Light from all around, as a picture by direction, and the lamps that stand for it.
-
-The picture has longitude along its rows and latitude down its columns: the top row is the zenith,
-the middle column is azimuth 0 (+x), and azimuths fall toward the right, as one sees them from the
-inside.
-"""
+"""Light from all around, as a picture by direction, and the lamps that stand for it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +7,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
-from tbcad.formats.radiance import read_hdr
+from tbcad.formats.light_pictures import read_light
 from tbcad.geometry.vectors import norm, unit
+from tbcad.reflectance.light_directions import LightFormat, light_pixels
 from tbcad.simulate.scene.point_lights import PointLights
 from tbcad.types import Floats
 
@@ -64,34 +60,35 @@ def even_directions(count: int) -> Floats:
     return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1)
 
 
-def environment(picture: Floats, turn: float = 0.0) -> Environment:
-    """The light of a picture (h, w, 3), turned about z by an angle, radians."""
-    height, width = picture.shape[:2]
-    edges = np.pi / 2 - np.pi * np.arange(height + 1) / height
-    solid_angle = (np.sin(edges[:-1]) - np.sin(edges[1:])) * 2 * np.pi / width
-    elevation = (edges[:-1] + edges[1:]) / 2
-    azimuth = turn + np.pi - 2 * np.pi * (np.arange(width) + 0.5) / width
-    above = np.flatnonzero(elevation > 0)
-    level = np.cos(elevation[above])[:, None]
-    direction = np.stack(
-        [
-            level * np.cos(azimuth),
-            level * np.sin(azimuth),
-            np.broadcast_to(np.sin(elevation[above])[:, None], (len(above), width)),
-        ],
-        axis=-1,
-    )
-    light = picture[above] * solid_angle[above, None, None]
-    return Environment(direction.reshape(-1, 3), light.reshape(-1, 3))
+def environment(
+    picture: Floats, turn: float = 0.0, kind: LightFormat | None = None, name: str = "the picture"
+) -> Environment:
+    """The light of a picture (h, w, 3) of the surroundings.
 
-
-def read_environment(path: Path, turn: float = 0.0) -> Environment:
-    """The light of a file.
+    Args:
+        picture: linear red, green, blue.
+        turn: about z, radians.
+        kind: format of the picture; None: latlong, if it has the shape of one.
+        name: of the picture, for the error.
 
     Raises:
-        InputError: it cannot be read, or is dark above the horizon.
+        InputError: its shape is not that of its format.
     """
-    found = environment(read_hdr(path), turn)
+    pixels = light_pixels(picture, kind, name)
+    above = pixels.direction[:, 2] > 0
+    cosine, sine = np.cos(turn), np.sin(turn)
+    about_z = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    light = picture[pixels.row[above], pixels.column[above]]
+    return Environment(pixels.direction[above] @ about_z, light * pixels.solid_angle[above, None])
+
+
+def read_environment(path: Path, turn: float = 0.0, kind: LightFormat | None = None) -> Environment:
+    """The light of a file; else as `environment`.
+
+    Raises:
+        InputError: it cannot be read, is not of that format, or is dark above the horizon.
+    """
+    found = environment(read_light(path), turn, kind, str(path))
     if not (found.light > 0).any():
-        raise InputError(f"{path} is dark above the horizon: its upper half must have light")
+        raise InputError(f"{path} is dark above the horizon: it must have light there")
     return found

@@ -14,6 +14,7 @@ import numpy as np
 import pyvista
 import trimesh
 
+from tbcad.srgb import shown_colour
 from tbcad.types import Floats
 
 Record = dict[str, Any]
@@ -217,7 +218,7 @@ def assembly_bodies(folder: Path, record: Record) -> list[Drawn]:
         faces = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces])
         surface = pyvista.PolyData(points, faces.ravel()).clean()
         surface = surface.compute_normals(split_vertices=True, feature_angle=30.0)
-        colour = mesh.visual.material.baseColorFactor / 255
+        colour = np.array(shown_colour(mesh.visual.material.baseColorFactor))
         drawn.append(Drawn(name, scene.graph.transforms.parents[name], surface, colour))
     return drawn
 

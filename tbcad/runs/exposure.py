@@ -20,7 +20,6 @@ from tbcad.formats.checked_files import Finite, Record
 
 EXPOSURE_SCHEMA = "tbcad-exposure/1"
 PHOTOGRAPHS = "photographs"
-SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg")
 DARK, LIT = "dark", "lit"
 """Phases beside those of the LEDs, which have the names of prototype.json: led_1, led_2 ..."""
 
@@ -59,7 +58,7 @@ class Exposure(Record):
 
     frame: Frame
     phase: PhaseName
-    file: str = Field(pattern=r"^[ab]_\d{4,7}_[a-z]+(_\d+)?\.[a-z]+$")
+    file: str = Field(pattern=r"^[ab]_\d{4,7}_[a-z]+(_\d+)?\.[a-z0-9]+$")
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     width_px: int = Field(ge=16, le=65_536)
     height_px: int = Field(ge=16, le=65_536)

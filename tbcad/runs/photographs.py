@@ -78,7 +78,7 @@ def read_photograph(run: Run, exposure: Exposure) -> Image16:
         raise InputError(f"{path} cannot be read: {error.strerror}: {AGAIN}") from None
     if hashlib.sha256(data).hexdigest() != exposure.sha256:
         raise InputError(f"{path} is not the file that was photographed: {AGAIN}")
-    pixels = decoded_image(path, data, AGAIN)
+    pixels = decoded_image(data, str(path))
     if pixels.shape[:2] != (exposure.height_px, exposure.width_px):
         raise InputError(f"{path} has another size than its sidecar says: {AGAIN}")
     return pixels

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.errors import InputError
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, SUFFIXES, Exposure, exposure_name
+from tbcad.formats.pictures import PICTURE_SUFFIXES
+from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, exposure_name
 from tbcad.runs.photographs import read_run
 from tbcad.runs.record import JOURNAL, RECORD, RUN_SCHEMA, RunRecord, read_record
 
@@ -139,7 +140,7 @@ def _remove_remains(folder: Path, names: set[str], kept: dict[str, Exposure]) ->
         path.unlink()
     whole = {f"{name}.json" for name in kept} | {one.file for one in kept.values()}
     for path in (folder / PHOTOGRAPHS).glob("*"):
-        ours = path.stem in names and path.suffix in (*SUFFIXES, ".json")
+        ours = path.stem in names and path.suffix in (*PICTURE_SUFFIXES, ".json")
         if ours and path.name not in whole:
             path.unlink()
 

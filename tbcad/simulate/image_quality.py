@@ -1,5 +1,6 @@
 """How like two pictures are."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +19,18 @@ class ImageQuality:
     Attributes:
         psnr_db: peak signal to noise ratio; infinite for equal pictures.
         ssim: structural similarity, 1 for equal pictures.
+
+    Both are NaN where the pictures show nothing but one and the same colour, black for instance.
     """
 
     psnr_db: float
     ssim: float
+
+    def words(self, other: str) -> str:
+        """The figures in a line, against a picture of that name."""
+        if math.isnan(self.ssim):
+            return f"nothing to compare: it and the {other} picture are of one colour everywhere"
+        return f"PSNR {self.psnr_db:.2f} dB, SSIM {self.ssim:.4f} against the {other} picture"
 
 
 def image_quality(truth: Bytes, picture: Bytes) -> ImageQuality:
@@ -37,6 +46,8 @@ def image_quality_map(truth: Bytes, picture: Bytes) -> tuple[ImageQuality, Float
     """The same, and SSIM about each pixel, the mean over the colours, (h, w)."""
     from skimage.metrics import structural_similarity
 
+    if (truth == truth[:1, :1]).all() and np.array_equal(truth, picture):
+        return ImageQuality(math.nan, math.nan), np.full(truth.shape[:2], math.nan)
     error = np.mean((truth.astype(np.float64) - picture.astype(np.float64)) ** 2)
     psnr = float(10 * np.log10(255**2 / error)) if error > 0 else float("inf")
     ssim, about = structural_similarity(

@@ -28,7 +28,8 @@ from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.lamps import lit_by, read_lamps
-from tbcad.simulate.scene.object import SceneObject, built_in_object, load_object
+from tbcad.simulate.scene.object import SceneObject, built_in_object
+from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.occluders import Occluders, stage_scene
 from tbcad.simulated_run.options import RunOptions
@@ -239,7 +240,12 @@ def _write_json(path: Path, value: dict[str, object]) -> None:
     path.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
 
 
-def run_object(export: ExportedDesign, file: Path | str | None) -> SceneObject:
+def run_object(
+    export: ExportedDesign,
+    file: Path | str | None,
+    options: ObjectOptions | None = None,
+    told: Progress | None = None,
+) -> SceneObject:
     """The object of a file, or the built-in one in the size that stands on the stage.
 
     Raises:
@@ -247,4 +253,6 @@ def run_object(export: ExportedDesign, file: Path | str | None) -> SceneObject:
     """
     stage = export.spec.prototype.stage
     room = min(export.capture_mm, stage.object_diameter_mm, 2 * abs(stage.top_mm))
-    return load_object(Path(file), export.capture_mm) if file else built_in_object(room)
+    if file is None:
+        return built_in_object(room)
+    return load_object(Path(file), export.capture_mm, options, told)

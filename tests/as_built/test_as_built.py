@@ -75,7 +75,7 @@ class TestFiles:
         assert shown == pytest.approx(expected.tolist(), abs=0.5 / 255)
 
     def test_the_legend_has_the_colours_of_the_scale(self, written: Path) -> None:
-        found = read_image(written / "legend.png", "draw it again")
+        found = read_image(written / "legend.png")
         ends = colours(np.array([0.0, 1.0]))
         assert found[30, 40] / 255 == pytest.approx(ends[0], abs=0.01)
         assert found[30, -41] / 255 == pytest.approx(ends[1], abs=0.01)

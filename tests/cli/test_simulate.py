@@ -85,6 +85,35 @@ def test_capture_is_named_after_its_object(
     assert sorted(path.name for path in Path("captures").iterdir()) == ["knot", "my box"]
 
 
+def test_capture_says_how_a_file_was_taken(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file of millimetres, y up, whose texture is lost."""
+    (tmp_path / "a.mtl").write_text("newmtl m\nKd 1 0.5 0\nmap_Kd C:\\lost.png\n")
+    (tmp_path / "a.obj").write_text(
+        "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nvt 0 0\nf 1/1 2/1 3/1\n"
+    )
+    arguments = ["capture", str(record), "--object", str(tmp_path / "a.obj"), "--up", "y"]
+    assert run([*arguments, "--out", str(tmp_path / "out"), "--json"]) == 0
+    printed = capsys.readouterr()
+    lost = "its texture C:\\lost.png is not in the folder of the mesh"
+    assert f"tbcad: warning: a.obj: {lost}" in printed.err
+    assert "a.obj: unit mm, y up, colours: colours of materials (Kd)" in printed.err
+    wanted = {"unit": "mm", "up": "y", "colours": "colours of materials (Kd)", "left_out": [lost]}
+    assert json.loads(printed.out)["object_file"] == wanted
+    assert json.loads((tmp_path / "out/capture.json").read_text())["object_file"] == wanted
+
+
+@pytest.mark.parametrize("command", [["capture"], ["simulate-run"], ["study", "prototype"],
+                                     ["study", "low-pass"], ["tolerance"]])  # fmt: skip
+def test_unit_and_axis_are_of_a_file(
+    command: list[str], record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([*command, str(record), "--unit", "cm", "--out", str(tmp_path / "out")]) == 2
+    assert "give --object too, or leave them out" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_capture_of_a_mesh_that_is_too_large(
     record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -222,7 +251,7 @@ def test_the_method_and_why(
 
 @pytest.mark.parametrize(
     ("size_mm", "more", "warned"),
-    [(0.04, [], "metres"), (1.5, [], "inches"), (0.04, ["--fit"], ""), (20, [], "")],
+    [(0.04, [], "--unit m"), (1.5, [], "--unit in"), (0.04, ["--fit"], ""), (20, [], "")],
 )
 def test_an_object_in_another_unit_is_warned_of(
     record: Path,

@@ -78,8 +78,11 @@ def test_no_camera(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
         ("command:no-such-program {output}", "there is no program no-such-program"),
         ("command:false {output}", "the camera's command ended with 1"),
         ("command:true {output}", "wrote no file at {output}"),
-        ("command:cp /etc/hostname {output}.nef", "set its image format to JPEG, TIFF or PNG"),
-        ("command:cp /etc/hostname {output}.jpg", "the photograph cannot be read"),
+        (
+            "command:cp /etc/hostname {output}.heic",
+            "set its image format to JPEG, TIFF, PNG or raw",
+        ),
+        ("command:cp /etc/hostname {output}.jpg", "photograph.jpg is no TIFF, PNG, JPEG"),
         ("folder:/no/such/folder", "there is no such folder"),
     ],
 )

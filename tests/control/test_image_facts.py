@@ -52,10 +52,11 @@ def test_facts_of_a_bare_file() -> None:
 @pytest.mark.parametrize(
     ("suffix", "cut", "says"),
     [
-        (".cr2", None, "set its image format to JPEG, TIFF or PNG"),
+        (".heic", None, "set its image format to JPEG, TIFF, PNG or raw"),
+        (".cr2", None, "of a camera that LibRaw does not know"),
         (".png", None, "is a JPEG file and is called .png"),
-        (".jpg", -200, "cannot be read"),
-        (".jpg", 0, "cannot be read"),
+        (".jpg", -200, "damaged or cut short"),
+        (".jpg", 0, "is no TIFF, PNG, JPEG"),
     ],
 )
 def test_files_that_will_not_do(suffix: str, cut: int | None, says: str) -> None:

@@ -173,8 +173,9 @@ def test_patterns_are_sampled_finely() -> None:
         mesh.points[mesh.faces[:, 1]] - mesh.points[mesh.faces[:, 0]],
         mesh.points[mesh.faces[:, 2]] - mesh.points[mesh.faces[:, 0]],
     )
-    assert area[:, 2].min() > 0
-    assert area[:, 2].sum() / 2 == pytest.approx(200)
+    for side in (1, -1):  # a plate is seen from both
+        assert (side * area[:, 2]).clip(0).sum() / 2 == pytest.approx(200)
+    assert sorted({float(z) for z in mesh.points[:, 2]}) == pytest.approx([-0.001, 0])
     sides = mesh.points[mesh.faces] - np.roll(mesh.points[mesh.faces], 1, axis=1)
     assert np.linalg.norm(sides, axis=2).max() <= 1.0
     cloud = trimesh.load(io.BytesIO(mesh.ply()), file_type="ply", process=False)

@@ -70,9 +70,20 @@ def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
 
 
 def test_quality_of_equal_images() -> None:
-    same = image_quality(RED, RED)
+    striped = np.where(np.arange(RED.shape[1])[None, :, None] % 2, RED, 0).astype(np.uint8)
+    same = image_quality(striped, striped)
     assert same.ssim == pytest.approx(1)
     assert same.psnr_db == float("inf")
+
+
+@pytest.mark.parametrize("level", [0, 90])
+def test_pictures_of_nothing_are_not_compared(level: int) -> None:
+    even = np.full((24, 32, 3), level, dtype=np.uint8)
+    quality, about = image_quality_map(even, even)
+    assert np.isnan([quality.psnr_db, quality.ssim]).all()
+    assert np.isnan(about).all()
+    assert quality.words("true").startswith("nothing to compare")
+    assert image_quality(even, even + np.uint8(9)).psnr_db < 40
 
 
 def test_psnr_in_closed_form() -> None:

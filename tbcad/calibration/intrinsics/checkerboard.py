@@ -1,11 +1,11 @@
 """A lens solved by OpenCV from photographs of a board (Zhang 2000)."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from tbcad.calibration.intrinsics.boards import (
     MIN_CORNERS,
@@ -16,12 +16,14 @@ from tbcad.calibration.intrinsics.boards import (
 from tbcad.calibration.intrinsics.lens import Lens
 from tbcad.calibration.intrinsics.opencv import cv
 from tbcad.errors import InputError
-from tbcad.runs.exposure import SUFFIXES
+from tbcad.formats.pictures import visible_files
+from tbcad.runs.images import read_image
 from tbcad.types import Floats, Progress
 
 MIN_BOARDS = 6
 """Photographs of the board: fewer do not tell focal length, principal point and distortion."""
 EPSILON, STEPS = 1e-6, 100
+LUMA = np.array([0.299, 0.587, 0.114], dtype=np.float32)  # ITU-R BT.601
 EDGE_SHARE = 0.75
 """Of the distance from centre to corner of the picture, that the corners of boards should reach."""
 OUTLIER = 6.0
@@ -97,16 +99,18 @@ def solve_lens(folder: Path, board: Board, progress: Progress) -> SolvedLens:
 def _photographs(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; name one with photographs of a board")
-    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
+    files = visible_files(folder)
+    for one, other in pairwise(files):
+        if one.stem == other.stem:
+            raise InputError(f"{one} and {other.name} are one photograph twice: keep one of them")
+    return files
 
 
 def _grey(file: Path) -> Any:
-    try:
-        with Image.open(file) as image:
-            pixels = np.asarray(image.convert("L") if image.mode != "I;16" else image)
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"{file} cannot be read: {error}: remove it or photograph again") from None
-    return pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
+    """A photograph as grey of 8 bits, (h, w); luma as ITU-R BT.601 weighs it."""
+    image = read_image(file)
+    share = (image @ LUMA) / np.iinfo(image.dtype).max
+    return np.rint(255 * share).astype(np.uint8)
 
 
 def _same_size(file: Path, grey: Any, size: tuple[int, int] | None) -> tuple[int, int]:

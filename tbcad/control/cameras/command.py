@@ -45,7 +45,7 @@ class CommandCamera:
         with tempfile.TemporaryDirectory(prefix="tbcad-") as folder:
             output = str(Path(folder, "photograph"))
             self._run([word.replace(PLACE, output) for word in self._words])
-            files = sorted(Path(folder).iterdir())
+            files = [file for file in Path(folder).iterdir() if not file.name.startswith(".")]
             if len(files) != 1:
                 count = f"{len(files)} files" if files else "no file"
                 raise CameraFault(f"the camera's command wrote {count} at {PLACE}, one is needed")

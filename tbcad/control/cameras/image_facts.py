@@ -5,6 +5,8 @@ Source: Exif 2.32, tables 4 and 7.
 
 import io
 import math
+import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +14,14 @@ from typing import Any
 from PIL import Image
 
 from tbcad.control.faults import CameraFault
-from tbcad.runs.exposure import SUFFIXES, Setting
+from tbcad.errors import InputError
+from tbcad.formats.camera_raw import RAW_SUFFIXES
+from tbcad.formats.pictures import PICTURE_SUFFIXES
+from tbcad.formats.tiff_pictures import TIFF_SIGNATURES
+from tbcad.runs.exposure import Setting
+from tbcad.runs.images import decoded_image
 
-FORMATS = {"PNG": ".png", "TIFF": ".tif", "JPEG": ".jpg"}
+FORMATS = {"PNG": ".png", "TIFF": ".tif", "JPEG": ".jpg", "MPO": ".jpg"}
 SAME_FORMAT = {".tiff": ".tif", ".jpeg": ".jpg"}
 MAKE, MODEL, EXIF = 0x010F, 0x0110, 0x8769
 EXPOSURE = 0x829A
@@ -54,30 +61,41 @@ def image_facts(data: bytes, suffix: str) -> ImageFacts:
     Raises:
         CameraFault: it is no image of a kind that a run takes, or not complete.
     """
-    if suffix not in SUFFIXES:
+    if suffix not in PICTURE_SUFFIXES:
         raise CameraFault(
-            f"the camera gives {suffix or 'nameless'} files: set its image format to JPEG, TIFF or "
-            "PNG"
+            f"the camera gives {suffix or 'nameless'} files: set its image format to JPEG, TIFF, "
+            "PNG or raw"
         )
     try:
-        with Image.open(io.BytesIO(data)) as image:
-            kind, size = image.format, image.size
-            tags = image.getexif()
-            inner = tags.get_ifd(EXIF)
-            image.load()  # after the tags: it closes the file of a TIFF
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise CameraFault(f"the photograph cannot be read: {error}") from None
-    if FORMATS.get(kind or "") != SAME_FORMAT.get(suffix, suffix):
+        height, width = decoded_image(data, f"photograph{suffix}").shape[:2]
+    except InputError as error:
+        raise CameraFault(str(error)) from None
+    kind, tags, inner = _kind_and_tags(data)
+    if suffix not in RAW_SUFFIXES and FORMATS.get(kind) != SAME_FORMAT.get(suffix, suffix):
         raise CameraFault(f"the photograph is a {kind} file and is called {suffix}")
     told = {name: _setting(inner.get(tag)) for tag, name in LOCKED.items()}
     exposure = told[LOCKED[EXPOSURE]]
     return ImageFacts(
-        width_px=size[0],
-        height_px=size[1],
+        width_px=width,
+        height_px=height,
         model=" ".join(str(tags[tag]).strip("\0 ") for tag in (MAKE, MODEL) if tag in tags),
         exposure_s=float(exposure) if exposure and not isinstance(exposure, str) else None,
         settings={name: value for name, value in told.items() if value is not None},
     )
+
+
+def _kind_and_tags(data: bytes) -> tuple[str, Mapping[int, Any], Mapping[int, Any]]:
+    """Format of an image, its tags and those of Exif: none where they cannot be read."""
+    kind, tags = "TIFF" if data.startswith(TIFF_SIGNATURES) else "", Image.Exif()
+    try:
+        if kind:  # raw files too, and kinds that Pillow does not open
+            tags.load(data)
+        else:
+            with Image.open(io.BytesIO(data)) as image:
+                kind, tags = image.format or "", image.getexif()
+        return kind, tags, tags.get_ifd(EXIF)
+    except (OSError, ValueError, SyntaxError, struct.error):
+        return kind, {}, {}
 
 
 def suffix_of(name: str) -> str:

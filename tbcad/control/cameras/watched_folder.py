@@ -8,7 +8,7 @@ from tbcad.control.cameras.camera import Shot
 from tbcad.control.cameras.image_facts import image_facts, suffix_of
 from tbcad.control.faults import CameraFault
 from tbcad.errors import InputError
-from tbcad.runs.exposure import SUFFIXES
+from tbcad.formats.pictures import visible_files
 
 POLL_S = 0.05
 QUIET_S = 0.3  # a file that has not grown for so long, and can be read, is complete
@@ -68,11 +68,7 @@ class WatchedFolder:
 
     def _names(self) -> set[str]:
         try:
-            return {
-                path.name
-                for path in self._folder.iterdir()
-                if suffix_of(path.name) in SUFFIXES and not path.name.startswith(".")
-            }
+            return {path.name for path in visible_files(self._folder)}
         except OSError as error:
             raise CameraFault(f"{self._folder} cannot be read: {error.strerror}") from None
 

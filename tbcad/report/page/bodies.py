@@ -19,6 +19,7 @@ from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.spec.design import MeshSpec, Spec
 from tbcad.spec.errors import SpecError
+from tbcad.srgb import shown_colour
 from tbcad.types import Floats, Ints
 
 Record = dict[str, Any]
@@ -191,7 +192,7 @@ def _drawn(
         place, geometry = scene.graph[name]
         mesh = scene.geometry[geometry]
         points = trimesh.transform_points(mesh.vertices, place) @ SHELL_FRAME
-        colour = tuple(float(part) / 255 for part in mesh.visual.material.baseColorFactor)
+        colour = shown_colour(mesh.visual.material.baseColorFactor)
         group = str(scene.graph.transforms.parents[name])
         yield name, group, np.asarray(points), np.asarray(mesh.faces), colour
 

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.formats.pictures import decoded, visible_files
+from tbcad.types import Bytes
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 MAX_FILE_BYTES = 40_000_000
@@ -35,8 +37,7 @@ class Picture(NamedTuple):
 
 def read_pictures(folder: Path) -> list[Picture]:
     """The pictures in a folder by name, made smaller where they are large; others are left out."""
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
-    found = (_read(path) for path in files if path.is_file())
+    found = (_read(path) for path in visible_files(folder, SUFFIXES) if path.is_file())
     return [one for one in found if one is not None]
 
 
@@ -100,16 +101,23 @@ def _read(path: Path) -> Picture | None:
             warnings.simplefilter("error")  # of a picture that is far too large
             with Image.open(path, formats=("PNG", "JPEG")) as image:
                 image.draft("RGB", (MAX_SIDE_PX, MAX_SIDE_PX))
-                return _jpeg(path.name, np.asarray(_on_white(image)), MAX_SIDE_PX)
-    except (OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
+                return _jpeg(path.name, _in_8_bits(_on_white(image), path.name), MAX_SIDE_PX)
+    except (InputError, OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
         return None
+
+
+def _in_8_bits(image: Any, name: str) -> Bytes:
+    pixels = decoded(image, name)
+    return np.asarray(
+        pixels if pixels.dtype == np.uint8 else pixels.astype(np.uint16) >> 8, np.uint8
+    )
 
 
 def _on_white(image: Any) -> Any:
     from PIL import Image
 
     if "A" not in image.getbands() and "transparency" not in image.info:
-        return image.convert("RGB")
+        return image
     drawn = image.convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
 

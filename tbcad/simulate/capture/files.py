@@ -14,6 +14,7 @@ from tbcad.simulate.capture.light_field import NAME
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.image_files import write_images
 from tbcad.simulate.scene.object import SceneObject
+from tbcad.types import Bytes, Ints
 
 OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
@@ -68,7 +69,8 @@ def write_record(folder: Path, record: dict[str, Any]) -> None:
 
 def write_object(path: Path, subject: SceneObject) -> None:
     """Write an object with all that gives its colours; the bytes are the same each time."""
-    values = {field.name: getattr(subject, field.name) for field in fields(subject)}
+    kept = (field.name for field in fields(subject) if field.name != "reading")
+    values = {name: getattr(subject, name) for name in kept}
     arrays = {name: np.asarray(value) for name, value in values.items() if value is not None}
     np.savez_compressed(path, allow_pickle=False, **arrays)
 
@@ -104,10 +106,27 @@ def _subject(arrays: dict[str, Any]) -> SceneObject:
         raise ValueError("arrays do not belong together")
     if faces.min() < 0 or faces.max() >= v or not np.isfinite(points).all():
         raise ValueError("facets have corners that do not exist")
-    light = arrays.get("light")
-    if light is not None and (light.shape != (v,) or not np.isfinite(light).all()):
+    light, tiles = arrays.get("light"), arrays.get("tiles")
+    if light is not None and light.ndim == 1:  # of older captures: backs had the front's
+        light = np.column_stack([light, light])
+    if texture is not None and tiles is None:  # and the only texture was not multiplied
+        tiles, albedo = np.tile([0, *texture.shape[:2]], (f, 1)), np.ones_like(albedo)
+    if light is not None and (light.shape != (v, 2) or not np.isfinite(light).all()):
         raise ValueError("light and corners do not belong together")
     if (uv is None) != (texture is None) or (uv is not None and uv.shape != (f, 3, 2)):
         raise ValueError("a texture without its coordinates")
+    if tiles is not None and not _are_within(tiles, texture, f):
+        raise ValueError("a texture without its places")
     name, patterned = str(arrays["name"]), bool(arrays["patterned"])
-    return SceneObject(name, points, faces, normals, albedo, uv, texture, patterned, light)
+    return SceneObject(name, points, faces, normals, albedo, uv, texture, tiles, patterned, light)
+
+
+def _are_within(tiles: Ints, texture: Bytes | None, facets: int) -> bool:
+    """Whether pictures (f, 3), by first row, height and width, are on a texture."""
+    if texture is None or tiles.shape != (facets, 3) or tiles.min() < 0:
+        return False
+    used = tiles[tiles[:, 1] > 0]
+    return bool(
+        (used[:, 0] + used[:, 1] <= len(texture)).all()
+        and ((used[:, 2] > 0) & (used[:, 2] <= texture.shape[1])).all()
+    )

@@ -15,7 +15,7 @@ from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.capture.sequence import AGAIN, NAME, SequenceWriter, create_sequence
 from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.simulate.scene.ray_casting import Scene, built_in_shade, cast_rays
+from tbcad.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, cast_rays
 from tbcad.types import Bytes, Floats, Progress
 
 RAYS_PER_CHUNK = 1 << 16
@@ -89,7 +89,7 @@ def _about_z(angle: float) -> Floats:
 def lit_when_turned(scene: Scene, angle: float) -> Scene:
     """The object before its turn, with the light that it has after it."""
     normals = scene.subject.normals @ _about_z(angle).T
-    return replace(scene, shade=built_in_shade(normals))
+    return replace(scene, shade=both_sides(built_in_shade, normals))
 
 
 def camera_before_turn(camera: Camera, angle: float) -> Camera:

@@ -101,7 +101,14 @@ def irradiance(lamps: Lamps, points: Floats, normals: Floats) -> Floats:
 
 
 def lit_by(lamps: Lamps, subject: SceneObject) -> SceneObject:
-    """An object with the light of lamps at its corners, as bright as a good exposure shows it."""
-    found = irradiance(lamps, subject.points, subject.normals)
-    white = float(np.percentile(found, EXPOSED))
-    return replace(subject, light=np.minimum(found / white, 1.0) if white > 0 else found)
+    """An object with the light of lamps at its corners, as bright as a good exposure shows it.
+
+    The exposure is that of the outside, or of an open surface whose normals are away from the lamps
+    that of its back.
+    """
+    both = np.column_stack(
+        [irradiance(lamps, subject.points, side * subject.normals) for side in (1, -1)]
+    )
+    front, back = np.percentile(both, EXPOSED, axis=0)
+    white = float(front or back)
+    return replace(subject, light=np.minimum(both / white, 1.0) if white > 0 else both)

@@ -1,22 +1,12 @@
-"""The object before the cameras: its shape and its colours, from a file or built in."""
+"""The object before the cameras: its shape and its colours; and the built-in one."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 
-from tbcad.errors import InputError
 from tbcad.geometry.vectors import unit
-from tbcad.simulate.plausibility import warn_of_small_object
 from tbcad.types import Bytes, Floats, Ints
 
-Paint = Literal["own", "pattern", "plain"]
-
-MAX_FILE_BYTES = 1 << 30  # bytes
-MAX_FACETS = 20_000_000
-# Larger than the capture sphere by less than rounding in a file: not too large.
-ROUNDING = 1e-6
 GREY = 0.8
 CELL_MM = 6.0  # side of the built-in pattern's cubes
 KNOT = (2, 3)  # turns about the axis and through the hole: a trefoil
@@ -25,19 +15,38 @@ BALL_DIVISIONS = 5  # of an icosahedron: 20,480 facets
 
 
 @dataclass(frozen=True)
+class Reading:
+    """How an object's file was taken: unit, axis, colours, and what was left out of it."""
+
+    unit: str
+    up: str
+    colours: str
+    left_out: tuple[str, ...] = ()
+
+    def line(self, name: str) -> str:
+        """One line for the user."""
+        return f"{name}: unit {self.unit}, {self.up} up, colours: {self.colours}"
+
+
+@dataclass(frozen=True)
 class SceneObject:
-    """A triangle mesh with a colour at each corner of each facet, or a picture on it.
+    """A triangle mesh with a colour at each corner of each facet, or pictures on it.
 
     Attributes:
         name: what it is, for records.
         points: corners, mm, (v, 3), z up, in the frame of the design.
         faces: corners of the facets, (f, 3).
-        normals: unit normals at the corners, for shading, (v, 3).
+        normals: unit normals at the corners, for shading, on either side, (v, 3).
         albedo: red, green, blue at each facet's corners, 0 to 1, (f, 3, 3).
-        uv: where each facet's corners lie on `texture`, 0 to 1 from its lower left, (f, 3, 2).
-        texture: the picture, (h, w, 3); None where `albedo` says it all.
+        uv: where each facet's corners lie on its picture, 0 to 1 from its lower left, (f, 3, 2).
+        texture: pictures below each other, (h, w, 3), which albedo multiplies; None where `albedo`
+            says it all.
+        tiles: first row, height and width of each facet's picture in `texture`, (f, 3); height 0
+            where it has none.
         patterned: whether the built-in pattern is painted over it.
-        light: on each corner, 0 to 1, (v,); None for the built-in light.
+        light: on each corner, 0 to 1, on the side of the normal and behind it, (v, 2); None for the
+            built-in light.
+        reading: how its file was taken; None without a file.
     """
 
     name: str
@@ -47,55 +56,15 @@ class SceneObject:
     albedo: Floats
     uv: Floats | None = None
     texture: Bytes | None = None
+    tiles: Ints | None = None
     patterned: bool = False
     light: Floats | None = None
+    reading: Reading | None = None
 
     @property
     def radius(self) -> float:
         """Distance of the farthest point from the origin, mm."""
         return float(np.linalg.norm(self.points, axis=1).max())
-
-
-def load_object(
-    path: Path, capture_mm: float, fit: bool = False, paint: Paint = "own"
-) -> SceneObject:
-    """Read a triangle mesh in millimetres, z up, about the origin.
-
-    Args:
-        path: any file that trimesh reads; its textures must be in the same folder.
-        capture_mm: diameter of the capture sphere.
-        fit: move and scale it so that it just fits that sphere.
-        paint: its own colours, or the built-in pattern where the file has none; the pattern in any
-            case; or plain grey.
-
-    Raises:
-        InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
-
-    Warns:
-        PlausibilityWarning: it is so small that its unit is likely to be another one.
-    """
-    mesh = _read(path)
-    points = np.asarray(mesh.vertices, dtype=np.float64)
-    faces = np.asarray(mesh.faces, dtype=np.int64)
-    _check(path, points, faces)
-    points = _fitted(points, faces, capture_mm) if fit else points
-    colours = _colours(mesh, faces) if paint == "own" else {}
-    patterned = not colours and paint != "plain"
-    normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
-    plain = np.full((len(faces), 3, 3), GREY)
-    fields = {"albedo": plain, "patterned": patterned, **colours}
-    subject = SceneObject(path.name, points, faces, normals, **fields)
-    _check_size(path, subject, capture_mm)
-    return subject
-
-
-def load_or_built_in(
-    path: Path | str | None, capture_mm: float, fit: bool = False, paint: Paint = "own"
-) -> SceneObject:
-    """The object of a file, as `load` reads it, or without one the built-in one."""
-    if path is None:
-        return built_in_object(capture_mm)
-    return load_object(Path(path), capture_mm, fit, paint)
 
 
 def built_in_object(capture_mm: float) -> SceneObject:
@@ -159,75 +128,3 @@ def _grid(rows: int, columns: int) -> Ints:
     a, b = i * columns + j, i * columns + (j + 1) % columns
     c, d = (i + 1) % rows * columns + (j + 1) % columns, (i + 1) % rows * columns + j
     return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-
-
-def _read(path: Path) -> Any:
-    import trimesh
-
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; give a triangle mesh (PLY, STL, OBJ, GLB ...)")
-    if path.stat().st_size > MAX_FILE_BYTES:
-        raise InputError(f"{path} is over 1 GiB: reduce the mesh first")
-    try:
-        return trimesh.load_mesh(path, process=False)
-    except Exception as error:  # trimesh's readers raise whatever their libraries do
-        reason = str(error) or type(error).__name__
-        raise InputError(f"{path} cannot be read as a mesh: {reason}: name another") from error
-
-
-def _check(path: Path, points: Floats, faces: Ints) -> None:
-    if len(points) == 0:
-        raise InputError(f"{path} is empty: name a mesh with facets")
-    if len(faces) == 0:
-        raise InputError(f"{path} has points but no facets: name a triangle mesh")
-    if len(faces) > MAX_FACETS:
-        raise InputError(f"{path} has {len(faces)} facets, allowed are {MAX_FACETS}: reduce it")
-    if not np.isfinite(points).all():
-        raise InputError(f"{path} has points that are not finite: repair the mesh")
-
-
-def _check_size(path: Path, subject: SceneObject, capture_mm: float) -> None:
-    used = subject.points[np.unique(subject.faces)]
-    size, reach = np.ptp(used, axis=0), 2 * float(np.linalg.norm(used, axis=1).max())
-    if size.max() == 0:
-        raise InputError(f"{path} has no extent: all its points are one: name another")
-    if reach > capture_mm * (1 + ROUNDING):
-        raise InputError(
-            f"{path} does not fit the capture sphere: it is {size[0]:.4g} x {size[1]:.4g} x "
-            f"{size[2]:.4g} mm and reaches {reach / 2:.4g} mm from the origin, allowed is "
-            f"{capture_mm / 2:g}: move or scale it, or use --fit"
-        )
-    warn_of_small_object(path.name, float(size.max()), capture_mm)
-
-
-def _fitted(points: Floats, faces: Ints, capture_mm: float) -> Floats:
-    """Points moved and scaled so that the smallest sphere about them is the capture sphere."""
-    import trimesh
-
-    used = points[np.unique(faces)]
-    if np.ptp(used, axis=0).max() == 0:
-        return points
-    centre, _ = trimesh.nsphere.minimum_nsphere(used)
-    reach = np.linalg.norm(used - centre, axis=1).max()
-    return np.asarray((points - centre) * (capture_mm / 2 / reach))
-
-
-def _colours(mesh: Any, faces: Ints) -> dict[str, Any]:
-    """What the file says of colours, as fields of Subject; nothing where it says nothing."""
-    visual = mesh.visual
-    if visual.kind == "texture" and visual.uv is not None:
-        picture = _picture(visual.material)
-        if picture is not None:
-            return {"uv": np.asarray(visual.uv, dtype=np.float64)[faces], "texture": picture}
-        colour = np.asarray(visual.material.main_color, dtype=np.float64)[:3] / 255
-        return {"albedo": np.broadcast_to(colour, (len(faces), 3, 3)).copy()}
-    if visual.kind == "vertex":
-        return {"albedo": np.asarray(visual.vertex_colors)[:, :3][faces] / 255}
-    if visual.kind == "face":
-        return {"albedo": np.repeat(np.asarray(visual.face_colors)[:, None, :3] / 255, 3, axis=1)}
-    return {}
-
-
-def _picture(material: Any) -> Bytes | None:
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    return None if image is None else np.asarray(image.convert("RGB"))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.geometry.vectors import dot, norm
 from tbcad.types import Floats
 
 # Rays toward a lamp begin so far above the facet that they do not meet it again by rounding, mm.
@@ -82,9 +82,3 @@ def lamp_light(embree: Any, spots: Spots, lights: PointLights) -> Floats:
     for place, colour in zip(lights.place, lights.colour, strict=True):
         total += received_light(embree, spots, place)[:, None] * colour
     return total
-
-
-def facet_normals(corners: Floats, normal: Floats) -> Floats:
-    """Unit normals (k, 3) of facets with corners (k, 3, 3), on the side of other normals (k, 3)."""
-    across = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return np.asarray(np.where(dot(across, normal)[:, None] < 0, -across, across))

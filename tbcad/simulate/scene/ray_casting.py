@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, unit
 from tbcad.simulate.scene.object import SceneObject, pattern
-from tbcad.simulate.scene.point_lights import PointLights, Spots, facet_normals, lamp_light
+from tbcad.simulate.scene.point_lights import PointLights, Spots, lamp_light
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
@@ -30,7 +30,7 @@ class Scene:
     Attributes:
         subject: the object.
         embree: its facets, committed; queries release the interpreter's lock.
-        shade: light at each corner, 0 to 1, (v,).
+        shade: light at each corner, 0 to 1, on the side of its normal and behind it, (v, 2).
         radius: of the sphere about the origin that holds it, mm.
         gloss: share of the lamps' light in highlights, which move with the viewpoint; 0: matt.
         lamps: in place of all that light, with cast shadows; None: as `shade` says.
@@ -83,7 +83,12 @@ def prepared_scene(subject: SceneObject) -> Scene:
     embree = embree_scene(subject.points, subject.faces)
     if subject.light is not None:
         return Scene(subject, embree, subject.light, subject.radius)
-    return Scene(subject, embree, built_in_shade(subject.normals), subject.radius)
+    return Scene(subject, embree, both_sides(built_in_shade, subject.normals), subject.radius)
+
+
+def both_sides(light: Callable[[Floats], Floats], normals: Floats) -> Floats:
+    """Light on surfaces with unit normals (v, 3), and on their backs, (v, 2)."""
+    return np.column_stack([light(normals), light(-normals)])
 
 
 def built_in_shade(normals: Floats) -> Floats:
@@ -102,41 +107,65 @@ class SurfaceHits:
         depth: mm along them, (k,).
         facet: (k,).
         weight: barycentric, of the facet's corners, (k, 3).
+        direction: unit vectors of the rays: light is that of the side that they meet, (k, 3).
     """
 
     rows: Ints
     depth: Floats
     facet: Ints
     weight: Floats
+    direction: Floats
 
     def albedo(self, subject: SceneObject) -> Floats:
         """Colours (k, 3), 0 to 1."""
         return _albedo(subject, self.facet, self.weight)
 
-    def normals(self, subject: SceneObject) -> Floats:
-        """Unit normals (k, 3) of the smooth surface."""
+    def facet_normals(self, subject: SceneObject) -> Floats:
+        """Unit normals (k, 3) of the facets, on the side that the rays meet."""
+        a, b, c = (subject.points[subject.faces[self.facet, k]] for k in range(3))
+        across = unit(np.cross(b - a, c - a))
+        return np.where(dot(across, self.direction)[:, None] > 0, -across, across)
+
+    def behind(self, subject: SceneObject, facet_normals: Floats) -> Bools:
+        """Which normals of the facets' corners (k, 3) are behind the side that the rays meet."""
         corners = subject.normals[subject.faces[self.facet]]
-        return unit(np.einsum("nk,nkx->nx", self.weight, corners))
+        return np.asarray(np.einsum("nkx,nx->nk", corners, facet_normals) < 0)
+
+    def normals(self, subject: SceneObject) -> Floats:
+        """Unit normals (k, 3) of the smooth surface, on the side that the rays meet."""
+        return self._smooth(subject, self.facet_normals(subject))
+
+    def _smooth(self, subject: SceneObject, facet_normals: Floats) -> Floats:
+        weight = np.where(self.behind(subject, facet_normals), -self.weight, self.weight)
+        return unit(np.einsum("nk,nkx->nx", weight, subject.normals[subject.faces[self.facet]]))
 
     def spots(self, subject: SceneObject) -> Spots:
         """Places and normals of the surface."""
-        corners, normal = subject.points[subject.faces[self.facet]], self.normals(subject)
+        corners, facet = subject.points[subject.faces[self.facet]], self.facet_normals(subject)
         place = np.einsum("nk,nkx->nx", self.weight, corners)
-        return Spots(place, normal, facet_normals(corners, normal))
+        return Spots(place, self._smooth(subject, facet), facet)
+
+    def light(self, subject: SceneObject, shade: Floats) -> Floats:
+        """Light (k,) of corners' light on both sides (v, 2)."""
+        corners = shade[subject.faces[self.facet]]
+        behind = self.behind(subject, self.facet_normals(subject))
+        met: Floats = np.where(behind, corners[..., 1], corners[..., 0])
+        return np.asarray((met * self.weight).sum(axis=1))
 
 
 def surface_hits(scene: Scene, origin: Floats, direction: Floats) -> SurfaceHits:
     """Where rays from origins (n, 3) along unit directions (n, 3) meet the object."""
     near = np.flatnonzero(meets_sphere(origin, direction, scene.radius))
     if len(near) == 0:
-        return SurfaceHits(near, np.zeros(0), near, np.zeros((0, 3)))
+        return SurfaceHits(near, np.zeros(0), near, np.zeros((0, 3)), np.zeros((0, 3)))
     hits = scene.embree.run(
         origin[near].astype(np.float32), direction[near].astype(np.float32), output=1
     )
     hit = hits["primID"] >= 0
     u, v = hits["u"][hit], hits["v"][hit]
     weight = np.column_stack([1 - u - v, u, v]).astype(np.float64)
-    return SurfaceHits(near[hit], hits["tfar"][hit], hits["primID"][hit].astype(np.int64), weight)
+    facet, rows = hits["primID"][hit].astype(np.int64), near[hit]
+    return SurfaceHits(rows, hits["tfar"][hit], facet, weight, direction[rows])
 
 
 def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
@@ -166,8 +195,7 @@ def _light(scene: Scene, hits: SurfaceHits) -> Floats:
     """Light on what is hit, (k, 1) or by colours (k, 3)."""
     if scene.lamps is not None:
         return lamp_light(scene.embree, hits.spots(scene.subject), scene.lamps)
-    light = (scene.shade[scene.subject.faces[hits.facet]] * hits.weight).sum(axis=1)
-    return np.asarray(light[:, None])
+    return hits.light(scene.subject, scene.shade)[:, None]
 
 
 def object_in_front(
@@ -192,18 +220,26 @@ def _albedo(subject: SceneObject, facet: Ints, weight: Floats) -> Floats:
     if subject.patterned:
         corners = subject.points[subject.faces[facet]]
         return pattern(np.einsum("nk,nkx->nx", weight, corners))
-    if subject.texture is not None and subject.uv is not None:
-        return _texels(subject.texture, np.einsum("nk,nkx->nx", weight, subject.uv[facet]))
-    return np.asarray(np.einsum("nk,nkx->nx", weight, subject.albedo[facet]))
+    albedo = np.einsum("nk,nkx->nx", weight, subject.albedo[facet])
+    if subject.texture is None or subject.uv is None or subject.tiles is None:
+        return np.asarray(albedo)
+    uv = np.einsum("nk,nkx->nx", weight, subject.uv[facet])
+    tiles = subject.tiles[facet]
+    on = tiles[:, 1] > 0
+    albedo[on] *= _texels(subject.texture, uv[on], tiles[on])
+    return np.asarray(albedo)
 
 
-def _texels(picture: Bytes, uv: Floats) -> Floats:
-    """Colours (n, 3) of a picture that repeats, between its four nearest texels."""
-    height, width = picture.shape[:2]
+def _texels(texture: Bytes, uv: Floats, tiles: Ints) -> Floats:
+    """Colours (n, 3) of pictures that repeat, between their four nearest texels."""
+    first, height, width = tiles.T
     x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     across, down = (x - column)[:, None], (y - row)[:, None]
-    rows, columns = (row % height, (row + 1) % height), (column % width, (column + 1) % width)
-    upper = picture[rows[0], columns[0]] * (1 - across) + picture[rows[0], columns[1]] * across
-    lower = picture[rows[1], columns[0]] * (1 - across) + picture[rows[1], columns[1]] * across
+    rows = (first + row % height, first + (row + 1) % height)
+    columns = (column % width, (column + 1) % width)
+    upper, lower = (
+        texture[which, columns[0]] * (1 - across) + texture[which, columns[1]] * across
+        for which in rows
+    )
     return np.asarray((upper * (1 - down) + lower * down) / 255)

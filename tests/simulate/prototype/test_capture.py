@@ -162,7 +162,10 @@ class TestGeometry:
 class TestPhotographs:
     def test_the_second_run_sees_the_object_turned(self, runs: Runs, knot: Scene) -> None:
         """Camera a before an object that was really turned takes the same photograph."""
-        subject = replace(knot.subject, points=knot.subject.points * HALF_TURN)
+        points, normals = (
+            getattr(knot.subject, name) * HALF_TURN for name in ("points", "normals")
+        )
+        subject = replace(knot.subject, points=points, normals=normals)
         turned = replace(prepared_scene(subject), shade=knot.shade)
         second, first = stop_photograph(runs[1], knot, 3), stop_photograph(runs[0], turned, 3)
         assert second.any()

@@ -7,9 +7,10 @@ import pytest
 import trimesh
 from PIL import Image
 
-from tbcad.errors import InputError
+from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.scene.object import SceneObject, built_in_object, load_object, pattern
+from tbcad.simulate.scene.object import SceneObject, built_in_object, pattern
+from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import (
     LAMP_LIGHT,
     LAMPS,
@@ -40,7 +41,7 @@ def light_on_top(normal: np.ndarray) -> float:
 def test_file_formats(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"box.{kind}"
     box().export(path)
-    subject = load_object(path, CAPTURE_MM)
+    subject = load_object(path, CAPTURE_MM, ObjectOptions(unit="mm"))
     assert subject.patterned
     assert subject.radius == pytest.approx(10 * np.sqrt(3))
     assert from_above(subject, 1, 2).depth == pytest.approx([90])
@@ -77,7 +78,7 @@ def test_texture_is_shown(tmp_path: Path) -> None:
     corners = [[0, 0], [1, 0], [1, 1], [0, 1]]
     mesh.visual = trimesh.visual.TextureVisuals(uv=corners, image=Image.fromarray(picture))
     mesh.export(tmp_path / "square.glb")
-    subject = load_object(tmp_path / "square.glb", CAPTURE_MM)
+    subject = load_object(tmp_path / "square.glb", CAPTURE_MM, ObjectOptions(up="z", unit="mm"))
     assert subject.texture is not None
     left, right = (from_above(subject, x, 1).colour[0] for x in (-5, 5))
     assert left[0] > 100 > left[1] == 0
@@ -92,7 +93,8 @@ def test_texture_outside_of_its_folder_is_not_read(tmp_path: Path) -> None:
     (inside / "a.obj").write_text(
         "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
     )
-    assert load_object(inside / "a.obj", CAPTURE_MM).texture is None
+    with pytest.warns(PlausibilityWarning, match=r"secret\.png is not in the folder"):
+        assert load_object(inside / "a.obj", CAPTURE_MM).texture is None
 
 
 def test_paint_pattern(tmp_path: Path) -> None:
@@ -100,7 +102,7 @@ def test_paint_pattern(tmp_path: Path) -> None:
     mesh.visual.vertex_colors = np.full((8, 4), 255, dtype=np.uint8)
     mesh.export(tmp_path / "box.ply")
     assert not load_object(tmp_path / "box.ply", CAPTURE_MM).patterned
-    subject = load_object(tmp_path / "box.ply", CAPTURE_MM, paint="pattern")
+    subject = load_object(tmp_path / "box.ply", CAPTURE_MM, ObjectOptions(paint="pattern"))
     assert subject.patterned
     colour = from_above(subject, 1, 2).colour[0] / 255
     shown = pattern(np.array([[1.0, 2.0, 10.0 - 1e-9]]))[0]
@@ -109,7 +111,7 @@ def test_paint_pattern(tmp_path: Path) -> None:
 
 def test_paint_plain(tmp_path: Path) -> None:
     box().export(tmp_path / "box.stl")
-    subject = load_object(tmp_path / "box.stl", CAPTURE_MM, paint="plain")
+    subject = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(paint="plain"))
     colours = from_above(subject, 1, 2).colour[0]
     assert not subject.patterned
     assert np.ptp(colours) == 0 < colours[0]
@@ -119,7 +121,8 @@ def test_too_large_names_the_size(tmp_path: Path) -> None:
     box(50).export(tmp_path / "box.stl")
     with pytest.raises(InputError, match=r"50 x 50 x 50 mm and reaches 43\.3 mm .* 30"):
         load_object(tmp_path / "box.stl", CAPTURE_MM)
-    assert load_object(tmp_path / "box.stl", CAPTURE_MM, fit=True).radius == pytest.approx(30)
+    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True))
+    assert fitted.radius == pytest.approx(30)
 
 
 def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
@@ -128,7 +131,7 @@ def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
     mesh.export(tmp_path / "box.stl")
     with pytest.raises(InputError, match="does not fit the capture sphere"):
         load_object(tmp_path / "box.stl", CAPTURE_MM)
-    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, fit=True)
+    fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True))
     assert fitted.points.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-3)
 
 

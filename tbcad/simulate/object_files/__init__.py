@@ -1,0 +1,1 @@
+"""Files of objects: meshes with their colours, unit and axis, as the file has them."""

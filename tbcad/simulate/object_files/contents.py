@@ -1,0 +1,111 @@
+"""The contents of an object's file, whatever its format."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.types import Bytes, Floats, Ints
+
+Up = Literal["y", "z"]
+# Real colours of at least so much in one file are bytes; those over 1 and below are refused.
+LEAST_OF_BYTES, ROUNDING = 2.0, 1e-3
+UNITS_MM = {"um": 0.001, "mm": 1.0, "cm": 10.0, "in": 25.4, "ft": 304.8, "m": 1000.0}
+
+
+@dataclass(frozen=True)
+class Part:
+    """Triangles with colours of one kind.
+
+    Attributes:
+        points: corners, in the unit and the axes of the file, (v, 3).
+        faces: corners of the facets, (f, 3).
+        normals: at the corners, as the file has them, (v, 3); None where it has none.
+        colours: at each facet's corners, 0 to 1 as shown (sRGB), (f, 3, 3); None: it has none.
+        uv: where each facet's corners lie on `picture`, 0 to 1 from its lower left, (f, 3, 2).
+        picture: (h, w, 3).
+        source: what the colours are, for the user; "" where there are none.
+    """
+
+    points: Floats
+    faces: Ints
+    normals: Floats | None = None
+    colours: Floats | None = None
+    uv: Floats | None = None
+    picture: Bytes | None = None
+    source: str = ""
+
+    def moved(self, matrix: Floats) -> "Part":
+        """The part moved by a matrix (4, 4); normals follow its inverse."""
+        points = self.points @ matrix[:3, :3].T + matrix[:3, 3]
+        if self.normals is None:
+            return replace(self, points=points)
+        cofactors = np.stack([np.cross(matrix[(k + 1) % 3, :3], matrix[(k + 2) % 3, :3])
+                              for k in range(3)])  # fmt: skip
+        return replace(self, points=points, normals=self.normals @ cofactors.T)
+
+    def flat(self) -> "Part":
+        """The part with corners of their own for each facet, which is then shaded flat."""
+        faces = np.arange(self.faces.size).reshape(-1, 3)
+        return replace(self, points=self.points[self.faces].reshape(-1, 3), faces=faces)
+
+
+class ObjectFile(NamedTuple):
+    """A file as it is read.
+
+    Attributes:
+        parts: its triangles.
+        notes: what it names that was not found, not understood or left out.
+        unit: key of UNITS_MM; None where the file does not say.
+        up: the axis that points up; None where the file does not say.
+    """
+
+    parts: Sequence[Part]
+    notes: Sequence[str] = ()
+    unit: str | None = None
+    up: Up | None = None
+
+
+def shown_shares(values: NDArray[Any]) -> Floats:
+    """Colours from 0 to 1 of numbers of a type: whole ones of 8, 16 or 32 bits, or real ones.
+
+    Whole numbers of other types are taken for bytes, and real ones if the largest is at least 2.
+
+    Raises:
+        InputError: they are out of range.
+    """
+    largest = {"u1": 255, "u2": 65535}.get(values.dtype.str[-2:])
+    if largest is None:
+        bytes_as_reals = values.size and values.max() >= LEAST_OF_BYTES
+        largest = 255 if values.dtype.kind in "iu" or bytes_as_reals else 1
+    share = values.astype(np.float64) / largest
+    if not ((share >= 0) & (share <= 1 + ROUNDING)).all():
+        raise InputError(
+            "its colours are out of range: allowed is 0 to 1, 0 to 255, or 0 to 65535 as ushort"
+        )
+    return share.clip(0, 1)
+
+
+def text_of(data: bytes) -> str:
+    """A text file of UTF-8, or of UTF-16 with its mark; what is neither becomes a question mark."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", "replace")
+    return data.decode("utf-8-sig", "replace")
+
+
+def even(colour: Sequence[float] | Floats, facets: int) -> Floats:
+    """One colour (3,) at all corners of facets, (f, 3, 3)."""
+    return np.broadcast_to(np.asarray(colour, dtype=np.float64), (facets, 3, 3)).copy()
+
+
+def without_facets(points: int) -> InputError:
+    """The error of a file that has nothing to see."""
+    if points == 0:
+        return InputError("it is empty: name a mesh with facets")
+    return InputError(
+        f"it has {points} points and no facets: name a triangle mesh; MeshLab makes one of a cloud "
+        "of points (screened Poisson)"
+    )
