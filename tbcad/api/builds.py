@@ -79,14 +79,12 @@ def build(
     with large_libraries():
         from tbcad.design_process import design_process
         from tbcad.output.folder import check_replaceable
-        from tbcad.output.parts import PROTOTYPE, default_parts
-        from tbcad.prototype.purchased.prices import load_prices
+        from tbcad.output.parts import PROTOTYPE, check_lists, default_parts
 
     chosen, out = chosen_spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
     check_replaceable(out, force)
-    if PROTOTYPE in asked:
-        load_prices(chosen.prototype.prices)  # a wrong list is no reason to leave parts out
+    check_lists(chosen, asked)
     started = monotonic()
     progress("mirrors: radii and cells")
     with design_process(chosen, PROTOTYPE in asked) as ahead:

@@ -94,7 +94,7 @@ def build(
     from tbcad.cli.memory import keep_freed_memory
     from tbcad.cli.stage_times import build_times, margin_stage
     from tbcad.output.folder import check_replaceable
-    from tbcad.output.parts import check_parts, default_parts, parse_parts
+    from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
     started = monotonic()
@@ -108,8 +108,8 @@ def build(
     chosen = asked or default_parts(spec)
     if asked is not None:
         check_parts(spec, asked)
-    if not dry_run:
-        check_replaceable(out, force)
+    check_lists(spec, chosen)
+    check_replaceable(out, force)
     times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
     with stages(times, silent=quiet) as screen:
         if process is not None:
