@@ -1,6 +1,7 @@
 """Text and TOML files that users write: limited in size, with errors of one line."""
 
 import codecs
+import re
 import tomllib
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -17,6 +18,10 @@ ENCODINGS = {
     codecs.BOM_UTF16_BE: "utf-16",
     codecs.BOM_UTF8: "utf-8-sig",
 }
+# A key of very many parts: the time that tomllib takes grows with their number squared.
+DOTTED = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""", re.ASCII
+)
 
 Table: TypeAlias = dict[str, Any]
 
@@ -33,12 +38,16 @@ def read_toml(file: Path | Traversable, name: str, kind: str) -> Table:
         SpecError: it cannot be read or is not TOML.
     """
     text = read_text(file, name, kind)
+    if found := DOTTED.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise SpecError(f"{name}: line {line}: tables nested too deeply: flatten them")
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise SpecError(f"{name}: tables nested too deeply: flatten them") from None
     except ValueError as error:
-        raise SpecError(f"{name}: not valid TOML: {error}: correct that line") from None
+        reason = str(error).partition(" for integer string conversion")[0]
+        raise SpecError(f"{name}: not valid TOML: {reason}: correct that line") from None
 
 
 def read_text(file: Path | Traversable, name: str, kind: str, max_bytes: int = MAX_BYTES) -> str:

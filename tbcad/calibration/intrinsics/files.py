@@ -25,7 +25,7 @@ COLMAP = {
     "FULL_OPENCV": tuple(range(12)),
 }
 MRCAL = re.compile(r"LENSMODEL_(PINHOLE|OPENCV(4|5|8|12))")
-MRCAL_FILE = re.compile(r"['\"]lens_?model['\"]\s?:\s?b?['\"](LENSMODEL|CAHV)")
+MRCAL_FILE = re.compile(r"['\"]lens_?model['\"]\s{0,9}:\s{0,9}b?['\"](LENSMODEL|CAHV)")
 
 
 def read_lens(path: Path) -> Lens:
@@ -62,7 +62,7 @@ def _mrcal(text: str, name: str) -> Lens:
     except (RecursionError, MemoryError):
         raise InputError(f"{name} is nested too deeply for a lens: export it again") from None
     known = MRCAL.fullmatch(model)
-    if known is None:
+    if known is None or any(numbers[9:]):  # k4 and what follows
         raise InputError(
             f"{name} has the lens model {model:.60}: {USABLE} (mrcal-convert-lensmodel "
             "LENSMODEL_OPENCV5)"
