@@ -60,7 +60,7 @@ def read_rows(
     while header and not header[-1]:
         header.pop()
     places = _places(header, columns, where, separator, others)
-    rows = [(where, _row(cells, places, len(header), where)) for where, cells in records]
+    rows = [(where, _row(cells, places, len(header), where, separator)) for where, cells in records]
     _write_points(rows, numbers)
     yield from rows
 
@@ -137,12 +137,13 @@ def _places(
     return {column: found.index(column) for column in columns}
 
 
-def _row(cells: list[str], places: dict[str, int], width: int, where: str) -> Row:
+def _row(cells: list[str], places: dict[str, int], width: int, where: str, separator: str) -> Row:
     """Cells by column; what is right of the header must be empty."""
     if len(cells) < width or any(cells[width:]):
         raise SpecError(
-            f"{where}: {len(cells)} columns, not {width}: correct it; a cell with the separator in "
-            "it, also as a decimal comma, stands in quotes"
+            f"{where}: {len(cells)} columns, not {width}, parted by a {SEPARATORS[separator]}: put "
+            f"each cell with a {SEPARATORS[separator]} in it in quotes"
+            + (", also as a decimal comma" if separator == "," else "; decimal commas are read")
         )
     return {column: cells[place] for column, place in places.items()}
 
