@@ -80,15 +80,13 @@ def build(
         from tbcad.design_process import design_process
         from tbcad.output.folder import check_replaceable
         from tbcad.output.inputs import design_files
-        from tbcad.output.parts import PROTOTYPE, default_parts
-        from tbcad.prototype.purchased.prices import load_prices
+        from tbcad.output.parts import PROTOTYPE, check_lists, default_parts
 
     chosen, out = chosen_spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
     inputs = design_files(chosen, None if isinstance(spec, Spec) else spec)
     check_replaceable(out, "build", force, inputs)
-    if PROTOTYPE in asked:
-        load_prices(chosen.prototype.prices)  # a wrong list is no reason to leave parts out
+    check_lists(chosen, asked)
     started = monotonic()
     progress("mirrors: radii and cells")
     with design_process(chosen, PROTOTYPE in asked) as ahead:

@@ -93,7 +93,10 @@ def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
     Raises:
         InputError: a list cannot be read; it names the line and column.
     """
-    return [_camera(where, row) for where, row in _rows("cameras.csv", user_list, CAMERA_COLUMNS)]
+    return [
+        _camera(where, row)
+        for where, row in _rows("cameras.csv", user_list, CAMERA_COLUMNS, CAMERA_SIZES)
+    ]
 
 
 def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
@@ -102,7 +105,9 @@ def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
     Raises:
         InputError: a list cannot be read; it names the line and column.
     """
-    return [_lens(where, row) for where, row in _rows("lenses.csv", user_list, LENS_COLUMNS)]
+    return [
+        _lens(where, row) for where, row in _rows("lenses.csv", user_list, LENS_COLUMNS, LENS_SIZES)
+    ]
 
 
 def _camera(where: str, row: Row) -> CameraBody:
@@ -129,12 +134,14 @@ def _lens(where: str, row: Row) -> RectilinearLens:
     )
 
 
-def _rows(name: str, user_list: Path | None, columns: tuple[str, ...]) -> list[tuple[str, Row]]:
+def _rows(
+    name: str, user_list: Path | None, columns: tuple[str, ...], sizes: tuple[str, ...]
+) -> list[tuple[str, Row]]:
     lists: list[tuple[Path | Traversable, str]] = [(files("tbcad.camera") / name, name)]
     if user_list is not None:
         lists.append((user_list, str(user_list)))
     names: set[str] = set()
-    rows = [row for file, shown in lists for row in read_rows(file, shown, columns)]
+    rows = [row for file, shown in lists for row in read_rows(file, shown, columns, sizes)]
     for where, row in rows:
         required_text(where, row, "name")
         check_unique(where, row, "name", names)

@@ -95,7 +95,7 @@ def build(
     from tbcad.cli.stage_times import build_times, margin_stage
     from tbcad.output.folder import check_replaceable
     from tbcad.output.inputs import design_files, files_named
-    from tbcad.output.parts import check_parts, default_parts, parse_parts
+    from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
     started = monotonic()
@@ -109,10 +109,9 @@ def build(
     chosen = asked or default_parts(spec)
     if asked is not None:
         check_parts(spec, asked)
-    if not dry_run:
-        check_replaceable(
-            out, "build", force, [*design_files(spec, design), *files_named(for_process)]
-        )
+    check_lists(spec, chosen)
+    inputs = [*design_files(spec, design), *files_named(for_process)]
+    check_replaceable(out, "build", force, inputs)
     times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
     with stages(times, silent=quiet) as screen:
         if process is not None:

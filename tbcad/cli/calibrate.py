@@ -58,8 +58,9 @@ def calibrate(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Lens of the camera as OpenCV (YAML, XML), mrcal (.cameramodel), COLMAP "
-            "(cameras.txt) or tbcad intrinsics wrote it. By default the lens is estimated too.",
+            help="Lens of the camera as OpenCV (YAML, XML), ROS, Kalibr (YAML), mrcal "
+            "(.cameramodel), COLMAP (cameras.txt) or tbcad intrinsics wrote it. By default the "
+            "lens is estimated too.",
         ),
     ] = None,
     plot: PlotFormatOption = "png",

@@ -44,6 +44,20 @@ def check_parts(spec: Spec, parts: Sequence[str]) -> None:
         raise (only_shell_remains(error) if SHELL in parts else error) from None
 
 
+def check_lists(spec: Spec, parts: Sequence[str]) -> None:
+    """Refuse lists of balls and prices that cannot be read: no reason to leave a prototype out.
+
+    Raises:
+        SpecError: as said; it names line and column.
+    """
+    if PROTOTYPE in parts:
+        from tbcad.prototype.balls.catalogue import load_catalogue
+        from tbcad.prototype.purchased.prices import load_prices
+
+        load_catalogue(spec.prototype.catalogues)
+        load_prices(spec.prototype.prices)
+
+
 def only_shell_remains(error: SpecError) -> SpecError:
     """The error of a prototype that is built with the shell, and could be left out."""
     return SpecError(f"{error}; or leave the prototype out with --parts shell")

@@ -14,19 +14,15 @@ import numpy as np
 from tbcad.datasets.crops import MirrorId, chosen_mirrors, spread_evenly
 from tbcad.datasets.virtual_cameras import virtual_cameras
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Finite, Record, columns, read_csv
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.spec.csv_rows import number, read_rows
 from tbcad.types import Floats
 
 MIRRORS = "mirrors"
+COLUMNS = ("x_mm", "y_mm", "z_mm")
+MAX_MM = 1e9
 # Both halves of a mirror on the seam have one virtual camera.
 ON_SEAM = 1e-9
-
-
-class _Columns(Record):
-    x_mm: Finite
-    y_mm: Finite
-    z_mm: Finite
 
 
 @dataclass(frozen=True)
@@ -48,14 +44,16 @@ def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
     Raises:
         InputError: it cannot be read, has no rows, or a lamp is in the capture sphere.
     """
-    rows = read_csv(path, _Columns, "give a table with the columns x_mm,y_mm,z_mm, or mirrors")
+    if not path.exists():
+        raise InputError(f"{path} is not there: give a table with {','.join(COLUMNS)}, or mirrors")
+    rows = list(read_rows(path, str(path), COLUMNS, COLUMNS, others=True))
     if not rows:
         raise InputError(f"{path} has no lamps: give a row for each")
-    place = columns(rows, "x_mm y_mm z_mm")
+    place = np.array([[number(where, row, one, MAX_MM) for one in COLUMNS] for where, row in rows])
     inside = np.flatnonzero(np.linalg.norm(place, axis=1) <= capture_mm / 2)
     if len(inside):
         raise InputError(
-            f"{path}: lamp {inside[0] + 1} is in the capture sphere: place it more than "
+            f"{rows[inside[0]][0]}: a lamp in the capture sphere: place it more than "
             f"{capture_mm / 2:g} mm from the origin"
         )
     return LampPlaces(tuple(f"lamp{k + 1:04d}" for k in range(len(place))), place)

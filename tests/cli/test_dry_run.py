@@ -48,8 +48,20 @@ def test_why_there_is_no_prototype() -> None:
     assert "no prototype: a prototype needs cameras that a half turn about z swaps" in result.stdout
 
 
-def test_a_folder_that_cannot_be_replaced_does_not_matter(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_replaced_is_refused_as_by_the_build(tmp_path: Path) -> None:
     (tmp_path / "exports").mkdir()
     (tmp_path / "exports" / "mine.txt").write_text("mine")
-    options = ["--n", "3", "--parts", "shell", "--dry-run"]
-    assert run(app, ["build", *options]).exit_code == 0
+    result = run(app, ["build", "--n", "3", "--parts", "shell", "--dry-run"])
+    assert "holds what tbcad did not write (mine.txt)" in str(result.exception)
+
+
+@pytest.mark.parametrize("dry_run", [["--dry-run"], []])
+@pytest.mark.parametrize("key", ["catalogues", "prices"])
+def test_a_list_that_is_not_there_is_no_reason_to_leave_the_prototype_out(
+    tmp_path: Path, key: str, dry_run: list[str]
+) -> None:
+    options = ["--n", "3", "--set", f'prototype.{key}=["absent.csv"]', *dry_run]
+    result = run(app, ["build", *options])
+    assert f"prototype.{key}: 'absent.csv' is neither" in str(result.exception)
+    assert result.stdout == ""
+    assert list(tmp_path.iterdir()) == []

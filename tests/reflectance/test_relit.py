@@ -107,7 +107,7 @@ def test_the_same_bytes_each_time(
     [
         (None, [], "lamps.csv"),
         ("x_mm,y_mm,z_mm\n", [], "has no lamps"),
-        ("x_mm,y_mm,z_mm\n1,2,3\n", [], "lamp 1 is in the capture sphere"),
+        ("x_mm,y_mm,z_mm\n1,2,3\n", [], "lamps.csv, line 2: a lamp in the capture sphere"),
         ("x,y,z\n1,2,300\n", [], "x_mm"),
         ("x_mm,y_mm,z_mm\n1,2,300\n", ["--samples", "2"], "leave out --samples"),
         ("x_mm,y_mm,z_mm\n1,2,300\n", ["--every", "2"], "--every chooses"),

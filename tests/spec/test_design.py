@@ -118,6 +118,14 @@ class TestFile:
 
     def test_not_utf8(self, file: Path) -> None:
         assert refused(file, b"# a\n# \xff\n").startswith("not UTF-8 text (line 2)")
+        assert refused(file, b"# a\r# \xff\n").startswith("not UTF-8 text (line 2)")
+        assert refused(file, "n = 1".encode("utf-16-le")).startswith("no text")
+
+    @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32"])
+    @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+    def test_encodings(self, file: Path, encoding: str, end: str) -> None:
+        file.write_bytes(f"[optics]{end}n = 4{end}".encode(encoding))
+        assert load_spec(file).optics.n == 4
 
     def test_over_one_megabyte(self, file: Path) -> None:
         assert refused(file, b"#" * 1_000_001).startswith("over 1 MB")
@@ -130,6 +138,11 @@ class TestFile:
 
     def test_nested_too_deeply(self, file: Path) -> None:
         assert refused(file, "a = " + "[" * 50_000).startswith("tables nested too deeply")
+        assert refused(file, "\na" + ".a" * 400_000 + " = 1").startswith("line 2: tables nested")
+
+    def test_a_number_of_thousands_of_digits(self, file: Path) -> None:
+        message = refused(file, "n = " + "9" * 5000)
+        assert message == "not valid TOML: Exceeds the limit (4300 digits): correct that line"
 
     @given(text=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
     @example(text=b'"" = 1')

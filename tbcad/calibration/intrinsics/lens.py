@@ -1,14 +1,22 @@
 """A lens as its calibration gives it, without the camera's pose."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.lens_camera import LensCamera, distorted
+from tbcad.spec.errors import short_text
 from tbcad.types import Floats
 
+COEFFICIENTS = 5  # k1, k2, p1, p2, k3; what follows must be zero
 FOCAL_SHARES = (0.05, 50.0)  # of the width, that a focal length may have
+MAX_PX = 65_536
+USABLE = (
+    "use a pinhole with OpenCV's k1, k2, p1, p2, k3 (plumb_bob, radtan): calibrate with that "
+    "model, as tbcad intrinsics does"
+)
 
 
 @dataclass(frozen=True)
@@ -19,15 +27,15 @@ class Lens:
         focal: along rows and columns, pixels, (2,).
         principal: column and row of the optical axis; whole numbers are pixel centres, (2,).
         distortion: k1, k2, p1, p2, k3, (5,).
-        width_px: columns; None where the file does not say.
-        height_px: rows; likewise.
+        width_px: columns.
+        height_px: rows.
     """
 
     focal: Floats
     principal: Floats
     distortion: Floats
-    width_px: int | None = None
-    height_px: int | None = None
+    width_px: int
+    height_px: int
 
     def on(self, camera: LensCamera) -> LensCamera:
         """A camera with this lens.
@@ -36,7 +44,7 @@ class Lens:
             InputError: the lens was calibrated at another size of the picture.
         """
         size = camera.width_px, camera.height_px
-        if self.width_px is not None and (self.width_px, self.height_px) != size:
+        if (self.width_px, self.height_px) != size:
             raise InputError(
                 f"--intrinsics is of pictures of {self.width_px} x {self.height_px} pixels, the "
                 f"run's have {size[0]} x {size[1]}: calibrate the lens at that size"
@@ -54,26 +62,90 @@ class Lens:
         Raises:
             InputError: it cannot.
         """
-        values = np.concatenate([self.focal, self.principal, self.distortion])
-        if not np.isfinite(values).all() or (self.focal <= 0).any():
-            raise InputError(f"{name}: focal lengths must be above 0, and all numbers finite")
-        width = self.width_px or 2 * self.principal[0]
-        share = self.focal / width
+        if (self.focal <= 0).any():
+            raise InputError(f"{name}: focal lengths must be above 0: export it again")
+        share = self.focal / self.width_px
         if (share < FOCAL_SHARES[0]).any() or (share > FOCAL_SHARES[1]).any():
             raise InputError(
                 f"{name}: focal lengths of {self.focal[0]:g} and {self.focal[1]:g} pixels do not "
-                f"fit a picture of {width:g} columns: give the file of this camera"
+                f"fit a picture of {self.width_px} columns: give the file of this camera"
+            )
+        size = np.array([self.width_px, self.height_px])
+        if ((self.principal < 0) | (self.principal > size)).any():
+            raise InputError(
+                f"{name}: the principal point {self.principal[0]:g}, {self.principal[1]:g} is "
+                f"outside of a picture of {size[0]} x {size[1]} pixels: give the camera's own file"
             )
         self._check_folding(name)
         return self
 
     def _check_folding(self, name: str) -> None:
         """Distortion may not show the inner part of the picture farther out than its corner."""
-        corner = np.abs(self.principal / self.focal)
+        size = np.array([self.width_px, self.height_px])
+        corner = np.maximum(self.principal, size - 1 - self.principal) / self.focal
         place = np.linspace(0, 1, 200)[:, None] * corner
-        shown = np.linalg.norm(distorted(place, self.distortion), axis=1)
-        if (np.diff(shown) <= 0).any():
+        with np.errstate(all="ignore"):  # coefficients of any size
+            shown = np.linalg.norm(distorted(place, self.distortion), axis=1)
+            folded = not (np.diff(shown) > 0).all()
+        if folded:
             raise InputError(
                 f"{name}: the distortion folds the picture over itself within its corners: "
                 "calibrate the lens with boards up to the corners"
             )
+
+
+def lens_of(
+    intrinsics: Iterable[object], coefficients: Iterable[object], size: Iterable[object], name: str
+) -> Lens:
+    """A lens from what a file says.
+
+    Args:
+        intrinsics: focal lengths and principal point, 4 numbers.
+        coefficients: of distortion, as many of OpenCV's as there are.
+        size: columns and rows of the pictures.
+        name: of the file, for errors.
+
+    Raises:
+        InputError: one is no number, or a coefficient after k3 is not zero.
+    """
+    values, given = numbers_of(intrinsics, name), numbers_of(coefficients, name)
+    if len(values) != 4:
+        raise InputError(f"{name} has {len(values)} numbers, 4 or more are needed: export it again")
+    if given[COEFFICIENTS:].any():
+        raise InputError(
+            f"{name} has more than five coefficients of distortion ({_model(len(given))}): {USABLE}"
+        )
+    distortion = np.zeros(COEFFICIENTS)
+    distortion[: len(given)] = given[:COEFFICIENTS]
+    width, height = numbers_of(size, name)
+    if not all(value == round(value) and 0 < value <= MAX_PX for value in (width, height)):
+        raise InputError(
+            f"{name} is of pictures of {width:g} x {height:g} pixels: allowed are whole numbers to "
+            f"{MAX_PX}"
+        )
+    return Lens(values[:2], values[2:], distortion, int(width), int(height))
+
+
+def _model(coefficients: int) -> str:
+    """OpenCV's name for the models that have more coefficients than are used here."""
+    return {8: "rational model", 12: "thin prism model"}.get(coefficients, "tilted model")
+
+
+def numbers_of(values: Iterable[object], name: str) -> Floats:
+    """Finite numbers from texts and numbers of a file, (n,).
+
+    Raises:
+        InputError: one is none.
+    """
+    found = np.array([_number(value) for value in values], dtype=np.float64)
+    if not np.isfinite(found).all():
+        wrong = next(value for value in values if not np.isfinite(_number(value)))
+        raise InputError(f"{name}: {short_text(wrong)} is no finite number: correct it")
+    return found
+
+
+def _number(value: object) -> float:
+    try:
+        return float(value) if isinstance(value, str | int | float) else np.nan
+    except (ValueError, OverflowError):
+        return np.nan

@@ -143,8 +143,8 @@ def _load(name: str) -> list[StockBall]:
     file = _built_in(name) if name in BUILT_IN else Path(name)
     if not file.is_file():
         raise SpecError(
-            f"prototype.catalogues: {name} is neither {' nor '.join(BUILT_IN)} nor a file: "
-            "name one of these"
+            f"prototype.catalogues: {short_text(name)} is neither {' nor '.join(BUILT_IN)} nor a "
+            "file: name one of these"
         )
     balls = list(_balls(file, name))
     if not balls:
@@ -154,7 +154,7 @@ def _load(name: str) -> list[StockBall]:
 
 def _balls(file: Path | Traversable, name: str) -> Iterator[StockBall]:
     known_grades, sizes = frozenset(load_grades()), set[str]()
-    for where, row in read_rows(file, name, COLUMNS):
+    for where, row in read_rows(file, name, COLUMNS, ("diameter_mm", "mass_g")):
         size = required_text(where, row, "size")
         check_unique(where, row, "size", sizes)
         diameter = positive_number(where, row, "diameter_mm", MAX_DIAMETER_MM)

@@ -57,7 +57,7 @@ def read_parts_list(folder: Path, prices: Prices | None = None) -> PartsList:
     path = folder / NAME
     if not path.is_file():
         raise InputError(f"{path} is not there: name a folder with a prototype by tbcad build")
-    rows = [_row(where, cells) for where, cells in read_rows(path, NAME, COLUMNS)]
+    rows = [_row(where, cells) for where, cells in read_rows(path, NAME, COLUMNS, NUMBERS)]
     return PartsList(tuple(_priced(row, prices) for row in rows) if prices else tuple(rows))
 
 

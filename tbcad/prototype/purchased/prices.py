@@ -105,7 +105,7 @@ def _file(name: str) -> Path | Traversable:
 
 def _rules(file: Path | Traversable, name: str) -> Iterator[PriceRule]:
     patterns = set[str]()
-    for where, row in read_rows(file, name, COLUMNS):
+    for where, row in read_rows(file, name, COLUMNS, ("each", "per_kg")):
         pattern = required_text(where, row, "part")
         check_unique(where, row, "part", patterns)
         each, per_kg = (_amount(where, row, column) for column in ("each", "per_kg"))

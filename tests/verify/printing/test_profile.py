@@ -139,6 +139,11 @@ def test_a_file_that_is_too_large(file: Path) -> None:
         load(str(file))
 
 
+def test_a_byte_order_mark(file: Path) -> None:
+    file.write_text(GOOD, encoding="utf-8-sig")
+    assert load(str(file)).name == "mine"
+
+
 def test_no_text(file: Path) -> None:
     file.write_bytes(GOOD.encode() + b"# \xff")
     with pytest.raises(BadProfile, match="not UTF-8 text"):

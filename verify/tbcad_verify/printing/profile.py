@@ -139,7 +139,7 @@ def _read(path: str) -> str:
     if len(data) > MAX_BYTES:
         raise BadProfile(f"profile {where}: larger than the {MAX_BYTES} bytes allowed")
     try:
-        return data.decode("utf-8")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadProfile(
             f"profile {where}: not UTF-8 text (byte {error.start}); save it as UTF-8"
