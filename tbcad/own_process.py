@@ -1,4 +1,4 @@
-"""Whether this process is a command's own, so that it may be copied and set up as suits the command.
+"""Whether this process is a command's own, which may be copied and set up as suits the command.
 
 A library is a guest: a copy of its user's process would hold other threads' locks for ever, and a
 process started by `multiprocessing` would run the user's script again.
