@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import h5py
-import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import parse_json
@@ -43,9 +42,9 @@ class StoredArray:
         return tuple(self._data.shape)
 
     @property
-    def dtype(self) -> np.dtype[Any]:
-        """Kind of its elements."""
-        return np.dtype(self._data.dtype)
+    def dtype(self) -> Any:
+        """Kind of its elements, a `numpy.dtype`."""
+        return self._data.dtype
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -73,7 +72,8 @@ class StoredGroup:
     @property
     def attributes(self) -> Mapping[str, Any]:
         """Of the group, by name."""
-        return self._group.attrs
+        attributes: Mapping[str, Any] = self._group.attrs
+        return attributes
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -106,10 +106,10 @@ class StoredGroup:
             raise ValueError(f"array {name} of {self._group.name} {reason}")
         return StoredArray(data, self._damaged)
 
-    def _member(self, name: str, kind: type) -> Any:
+    def _member(self, name: str, kind: type[Any]) -> Any:
         if not isinstance(self._group.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"{name} of {self._group.name} is missing or lies elsewhere")
-        member = self._group[name]
+        member: Any = self._group[name]
         if not isinstance(member, kind):
             raise ValueError(f"{name} of {self._group.name} is no {kind.__name__.lower()}")
         place = h5py.h5o.get_info(member.id).addr

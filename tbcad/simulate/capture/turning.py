@@ -75,7 +75,7 @@ def turn_of_frame(folder: Path, number: int) -> float:
         InputError: the sequence does not say how far the object turned.
     """
     with open_hdf5(folder / NAME, SCHEMA, "sequence", AGAIN, lambda store: store.facts) as facts:
-        turned = facts.get("turns_deg")
+        turned: Any = facts.get("turns_deg")
     try:
         return float(np.radians(turned[number]))
     except (TypeError, LookupError) as error:
