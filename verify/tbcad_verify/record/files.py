@@ -104,7 +104,9 @@ def refuse_other_kinds(folder: Path, names: Iterable[str]) -> None:
             mode = (folder / name).stat().st_mode
             if not stat.S_ISREG(mode):
                 kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or device"
-                raise BadExport(f"{name}: {kind}, where the manifest lists a file; {AGAIN}")
+                raise BadExport(
+                    f"{name}: not a regular file but {kind}, yet in the manifest; {AGAIN}"
+                )
 
 
 def read(
