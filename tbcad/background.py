@@ -1,7 +1,11 @@
-"""Work in a process of its own while this one does something else."""
+"""Work in a process of its own while this one does something else.
+
+Only in a command's own process: for a user of the library all work is done here, to the same bytes.
+"""
 
 import ctypes
 import multiprocessing
+import pickle
 import signal
 import sys
 import threading
@@ -10,6 +14,8 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from typing import Any, TypeAlias
+
+from tbcad.own_process import is_own_process
 
 PR_SET_PDEATHSIG = 1  # prctl(2): the signal to get when the parent ends
 
@@ -20,10 +26,19 @@ Submit: TypeAlias = Callable[..., "Future[Any]"]
 
 
 def at_once(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-    """Do work here and now, where there is no other process."""
+    """Do work here and now, where there is no other process.
+
+    What it takes and returns is copied as by a process: solids lose the sign of zeros on the way,
+    and files are to have the same bytes.
+    """
     future: Future[Any] = Future()
-    future.set_result(work(*arguments))
+    work, arguments = _copied((work, arguments))
+    future.set_result(_copied(work(*arguments)))
     return future
+
+
+def _copied(value: Any) -> Any:
+    return pickle.loads(pickle.dumps(value))
 
 
 @contextmanager
@@ -36,6 +51,9 @@ def background_process() -> Iterator[Submit]:
         Exception: the first that the work raised.
         RuntimeError: the process ended before its work was done.
     """
+    if not is_own_process():
+        yield at_once
+        return
     others, futures = multiprocessing.active_children(), list[Future[Any]]()
     with ProcessPoolExecutor(1, _context(), initializer=end_with_parent) as pool:
 
@@ -64,12 +82,12 @@ def _context() -> multiprocessing.context.BaseContext:
 
 
 def may_fork() -> bool:
-    """Whether this process can be copied during a `pause`.
+    """Whether this process is a command's, which can be copied during a `pause`.
 
     A copy has no other threads: what they hold locked would stay locked in it.
     """
     paused = sum(one.running for one in _repeated)
-    return sys.platform == "linux" and threading.active_count() - paused == 1
+    return is_own_process() and sys.platform == "linux" and threading.active_count() - paused == 1
 
 
 class Repeated:

@@ -233,7 +233,8 @@ def _failure(code: int, stderr: str) -> str:
 
 
 def _last_line(text: str) -> str:
-    plain = re.sub(r"\x1b\[[0-9;]*m|.*ERR\| ", "", text)  # VTK's colours, times and addresses
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", text)  # VTK's colours
+    plain = re.sub(r"^.*ERR\| ", "", plain, flags=re.MULTILINE)  # its times and addresses
     return ([line.strip() for line in plain.splitlines() if line.strip()] or [""])[-1]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from io import BytesIO
+from threading import RLock
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from tbcad.palette import CYCLE, SHADES
@@ -21,6 +22,7 @@ METADATA: dict[PlotFormat, dict[str, None]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
+_SETTINGS = RLock()  # of the process: threads take turns
 NAMES_IN_SVG = "tbcad"  # in place of random ones
 
 
@@ -38,7 +40,7 @@ def figure_file(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_settings()):
+    with _SETTINGS, matplotlib.rc_context(_settings()):
         figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         draw(figure)

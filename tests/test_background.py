@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from io import RawIOBase
 from pathlib import Path
@@ -12,7 +13,8 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from tbcad.background import at_once, background_process
+from tbcad.background import at_once, background_process, may_fork
+from tbcad.own_process import is_own_process, own_process
 from tbcad.spec.errors import SpecError
 
 ROOT = Path(__file__).parents[1]
@@ -48,14 +50,14 @@ def in_background(
     work: Callable[..., None], *arguments: object, error: type[Exception] | None = None
 ) -> None:
     """Do some work, and then no more, or fail."""
-    with background_process() as submit:
+    with own_process(), background_process() as submit:
         submit(work, *arguments)
         if error:
             raise error
 
 
 def test_both_are_done(tmp_path: Path) -> None:
-    with background_process() as submit:
+    with own_process(), background_process() as submit:
         submit(write, tmp_path / "there", "x")
         (tmp_path / "here").write_text("y")
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"there": "x", "here": "y"}
@@ -68,8 +70,25 @@ def test_what_it_raises_is_raised() -> None:
         at_once(refuse, "too thin")
 
 
-def test_results_come_in_the_block() -> None:
+def test_a_guest_does_it_itself_to_a_copy() -> None:
+    """As a process would: what it takes and returns is copied."""
+    given = [1]
     with background_process() as submit:
+        assert submit(os.getpid).result() == os.getpid()
+        taken = submit(list.copy, [given]).result()
+    assert taken == [given]
+    assert taken[0] is not given
+    assert not may_fork()
+
+
+def test_another_thread_of_a_command_is_a_guest() -> None:
+    with own_process(), ThreadPoolExecutor(1) as pool:
+        assert not pool.submit(is_own_process).result()
+        assert is_own_process()
+
+
+def test_results_come_in_the_block() -> None:
+    with own_process(), background_process() as submit:
         assert submit(max, 1, 2).result() == at_once(max, 1, 2).result() == 2
 
 
@@ -89,9 +108,10 @@ KILLED = """
 import os, signal, sys, time
 from pathlib import Path
 from tbcad.background import background_process
+from tbcad.own_process import own_process
 from tests.test_background import wait_and_write, write
 
-with background_process() as submit:
+with own_process(), background_process() as submit:
     submit(write, Path(sys.argv[1]) / "begun", "").result()
     submit(wait_and_write, Path(sys.argv[1]) / "late")
     time.sleep(0.5)
@@ -112,18 +132,19 @@ def test_it_ends_with_the_process_that_waits(tmp_path: Path) -> None:
 def test_a_copy_of_a_process_that_has_joined_solids_joins_solids_too() -> None:
     """The kernel's threads are not in the copy, which must not wait for them."""
     volume = joined_cylinders()
-    with background_process() as submit:
+    with own_process(), background_process() as submit:
         assert submit(joined_cylinders).result(timeout=60) == volume
 
 
 ON_A_TERMINAL = """
 import time
 from tbcad.background import background_process, may_fork
+from tbcad.own_process import own_process
 from tbcad.screen import stages
 from tests import test_background as here
 
 here.copied = True  # known in a copy of this process only
-with stages({"first": 1.0, "second": 1.0}) as screen:
+with own_process(), stages({"first": 1.0, "second": 1.0}) as screen:
     screen.stage("first")
     time.sleep(0.3)
     assert may_fork()

@@ -6,9 +6,9 @@ from itertools import islice
 
 import pytest
 
-from tbcad import design_process as module
 from tbcad.design_process import design_process
 from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.own_process import own_process
 from tbcad.prototype.arrangement import Arrangement, arrange, arrangements
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
@@ -22,7 +22,7 @@ def few() -> Spec:
 def ahead_of_use(spec: Spec) -> tuple[list[bytes], list[str], list[str]]:
     """Figures of mirrors and of two arrangements, and what was reported."""
     heard: list[str] = []
-    with design_process(spec, arranged=True) as ahead:
+    with own_process(), design_process(spec, arranged=True) as ahead:
         mirrors = ahead.mirrors(heard.append)
         return figures(mirrors), first_two(ahead.arrangements(mirrors)), heard
 
@@ -49,20 +49,17 @@ def test_mirrors_and_arrangements_are_those_computed_here() -> None:
     assert arranged == first_two(arrangements(here))
 
 
-def test_where_no_copy_is_safe_they_are_computed_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    there = ahead_of_use(few())
-    monkeypatch.setattr(module, "may_fork", lambda: False)
-    here = ahead_of_use(few())
-    assert here[1:] == there[1:]
-
-
 def test_mirrors_that_cannot_be_made_are_refused() -> None:
     spec = load_spec(
         None, ["n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36"]
     )
     with pytest.raises(SpecError) as here:
         design(spec)
-    with design_process(spec, arranged=True) as ahead, pytest.raises(SpecError) as there:
+    with (
+        own_process(),
+        design_process(spec, arranged=True) as ahead,
+        pytest.raises(SpecError) as there,
+    ):
         ahead.mirrors(lambda _: None)
     assert str(there.value) == str(here.value)
 
@@ -71,12 +68,16 @@ def test_a_prototype_that_cannot_be_arranged_is_refused() -> None:
     spec = load_spec(None, ["n=4", "camera_diameter_mm=500", "camera_length_mm=1000"])
     with pytest.raises(SpecError) as here:
         arrange(design(spec))
-    with design_process(spec, arranged=True) as ahead, pytest.raises(SpecError) as there:
+    with (
+        own_process(),
+        design_process(spec, arranged=True) as ahead,
+        pytest.raises(SpecError) as there,
+    ):
         next(ahead.arrangements(ahead.mirrors(lambda _: None)))
     assert str(there.value) == str(here.value)
 
 
 def test_an_arrangement_that_is_not_wanted_is_not_computed_ahead() -> None:
-    with design_process(few(), arranged=False) as ahead:
+    with own_process(), design_process(few(), arranged=False) as ahead:
         assert not ahead.arranged
         assert next(ahead.arrangements(ahead.mirrors(lambda _: None))) is not None

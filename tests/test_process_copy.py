@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 
 from tbcad.background import may_fork
+from tbcad.own_process import own_process
 from tbcad.process_copy import copied_process, next_result
 from tbcad.spec.errors import SpecError
 
-pytestmark = pytest.mark.skipif(not may_fork(), reason="it is no process of its own")
+with own_process():
+    pytestmark = pytest.mark.skipif(not may_fork(), reason="the runner of tests has threads")
 
 
 def serve(pipe: Connection) -> None:

@@ -8,6 +8,7 @@ from tbcad_verify.report.report import NAME
 from tbcad_verify.run.verify import verify
 
 from tbcad.background import may_fork
+from tbcad.own_process import own_process
 from tbcad.verification_process import verification_process
 from tests.verify.synthetic_export import Design, export
 
@@ -22,7 +23,7 @@ def test_it_gives_the_same_report(tmp_path: Path) -> None:
     expected = verify(folder)
     written = (folder / NAME).read_bytes()
     stages: list[str] = []
-    with verification_process() as verify_there:
+    with own_process(), verification_process() as verify_there:
         report = verify_there(folder, stages.append)
     assert report.checks == expected.checks
     assert (folder / NAME).read_bytes() == written
@@ -30,16 +31,27 @@ def test_it_gives_the_same_report(tmp_path: Path) -> None:
 
 
 def test_a_refusal_is_raised(tmp_path: Path) -> None:
-    with verification_process() as verify_there, pytest.raises(BadExport, match="missing"):
+    with (
+        own_process(),
+        verification_process() as verify_there,
+        pytest.raises(BadExport, match="missing"),
+    ):
         verify_there(tmp_path, lambda _: None)
 
 
-@pytest.mark.skipif(not may_fork(), reason="it is no process of its own")
 def test_its_death_is_told(tmp_path: Path) -> None:
+    with own_process():
+        if not may_fork():
+            pytest.skip("the runner of tests has threads")
+
     def kill_all(_: str) -> None:
         children = Path(f"/proc/self/task/{os.getpid()}/children").read_text(encoding="ascii")
         for child in children.split():
             os.kill(int(child), signal.SIGKILL)
 
-    with verification_process() as verify_there, pytest.raises(RuntimeError, match="memory short"):
+    with (
+        own_process(),
+        verification_process() as verify_there,
+        pytest.raises(RuntimeError, match="memory short"),
+    ):
         verify_there(small_export(tmp_path), kill_all)

@@ -38,6 +38,7 @@ from tbcad.cli.help_order import order_help
 from tbcad.cli.stopping import signals_as_interrupt
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
+from tbcad.own_process import own_process
 
 order_help(app)
 add_examples(app)
@@ -85,4 +86,5 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Both cores are at work; threads of the linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    sys.exit(run(sys.argv[1:]))
+    with own_process():
+        sys.exit(run(sys.argv[1:]))

@@ -38,10 +38,16 @@ def drawings(
     """
     check_is_export(folder)
     from tbcad.drawings.write import record, write_drawings
+    from tbcad.schedule import cores
 
     with stages(0, silent=json) as screen:
         written = write_drawings(
-            folder, out, only or (), force=force, progress=lambda name: screen.stage(f"drew {name}")
+            folder,
+            out,
+            only or (),
+            force=force,
+            progress=lambda name: screen.stage(f"drew {name}"),
+            workers=cores(),
         )
     if json:
         typer.echo(json_text.dumps(record(out, written), indent=1))

@@ -3,7 +3,6 @@
 The checks are those of the readers, who make them again.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -124,8 +123,11 @@ def _cameras(folder: Path) -> list[Path]:
 
 def _is_of_shell(folder: Path) -> bool:
     """Whether a calibration's record says that it is of one camera of a shell."""
+    from tbcad.formats.checked_files import parse_json
+
+    file = folder / CALIBRATION_FILE
     try:
-        record = json.loads((folder / CALIBRATION_FILE).read_text(encoding="utf-8"))
+        record = parse_json(file.read_text(encoding="utf-8")) if file.is_file() else None
     except (OSError, ValueError):
         return False  # its readers say so
     return isinstance(record, dict) and record.get("geometry") == "shell"

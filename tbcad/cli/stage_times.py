@@ -6,7 +6,6 @@ whose number of parts hardly depends on n, are not. The pace of the computer at 
 the stages as they end.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -124,10 +123,13 @@ def export_times(folder: Path) -> Seconds:
 
 def look_at(folder: Path) -> tuple[int, tuple[str, ...]]:
     """What a folder seems to hold; it may be no export: that is for others to say."""
+    from tbcad.formats.checked_files import parse_json
+
     try:
-        document = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+        file = folder / "design.json"
+        document = parse_json(file.read_text(encoding="utf-8") if file.is_file() else "{}")
         n = int(document["spec"]["optics"]["n"])
-    except (OSError, ValueError, TypeError, LookupError, RecursionError):
+    except (OSError, ValueError, TypeError, LookupError):
         n = N
     files = {SHELL: "shell_a.stl", PROTOTYPE: "prototype.json"}
     return n, tuple(part for part, name in files.items() if (folder / name).exists())

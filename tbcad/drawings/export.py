@@ -1,12 +1,12 @@
 """What drawings take from an export: files as they were written, or refused."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.formats.csv_table import Row
 from tbcad.output.manifest import MANIFEST, Manifest, is_listed, read_manifest
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
@@ -110,7 +110,7 @@ def read_export(folder: Path) -> Export:
 
 def _design(path: Path) -> Record:
     try:
-        design = json.loads(path.read_text(encoding="utf-8"))
+        design = parse_json(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"{path} is no JSON ({error}): build again") from None
     if not isinstance(design, dict) or design.get("schema") != SCHEMA:

@@ -17,7 +17,6 @@ from tbcad.drawings.export import Export, read_export
 from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
 from tbcad.errors import InputError
 from tbcad.output.single_files import check_file
-from tbcad.schedule import cores
 from tbcad.types import Progress
 
 SUFFIXES = (".pdf", ".dxf")
@@ -70,7 +69,7 @@ def write_drawings(
     *,
     force: bool = False,
     progress: Progress = lambda _: None,
-    workers: int | None = None,
+    workers: int = 1,
 ) -> list[Drawing]:
     """Draw an export.
 
@@ -80,7 +79,8 @@ def write_drawings(
         only: names of what is drawn; everything without names.
         force: whether files that exist may be replaced.
         progress: called with each sheet's name when its part is done.
-        workers: number of processes; None: one for each core.
+        workers: number of processes; more than one only in a command's own process: the script of
+            a library's user would run again in each.
 
     Raises:
         InputError: no export, a file of it is not as it was written, a name is unknown, or files
@@ -95,7 +95,7 @@ def write_drawings(
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
-        drawings = _drawn(jobs, Path(place), progress, workers or cores())
+        drawings = _drawn(jobs, Path(place), progress, workers)
         files = sorted(Path(place).iterdir())
         for file in files:
             check_file(out / file.name, force)

@@ -2,9 +2,11 @@
 
 import csv
 import json
+import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -13,6 +15,9 @@ from tbcad.errors import InputError
 from tbcad.types import Floats
 
 REBUILD = "build it again with tbcad build"
+MAX_DIGITS = 30  # of whole numbers
+SHOWN = 20  # characters of what is not allowed
+HALF = re.compile(rb"\\u[dD][89a-fA-F]")  # of a character, as JSON writes those beyond 16 bits
 MAX_BYTES = 200_000_000  # n = 60 takes 12 million
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -42,8 +47,8 @@ def read_json(path: Path, model: type[Model], schema: str | None, missing: str) 
     """
     text = _text(path, missing)
     try:
-        value = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        value = parse_json(text)
+    except ValueError as error:
         raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
     version = value.get("schema") if isinstance(value, dict) else None
     if version != schema:
@@ -54,6 +59,50 @@ def read_json(path: Path, model: type[Model], schema: str | None, missing: str) 
         return model.model_validate(value)
     except ValidationError as error:
         raise _refused(path, error) from None
+
+
+def parse_json(text: str | bytes) -> Any:
+    """The value of a JSON text with finite numbers, each key once, and whole characters.
+
+    Raises:
+        ValueError: it is no such text.
+    """
+    try:
+        value = json.loads(
+            text,
+            parse_constant=_number,
+            parse_float=_number,
+            parse_int=_whole,
+            object_pairs_hook=_table,
+        )
+        if HALF.search(text if isinstance(text, bytes) else text.encode()):
+            json.dumps(value, ensure_ascii=False).encode()
+    except RecursionError:
+        raise ValueError("lists or tables nested too deeply") from None
+    except UnicodeEncodeError:
+        raise ValueError("a character that is half of one (\\ud800 to \\udfff)") from None
+    return value
+
+
+def _number(text: str) -> float:
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"the number {text[:SHOWN]} is not finite")
+    return number
+
+
+def _whole(text: str) -> int:
+    if len(text) > MAX_DIGITS:
+        raise ValueError(f"the number {text[:SHOWN]}... has {len(text)} digits")
+    return int(text)
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice[:SHOWN]!r} is there twice")
+    return table
 
 
 def read_csv(path: Path, model: type[Model], missing: str) -> list[Model]:

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from functools import singledispatch
 from io import StringIO
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING
 
 from tbcad.formats.dxf_dimensions import add_dimension
@@ -33,6 +34,7 @@ PATTERNS = {  # total length, then dashes and, below zero, gaps, mm
 }
 LINETYPES = {Layer.FOLD: DASHED, Layer.HIDDEN: DASHED, Layer.CENTRE: CHAIN}
 CLASSES = ("ACDBPLACEHOLDER", "LAYOUT")  # of every drawing; ezdxf orders them by their hashes
+_OPTION = RLock()
 ALIGNMENTS = {"left": "LEFT", "centre": "CENTER", "right": "RIGHT"}  # in ezdxf
 
 
@@ -59,15 +61,16 @@ def write_dxf(path: Path, entities: Iterable[Entity]) -> None:
 
 @contextmanager
 def _fixed_dates() -> Iterator[None]:
-    """Without dates and random identifiers."""
+    """Without dates and random identifiers: an option of the process, so threads take turns."""
     import ezdxf
 
-    before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True
-    try:
-        yield
-    finally:
-        ezdxf.options.write_fixed_meta_data_for_testing = before
+    with _OPTION:
+        before = ezdxf.options.write_fixed_meta_data_for_testing
+        ezdxf.options.write_fixed_meta_data_for_testing = True
+        try:
+            yield
+        finally:
+            ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
 @singledispatch

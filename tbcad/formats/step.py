@@ -1,6 +1,9 @@
 """STEP: the exact solid, its faces named, the same bytes for the same design."""
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.gp import gp_Pnt
@@ -19,6 +22,8 @@ from tbcad.cad.brep import Solid
 from tbcad.cad.measures import SolidProperties, properties
 from tbcad.formats.native_files import check_complete, incomplete
 
+SURFACE_CURVES = "write.surfacecurve.mode"
+_SETTINGS = RLock()
 END = b"END-ISO-10303-21;"  # of every STEP file
 # A fixed time stamp: the file's bytes then depend on the design alone.
 TIME_STAMP = "2022-11-01T00:00:00"
@@ -44,14 +49,18 @@ def write_step(
         StepError: when the kernel fails.
         OSError: when the file cannot be written in full.
     """
-    configure(pcurves)
+    with kernel_settings(pcurves):
+        _write(path, solid, known or properties(solid.shape))
+
+
+def _write(path: Path, solid: Solid, known: SolidProperties) -> None:
     writer = STEPControl_Writer()
     if writer.Transfer(solid.shape, STEPControl_AsIs) != IFSelect_RetDone:
         raise StepError(f"{path.name}: the kernel cannot translate the solid")
     finder = writer.WS().TransferWriter().FinderProcess()
     for name, face in solid.faces:
         _name(finder, face, name)
-    _validation_properties(writer, solid.shape, known or properties(solid.shape))
+    _validation_properties(writer, solid.shape, known)
     _name_product(writer, solid.name)
     write_header(writer, solid.name)
     if writer.Write(str(path)) != IFSelect_RetDone:
@@ -59,17 +68,34 @@ def write_step(
     check_complete(path, END)
 
 
-def configure(pcurves: bool) -> None:
-    """Write AP214 in millimetres; keep statistics off the screen, failures are raised here.
+@contextmanager
+def kernel_settings(pcurves: bool = False, schema: str = "AP214IS") -> Iterator[None]:
+    """Settings of the kernel for the block: millimetres, a schema, statistics off the screen.
 
-    A writer keeps the settings that it finds when it is constructed.
+    They are of the whole process: threads take turns, and the user finds them as they were.
+    Failures are raised, not printed.
     """
-    STEPControl_Controller.Init_s()  # which declares the settings
-    for printer in Message.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(Message_Gravity.Message_Fail)
-    Interface_Static.SetCVal_s("write.step.unit", "MM")
-    Interface_Static.SetCVal_s("write.step.schema", "AP214IS")
-    Interface_Static.SetIVal_s("write.surfacecurve.mode", int(pcurves))
+    texts = {"write.step.unit": "MM", "write.step.schema": schema}
+    with _SETTINGS:
+        STEPControl_Controller.Init_s()  # which declares the settings
+        printers = [(one, one.GetTraceLevel()) for one in Message.DefaultMessenger_s().Printers()]
+        before = {name: Interface_Static.CVal_s(name) for name in texts}
+        curves = Interface_Static.IVal_s(SURFACE_CURVES)
+        try:
+            for printer, _ in printers:
+                printer.SetTraceLevel(Message_Gravity.Message_Fail)
+            _set(texts, int(pcurves))
+            yield
+        finally:
+            _set(before, curves)
+            for printer, level in printers:
+                printer.SetTraceLevel(level)
+
+
+def _set(texts: Mapping[str, str], curves: int) -> None:
+    for name, value in texts.items():
+        Interface_Static.SetCVal_s(name, value)
+    Interface_Static.SetIVal_s(SURFACE_CURVES, curves)
 
 
 def _name(finder: Transfer_FinderProcess, face: TopoDS_Face, name: str) -> None:

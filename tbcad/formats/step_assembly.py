@@ -22,11 +22,12 @@ from OCP.XSControl import XSControl_WorkSession
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
 from tbcad.formats.native_files import check_complete, incomplete
 from tbcad.formats.step import END as STEP_END
-from tbcad.formats.step import StepError, configure, write_header
+from tbcad.formats.step import StepError, kernel_settings, write_header
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
 
 
+@kernel_settings()
 def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     """Write groups of bodies as one AP214 assembly in millimetres, all solids in their places.
 
@@ -37,7 +38,6 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
         OSError: when the file cannot be written in full.
     """
     document = _document(name, groups)
-    configure(pcurves=False)
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetColorMode(False)
     writer.SetNameMode(True)

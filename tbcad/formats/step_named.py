@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from tbcad.cad.brep import Solid
 from tbcad.cad.solids import faces
 from tbcad.errors import InputError
-from tbcad.formats.step import StepError, configure
+from tbcad.formats.step import StepError, kernel_settings
 from tbcad.types import Floats, Ints
 
 Place: TypeAlias = tuple[float, ...]
@@ -28,13 +28,13 @@ OTHER: Place = (0.0,) * 7
 SAME = 1e-6
 
 
+@kernel_settings()
 def read_named_solid(path: Path) -> Solid:
     """Read a file of one solid.
 
     Raises:
         InputError: it cannot be read, or is not one solid.
     """
-    configure(pcurves=False)
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() != 1:
         raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")

@@ -14,7 +14,6 @@ from typing import TypeAlias
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct
 from OCP.STEPControl import STEPControl_AsIs
@@ -44,7 +43,7 @@ from OCP.XSControl import XSControl_WorkSession
 from tbcad.cad.brep import Solid
 from tbcad.formats.native_files import check_complete, incomplete
 from tbcad.formats.step import END as STEP_END
-from tbcad.formats.step import StepError, configure, write_header
+from tbcad.formats.step import StepError, kernel_settings, write_header
 from tbcad.formats.step_assembly import END
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -75,6 +74,7 @@ class FaceTolerances:
     common_profile: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
 
+@kernel_settings(schema="AP242DIS")
 def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
     """Write a solid with named faces and its tolerances as AP242 in millimetres.
 
@@ -82,8 +82,6 @@ def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
         StepError: when the kernel fails.
         OSError: when the file cannot be written in full.
     """
-    configure(pcurves=False)
-    Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetDimTolMode(True)
     writer.SetColorMode(False)

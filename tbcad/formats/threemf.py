@@ -1,8 +1,6 @@
 """3MF: vertices and triangles in a zip, millimetres, the same bytes for the same mesh."""
 
-import locale
-from collections.abc import Iterator
-from contextlib import contextmanager
+import ctypes
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
@@ -11,10 +9,8 @@ import lib3mf
 import numpy as np
 
 from tbcad.cad.mesh import Mesh
-from tbcad.formats.native_files import check_complete, incomplete
 
 DECIMALS = 6
-ZIP_END = b"PK\x05\x06"  # begins the last record of a zip
 
 
 def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
@@ -37,22 +33,20 @@ def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
     model.SetBuildUUID(_identifier(name, "build"))
     writer = model.QueryWriter("3mf")
     writer.SetDecimalPrecision(DECIMALS)
-    try:
-        with same_locale():
-            writer.WriteToFile(str(path))
-    except lib3mf.ELib3MFException as error:
-        raise incomplete(path) from error
-    check_complete(path, ZIP_END)
+    path.write_bytes(_written(wrapper, writer))
 
 
-@contextmanager
-def same_locale() -> Iterator[None]:
-    """The library leaves the process in the locale C, in which Python opens texts as ASCII."""
-    before = locale.setlocale(locale.LC_ALL)
-    try:
-        yield
-    finally:
-        locale.setlocale(locale.LC_ALL, before)
+def _written(wrapper: Any, writer: Any) -> bytes:
+    """The bytes of the file.
+
+    Writing files itself the library would leave the process in the locale C, and its own method for
+    bytes makes an object of each. The first call writes, and tells their number.
+    """
+    call, size = wrapper.lib.lib3mf_writer_writetobuffer, ctypes.c_uint64(0)
+    wrapper.checkError(writer, call(writer._handle, ctypes.c_uint64(0), size, None))
+    buffer = (ctypes.c_uint8 * size.value)()
+    wrapper.checkError(writer, call(writer._handle, size, size, buffer))
+    return bytes(buffer)
 
 
 def _set_geometry(wrapper: Any, part: Any, mesh: Mesh) -> None:

@@ -1,9 +1,9 @@
 """The export of the machine that was calibrated."""
 
-import json
 from pathlib import Path
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.machine.shells import CAMERAS
 
 CALIBRATION = "calibration.json"
@@ -18,7 +18,7 @@ def export_of(calibration: Path) -> Path:
     folders = [calibration, *(calibration / name for name in CAMERAS)]
     path = next((one / CALIBRATION for one in folders if (one / CALIBRATION).is_file()), None)
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))["exports"] if path else None
+        found = parse_json(path.read_text(encoding="utf-8"))["exports"] if path else None
     except (OSError, ValueError, KeyError, TypeError):
         found = None
     if not isinstance(found, str):

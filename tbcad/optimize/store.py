@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.optimize.candidate import Candidate, Figures, Place
 
 SCHEMA = "tbcad-candidates/2"
@@ -31,10 +32,10 @@ def read_store(store: Path, key: str) -> dict[Place, Candidate]:
     if not store.exists():
         return {}
     try:
-        head, *rows = map(json.loads, store.read_text(encoding="utf-8").splitlines())
+        head, *rows = map(parse_json, store.read_text(encoding="utf-8").splitlines())
         known = head["design"] == key
         found = [_candidate(row) for row in rows]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
     if not known:
         raise InputError(f"{store}: of another design: name another --out, or remove the file")

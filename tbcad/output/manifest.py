@@ -94,6 +94,7 @@ def is_listed(path: Path, entry: Entry | None) -> bool:
     # The size first: it settles most without reading the file.
     return (
         entry is not None
+        and is_file(path)
         and entry.size == path.lstat().st_size
         and entry.model_dump() == fingerprint(path)
     )

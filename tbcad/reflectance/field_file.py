@@ -11,17 +11,16 @@ A lamp gives 1 to a white surface at the origin that faces it. Light adds up, so
 light is the sum over the lamps of their colours times their transport.
 """
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.reflectance.lamp_places import LampPlaces
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.types import Colours, Floats
@@ -75,30 +74,24 @@ def open_reflectance(folder: Path) -> Iterator[ReflectanceField]:
     file = (folder if folder.is_dir() else folder.parent) / NAME
     if not file.is_file():
         raise InputError(f"{file}: no such file, so no other light is known: {AGAIN}")
-    try:
-        store = h5py.File(file, "r")
-    except OSError as error:
-        raise InputError(f"{file} is no reflectance field: {error}: {AGAIN}") from error
-    with store:
-        try:
-            yield _read(store)
-        except (KeyError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"{file} is a damaged reflectance field: {error}: {AGAIN}") from error
+    with open_hdf5(file, SCHEMA, "reflectance field", AGAIN, _read) as stored:
+        yield stored
 
 
-def _read(store: h5py.File) -> ReflectanceField:
-    if store.attrs.get("schema") != SCHEMA:
-        raise ValueError(f"its schema is {store.attrs.get('schema')!r}, allowed is {SCHEMA!r}")
-    place = np.asarray(store["lamps/place"], dtype=np.float64)
-    names = tuple(name.decode() for name in store["lamps/name"][:])
+def _read(store: StoredGroup) -> ReflectanceField:
+    lamps = store.group("lamps")
+    place = np.asarray(lamps.array("place")[:], dtype=np.float64)
+    names = tuple(name.decode() for name in lamps.array("name")[:])
     if place.shape != (len(names), 3) or not np.isfinite(place).all():
         raise ValueError("lamps lack names or places")
-    cameras = [name for name in ("a", "b") if name in store]
-    pixel = {name: store[name]["pixel"][:].astype(np.int64) for name in cameras}
-    transport = {name: store[name]["transport"] for name in cameras}
+    cameras = {name: store.group(name) for name in ("a", "b") if name in store}
+    pixel = {name: one.array("pixel") for name, one in cameras.items()}
+    transport = {name: one.array("transport") for name, one in cameras.items()}
     for name in cameras:
-        if transport[name].shape != (len(names), len(pixel[name]), 3):
-            raise ValueError(f"transport of camera {name} has another shape than its rays")
-    return ReflectanceField(
-        LampPlaces(names, place), pixel, transport, json.loads(store.attrs["facts"])
-    )
+        rays = pixel[name].shape
+        if len(rays) != 1 or pixel[name].dtype != np.uint32:
+            raise ValueError(f"pixels of camera {name} have another shape or kind")
+        if transport[name].shape != (len(names), *rays, 3) or transport[name].dtype != np.float16:
+            raise ValueError(f"transport of camera {name} has another shape or kind than its rays")
+    numbers = {name: one[:].astype(np.int64) for name, one in pixel.items()}
+    return ReflectanceField(LampPlaces(names, place), numbers, transport, store.facts)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.formats.pictures import PICTURE_SUFFIXES
 from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, exposure_name
 from tbcad.runs.photographs import read_run
@@ -160,10 +161,11 @@ def _end_journal(path: Path) -> set[str]:
 
 def _name_taken(line: bytes) -> str:
     try:
-        told = json.loads(line)
+        told = parse_json(line)
     except ValueError:
         return ""
-    return str(told.get("name", "")) if told.get("event") == TAKEN else ""
+    taken = isinstance(told, dict) and told.get("event") == TAKEN
+    return str(told.get("name", "")) if taken else ""
 
 
 def write_safely(path: Path, data: bytes) -> None:

@@ -76,6 +76,6 @@ def _placed(folder: Path, part: _Part) -> Floats:
     try:
         mesh: Any = trimesh.load(path, file_type="stl", force="mesh", process=False)
         corners = np.asarray(mesh.triangles, dtype=np.float64)
-    except (OSError, ValueError, KeyError) as error:
+    except Exception as error:  # trimesh's readers raise whatever their libraries do
         raise InputError(f"{path} cannot be read: {error}: build it again") from None
     return np.asarray((corners - part.origin_mm) @ np.array(part.axes).T)

@@ -11,6 +11,7 @@ from tbcad.simulate.scene.viewpoint import camera_around_object
 MAX_DISTANCE_MM = 5000.0
 MAX_APERTURE_MM = 300.0
 MIN_PX, MAX_PX = 16, 2048
+SHOWN = 40  # characters of what is not allowed
 # The nearest viewpoint, in radii of the capture sphere.
 MIN_RADII = 1.5
 
@@ -90,7 +91,9 @@ def parse_query(text: str, capture_mm: float) -> Query:
     values = asdict(Query())
     for k, (name, value) in enumerate(pairs):
         if name not in kinds or name in {before for before, _ in pairs[:k]}:
-            raise InputError(f"{name!r} is unknown or given twice: allowed is {', '.join(kinds)}")
+            raise InputError(
+                f"{name[:SHOWN]!r} is unknown or given twice: allowed is {', '.join(kinds)}"
+            )
         values[name] = _number(name, value, kinds[name])
     return Query(**values).check(capture_mm)
 
@@ -98,8 +101,9 @@ def parse_query(text: str, capture_mm: float) -> Query:
 def _number(name: str, text: str, kind: type) -> float:
     try:
         value: float = kind(text)
-    except ValueError:
-        raise InputError(f"{name} {text!r} is no number") from None
-    if not isfinite(value):
-        raise InputError(f"{name} {text!r} is no number")
+        finite = isfinite(value)
+    except (ValueError, OverflowError):  # of a whole number beyond all floats
+        finite = False
+    if not finite:
+        raise InputError(f"{name} {text[:SHOWN]!r} is no number")
     return value

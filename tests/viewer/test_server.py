@@ -1,7 +1,12 @@
 """The server of views: it answers its own page, and refuses all else in plain words."""
 
+import itertools
+import socket
+import struct
 import threading
+import time
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from http.client import HTTPConnection, HTTPResponse
 from io import BytesIO
 
@@ -14,7 +19,7 @@ from tbcad.errors import InputError
 from tbcad.simulate.views.refocus import ThinLens, refocus
 from tbcad.viewer.query import Query
 from tbcad.viewer.render import Renderer, Superseded
-from tbcad.viewer.server import HOST, ViewServer
+from tbcad.viewer.server import HOST, MAX_CONNECTIONS, ViewServer
 
 SMALL = "width=160&height=120"
 
@@ -149,3 +154,100 @@ def test_a_lens_gives_up_when_another_view_is_asked_for(renderer: Renderer) -> N
             renderer.jpeg(lens)
     finally:
         del renderer.picture  # type: ignore[method-assign]
+
+
+def raw(server: ViewServer, sent: bytes) -> socket.socket:
+    connection = socket.create_connection((HOST, server.server_port), timeout=60)
+    connection.sendall(sent)
+    return connection
+
+
+def head(server: ViewServer, path: str, *more: str) -> bytes:
+    host = f"Host: {HOST}:{server.server_port}"
+    return "\r\n".join([f"GET {path} HTTP/1.1", host, *more, "", ""]).encode()
+
+
+def reset(connection: socket.socket) -> None:
+    """Close a connection as a client does that crashes."""
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    connection.close()
+
+
+def everything(connection: socket.socket) -> bytes:
+    with connection, connection.makefile("rb") as file:
+        return file.read()
+
+
+def all_are_served(server: ViewServer) -> None:
+    """Wait until no connection is served any more: then all that could be printed is."""
+    for _ in range(MAX_CONNECTIONS):
+        assert server._free.acquire(timeout=60)
+    server._free.release(MAX_CONNECTIONS)
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [b"", b"GE", b"GET / HTTP/1.1\r\nHost: x\r\n", "page", "view", b"\0\xff\xfe" * 9 + b"\r\n\r\n"],
+)
+def test_a_client_that_resets_is_no_error(
+    server: ViewServer, sent: bytes | str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if isinstance(sent, str):
+        path = f"/{server.token}/" + (f"view?{SMALL}" if sent == "view" else "")
+        sent = head(server, path)
+    reset(raw(server, sent))
+    all_are_served(server)
+    assert capfd.readouterr() == ("", "")
+    assert get(server, f"/{server.token}/")[0].status == 200
+
+
+def test_a_client_that_takes_no_answer_is_let_go(
+    server: ViewServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tbcad.viewer.server.TIMEOUT_S", 0.2)
+    monkeypatch.setattr(server, "page", bytes(50_000_000))  # more than the system keeps
+    with raw(server, head(server, f"/{server.token}/")):
+        all_are_served(server)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_client_that_sends_a_byte_now_and_then_gains_no_time(
+    server: ViewServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = itertools.count(0.0, 7.0)  # seconds, asked at each read
+    monkeypatch.setattr("tbcad.viewer.server.monotonic", lambda: next(clock))
+    with raw(server, b"") as connection, suppress(ConnectionError):
+        for byte in itertools.repeat(b"G"):  # the time limit of the socket ends a test that fails
+            connection.sendall(byte)
+            time.sleep(0.001)
+    all_are_served(server)
+
+
+def test_a_client_that_has_sent_all_gets_its_answer(server: ViewServer) -> None:
+    connection = raw(server, head(server, f"/{server.token}/"))
+    connection.shutdown(socket.SHUT_WR)
+    assert everything(connection).startswith(b"HTTP/1.1 200")
+
+
+def test_what_follows_a_request_with_a_body_is_no_request(server: ViewServer) -> None:
+    body = head(server, f"/{server.token}/")
+    connection = raw(server, head(server, "/", f"Content-Length: {len(body)}") + body)
+    assert everything(connection).count(b"HTTP/1.1") == 1
+
+
+def test_more_connections_than_are_allowed_are_closed(server: ViewServer) -> None:
+    with ExitStack() as stack:
+        for _ in range(MAX_CONNECTIONS):
+            stack.enter_context(raw(server, b"GET"))
+        assert everything(raw(server, b"")) == b""
+    all_are_served(server)
+    assert get(server, f"/{server.token}/")[0].status == 200
+
+
+@pytest.mark.parametrize("value", ["9" * 4000, "-" + "9" * 4300, "9" * 5000, "1e400", "%ff%00", ""])
+def test_numbers_beyond_all_bounds_are_refused(server: ViewServer, value: str) -> None:
+    for name in ("width", "azimuth"):
+        answer, body = get(server, f"/{server.token}/view?{name}={value}")
+        assert answer.status == 400
+        assert body.count(b"\n") == 1
+        assert len(body) < 200

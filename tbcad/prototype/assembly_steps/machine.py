@@ -1,6 +1,5 @@
 """A prototype as its export describes it: bodies, fasteners and the list of parts."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.formats.csv_table import Row
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files.bom_view import read_parts_list
@@ -113,7 +113,7 @@ def read_machine(folder: Path) -> Machine:
 
 def _record(path: Path) -> Record:
     try:
-        record = json.loads(read_text(_present(path), RECORD, "record"))
+        record = parse_json(read_text(_present(path), RECORD, "record"))
     except ValueError as error:
         raise InputError(f"{path} is no JSON ({error}): build again") from None
     if not isinstance(record, dict) or record.get("schema") != SCHEMA:

@@ -13,7 +13,6 @@ and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64, and boxes
 columns x0, x1 and rows y0, y1, ends excluded, that hold all of a mirror's pixels.
 """
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,11 +20,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
+from tbcad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.picture_bytes import png_bytes
@@ -42,8 +41,6 @@ PIXEL_ARRAYS: dict[str, tuple[tuple[int, ...], str]] = {
     "origin": ((3,), "f4"),
     "direction": ((3,), "f4"),
 }
-# Bytes an array keeps unpacked: mirrors side by side share chunks, two rows of which fit in.
-CHUNK_CACHE = 32 << 20
 MIRROR_ARRAYS = ("u", "apex", "normal", "curvature", "boxes")
 
 
@@ -102,12 +99,8 @@ class LightField:
                 f"{file}: no such file; give a light field: the folder that `tbcad capture` or "
                 "`tbcad merge` wrote, or its lightfield.h5"
             )
-        try:
-            store = h5py.File(file, "r", rdcc_nbytes=CHUNK_CACHE)
-        except OSError as error:
-            raise InputError(f"{file} is no light field: {error}: capture again") from error
-        with store:
-            yield _read(file, store)
+        with open_hdf5(file, SCHEMA, "light field", "capture again", _read) as stored:
+            yield stored
 
     @staticmethod
     def read(path: Path) -> "LightField":
@@ -175,46 +168,27 @@ def light_field_in_memory(
     return LightField(frames, capture_mm, dict(facts))
 
 
-def _read(file: Path, store: h5py.File) -> LightField:
-    schema = store.attrs.get("schema")
-    if schema != SCHEMA:
-        raise InputError(
-            f"{file} has schema {schema!r}, allowed is {SCHEMA!r}: capture again with this tbcad"
-        )
-    try:
-        frames = {name: _frame(_member(store, name)) for name in ("a", "b") if name in store}
-        capture_mm = float(store.attrs["capture_mm"])
-        facts = json.loads(store.attrs["facts"])
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(f"{file} is a damaged light field: {error}: capture again") from error
-    if not frames or not np.isfinite(capture_mm) or capture_mm <= 0 or not isinstance(facts, dict):
-        raise InputError(f"{file} is a damaged light field, without cameras: capture again")
-    return LightField(frames, capture_mm, facts)
+def _read(store: StoredGroup) -> LightField:
+    frames = {name: _frame(store.group(name)) for name in ("a", "b") if name in store}
+    capture_mm = float(store.attributes["capture_mm"])
+    if not frames or not np.isfinite(capture_mm) or capture_mm <= 0:
+        raise ValueError("it is without cameras or capture sphere")
+    return LightField(frames, capture_mm, store.facts)
 
 
-def _member(group: h5py.Group, name: str) -> Any:
-    """A group or array that lies in this very file: a link could name any other."""
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-        raise ValueError(f"{name} of {group.name} is missing or lies elsewhere")
-    member = group[name]
-    if isinstance(member, h5py.Dataset) and (member.external or member.is_virtual):
-        raise ValueError(f"array {name} of {group.name} lies elsewhere")
-    return member
-
-
-def _frame(group: h5py.Group) -> Frame:
-    planes = {name: _member(group, name) for name in PIXEL_ARRAYS}
+def _frame(group: StoredGroup) -> Frame:
+    planes = {name: group.array(name) for name in PIXEL_ARRAYS}
     height, width = planes["mirror"].shape
     for name, (last, kind) in PIXEL_ARRAYS.items():
         if planes[name].shape != (height, width, *last) or planes[name].dtype != np.dtype(kind):
-            raise ValueError(f"array {name} of {group.name} has another shape or kind")
-    attributes = group.attrs
+            raise ValueError(f"array {name} has another shape or kind")
+    attributes = group.attributes
     pinhole, forward, right = (
         _numbers(attributes[name], (3,)) for name in ("pinhole_mm", "forward", "right")
     )
     hfov = float(_numbers(attributes["hfov_rad"], ()))
-    table = _member(group, "mirrors")
-    columns = {name: _member(table, name)[:] for name in MIRROR_ARRAYS}
+    table = group.group("mirrors")
+    columns = {name: table.array(name)[:] for name in MIRROR_ARRAYS}
     m = len(columns["curvature"])
     u, apex, normal = (_numbers(columns[name], (m, 3)) for name in ("u", "apex", "normal"))
     mirrors = Surfaces(apex, normal, _numbers(columns["curvature"], (m,)))

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import h5py
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.simulate.capture.light_field import Frame, LightField
 from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands
@@ -117,20 +119,22 @@ def sequence_frame(source: LightField, folder: Path, number: int) -> LightField:
     file = folder / NAME
     if not file.is_file():
         raise InputError(f"{file}: no such file, so there is one frame only: {AGAIN}")
-    try:
-        with h5py.File(file, "r") as store:
-            if store.attrs.get("schema") != SCHEMA:
-                raise ValueError(f"allowed is the schema {SCHEMA!r}")
-            count = min(len(store[name]["colour"]) for name in source.frames)
-            if not 0 <= number < count:
-                raise InputError(f"--frame {number} is not in {file}: allowed is 0 to {count - 1}")
-            frames = {
-                name: _coloured(frame, store[name]["pixel"][:], store[name]["colour"][number])
-                for name, frame in source.frames.items()
-            }
-    except (OSError, KeyError, ValueError, IndexError) as error:
-        raise InputError(f"{file} is a damaged sequence: {error}: {AGAIN}") from error
-    return replace(source, frames=frames)
+    read = partial(_frames, source=source, number=number)
+    with open_hdf5(file, SCHEMA, "sequence", AGAIN, read) as frames:
+        return replace(source, frames=frames)
+
+
+def _frames(store: StoredGroup, source: LightField, number: int) -> dict[str, Frame]:
+    groups = {name: store.group(name) for name in source.frames}
+    pixel = {name: group.array("pixel") for name, group in groups.items()}
+    colour = {name: group.array("colour") for name, group in groups.items()}
+    count = min(map(len, colour.values()))
+    if not 0 <= number < count:
+        raise InputError(f"--frame {number} is not in the sequence: allowed is 0 to {count - 1}")
+    return {
+        name: _coloured(frame, pixel[name][:], colour[name][number])
+        for name, frame in source.frames.items()
+    }
 
 
 def _coloured(frame: Frame, pixel: Ints, colour: Bytes) -> Frame:

@@ -1,19 +1,18 @@
 """An object that turns about z in a light that stands still."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
+from tbcad.formats.hdf5 import open_hdf5
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.capture.sequence import AGAIN, NAME, SequenceWriter, create_sequence
+from tbcad.simulate.capture.sequence import AGAIN, NAME, SCHEMA, SequenceWriter, create_sequence
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, cast_rays
 from tbcad.types import Bytes, Floats, Progress
@@ -75,10 +74,11 @@ def turn_of_frame(folder: Path, number: int) -> float:
     Raises:
         InputError: the sequence does not say how far the object turned.
     """
+    with open_hdf5(folder / NAME, SCHEMA, "sequence", AGAIN, lambda store: store.facts) as facts:
+        turned: Any = facts.get("turns_deg")
     try:
-        with h5py.File(folder / NAME, "r") as store:
-            return float(np.radians(json.loads(store.attrs["facts"])["turns_deg"][number]))
-    except (OSError, KeyError, ValueError, IndexError) as error:
+        return float(np.radians(turned[number]))
+    except (TypeError, LookupError) as error:
         raise InputError(f"{folder / NAME} says nothing of frame {number}: {AGAIN}") from error
 
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.formats.threemf import same_locale
 from tbcad.simulate.object_files.contents import ObjectFile, Part
 from tbcad.types import Floats
 
@@ -24,18 +23,17 @@ def read_3mf(path: Path) -> ObjectFile:
     """
     import lib3mf
 
-    with same_locale():
-        model = lib3mf.get_wrapper().CreateModel()
-        try:
-            reader = model.QueryReader("3mf")
-            reader.SetStrictModeActive(False)
-            reader.ReadFromFile(str(path))
-        except lib3mf.ELib3MFException as error:
-            raise InputError(f"lib3mf says: {error}") from None
-        notes = list[str]()
-        parts = [part for item in _items(model.GetBuildItems())
-                 for part in _parts(model, item.GetObjectResource(),
-                                    _matrix(item.GetObjectTransform()), notes)]  # fmt: skip
+    model = lib3mf.get_wrapper().CreateModel()
+    try:
+        reader = model.QueryReader("3mf")
+        reader.SetStrictModeActive(False)
+        reader.ReadFromFile(str(path))
+    except lib3mf.ELib3MFException as error:
+        raise InputError(f"lib3mf says: {error}") from None
+    notes = list[str]()
+    parts = [part for item in _items(model.GetBuildItems())
+             for part in _parts(model, item.GetObjectResource(),
+                                _matrix(item.GetObjectTransform()), notes)]  # fmt: skip
     if not parts:
         raise InputError("it builds no mesh: its build section is empty")
     return ObjectFile(parts, list(dict.fromkeys(notes)), UNITS[int(model.GetUnit())], "z")

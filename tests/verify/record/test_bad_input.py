@@ -115,6 +115,22 @@ def test_the_command_refuses_in_one_line(
     assert files_of(export_folder) == before
 
 
+@pytest.mark.parametrize(("kind", "told"), [("folder", "a folder"), ("pipe", "a pipe or device")])
+@pytest.mark.parametrize("name", ["mine", "shell_a.stl"])
+def test_what_is_no_file_in_a_manifest_is_refused_as_such(
+    export_folder: Path, kind: str, told: str, name: str
+) -> None:
+    """A pipe would be waited for, and a folder's size is no sign that it changed."""
+    path = export_folder / name
+    path.unlink(missing_ok=True)
+    path.mkdir() if kind == "folder" else os.mkfifo(path)
+    manifest(lambda files: files.update({name: {"sha256": "0" * 64, "size": 0}}))(export_folder)
+    with pytest.raises(
+        BadExport, match=f"^{name}: not a regular file but {told}, yet in the manifest"
+    ):
+        verify(export_folder, options=IN_PROCESS)
+
+
 def test_link_inside_is_followed(export_folder: Path) -> None:
     (export_folder / "shell_a.stl").rename(export_folder / "real.stl")
     (export_folder / "shell_a.stl").symlink_to("real.stl")

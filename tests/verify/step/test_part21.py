@@ -1,6 +1,5 @@
 """The reader of STEP text against steputils, a parser of the whole grammar."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steputils import p21
-from tbcad_verify.step import part21
+from tbcad_verify.prototype.drawing_checks import PDF_TEXT
+from tbcad_verify.step.mirror_image import LABEL, NAME, STATEMENT
 from tbcad_verify.step.part21 import (
     Enumeration,
     Reference,
@@ -17,6 +17,7 @@ from tbcad_verify.step.part21 import (
     parameters,
     read_entities,
 )
+from tbcad_verify.step.solids_text import NUMBER
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample" / "shell_a.step"
 HEAD = "ISO-10303-21;\nHEADER;\nFILE_NAME('a;b','ENDSEC;');\nENDSEC;\nDATA;\n"
@@ -53,33 +54,62 @@ def test_every_entity_of_a_shell() -> None:
         assert parameters(text) == [as_ours(one) for one in entity.params]
 
 
-def test_both_expressions_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = SAMPLE.read_text(encoding="utf-8")
-    found = read_entities(text).texts
-    monkeypatch.setattr(part21, "PLAIN", re.compile(r"(?!)"))
-    assert read_entities(text).texts == found
+@pytest.mark.parametrize(
+    ("entity", "texts"),
+    [
+        ("A(1)/* ) ;#2=B(2); */;", "1"),
+        ("A(1)/*)*/;", "1"),
+        ("A('it''s;)','/*')\n ;", "'it''s;)','/*'"),
+        ("A(/* x) ;*/'y');", " 'y'"),
+        ("/**//* ' */A/***/(2)/**/;", "2"),
+    ],
+)
+def test_comments_and_texts_in_an_entity(entity: str, texts: str) -> None:
+    assert read_entities(f"{HEAD}#1={entity}\n#3=C(#1);{END}").texts[1] == ("A", texts)
+
+
+MANY = 200_000
+ENDLESS = {
+    "comments": "/**/" * MANY,
+    "comments without an end": "/*" * MANY,
+    "stars": "/*" + "*" * MANY,
+    "texts": "''" * MANY,
+    "an open text": "'" + "''" * MANY,
+    "blanks": " " * MANY,
+    "ends of a header": "ENDSEC; " * MANY,
+    "digits": "#" + "1" * MANY,
+    "lists": "#1=A(" + "(" * MANY,
+    "lists with an end": "#1=A(" + "(" * MANY + ")" * MANY + ");",
+    "names": "#1=" + "A" * MANY,
+    "complex": "#1=(" + "A(" * MANY + ")" * MANY + ");",
+}
+
+
+@pytest.mark.parametrize("text", ENDLESS.values(), ids=ENDLESS.keys())
+@pytest.mark.parametrize("head", ["", "ISO-10303-21;HEADER;", HEAD])
+def test_no_text_is_read_again_and_again(head: str, text: str) -> None:
+    """Twice the text takes twice the time; a quadratic search would take hours."""
+    for tail in ("x", ""):
+        with pytest.raises(ValueError, match="broken STEP text") as error:
+            read_entities(head + text + tail)
+        assert len(str(error.value)) < 200
+
+
+def test_no_other_expression_for_step_text_reads_again() -> None:
+    header = "FILE_NAME(" * MANY + "FILE_NAME('" + "''" * MANY + "');"
+    assert len(STATEMENT.findall(header)) == 1
+    assert NAME.findall("A" * MANY) == []
+    assert len(LABEL.findall("'" + "''" * MANY)) == 1
+    assert NUMBER.findall("1" * MANY) == []
+    assert PDF_TEXT.findall(b"(" * MANY + b"((" + b"\\" * MANY) == []
 
 
 @pytest.mark.parametrize(
-    "entity",
-    [
-        "A(1)/* ) ;#2=B(2); */;",
-        "A(1)/*)*/;",
-        "A('it''s;)','')\n ;",
-        "A(/* x) ;*/'y');",
-        "(A(1)B($));",
-    ],
+    "text", ["(" * MANY, "A(" * MANY, "(" * 40 + ")" * 40, "1" * 5000, "1E400", "#" + "1" * 5000]
 )
-def test_comments_and_texts_in_an_entity(entity: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def found() -> dict[int, tuple[str, str]] | str:
-        try:
-            return read_entities(f"{HEAD}#1={entity}\n#3=C(#1);{END}").texts
-        except ValueError as error:
-            return str(error)
-
-    quick = found()
-    monkeypatch.setattr(part21, "PLAIN", re.compile(r"(?!)"))
-    assert found() == quick
+def test_lists_too_deep_and_numbers_too_large_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="broken STEP text"):
+        parameters(text)
 
 
 def written(value: Value) -> str:

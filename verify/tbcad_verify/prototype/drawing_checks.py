@@ -23,7 +23,7 @@ from tbcad_verify.types import Floats
 CHECKS = {"drawings": "faults"}
 DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
 PDF_HEAD = b"%PDF-1."
-PDF_TEXT = re.compile(rb"\(((?:[^()\\]|\\.)*)\) Tj")
+PDF_TEXT = re.compile(rb"\(((?:[^()\\]++|\\.)*+)\) Tj")
 CORNERS = 4  # of a strip
 
 

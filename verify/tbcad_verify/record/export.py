@@ -16,7 +16,14 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read, refuse_unsafe
+from tbcad_verify.record.files import (
+    AGAIN,
+    MAX_TEXT_BYTES,
+    open_folder,
+    read,
+    refuse_other_kinds,
+    refuse_unsafe,
+)
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.prototype import RECORD, Prototype, read_prototype
 from tbcad_verify.record.prototype_sections import PrintedPart
@@ -269,6 +276,7 @@ def read_export(folder: Path) -> Export:
     texts = {name: read(root, name, MAX_TEXT_BYTES) for name in TEXTS}
     design = validated(DESIGN, Design, parse_json(texts[DESIGN], SCHEMA))
     manifest = validated(MANIFEST, Manifest, parse_json(texts[MANIFEST], MANIFEST_SCHEMA))
+    refuse_other_kinds(root, manifest.files)
     cameras = {camera.id: camera for camera in design.cameras}
     digests = {name: blob.digest for name, blob in texts.items()}
     prototype = None

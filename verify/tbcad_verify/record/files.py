@@ -93,6 +93,22 @@ def locate(folder: Path, name: str) -> Path:
     return real
 
 
+def refuse_other_kinds(folder: Path, names: Iterable[str]) -> None:
+    """Refuse folders, pipes and devices where files are listed; what is missing is found later.
+
+    Raises:
+        BadExport: it names the first.
+    """
+    for name in names:
+        with contextlib.suppress(OSError, ValueError):
+            mode = (folder / name).stat().st_mode
+            if not stat.S_ISREG(mode):
+                kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or device"
+                raise BadExport(
+                    f"{name}: not a regular file but {kind}, yet in the manifest; {AGAIN}"
+                )
+
+
 def read(
     folder: Path,
     name: str,

@@ -20,17 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.step.part21 import Entities, read_entities
+from tbcad_verify.step.part21 import TEXT, Entities, read_entities
 from tbcad_verify.types import Floats
 
 Row = dict[str, Any]
 Texts = dict[int, tuple[str, str]]
 
 REFERENCE = re.compile(r"#(\d+)")
-LABEL = re.compile(r"'(?:[^']|'')*'")
-NAME = re.compile(r"[A-Z]\w*(?=\()")
-DIGITS = re.compile(r"[-+.\dE\s,]*")
-FILE_NAME = re.compile(r"FILE_NAME\((?:[^';]|'(?:[^']|'')*')*\);")
+LABEL = re.compile(TEXT)
+NAME = re.compile(r"\b[A-Z]\w*+(?=\()")
+DIGITS = re.compile(r"[-+.\dE\s,]*+")
+STATEMENT = re.compile(rf"(?:[^';]++|{TEXT})*+;")
 IMAGE, AXIAL, STILL = (-1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
 TURNING = frozenset(("CIRCLE", "ELLIPSE"))
 PLACED = frozenset(
@@ -82,7 +82,7 @@ def is_mirror_image(one: str, other: str) -> bool:
 
 def _same_frame(one: Entities, other: Entities) -> bool:
     """Header and units are the same."""
-    headers = [_packed(FILE_NAME.sub("", table.header)) for table in (one, other)]
+    headers = [_unnamed(table.header) for table in (one, other)]
     units = [{n: _packed(text) for n, text in table.units.items()} for table in (one, other)]
     known = UNITS.issuperset(chain(*(NAME.findall(text) for text in units[0].values())))
     return headers[0] == headers[1] and units[0] == units[1] and known
@@ -155,6 +155,12 @@ def _numbers(texts: Iterable[str]) -> Floats:
 
 def _references(text: str) -> list[int]:
     return [int(digits) for digits in REFERENCE.findall(text)]
+
+
+def _unnamed(header: str) -> list[str]:
+    """Statements of a header but for the file's name and date."""
+    statements = map(_packed, STATEMENT.findall(header))
+    return [text for text in statements if not text.startswith("FILE_NAME(")]
 
 
 def _unlinked(text: str) -> str:

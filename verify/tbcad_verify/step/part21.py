@@ -6,29 +6,27 @@ takes twenty times as long. It is the oracle of the tests.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
-BLANK = r"(?:\s|/\*.*?\*/)*"
-TEXT = r"'(?:[^']|'')*'"
+# No expression tries again what it has read, so that the time grows with the length alone.
+TEXT = r"'(?:[^']++|'')*+'"
+NOTE = re.compile(rf"{TEXT}|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?")  # a comment, or a text as it is
 ENTITY = re.compile(
-    rf"{BLANK}#(\d+){BLANK}={BLANK}([A-Z]\w*)?{BLANK}\(((?:[^';=]|{TEXT})*)\){BLANK};", re.S
+    rf"\s*+#(\d{{1,15}}+)\s*+=\s*+([A-Z]\w*+)?\s*+\(((?:[^';=]++|{TEXT})*+);",
 )
-# An entity without comments. It never tries again what it has read, and so takes half the time.
-PLAIN = re.compile(
-    r"\s*+#(\d++)\s*+=\s*+([A-Z]\w*+)?\s*+\(((?:[^';=]++|'(?:[^']++|'')*+')*+);", re.S
-)
-START = re.compile(
-    rf"{BLANK}ISO-10303-21;{BLANK}HEADER;(?:[^';]|{TEXT}|;)*?ENDSEC;{BLANK}DATA;", re.S
-)
-END = re.compile(rf"{BLANK}ENDSEC;{BLANK}END-ISO-10303-21;{BLANK}", re.S)
+START = re.compile(r"\s*+ISO-10303-21;\s*+HEADER;")
+HEADER_END = re.compile(rf"{TEXT}|(?P<end>ENDSEC;\s*+DATA;)|(?P<open>')")
+END = re.compile(r"\s*+ENDSEC;\s*+END-ISO-10303-21;\s*+")
 TOKEN = re.compile(
-    rf"{BLANK}(?:(?P<text>{TEXT})|#(?P<reference>\d+)|(?P<number>[-+]?\d+\.?\d*(?:E[-+]?\d+)?)"
-    rf"|\.(?P<enumeration>[A-Z]\w*)\.|(?P<none>[$*])|(?P<name>[A-Z]\w*){BLANK}(?=\()|(?P<mark>[(),]))",
-    re.S,
+    rf"\s*+(?:(?P<text>{TEXT})|#(?P<reference>\d{{1,15}}+)"
+    r"|(?P<number>[-+]?\d++\.?\d*+(?:E[-+]?\d++)?)|\.(?P<enumeration>[A-Z]\w*+)\."
+    r"|(?P<none>[$*])|(?P<name>[A-Z]\w*+)\s*+(?=\()|(?P<mark>[(),]))"
 )
+MAX_DEPTH = 30  # of lists in lists; a surface by splines has three
 SHOWN = 40  # characters of what cannot be read
 
 
@@ -55,10 +53,21 @@ Value: TypeAlias = "str | float | Reference | Enumeration | Typed | list[Value] 
 """A parameter; None: left open."""
 
 
+def finite(digits: str) -> float:
+    """A number, none too large.
+
+    Raises:
+        ValueError: it is beyond all floats.
+    """
+    if not math.isfinite(number := float(digits)):
+        raise ValueError(f"broken STEP text: the number {digits[:SHOWN]} is too large")
+    return number
+
+
 SIMPLE: Mapping[str, Callable[[str], Value]] = {
     "text": lambda word: word[1:-1].replace("''", "'"),
     "reference": lambda word: Reference(int(word)),
-    "number": float,
+    "number": finite,
     "enumeration": Enumeration,
     "none": lambda word: None,
 }
@@ -105,21 +114,15 @@ def read_entities(text: str) -> Entities:
     Raises:
         ValueError: the text is no STEP file, or two entities have one number.
     """
-    start = START.match(text)
-    if start is None:
-        raise ValueError("broken STEP text: no header and data section")
+    if "/*" in text:
+        text = NOTE.sub(lambda found: found[0] if found[0].startswith("'") else " ", text)
+    place = _data_start(text)
+    header = text[:place]
     texts: dict[int, tuple[str, str]] = {}
-    numbers, place = 0, start.end()
-    while True:
-        match = PLAIN.match(text, place)
-        if match and (inside := match[3].rstrip()).endswith(")"):
-            inside = inside[:-1]
-        elif match := ENTITY.match(text, place):
-            inside = match[3]
-        else:
-            break
+    numbers = 0
+    while (match := ENTITY.match(text, place)) and (inside := match[3].rstrip()).endswith(")"):
         numbers, place = numbers + 1, match.end()
-        texts[int(match[1])] = (match[2] or "", inside)
+        texts[int(match[1])] = (match[2] or "", inside[:-1])
     if not END.fullmatch(text, place):
         raise ValueError(f"broken STEP text at {text[place : place + SHOWN].strip()!r}")
     if len(texts) < numbers:
@@ -128,7 +131,18 @@ def read_entities(text: str) -> Entities:
     for inside in composed.values():
         _check_complex(inside)
     simple = {number: entity for number, entity in texts.items() if entity[0]}
-    return Entities(simple, composed, start[0])
+    return Entities(simple, composed, header)
+
+
+def _data_start(text: str) -> int:
+    """Where the first entity begins."""
+    start = START.match(text)
+    for found in HEADER_END.finditer(text, start.end()) if start else ():
+        if found["end"]:
+            return found.end()
+        if found["open"]:
+            break
+    raise ValueError("broken STEP text: no header and data section")
 
 
 def _check_complex(text: str) -> None:
@@ -137,7 +151,7 @@ def _check_complex(text: str) -> None:
     for kind, word in tokens:
         if kind != "name":
             raise ValueError(f"broken STEP text: {word!r} where a name must be")
-        _value(kind, word, tokens)
+        _value(kind, word, tokens, 0)
 
 
 def parameters(text: str) -> list[Value]:
@@ -149,7 +163,7 @@ def parameters(text: str) -> list[Value]:
     tokens = _tokens(f"({text})")
     if next(tokens) != ("mark", "("):
         raise ValueError("broken STEP text: no list")
-    values = _list(tokens)
+    values = _list(tokens, 0)
     if next(tokens, None) is not None:
         raise ValueError(f"broken STEP text in {text[:SHOWN]!r}")
     return values
@@ -165,14 +179,16 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
         place = match.end()
 
 
-def _list(tokens: Iterator[tuple[str, str]]) -> list[Value]:
+def _list(tokens: Iterator[tuple[str, str]], depth: int) -> list[Value]:
     """Values up to the closing parenthesis."""
+    if depth > MAX_DEPTH:
+        raise ValueError(f"broken STEP text: more than {MAX_DEPTH} lists in each other")
     values: list[Value] = []
     kind, word = _next(tokens)
     if (kind, word) == ("mark", ")"):
         return values
     while True:
-        values.append(_value(kind, word, tokens))
+        values.append(_value(kind, word, tokens, depth))
         match _next(tokens):
             case ("mark", ")"):
                 return values
@@ -182,14 +198,14 @@ def _list(tokens: Iterator[tuple[str, str]]) -> list[Value]:
                 raise ValueError(f"broken STEP text: {other!r} where a comma must be")
 
 
-def _value(kind: str, word: str, tokens: Iterator[tuple[str, str]]) -> Value:
+def _value(kind: str, word: str, tokens: Iterator[tuple[str, str]], depth: int) -> Value:
     if kind in SIMPLE:
         return SIMPLE[kind](word)
     if kind == "name":
         _next(tokens)
-        return Typed(word, _list(tokens))
+        return Typed(word, _list(tokens, depth + 1))
     if word == "(":
-        return _list(tokens)
+        return _list(tokens, depth + 1)
     raise ValueError(f"broken STEP text: {word!r} where a value must be")
 
 

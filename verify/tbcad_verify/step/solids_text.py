@@ -15,12 +15,12 @@ import numpy as np
 
 from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.part21 import read_entities
+from tbcad_verify.step.part21 import finite, read_entities
 from tbcad_verify.types import Floats
 
 REFERENCE = re.compile(r"#(\d+)")
-NUMBER = re.compile(r"[-+]?\d+\.\d*(?:E[-+]?\d+)?")
-TEXT = re.compile(r"'([^']*)'")
+NUMBER = re.compile(r"[-+]?(?<!\d)\d++\.\d*+(?:E[-+]?\d++)?")  # begins at none but the first digit
+TEXT = re.compile(r"'([^']*+)'")
 UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 SAME_LINE_MM = 1e-6  # of axes of one hole
 PARALLEL = 1e-9
@@ -93,7 +93,7 @@ class StepTable:
 
     def numbers(self, number: int) -> list[float]:
         """Decimal numbers in an entity."""
-        return [float(digits) for digits in NUMBER.findall(self.bodies[number])]
+        return [finite(digits) for digits in NUMBER.findall(self.bodies[number])]
 
     def reached(self, *start: int) -> Iterator[int]:
         """Some entities, all that they refer to, and what these refer to, each once.
