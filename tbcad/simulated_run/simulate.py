@@ -20,7 +20,13 @@ from tbcad.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.machine.designed import designed_prototype, dome_radius
 from tbcad.machine.record import truth_file, write_machine
 from tbcad.machine.shells import perfect_half, random_half, shell_frame
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.runs.exposure import (
+    EXPOSURE_SCHEMA,
+    PHOTOGRAPHS,
+    Exposure,
+    Frame,
+    exposure_name,
+)
 from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.prototype.plan import read_plan
@@ -30,7 +36,14 @@ from tbcad.simulate.scene.object import SceneObject, built_in_object, load_objec
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.occluders import Occluders, stage_scene
 from tbcad.simulated_run.options import RunOptions
-from tbcad.simulated_run.photographs import Chain, SimulatedRun, frames_of, phases_of
+from tbcad.simulated_run.photographs import (
+    EXPOSURE_S,
+    LED_LIGHT,
+    Chain,
+    SimulatedRun,
+    frames_of,
+    phases_of,
+)
 from tbcad.simulated_run.sensor import Image16, Sensor
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.prototype.wind_up import read_wind_up
@@ -43,7 +56,6 @@ DEPENDS_ON: dict[Geometry, tuple[str, ...]] = {
     "shell": MIRRORS,
 }
 PNG_LEVEL = 1
-EXPOSURE_S = 1.0
 # Of a simulated camera there is no clock: photographs follow each other from here.
 BEGIN = datetime(2022, 11, 1, tzinfo=UTC)
 
@@ -71,10 +83,15 @@ def prepare_run(
     """
     prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
     leds = len(prepared.builds[0][0].machine.leds)
-    phases = _chosen_phases(options.phases, phases_of(leds))
+    phases = options.times.phases(_chosen_phases(options.phases, phases_of(leds)))
     scene = prepared_scene(prepared.scene)
     occluders = Occluders(scene.embree, prepared.stage)
-    chain = Chain(Sensor(bits=options.bits, noise=options.noise), dome=dome_radius(export))
+    chain = Chain(
+        Sensor(bits=options.bits, noise=options.noise),
+        dome=dome_radius(export),
+        led_light=LED_LIGHT * options.led_brightness,
+        times=options.times,
+    )
     runs = []
     for whole, every in prepared.builds:
         frames = _chosen_stops(options.stops, every)
@@ -186,7 +203,8 @@ def _write_frames(
 
     def frame(number: int) -> None:
         for phase, image in run.frame_photographs(number, phases).items():
-            _write_photograph(folder, run.frames[number], phase, image)
+            seconds = EXPOSURE_S * run.chain.exposure(phase)
+            _write_photograph(folder, run.frames[number], phase, image, seconds)
 
     started = monotonic()
     with ThreadPoolExecutor(THREADS) as pool:
@@ -195,7 +213,9 @@ def _write_frames(
             progress(f"frame {done} of {count}, {left:.0f} s left")
 
 
-def _write_photograph(folder: Path, frame: Frame, phase: str, image: Image16) -> None:
+def _write_photograph(
+    folder: Path, frame: Frame, phase: str, image: Image16, seconds: float
+) -> None:
     name, data = exposure_name(frame, phase), BytesIO()
     Image.fromarray(image).save(data, "png", compress_level=PNG_LEVEL)
     (folder / f"{name}.png").write_bytes(data.getvalue())
@@ -206,7 +226,7 @@ def _write_photograph(folder: Path, frame: Frame, phase: str, image: Image16) ->
         sha256=hashlib.sha256(data.getvalue()).hexdigest(),
         width_px=image.shape[1],
         height_px=image.shape[0],
-        exposure_s=EXPOSURE_S,
+        exposure_s=seconds,
         taken=BEGIN,
         settings={},
     )
@@ -230,7 +250,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
         phases=phases,
         frames=frames,
         locked={},
-        seconds=EXPOSURE_S * len(frames) * len(phases),
+        seconds=EXPOSURE_S * len(frames) * sum(map(runs[0].chain.exposure, phases)),
         geometry=geometry,
     )
 
