@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from tbcad.formats.checked_files import Record, read_json
-from tbcad.runs.exposure import Frame, PhaseName, Setting
+from tbcad.runs.exposure import DARK_LIT, LIT, Frame, PhaseName, PhaseTimes, Setting
 
 RUN_SCHEMA = "tbcad-run/1"
 Geometry = Literal["prototype", "shell"]
@@ -66,6 +66,14 @@ class RunRecord(Record):
         """Settings that may not change among the photographs of a phase."""
         own = self.exposures.get(phase)
         return self.locked if own is None else self.locked | own.settings
+
+    @property
+    def times(self) -> PhaseTimes:
+        """Exposure times that the camera was told."""
+        of_lit = LIT, DARK_LIT
+        asked = [(name in of_lit, one.asked_s) for name, one in self.exposures.items()]
+        leds, lit = (dict(reversed(asked)).get(is_lit) for is_lit in (False, True))
+        return PhaseTimes(leds, lit)
 
     @property
     def machines(self) -> dict[str, tuple[Frame, ...]]:
