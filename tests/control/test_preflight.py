@@ -1,5 +1,6 @@
 """Exposures that will not do are found at one stop; those that will are set, kept and recorded."""
 
+import io
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,9 +16,10 @@ from tbcad.control.cameras.camera import Shot
 from tbcad.control.cameras.command import CommandCamera
 from tbcad.control.cameras.image_facts import EXIF, EXPOSURE, ImageFacts
 from tbcad.control.faults import CameraFault
-from tbcad.control.preflight import look
+from tbcad.control.preflight import look, preflight
 from tbcad.control.shooting import Photograph, take
 from tbcad.control.trials import common_settings
+from tbcad.errors import InputError
 from tbcad.runs.photographs import read_run
 from tests.control import exposing_camera
 from tests.control.exposing_camera import radiance
@@ -53,7 +55,7 @@ def test_exposures_that_will_not_do(lit_rig: Rig, capsys: pytest.CaptureFixture[
     assert "lit at 0.1 s is too dark: peak 4% of the largest number" in err
     last = err.splitlines()[-1]
     assert last.startswith("tbcad: the preflight: led_2 is saturated, lit is too dark: photograph ")
-    assert "with --exposure-leds 0.00934 --exposure-lit 1.91;" in last
+    assert "with --exposure-leds 0.00747 --exposure-lit 1.53;" in last
     assert not lit_rig.out.exists()
     assert not lit_rig.controller.machine.lights
 
@@ -139,6 +141,43 @@ def test_what_shines_in_the_dark_is_no_highlight() -> None:
     lamp = pixels(1.0, 3)
     assert look("led_1", lamp, lamp).highlights == 0
     assert look("led_1", lamp + pixels(0.6, 3, number=7) // 2, lamp).highlights == 2
+
+
+def png(image: np.ndarray) -> Shot:
+    file = io.BytesIO()
+    Image.fromarray(image).save(file, "PNG")
+    return Shot(file.getvalue(), ".png", {})
+
+
+def looked_at(*levels: float) -> list[str]:
+    """The lines of a preflight whose LEDs give highlights of some levels."""
+    lines: list[str] = []
+    leds = {f"led_{k}": png(pixels(level, 3)) for k, level in enumerate(levels, 1)}
+    times = dict.fromkeys(leds)
+    preflight(times, lambda phase, _: leds[phase], "camera, stop", lines.append)
+    return lines
+
+
+def test_leds_share_an_exposure() -> None:
+    weak, bright = looked_at(0.1, 0.6)
+    assert weak == (
+        "preflight, camera, stop: led_1 is good: peak 10% of the largest number, 0% of 5 "
+        "highlights saturated"
+    )
+    assert "led_2 is good: peak 60%" in bright
+
+
+@pytest.mark.parametrize(
+    ("levels", "says"),
+    [
+        ((0.6, 0.0), "led_2 is too dark: see to the LED's wires, or leave it out with --phases;"),
+        ((0.1, 0.0), "led_1 is too dark, led_2 is too dark: change the camera's exposure"),
+        ((0.6, 1.0), "led_2 is saturated: change the camera's exposure, or say one for each light"),
+    ],
+)
+def test_leds_that_will_not_do(levels: tuple[float, ...], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        looked_at(*levels)
 
 
 def photograph(**settings: str) -> Photograph:
