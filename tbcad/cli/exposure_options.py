@@ -27,7 +27,7 @@ ExposureLit = Annotated[
 ]
 
 
-def seconds(text: str | None) -> float | None:
+def seconds(option: str, text: str | None) -> float | None:
     """An exposure time, s, of a number or a fraction as cameras show it.
 
     Raises:
@@ -42,7 +42,7 @@ def seconds(text: str | None) -> float | None:
         found = math.nan
     if not SHORTEST_S <= found <= LONGEST_S:
         raise InputError(
-            f"an exposure is {text!r:.40}, allowed are {SHORTEST_S:g} to {LONGEST_S:g} s, as 0.5 "
+            f"{option} is {text!r:.40}, allowed are {SHORTEST_S:g} to {LONGEST_S:g} s, as 0.5 "
             "or 1/60: change it"
         )
     return found

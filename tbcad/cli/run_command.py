@@ -122,7 +122,8 @@ def run(
     input, or the preflight finds an exposure that will not do.
     """
     size_px = _size(size)
-    leds_s, lit_s = seconds(exposure_leds), seconds(exposure_lit)
+    leds_s = seconds("--exposure-leds", exposure_leds)
+    lit_s = seconds("--exposure-lit", exposure_lit)
     if preflight_only and (no_preflight or resume):
         other = "--resume" if resume else "--no-preflight"
         raise InputError(f"--preflight-only goes without {other}: leave one of both out")

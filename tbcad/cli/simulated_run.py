@@ -89,7 +89,9 @@ def simulate_run(
     from tbcad.runs.exposure import PhaseTimes
     from tbcad.simulated_run.options import RunOptions
 
-    times = PhaseTimes(seconds(exposure_leds), seconds(exposure_lit))
+    times = PhaseTimes(
+        seconds("--exposure-leds", exposure_leds), seconds("--exposure-lit", exposure_lit)
+    )
     options = RunOptions(seed, chosen, named, perfect, noise, bits, shell, led_brightness, times)
     with stages(2) as screen:
         run = simulate(

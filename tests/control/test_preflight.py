@@ -23,7 +23,7 @@ from tbcad.errors import InputError
 from tbcad.runs.photographs import read_run
 from tests.control import exposing_camera
 from tests.control.exposing_camera import radiance
-from tests.control.rig import ROOT, SIZE, Rig, connected_rig
+from tests.control.rig import ROOT, SIZE, Rig, connected_rig, put, scene_of
 from tests.control.run_checks import events
 
 GOOD = ("--exposure-leds", "1/100", "--exposure-lit", "2")
@@ -85,14 +85,43 @@ def test_each_phase_has_its_exposure(lit_rig: Rig, capsys: pytest.CaptureFixture
     assert read_run(lit_rig.out).exposures["a_0001_lit"].exposure_s == 2.0
 
 
+def test_camera_on_the_relay_is_looked_at_too(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its LEDs are at the largest number, and tbcad cannot change that."""
+    pictures = rig.folder / "pictures"
+    pictures.mkdir()
+    numbers = iter(range(1000))
+    rig.controller.released = lambda machine: put(
+        pictures / f"{next(numbers)}.jpg", scene_of(machine)
+    )
+    every = rig.words("--phases", "dark,led_1,lit", "--runs", "b", camera=f"folder:{pictures}")
+    assert tbcad([word for word in every if word != "--no-preflight"]) == 2
+    err = capsys.readouterr().err
+    assert "object turned by 180 degrees" in err
+    assert "run b, stop 2 at" in err
+    assert "led_1 is saturated" in err
+    assert "change the camera's exposure" in err.splitlines()[-1]
+    assert next(numbers) == 4  # the trial and three phases: nothing else can be tried
+    assert not rig.out.exists()
+
+
+def test_controller_that_fails_in_the_preflight(
+    lit_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lit_rig.controller.fault = lambda _, line: "reset" if line == "M64 P2" else None
+    assert tbcad(words(lit_rig, *GOOD)) == 2
+    assert "the controller began anew at 'M64 P2'" in capsys.readouterr().err.splitlines()[-1]
+    assert not lit_rig.out.exists()
+    assert not lit_rig.controller.machine.lights
+
+
 @pytest.mark.parametrize(
     ("camera", "exposures", "says"),
     [
         ("folder:.", GOOD, "photograph two runs, one with --phases dark,leds"),
         ("command:cp a {output}", GOOD, "put one where the exposure belongs"),
         ("command:cp {exposure_us} {output}", (), "say --exposure-leds and --exposure-lit"),
-        ("gphoto2", ("--exposure-lit", "1/0"), "an exposure is '1/0', allowed are"),
-        ("gphoto2", ("--exposure-leds", "nan"), "an exposure is 'nan', allowed are"),
+        ("gphoto2", ("--exposure-lit", "1/0"), "--exposure-lit is '1/0', allowed are"),
+        ("gphoto2", ("--exposure-leds", "nan"), "--exposure-leds is 'nan', allowed are"),
     ],
 )
 def test_cameras_that_cannot_be_told(
