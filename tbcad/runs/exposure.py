@@ -11,12 +11,14 @@ with names as `a_0012_led_1`: run a (object straight) or b (object turned by 180
 phase. Photographs are never changed after they are written.
 """
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from tbcad.errors import InputError
 from tbcad.formats.checked_files import Finite, Record
 
 EXPOSURE_SCHEMA = "tbcad-exposure/1"
@@ -39,6 +41,8 @@ Setting = str | int | float | bool
 class PhaseTimes:
     """Exposure times that are asked for; one alone is for all phases.
 
+    Raises an `InputError` where one is not above zero.
+
     Attributes:
         leds_s: of LEDs and darkness, s; None: not said.
         lit_s: of the lit object, s; likewise.
@@ -46,6 +50,14 @@ class PhaseTimes:
 
     leds_s: float | None = None
     lit_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the times."""
+        for seconds in (self.leds_s, self.lit_s):
+            if seconds is not None and not 0 < seconds < math.inf:
+                raise InputError(
+                    f"an exposure is {seconds!r}, allowed are seconds above 0: change it"
+                )
 
     def of(self, phase: str) -> float | None:
         """Exposure time of a phase, s; None: that which the camera has."""

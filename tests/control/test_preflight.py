@@ -20,6 +20,7 @@ from tbcad.control.preflight import look, preflight
 from tbcad.control.shooting import Photograph, take
 from tbcad.control.trials import common_settings
 from tbcad.errors import InputError
+from tbcad.runs.exposure import PhaseTimes
 from tbcad.runs.photographs import read_run
 from tests.control import exposing_camera
 from tests.control.exposing_camera import radiance
@@ -170,6 +171,12 @@ def test_what_shines_in_the_dark_is_no_highlight() -> None:
     lamp = pixels(1.0, 3)
     assert look("led_1", lamp, lamp).highlights == 0
     assert look("led_1", lamp + pixels(0.6, 3, number=7) // 2, lamp).highlights == 2
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+def test_times_that_are_none(seconds: float) -> None:
+    with pytest.raises(InputError, match="allowed are seconds above 0"):
+        PhaseTimes(lit_s=seconds)
 
 
 def png(image: np.ndarray) -> Shot:
