@@ -6,6 +6,7 @@ from tbcad.cli import run as tbcad
 from tbcad.runs.photographs import read_run
 from tests.control.rig import Rig
 from tests.control.run_checks import check_every_photograph
+from tests.exported_files import edit_json
 
 pytest.importorskip("gphoto2", reason="the extra `machine` is not installed")
 SETTINGS = {"shutterspeed": "0.0100s", "f-number": "f/2.8", "imagesize": "640x480"}
@@ -59,6 +60,9 @@ def test_exposure_of_each_phase(rig: Rig) -> None:
     assert run.exposures["a_0001_lit"].exposure_s == 0.1
     assert "shutterspeed" not in run.record.locked
     assert run.record.locked["imagesize"] == SETTINGS["imagesize"]
+    sidecar = rig.out / "photographs" / "a_0001_lit.json"
+    edit_json(sidecar, lambda value: value["settings"].update(shutterspeed=short))
+    assert "shutterspeed is not what the run is locked to" in read_run(rig.out).faults["a_0001_lit"]
 
 
 def test_exposure_that_the_camera_does_not_have(rig: Rig) -> None:
