@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tbcad.calibration.options import CalibrationOptions
     from tbcad.calibration.run import WrittenCalibration
     from tbcad.control.outcome import Outcome
+    from tbcad.control.selection import Preflight
     from tbcad.control.session import Ask, Show
     from tbcad.merged_run.corrections import Options as MergeOptions
     from tbcad.runs.photographs import Run
@@ -34,6 +35,9 @@ def run(
     stops: str | None = None,
     runs: str | None = None,
     size_px: tuple[int, int] | None = None,
+    exposure_leds_s: float | None = None,
+    exposure_lit_s: float | None = None,
+    preflight: Preflight = "first",
     resume: bool = False,
     send_settings: bool = False,
     timeout_s: float = 30.0,
@@ -52,6 +56,10 @@ def run(
         stops: numbers and ranges such as "1-10,40"; None: all.
         runs: "a", object straight, "b", turned by 180 degrees, or "ab"; None: both.
         size_px: columns and rows of a photograph; None: those of the design.
+        exposure_leds_s: exposure time by LEDs and in the dark, s; None: see the next.
+        exposure_lit_s: of the lit object, s; one alone is for all, none leaves the camera's own.
+        preflight: "first": one stop is looked at under each light before a new run; "only": and
+            nothing is photographed; "off": it is not.
         resume: take what is missing in the folder.
         send_settings: send the controller the settings that differ from the export's.
         timeout_s: how long one photograph may take.
@@ -62,12 +70,16 @@ def run(
         What was photographed, what is missing, and why the run stopped if it did.
 
     Raises:
-        InputError: something was wrong before the first photograph; none was taken.
+        InputError: something was wrong before the first photograph of the run, also an exposure.
     """
     from tbcad.control.run import RunRequest, run_machine
+    from tbcad.runs.exposure import PhaseTimes
     from tbcad.screen import stages
 
-    request = RunRequest(Path(exports), Path(out), phases, stops, runs, size_px, resume)
+    times = PhaseTimes(exposure_leds_s, exposure_lit_s)
+    request = RunRequest(
+        Path(exports), Path(out), phases, stops, runs, size_px, resume, times, preflight
+    )
     return run_machine(
         request,
         port,

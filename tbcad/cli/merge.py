@@ -117,7 +117,15 @@ def _lines(record: dict[str, Any]) -> list[str]:
             lines.append(f"  {len(unused)} photographs not used: {_few(list(unused))}")
         if half["without_dark"]:
             names = half["without_dark"]
-            lines.append(f"  {len(names)} without their dark photograph: {_few(names)}")
+            lines.append(
+                f"  {len(names)} without a dark photograph of their exposure: {_few(names)}"
+            )
+        if half["dark_scaled"]:
+            names = half["dark_scaled"]
+            lines.append(
+                f"  {len(names)} whose dark photograph was exposed otherwise, and is scaled: "
+                f"{_few(names)}"
+            )
     return lines
 
 

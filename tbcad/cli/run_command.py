@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
+from tbcad.cli.exposure_options import ExposureLeds, ExposureLit, seconds
 from tbcad.cli.options import Exports
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
@@ -29,7 +30,8 @@ def run(
         typer.Option(
             metavar="CAMERA",
             help="gphoto2: the camera on USB; command:PROGRAM ARGUMENTS, with {output} for the "
-            "image's path without suffix; folder:PATH, where another program puts photographs.",
+            "image's path without suffix and {exposure_s}, {exposure_ms} or {exposure_us} for the "
+            "exposure; folder:PATH, where another program puts photographs.",
         ),
     ] = "gphoto2",
     out: Annotated[
@@ -75,6 +77,19 @@ def run(
             help="Seconds that command: and folder: may take for one photograph.",
         ),
     ] = 30.0,
+    exposure_leds: ExposureLeds = None,
+    exposure_lit: ExposureLit = None,
+    no_preflight: Annotated[
+        bool,
+        typer.Option(
+            "--no-preflight",
+            help="Begin at once, without a look at one stop under each light for saturated and "
+            "dark photographs.",
+        ),
+    ] = False,
+    preflight_only: Annotated[
+        bool, typer.Option("--preflight-only", help="That look alone; nothing is kept.")
+    ] = False,
     send_settings: Annotated[
         bool,
         typer.Option(
@@ -100,15 +115,22 @@ def run(
 
     At each stop: one photograph in the dark, one by each LED, one of the lit object. Exit code 0:
     all photographs are there. 1: some are missing, or the run stopped; --resume goes on. 2: bad
-    input.
+    input, or the preflight finds an exposure that will not do.
     """
     size_px = _size(size)
+    leds_s = seconds("--exposure-leds", exposure_leds)
+    lit_s = seconds("--exposure-lit", exposure_lit)
+    if preflight_only and (no_preflight or resume):
+        other = "--resume" if resume else "--no-preflight"
+        raise InputError(f"--preflight-only goes without {other}: leave one of both out")
     if dry_run:
         from tbcad.control.run import RunRequest
         from tbcad.control.run import dry_run as planned
         from tbcad.control.verdict import dry_run_lines, dry_run_record
+        from tbcad.runs.exposure import PhaseTimes
 
-        request = RunRequest(folder, out, phases, stops, runs, size_px, resume)
+        times = PhaseTimes(leds_s, lit_s)
+        request = RunRequest(folder, out, phases, stops, runs, size_px, resume, times)
         found = planned(request)
         if json:
             print_json(dry_run_record(found))
@@ -128,7 +150,7 @@ def run(
             "the machine is ready"
         )
     from tbcad.api import run as photograph
-    from tbcad.control.verdict import outcome_lines
+    from tbcad.control.verdict import outcome_lines, preflight_lines
     from tbcad.screen import stages
 
     outcome = photograph(
@@ -141,13 +163,18 @@ def run(
         stops=stops,
         runs=runs,
         size_px=size_px,
+        exposure_leds_s=leds_s,
+        exposure_lit_s=lit_s,
+        preflight="only" if preflight_only else "off" if no_preflight else "first",
         resume=resume,
         send_settings=send_settings,
         timeout_s=timeout,
         show=stages,
         progress=_note,
     )
-    for line in outcome_lines(outcome, _resuming(folder, port, camera, out)):
+    resuming = _resuming(folder, port, camera, out)
+    lines = preflight_lines(outcome) if preflight_only else outcome_lines(outcome, resuming)
+    for line in lines:
         typer.echo(line)
     return 0 if outcome.complete else 1
 

@@ -7,12 +7,14 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_export, check_is_object
+from tbcad.cli.exposure_options import ExposureLeds, ExposureLit, seconds
 from tbcad.cli.options import Exports, ObjectFile, UnitOption, UpOption
 from tbcad.errors import InputError
 from tbcad.screen import stages
 
 MOST_NOISE = 100.0
 MOST_STOPS = 1_000_000  # as a run's record may have
+MOST_BRIGHTNESS = 10_000.0
 
 
 @app.command(name="simulate-run")
@@ -53,6 +55,18 @@ def simulate_run(
             "--shell", help="Both cameras of the shell, one photograph each, not the prototype."
         ),
     ] = False,
+    led_brightness: Annotated[
+        float,
+        typer.Option(
+            metavar="FACTOR",
+            min=0.001,
+            max=MOST_BRIGHTNESS,
+            help="Brightness of the LEDs. 1: at 1 s they fill 0.9 of a pixel, as the lit object's "
+            "white does; of a real LED some 100.",
+        ),
+    ] = 1.0,
+    exposure_leds: ExposureLeds = None,
+    exposure_lit: ExposureLit = None,
     perfect: Annotated[
         bool,
         typer.Option(
@@ -74,9 +88,13 @@ def simulate_run(
     named = None if phases is None else tuple(part.strip() for part in phases.split(","))
     from tbcad.api import simulate_run as simulate
     from tbcad.machine.record import truth_file
+    from tbcad.runs.exposure import PhaseTimes
     from tbcad.simulated_run.options import RunOptions
 
-    options = RunOptions(seed, chosen, named, perfect, noise, bits, shell)
+    times = PhaseTimes(
+        seconds("--exposure-leds", exposure_leds), seconds("--exposure-lit", exposure_lit)
+    )
+    options = RunOptions(seed, chosen, named, perfect, noise, bits, shell, led_brightness, times)
     with stages(2) as screen:
         run = simulate(
             folder,

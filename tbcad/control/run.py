@@ -2,12 +2,16 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
 from tbcad.control.base import Base
-from tbcad.control.cameras.choice import check_camera_name, connected_camera
+from tbcad.control.cameras.choice import (
+    check_camera_name,
+    check_can_expose,
+    connected_camera,
+)
 from tbcad.control.estimate import (
     BYTES_PER_PX,
     CAPTURE_S,
@@ -21,12 +25,12 @@ from tbcad.control.grbl import Grbl
 from tbcad.control.outcome import Outcome
 from tbcad.control.plan import Plan, read_control_plan
 from tbcad.control.port import SerialPort
-from tbcad.control.selection import chosen_frames, chosen_phases
-from tbcad.control.session import Ask, RunOptions, Session, Show
+from tbcad.control.selection import Preflight, RunOptions, chosen_frames, chosen_phases
+from tbcad.control.session import Ask, Session, Show
 from tbcad.errors import InputError
 from tbcad.output.content import refuse_inside
 from tbcad.output.inputs import refuse_inputs
-from tbcad.runs.exposure import exposure_name
+from tbcad.runs.exposure import DARK_LIT, PhaseTimes, exposure_name
 from tbcad.runs.photographs import read_run
 from tbcad.runs.record import RunRecord, read_record
 from tbcad.runs.writing import DiskFault, check_new
@@ -48,6 +52,8 @@ class RunRequest:
         runs: "a", "b" or "ab"; None: both, or as in the run that is resumed.
         size_px: columns and rows of the photographs; None: those of the design's camera.
         resume: go on with the run in the folder.
+        times: of exposure; where none is said, the camera's, or those of the run that is resumed.
+        preflight: whether one stop is looked at before a new run, and whether the run follows.
     """
 
     exports: Path
@@ -57,6 +63,8 @@ class RunRequest:
     runs: str | None = None
     size_px: tuple[int, int] | None = None
     resume: bool = False
+    times: PhaseTimes = field(default_factory=PhaseTimes)
+    preflight: Preflight = "first"
 
 
 @dataclass(frozen=True)
@@ -123,11 +131,15 @@ def run_machine(
         send_settings: send the controller the settings that differ from the export's.
         timeout_s: how long a photograph may take.
 
+    Returns:
+        What was photographed; nothing, if only the preflight is asked for.
+
     Raises:
-        InputError: something was wrong before the first motion; nothing was photographed.
+        InputError: something was wrong before the first photograph of the run.
     """
     plan, options = _prepared(request, send_settings)
     check_camera_name(camera)
+    check_can_expose(camera, options.times)
     with ExitStack() as stack:
         line = SerialPort(port)
         stack.callback(line.close)
@@ -140,7 +152,10 @@ def run_machine(
             stack.callback(chosen.close)
             session = Session(plan, options, base, chosen)
             with _faults_as_input_errors(port):
-                session.begin(request.out, ask, note, resume=request.resume)
+                look = request.preflight
+                session.begin(request.out, ask, note, resume=request.resume, look=look)
+            if look == "only":
+                return Outcome(request.out, 0, 0, 0, {}, "", base.secure(), 0.0)
             return _photographed(session, ask, show)
 
 
@@ -179,21 +194,28 @@ def _faults_as_input_errors(port: str) -> Iterator[None]:
 def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOptions]:
     """Plan and choice, or those of the run that is resumed."""
     plan = read_control_plan(request.exports)
-    phases = chosen_phases(plan, request.phases)
+    phases = chosen_phases(plan, request.phases, request.times)
     frames = chosen_frames(plan, request.stops, request.runs or "ab")
     size = request.size_px or plan.size_px
     if not request.resume:
         refuse_inputs(request.out, (request.exports,))
         refuse_inside(request.out, request.out.resolve())
         check_new(request.out)
-        return plan, RunOptions(frames, phases, size, send_settings)
+        return plan, RunOptions(frames, phases, size, send_settings, request.times)
     record = read_record(request.out)
     _check_same_export(request, plan, record)
-    recorded = chosen_phases(plan, ",".join(record.phases))
+    known = ",".join(name for name in record.phases if name != DARK_LIT)
+    recorded = chosen_phases(plan, known, record.times)
+    phases = chosen_phases(plan, request.phases, record.times)
     given = (
         ("--phases", request.phases, phases == recorded),
         ("--stops", request.stops or request.runs, frames == record.frames),
         ("--size", request.size_px, size == (record.width_px, record.height_px)),
+        (
+            "--exposure",
+            request.times if request.times != PhaseTimes() else None,
+            _same_times(request.times, record),
+        ),
     )
     for name, value, same in given:
         if value is not None and not same:
@@ -201,7 +223,12 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
                 f"{request.out} was begun with another {name}: leave it out with --resume"
             )
     size = record.width_px, record.height_px
-    return plan, RunOptions(record.frames, recorded, size, send_settings)
+    return plan, RunOptions(record.frames, recorded, size, send_settings, record.times)
+
+
+def _same_times(times: PhaseTimes, record: RunRecord) -> bool:
+    """Whether all phases of a run were photographed with these exposure times."""
+    return all(times.of(phase) == record.times.of(phase) for phase in record.phases)
 
 
 def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> None:

@@ -2,29 +2,58 @@
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
 
 from tbcad.control.plan import Phase, Plan
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Frame
+from tbcad.runs.exposure import DARK_LIT, Frame, PhaseTimes
 
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?$")
 RUNS = {"a": (0,), "b": (180,), "ab": (0, 180)}
+Preflight = Literal["first", "only", "off"]
+"""Whether one stop is looked at before a run, and whether the run follows."""
 
 
-def chosen_phases(plan: Plan, text: str | None) -> tuple[Phase, ...]:
-    """Phases by their names, in the plan's order.
+@dataclass(frozen=True)
+class RunOptions:
+    """What is photographed, and how.
+
+    Attributes:
+        frames: positions in order.
+        phases: lights at each, in order.
+        size_px: columns and rows that photographs must have.
+        send_settings: whether the controller's settings are sent to it where they differ.
+        times: of exposure, as far as the camera is told them.
+    """
+
+    frames: tuple[Frame, ...]
+    phases: tuple[Phase, ...]
+    size_px: tuple[int, int]
+    send_settings: bool = False
+    times: PhaseTimes = field(default_factory=PhaseTimes)
+
+    @property
+    def capture_times(self) -> dict[str, float | None]:
+        """Exposure time of each phase, s; None: that which the camera has."""
+        return {phase.name: self.times.of(phase.name) for phase in self.phases}
+
+
+def chosen_phases(
+    plan: Plan, text: str | None, times: PhaseTimes | None = None
+) -> tuple[Phase, ...]:
+    """Phases by their names, in the plan's order, and the dark one that exposure times ask for.
 
     Args:
         plan: of the export.
         text: names with commas between; `leds` for all LEDs; None for all phases.
+        times: of exposure.
 
     Raises:
         InputError: a name is none of the export's phases.
     """
-    if text is None:
-        return plan.phases
     known = [phase.name for phase in plan.phases]
-    named = [name.strip() for name in text.split(",")]
+    named = known if text is None else [name.strip() for name in text.split(",")]
     if "leds" in named:
         named += [name for name in known if name.startswith("led_")]
     wrong = [name for name in named if name not in (*known, "leds")]
@@ -33,7 +62,9 @@ def chosen_phases(plan: Plan, text: str | None) -> tuple[Phase, ...]:
             f"--phases names {wrong[0]!r:.40}, this export has {', '.join(known)}: name some of "
             "these, or leds for all LEDs"
         )
-    return tuple(phase for phase in plan.phases if phase.name in named)
+    chosen = {phase.name: phase for phase in plan.phases if phase.name in named}
+    dark = Phase(name=DARK_LIT, output=None)
+    return tuple(chosen.get(name, dark) for name in (times or PhaseTimes()).phases(tuple(chosen)))
 
 
 def chosen_frames(plan: Plan, stops: str | None, runs: str) -> tuple[Frame, ...]:

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
 
 from tbcad.control.base import Base
-from tbcad.control.cameras.camera import Camera
+from tbcad.control.cameras.camera import Camera, Shot
 from tbcad.control.estimate import (
     Shots,
     bytes_each,
@@ -21,16 +20,18 @@ from tbcad.control.estimate import (
 )
 from tbcad.control.faults import CameraFault, MachineFault
 from tbcad.control.outcome import Outcome
-from tbcad.control.plan import Phase, Plan
+from tbcad.control.plan import Plan
+from tbcad.control.selection import Preflight, RunOptions
 from tbcad.control.shooting import (
     Photograph,
     check_like_record,
     exposure_of,
-    take,
+    light_on,
+    taken_twice,
 )
+from tbcad.control.trials import run_record
 from tbcad.errors import InputError
 from tbcad.runs.exposure import Frame, exposure_name
-from tbcad.runs.record import RunRecord
 from tbcad.runs.writing import DiskFault, RunWriter, new_run, resumed_run
 from tbcad.screen import Stages
 from tbcad.types import Progress
@@ -42,23 +43,6 @@ Ask = Callable[[str], bool]
 """Asks the operator to do something; False: the operator will not."""
 Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
 """Shows stages with their expected seconds while a block runs."""
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What is photographed, and how.
-
-    Attributes:
-        frames: positions in order.
-        phases: lights at each, in order.
-        size_px: columns and rows that photographs must have.
-        send_settings: whether the controller's settings are sent to it where they differ.
-    """
-
-    frames: tuple[Frame, ...]
-    phases: tuple[Phase, ...]
-    size_px: tuple[int, int]
-    send_settings: bool = False
 
 
 class Session:
@@ -75,13 +59,22 @@ class Session:
         self._in_row = 0
         self._writer: RunWriter
 
-    def begin(self, folder: Path, ask: Ask, note: Progress, *, resume: bool) -> None:
-        """Take one photograph to know the camera, and begin or resume the folder.
+    def begin(
+        self,
+        folder: Path,
+        ask: Ask,
+        note: Progress,
+        *,
+        resume: bool,
+        look: Preflight = "off",
+    ) -> None:
+        """Take a photograph with each exposure to know the camera, and begin or resume the folder.
 
-        A camera on the controller's relay is released when the base is homed, not before.
+        A new run begins with a preflight, unless `look` is "off"; nothing is written if it is
+        "only". A camera on the controller's relay is released when the base is homed, not before.
 
         Raises:
-            InputError: camera, disk or folder will not do; nothing was photographed.
+            InputError: camera, disk, folder or exposure will not do; nothing was photographed.
             MachineFault: the machine does not do what it is told.
         """
         self._note = note
@@ -93,27 +86,38 @@ class Session:
         remaining = self._remaining() if resume else self._all()
         if self._camera.released:
             self._get_known_angle(_turned(remaining), ask)
-        trial = self._trial()
+        trials = self._trials()
         if resume:
-            self._check_same_run(folder, trial)
-        self._expected = expected_seconds(self._plan, remaining, trial.seconds)
+            self._check_same_run(folder, trials)
+        trial = max(trials.values(), key=lambda one: len(one.shot.data))
+        if look != "off" and not resume:
+            self._preflight(trial, remaining, ask)
+            if look == "only":
+                return
+        each_s = sum(one.seconds for one in trials.values()) / len(trials)
+        self._expected = expected_seconds(self._plan, remaining, each_s)
         seconds = sum(self._expected.values())
         facts = trial.facts
         each = bytes_each(len(trial.shot.data), facts.width_px, facts.height_px)
         needed = disk_bytes(count(remaining), each)
         check_disk(folder, needed)
         if not resume:
-            self._writer = new_run(folder, self._record(trial, seconds))
+            self._writer = new_run(folder, run_record(self._plan, self._options, trials, seconds))
         self._writer.log("resumed" if resume else "started", camera=trial.model)
         note(
             f"{count(remaining)} photographs at {len(remaining)} positions take about "
             f"{duration_text(seconds)} and {size_text(needed)} of disk"
         )
 
-    def _trial(self) -> Photograph:
-        """One photograph that is not kept."""
+    def _trials(self) -> dict[str, Photograph]:
+        """A photograph for each phase that is not kept; one for all with the same exposure."""
+        times = self._options.capture_times
+        first = {seconds: self._trial(seconds) for seconds in dict.fromkeys(times.values())}
+        return {name: first[seconds] for name, seconds in times.items()}
+
+    def _trial(self, seconds: float | None) -> Photograph:
         try:
-            trial = self._photograph(lambda _: None)
+            trial = taken_twice(self._camera, self._base, seconds, lambda _: None)
         except CameraFault as fault:
             raise InputError(f"the camera: {fault}") from None
         size = trial.facts.width_px, trial.facts.height_px
@@ -125,37 +129,35 @@ class Session:
             )
         return trial
 
-    def _photograph(self, check: Callable[[Photograph], None]) -> Photograph:
-        """A photograph that passes a check; a second one, over a new session, if the first fails.
+    def _preflight(self, trial: Photograph, remaining: list[Shots], ask: Ask) -> None:
+        """Look at the middle stop of the first run under each light; nothing is kept."""
+        from tbcad.control.preflight import preflight  # numerical libraries, for this alone
 
-        Raises:
-            CameraFault: both fail.
-        """
+        if not self._homed:
+            self._get_known_angle(_turned(remaining), ask)
+        first = [one for one in remaining if _turned([one]) == _turned(remaining)]
+        shots = first[len(first) // 2]
+        self._base.drive(self._plan.program.start)
+        self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
+        where = f"{trial.model}, {shots.title}"
+        preflight(self._options.capture_times, self._looked_at, where, self._note)
+
+    def _looked_at(self, phase: str, seconds: float | None) -> Shot:
         try:
-            photograph = take(self._camera, self._base)
-            check(photograph)
-        except CameraFault:
-            self._camera.again()
-            photograph = take(self._camera, self._base)
-            check(photograph)
-        return photograph
+            with self._light(phase):
+                return taken_twice(self._camera, self._base, seconds, lambda _: None).shot
+        except CameraFault as fault:
+            raise InputError(f"the camera: {fault}") from None
 
-    def _record(self, trial: Photograph, seconds: float) -> RunRecord:
-        return RunRecord(
-            export_sha256=self._plan.sha256,
-            source="camera",
-            camera=trial.model,
-            width_px=trial.facts.width_px,
-            height_px=trial.facts.height_px,
-            phases=tuple(phase.name for phase in self._options.phases),
-            frames=self._options.frames,
-            locked=trial.settings,
-            seconds=round(seconds, 1),
-        )
+    def _light(self, phase: str) -> AbstractContextManager[None]:
+        """Have the light of a phase on."""
+        lights = {one.name: one for one in self._options.phases}
+        return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
-    def _check_same_run(self, folder: Path, trial: Photograph) -> None:
+    def _check_same_run(self, folder: Path, trials: dict[str, Photograph]) -> None:
         try:
-            check_like_record(self._writer.record, trial)
+            for phase, trial in trials.items():
+                check_like_record(self._writer.record, phase, trial)
         except CameraFault as fault:
             raise InputError(f"{folder}: {fault}: set the camera as it was") from None
 
@@ -211,20 +213,17 @@ class Session:
     def _position(self, shots: Shots, note: Progress) -> None:
         """All photographs at one position."""
         self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
-        outputs = {phase.name: phase.output for phase in self._plan.phases}
         for name in shots.phases:
-            if (output := outputs[name]) is not None:
-                self._base.light(output, on=True)
-            self._base.wait(self._plan.motion.light_s)
-            self._one(shots.frame, name, note)
-            if output is not None:
-                self._base.light(output, on=False)
+            with self._light(name):
+                self._one(shots.frame, name, note)
 
     def _one(self, frame: Frame, phase: str, note: Progress) -> None:
         """One photograph, or why there is none."""
         name = exposure_name(frame, phase)
+        check = partial(check_like_record, self._writer.record, phase)
         try:
-            photograph = self._photograph(partial(check_like_record, self._writer.record))
+            seconds = self._options.times.of(phase)
+            photograph = taken_twice(self._camera, self._base, seconds, check)
         except CameraFault as fault:
             self._missed[name] = str(fault)
             self._writer.log("missed", name=name, reason=str(fault))

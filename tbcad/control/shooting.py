@@ -1,21 +1,22 @@
 """One photograph: taken, read, compared with what the run is locked to, and recorded."""
 
 import hashlib
-import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from time import monotonic
 
 from tbcad.control.base import Base
-from tbcad.control.cameras.camera import Camera, Shot
+from tbcad.control.cameras.camera import Camera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
 from tbcad.control.faults import CameraFault
+from tbcad.control.plan import Phase
 from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.runs.record import RunRecord
 
 SHUTTER = "shutterspeed"
 UNNAMED = "unnamed camera"
-_TIME = re.compile(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?\s*s?$")
 
 
 @dataclass(frozen=True)
@@ -26,11 +27,13 @@ class Photograph:
         shot: as the camera gave it.
         facts: what its file says.
         seconds: that it took.
+        asked_s: exposure time that the camera was told, s; None: it keeps its own.
     """
 
     shot: Shot
     facts: ImageFacts
     seconds: float
+    asked_s: float | None = None
 
     @property
     def settings(self) -> dict[str, Setting]:
@@ -44,29 +47,83 @@ class Photograph:
 
     @property
     def exposure_s(self) -> float | None:
-        """Exposure time, s, if it is known."""
-        match = _TIME.match(str(self.shot.settings.get(SHUTTER, "")))
-        if match is None or float(match[2] or 1) == 0 or float(match[1]) == 0:
-            return self.facts.exposure_s
-        return float(match[1]) / float(match[2] or 1)
+        """Exposure time, s, if it is known: as camera or file tell it, or else as asked for."""
+        return self.told_s or self.asked_s
+
+    @property
+    def told_s(self) -> float | None:
+        """Exposure time, s, that the camera or the file tells."""
+        shutter = shutter_seconds(str(self.shot.settings.get(SHUTTER, "")))
+        return shutter or self.facts.exposure_s
 
 
-def take(camera: Camera, base: Base) -> Photograph:
-    """Take one photograph.
+@contextmanager
+def light_on(base: Base, phase: Phase, seconds: float) -> Iterator[None]:
+    """Have the light of a phase on, and let it settle for some seconds."""
+    outputs = () if phase.output is None else (phase.output,)
+    for output in outputs:
+        base.light(output, on=True)
+    base.wait(seconds)
+    fault = None
+    try:
+        yield
+    except CameraFault as error:  # of the machine nothing is wrong
+        fault = error
+    for output in outputs:
+        base.light(output, on=False)
+    if fault is not None:
+        raise fault
+
+
+def taken_twice(
+    camera: Camera, base: Base, seconds: float | None, check: Callable[[Photograph], None]
+) -> Photograph:
+    """A photograph that passes a check; a second one, over a new session, if the first fails.
 
     Raises:
-        CameraFault: there is none, or it cannot be read.
+        CameraFault: both fail.
         MachineFault: the controller does not release the camera.
     """
+    try:
+        photograph = take(camera, base, seconds)
+        check(photograph)
+    except CameraFault:
+        camera.again()
+        photograph = take(camera, base, seconds)
+        check(photograph)
+    return photograph
+
+
+def take(camera: Camera, base: Base, seconds: float | None = None) -> Photograph:
+    """Take one photograph.
+
+    Args:
+        camera: that takes it.
+        base: whose controller may release the camera.
+        seconds: exposure time; None: that which the camera has.
+
+    Raises:
+        CameraFault: there is none, it cannot be read, or it has another exposure time.
+        MachineFault: the controller does not release the camera.
+    """
+    if seconds is not None:
+        camera.expose(seconds)
     begun = monotonic()
     camera.expect()
     if camera.released:
         base.release()
     shot = camera.photograph()
-    return Photograph(shot, image_facts(shot.data, shot.suffix), monotonic() - begun)
+    facts = image_facts(shot.data, shot.suffix)
+    found = Photograph(shot, facts, monotonic() - begun, seconds)
+    if seconds is not None and found.told_s is not None and not are_near(found.told_s, seconds):
+        raise CameraFault(
+            f"{seconds:g} s of exposure were asked for, and the photograph has {found.told_s:g} s: "
+            "set the camera to manual exposure"
+        )
+    return found
 
 
-def check_like_record(record: RunRecord, photograph: Photograph) -> None:
+def check_like_record(record: RunRecord, phase: str, photograph: Photograph) -> None:
     """Refuse a photograph that is not like the others of its run.
 
     Raises:
@@ -81,7 +138,7 @@ def check_like_record(record: RunRecord, photograph: Photograph) -> None:
             f"{record.width_px} x {record.height_px}"
         )
     settings = photograph.settings
-    for name, value in record.locked.items():
+    for name, value in record.locked_in(phase).items():
         if settings.get(name) != value:
             raise CameraFault(
                 f"{name} is {settings.get(name, 'not told')}, and the run is locked to {value}"

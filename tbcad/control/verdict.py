@@ -34,6 +34,13 @@ def outcome_lines(outcome: Outcome, resume: str) -> Iterator[str]:
         yield f"go on with: {resume}"
 
 
+def preflight_lines(outcome: Outcome) -> Iterator[str]:
+    """What a preflight that found nothing wrong came to."""
+    yield "every exposure will do; no photograph was kept"
+    if outcome.unsafe:
+        yield f"LOOK AT THE MACHINE: {outcome.unsafe}"
+
+
 def dry_run_record(found: DryRun) -> dict[str, object]:
     """What a run would do, for other programs."""
     positions = [{"title": shots.title, "phases": list(shots.phases)} for shots in found.remaining]

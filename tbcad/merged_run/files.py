@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.merged_run.merge import HalfMerge, Merge
-from tbcad.runs.exposure import DARK, LIT, exposure_name
+from tbcad.runs.exposure import LIT, exposure_name
 from tbcad.simulate.capture.files import capture_record, write_cameras, write_record
 from tbcad.types import Progress
 
@@ -28,7 +28,8 @@ def based_on(half: HalfMerge) -> dict[str, Any]:
     """What a camera's picture is based on, after its merge, for capture.json."""
     missing = half.missing_mirrors()
     run, known = half.photographs.run, [f for f in half.photographs.frames if f is not None]
-    names = {exposure_name(frame, phase) for frame in known for phase in (LIT, DARK)}
+    phases = LIT, half.photographs.dark_phase
+    names = {exposure_name(frame, phase) for frame in known for phase in phases}
     unread = {
         exposure_name(frame, LIT): half.photographs.missing[stop]
         for stop, frame in enumerate(half.photographs.frames)
@@ -46,4 +47,5 @@ def based_on(half: HalfMerge) -> dict[str, Any]:
         "photographs_not_used": {name: fault for name, fault in run.faults.items() if name in names}
         | unread,
         "without_dark": sorted(half.photographs.without_dark),
+        "dark_scaled": sorted(half.photographs.dark_scaled),
     }

@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.merged_run.corrections import Corrections
-from tbcad.runs.exposure import DARK, LIT, Exposure, Frame, exposure_name
+from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16
 from tbcad.runs.photographs import Run, read_photograph
 from tbcad.simulate.prototype.ball_rays import between_pixels
@@ -23,7 +23,9 @@ class CorrectedPhotographs:
         corrections: of all photographs.
         exposure_s: to which exposure times are brought; None where they are unknown.
         missing: for each stop without a photograph, from 0, why; filled as they are read.
-        without_dark: names of photographs whose dark one is missing; filled as they are read.
+        without_dark: names of photographs whose dark one is missing or exposed too short to be
+            subtracted; filled as they are read.
+        dark_scaled: names of those whose dark one had another exposure, and was scaled; likewise.
     """
 
     run: Run
@@ -32,6 +34,12 @@ class CorrectedPhotographs:
     exposure_s: float | None
     missing: dict[int, str] = field(default_factory=dict)
     without_dark: list[str] = field(default_factory=list)
+    dark_scaled: list[str] = field(default_factory=list)
+
+    @property
+    def dark_phase(self) -> str:
+        """The phase that is subtracted: that with the exposure of the lit object, if there is."""
+        return DARK_LIT if DARK_LIT in self.run.record.phases else DARK
 
     def colours(self, stop: int, places: Floats) -> Bytes | None:
         """Colours (n, 3) of a stop's photograph at columns and rows (n, 2), if there is one."""
@@ -51,9 +59,10 @@ class CorrectedPhotographs:
         last = np.array([self.run.record.width_px - 1, self.run.record.height_px - 1])
         pixel = np.minimum(pixel, last)
         light = self.corrections.light(read_photograph(self.run, lit), pixel)
-        dark = self._dark(frame)
+        dark = self._dark(frame, lit)
         if dark is not None:
-            light = light - self.corrections.light(dark, pixel)
+            image, factor = dark
+            light = light - np.float32(factor) * self.corrections.light(image, pixel)
         light = self.corrections.corrected(light, pixel, self._factor(lit))
         return self.corrections.encoded(np.einsum("nk,nkc->nc", weight, light))
 
@@ -64,15 +73,24 @@ class CorrectedPhotographs:
             raise InputError(self.run.faults.get(name, f"{name} was not photographed"))
         return found
 
-    def _dark(self, frame: Frame) -> Image16 | None:
-        """The photograph without light, if the run has such and this one is usable."""
-        if DARK not in self.run.record.phases:
+    def _dark(self, frame: Frame, lit: Exposure) -> tuple[Image16, float] | None:
+        """The photograph without light and its factor, if the run has such and it is usable."""
+        if self.dark_phase not in self.run.record.phases:
             return None
+        name = exposure_name(frame, LIT)
         try:
-            return read_photograph(self.run, self._exposure(frame, DARK))
+            dark = self._exposure(frame, self.dark_phase)
+            image = read_photograph(self.run, dark)
         except InputError:
-            self.without_dark.append(exposure_name(frame, LIT))
+            self.without_dark.append(name)
             return None
+        factor = dark_factor(dark.exposure_s, lit.exposure_s)
+        if factor is None:
+            self.without_dark.append(name)
+            return None
+        if factor != 1:
+            self.dark_scaled.append(name)
+        return image, factor
 
     def _factor(self, exposure: Exposure) -> float:
         """What brings a photograph to the exposure time of the others."""

@@ -92,7 +92,8 @@ def _exposure(folder: Path, record: RunRecord, frame: Frame, phase: str) -> Expo
         raise InputError(f"{path} is of another photograph: {AGAIN}")
     if (found.width_px, found.height_px) != (record.width_px, record.height_px):
         raise InputError(f"{path}: the photograph has another size than the run: {AGAIN}")
-    changed = [name for name, value in record.locked.items() if found.settings.get(name) != value]
+    locked = record.locked_in(phase)
+    changed = [name for name, value in locked.items() if found.settings.get(name) != value]
     if changed:
         raise InputError(f"{path}: {changed[0]} is not what the run is locked to: {AGAIN}")
     return found

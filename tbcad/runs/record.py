@@ -6,11 +6,23 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from tbcad.formats.checked_files import Record, read_json
-from tbcad.runs.exposure import Frame, PhaseName, Setting
+from tbcad.runs.exposure import DARK_LIT, LIT, Frame, PhaseName, PhaseTimes, Setting
 
 RUN_SCHEMA = "tbcad-run/1"
 Geometry = Literal["prototype", "shell"]
 RECORD, JOURNAL = "run.json", "journal.jsonl"
+
+
+class PhaseExposure(Record):
+    """Exposure of a phase that has its own.
+
+    Attributes:
+        asked_s: exposure time that was asked for, s.
+        settings: of the camera at it, which may not change, by name.
+    """
+
+    asked_s: float = Field(gt=0)
+    settings: dict[str, Setting]
 
 
 class RunRecord(Record):
@@ -25,6 +37,7 @@ class RunRecord(Record):
         phases: at each stop, in the order of photographing.
         frames: in the order of photographing: all stops of run a, then of run b.
         locked: settings of the camera that may not change, by name.
+        exposures: of each phase, where the camera was told them; else the camera's own is locked.
         seconds: expected duration of the whole run.
         geometry: "prototype": one camera before balls on a base took all; "shell": frames with the
             object turned are camera b's, which has the object before it that way.
@@ -38,6 +51,7 @@ class RunRecord(Record):
     phases: tuple[PhaseName, ...] = Field(min_length=1)
     frames: tuple[Frame, ...] = Field(min_length=1)
     locked: dict[str, Setting]
+    exposures: dict[PhaseName, PhaseExposure] = Field(default_factory=dict)
     seconds: float = Field(ge=0)
     geometry: Geometry = "prototype"
 
@@ -47,6 +61,19 @@ class RunRecord(Record):
         if len(set(keys)) < len(keys) or len(set(self.phases)) < len(self.phases):
             raise ValueError("names a frame or phase twice")
         return self
+
+    def locked_in(self, phase: str) -> dict[str, Setting]:
+        """Settings that may not change among the photographs of a phase."""
+        own = self.exposures.get(phase)
+        return self.locked if own is None else self.locked | own.settings
+
+    @property
+    def times(self) -> PhaseTimes:
+        """Exposure times that the camera was told."""
+        of_lit = LIT, DARK_LIT
+        asked = [(name in of_lit, one.asked_s) for name, one in self.exposures.items()]
+        leds, lit = (dict(reversed(asked)).get(is_lit) for is_lit in (False, True))
+        return PhaseTimes(leds, lit)
 
     @property
     def machines(self) -> dict[str, tuple[Frame, ...]]:

@@ -21,7 +21,8 @@ from tbcad.types import Bools, Floats, Ints
 
 DOME_MM = 1.5  # radius of a 3 mm LED
 ROUNDS = 5  # of the search for both points of a light that is reflected twice
-FAINT_PX2 = 2e-3  # less light than this is nothing: 0.1 of 255, spread over four pixels
+# Less light than this of an LED that fills a pixel is nothing: 0.1 of 255, spread over four pixels.
+FAINT_PX2 = 2e-3
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,12 @@ def balls_of_frame(built: BuiltPrototype, frame: int) -> Floats:
 
 
 def led_light(
-    built: BuiltPrototype, frame: int, turned: bool, occluders: Occluders, dome: float = DOME_MM
+    built: BuiltPrototype,
+    frame: int,
+    turned: bool,
+    occluders: Occluders,
+    dome: float = DOME_MM,
+    faint: float = FAINT_PX2,
 ) -> LightPoints:
     """All light of the LEDs that reaches the camera over the balls in a frame.
 
@@ -75,10 +81,11 @@ def led_light(
         turned: whether the object is turned by 180 degrees.
         occluders: what may hide LEDs.
         dome: radius of an LED's dome, mm.
+        faint: area of an image of an image that is not followed, square pixels.
     """
     balls = balls_of_frame(built, frame)
     once = _reflected_once(built, balls, turned, occluders, dome)
-    return once.joined(_reflected_twice(built, balls, turned, occluders, dome))
+    return once.joined(_reflected_twice(built, balls, turned, occluders, (dome, faint)))
 
 
 def _pairs(*counts: int) -> list[Ints]:
@@ -121,18 +128,23 @@ def _seen(
 
 
 def _reflected_twice(
-    built: BuiltPrototype, balls: Floats, turned: bool, occluders: Occluders, dome: float
+    built: BuiltPrototype,
+    balls: Floats,
+    turned: bool,
+    occluders: Occluders,
+    dome_and_faint: tuple[float, float],
 ) -> LightPoints:
     """Images of images, each a point with the area that it has at normal incidence."""
+    dome, faint = dome_and_faint
     camera = built.machine.camera
     first, last, led = _pairs(len(balls), len(balls), len(built.machine.leds))
     place = built.machine.leds[led]
-    bright = (first != last) & (_largest_area(camera, balls, first, last, dome) > FAINT_PX2)
+    bright = (first != last) & (_largest_area(camera, balls, first, last, dome) > faint)
     first, last, led, place = first[bright], last[bright], led[bright], place[bright]
     one, two = _path(balls, first, last, place, camera.pinhole)
     area = _area_twice(camera, balls, (first, last), (place, one, two), dome)
     walls = built.walls.of_mirrors(len(balls))
-    shown = (area > FAINT_PX2) & _on_front(balls, first, one, place, two)
+    shown = (area > faint) & _on_front(balls, first, one, place, two)
     shown &= points_within_walls(one, first, walls)
     shown &= _seen(camera, balls, built.walls, two, last)
     shown &= ~balls_between(one, place, balls, walls) & ~balls_between(two, one, balls, walls)

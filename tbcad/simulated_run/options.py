@@ -1,6 +1,8 @@
 """How a run is simulated."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from tbcad.runs.exposure import PhaseTimes
 
 
 @dataclass(frozen=True)
@@ -15,6 +17,8 @@ class RunOptions:
         noise: factor of all noise.
         bits: of a pixel's number, 8 or 16.
         shell: both cameras of the shell in place of the prototype.
+        led_brightness: of the LEDs, over what fills nine tenths of a pixel in an exposure of 1 s.
+        times: of exposure; 1 s where they are not said.
     """
 
     seed: int = 0
@@ -24,3 +28,5 @@ class RunOptions:
     noise: float = 1.0
     bits: int = 8
     shell: bool = False
+    led_brightness: float = 1.0
+    times: PhaseTimes = field(default_factory=PhaseTimes)

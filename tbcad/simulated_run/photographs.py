@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from tbcad.machine.built import BuiltPrototype
-from tbcad.runs.exposure import DARK, LIT, Frame
+from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulated_run.led_light import DOME_MM, balls_of_frame, led_light
+from tbcad.simulated_run.led_light import DOME_MM, FAINT_PX2, balls_of_frame, led_light
 from tbcad.simulated_run.object_light import object_light, pixel_directions
 from tbcad.simulated_run.occluders import Occluders
 from tbcad.simulated_run.sensor import (
@@ -23,6 +23,7 @@ from tbcad.simulated_run.sensor import (
 from tbcad.simulated_run.spread import PointSpread, add_points, blurred
 from tbcad.types import Floats
 
+EXPOSURE_S = 1.0  # in which LEDs and object give the light that follows
 LED_LIGHT = 0.9  # of a full pixel: brightness of an LED's image on the optical axis
 OBJECT_LIGHT = 0.9  # likewise: of white, where the object is lit best
 NOISE_STREAM = 4000
@@ -37,8 +38,10 @@ class Chain:
         sensor: of the camera.
         spread: of a point's light.
         dome: radius of the LEDs' domes, mm.
-        led_light: of each LED, on the optical axis, 1 fills a pixel; one for all, or (l,).
+        led_light: of each LED, on the optical axis, 1 fills a pixel in an exposure of
+            `EXPOSURE_S`; one for all, or (l,).
         object_light: of the lit object where it is white, likewise.
+        times: of exposure; `EXPOSURE_S` where they are not said.
     """
 
     sensor: Sensor = field(default_factory=Sensor)
@@ -46,6 +49,11 @@ class Chain:
     dome: float = DOME_MM
     led_light: float | tuple[float, ...] = LED_LIGHT
     object_light: float = OBJECT_LIGHT
+    times: PhaseTimes = field(default_factory=PhaseTimes)
+
+    def exposure(self, phase: str) -> float:
+        """Exposure time of a phase over `EXPOSURE_S`."""
+        return (self.times.of(phase) or EXPOSURE_S) / EXPOSURE_S
 
 
 @dataclass(frozen=True)
@@ -81,33 +89,38 @@ class SimulatedRun:
     def frame_photographs(self, number: int, phases: tuple[str, ...]) -> dict[str, Image16]:
         """The photographs of a frame, from 0, in some phases."""
         frame = self.frames[number]
-        light: dict[str, Signal | None] = {DARK: None}
+        light: dict[str, Signal | None] = {DARK: None, DARK_LIT: None}
         if LIT in phases:
             light[LIT] = self._object(number)
-        if set(phases) - {LIT, DARK}:
+        if set(phases) - {LIT, *light}:
             light.update(self._leds(number))
         return {phase: self._recorded(frame, phase, light[phase]) for phase in phases}
 
     def _recorded(self, frame: Frame, phase: str, light: Signal | None) -> Image16:
-        kind = {DARK: 0, LIT: 1}
-        number = kind[phase] if phase in kind else len(kind) + led_number(phase)
+        # Two more than an LED's own number: those before it are of the other phases.
+        kind = {DARK: 0, LIT: 1, DARK_LIT: 2}
+        number = kind[phase] if phase in kind else 2 + led_number(phase)
         stream = (NOISE_STREAM, frame.object_turn_deg, frame.stop, number)
-        return recorded(self.chain.sensor, self.maps, light, generator(self.seed, *stream))
+        random, exposure = generator(self.seed, *stream), self.chain.exposure(phase)
+        return recorded(self.chain.sensor, self.maps, light, random, exposure)
 
     def _object(self, number: int) -> Signal:
         pinhole = self.built.machine.camera.pinhole
         balls, turned = balls_of_frame(self.built, number), self._turned(number)
         walls = self.built.walls
         colour = object_light(pinhole, self.directions, balls, self.scene, turned, walls)
-        share = colour.astype(np.float32) * np.float32(self.chain.object_light / WHITE)
+        brightness = self.chain.object_light * self.chain.exposure(LIT)
+        share = colour.astype(np.float32) * np.float32(brightness / WHITE)
         return blurred(share, self.chain.spread)
 
     def _leds(self, number: int) -> dict[str, Signal]:
         camera = self.built.machine.camera
-        points = led_light(
-            self.built, number, self._turned(number), self.occluders, self.chain.dome
-        )
-        light = np.broadcast_to(self.chain.led_light, len(self.built.machine.leds))
+        leds = len(self.built.machine.leds)
+        times = np.array([self.chain.exposure(f"led_{led + 1}") for led in range(leds)])
+        light = np.broadcast_to(self.chain.led_light, leds) * times
+        faint = FAINT_PX2 / max(1.0, float(light.max(initial=0.0)))
+        turned, chain = self._turned(number), self.chain
+        points = led_light(self.built, number, turned, self.occluders, chain.dome, faint)
         images: dict[str, Signal] = {}
         for led, brightness in enumerate(light.tolist()):
             image = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)

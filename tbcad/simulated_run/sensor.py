@@ -3,7 +3,7 @@
 The sensor is linear. Signals are shares of a full pixel until electrons are counted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,9 @@ class Sensor:
     Attributes:
         full_electrons: that fill a pixel, and give the largest number.
         read_electrons: standard deviation of the read noise.
-        dark_electrons: mean dark signal of an exposure.
+        dark_electrons: mean dark signal of an exposure of 1 s.
         hot_share: share of pixels with a large dark signal.
-        hot_electrons: their mean dark signal, exponentially distributed.
+        hot_electrons: their mean dark signal, likewise, exponentially distributed.
         grains: of dust, on the whole sensor.
         bits: 8 or 16 a channel; 16 without colour.
         noise: factor of all noise; 0 for none.
@@ -100,9 +100,13 @@ def generator(seed: int, *stream: int) -> np.random.Generator:
 
 
 def recorded(
-    sensor: Sensor, maps: PixelMaps, light: Signal | None, random: np.random.Generator
+    sensor: Sensor,
+    maps: PixelMaps,
+    light: Signal | None,
+    random: np.random.Generator,
+    seconds: float = 1.0,
 ) -> Image16:
-    """The numbers of a photograph.
+    """The numbers of a photograph; what is more than full is clipped, and does not bloom.
 
     Args:
         sensor: that takes it.
@@ -110,17 +114,19 @@ def recorded(
         light: that falls on them before lens and dust, 1 fills a pixel, (h, w) or (h, w, 3); None
             for darkness.
         random: for the noise.
+        seconds: exposure time, which the dark signal grows with.
 
     Returns:
         (h, w, 3) of 8 bits, (h, w) of 16.
     """
+    sensor = replace(sensor, dark_electrons=sensor.dark_electrons * seconds)
     shape = maps.transmission.shape
     colours = CHANNELS if sensor.bits == 8 else 1
     image = _empty(sensor, (maps.transmission.size, colours), random)
     lit = np.empty(0, dtype=np.int64) if light is None else _lit(sensor, light)
     bright = np.union1d(lit, maps.hot)
     electrons = np.full((len(bright), colours), sensor.dark_electrons)
-    electrons[np.searchsorted(bright, maps.hot)] += maps.hot_electrons[:, None]
+    electrons[np.searchsorted(bright, maps.hot)] += seconds * maps.hot_electrons[:, None]
     if light is not None:
         through = sensor.full_electrons * maps.transmission.ravel()[bright, None]
         electrons += through * _in_colours(

@@ -33,7 +33,14 @@ from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.occluders import Occluders, stage_scene
 from tbcad.simulated_run.options import RunOptions
-from tbcad.simulated_run.photographs import Chain, SimulatedRun, frames_of, phases_of
+from tbcad.simulated_run.photographs import (
+    EXPOSURE_S,
+    LED_LIGHT,
+    Chain,
+    SimulatedRun,
+    frames_of,
+    phases_of,
+)
 from tbcad.simulated_run.sensor import Image16, Sensor
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.prototype.wind_up import read_wind_up
@@ -46,7 +53,6 @@ DEPENDS_ON: dict[Geometry, tuple[str, ...]] = {
     "shell": MIRRORS,
 }
 PNG_LEVEL = 1
-EXPOSURE_S = 1.0
 # Of a simulated camera there is no clock: photographs follow each other from here.
 BEGIN = datetime(2022, 11, 1, tzinfo=UTC)
 
@@ -74,10 +80,15 @@ def prepare_run(
     """
     prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
     leds = len(prepared.builds[0][0].machine.leds)
-    phases = _chosen_phases(options.phases, phases_of(leds))
+    phases = options.times.phases(_chosen_phases(options.phases, phases_of(leds)))
     scene = prepared_scene(prepared.scene)
     occluders = Occluders(scene.embree, prepared.stage)
-    chain = Chain(Sensor(bits=options.bits, noise=options.noise), dome=dome_radius(export))
+    chain = Chain(
+        Sensor(bits=options.bits, noise=options.noise),
+        dome=dome_radius(export),
+        led_light=LED_LIGHT * options.led_brightness,
+        times=options.times,
+    )
     runs = []
     for whole, every in prepared.builds:
         frames = _chosen_stops(options.stops, every)
@@ -187,7 +198,8 @@ def _write_frames(
 
     def frame(number: int) -> None:
         for phase, image in run.frame_photographs(number, phases).items():
-            _write_photograph(folder, run.frames[number], phase, image)
+            seconds = EXPOSURE_S * run.chain.exposure(phase)
+            _write_photograph(folder, run.frames[number], phase, image, seconds)
 
     started = monotonic()
     with ThreadPoolExecutor(THREADS) as pool:
@@ -196,7 +208,9 @@ def _write_frames(
             progress(f"frame {done} of {count}, {left:.0f} s left")
 
 
-def _write_photograph(folder: Path, frame: Frame, phase: str, image: Image16) -> None:
+def _write_photograph(
+    folder: Path, frame: Frame, phase: str, image: Image16, seconds: float
+) -> None:
     name, data = exposure_name(frame, phase), BytesIO()
     Image.fromarray(image).save(data, "png", compress_level=PNG_LEVEL)
     (folder / f"{name}.png").write_bytes(data.getvalue())
@@ -207,7 +221,7 @@ def _write_photograph(folder: Path, frame: Frame, phase: str, image: Image16) ->
         sha256=hashlib.sha256(data.getvalue()).hexdigest(),
         width_px=image.shape[1],
         height_px=image.shape[0],
-        exposure_s=EXPOSURE_S,
+        exposure_s=seconds,
         taken=BEGIN,
         settings={},
     )
@@ -231,7 +245,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
         phases=phases,
         frames=frames,
         locked={},
-        seconds=EXPOSURE_S * len(frames) * len(phases),
+        seconds=EXPOSURE_S * len(frames) * sum(map(runs[0].chain.exposure, phases)),
         geometry=geometry,
     )
 

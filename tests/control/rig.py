@@ -79,7 +79,7 @@ class Rig:
         """A command line of tbcad."""
         return [
             *("run", str(self.export), "--port", self.controller.port, "--out", str(self.out)),
-            *("--camera", camera or self.copying, "--yes", *more),
+            *("--camera", camera or self.copying, "--yes", "--no-preflight", *more),
             *(("--stops", stops) if stops else ()),
         ]
 

@@ -13,7 +13,7 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.merged_run.corrections import Options
-from tbcad.runs.exposure import DARK, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.runs.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.prototype.plan import Plan
@@ -294,6 +294,47 @@ class TestIncomplete:
         (run / PHOTOGRAPHS / "a_0003_dark.png").write_bytes(b"")
         record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
         assert record["based_on"]["a"]["without_dark"] == ["a_0003_lit"]
+
+    @pytest.mark.parametrize(
+        "case",
+        [
+            (DARK_LIT, 1.0, [], []),  # as long as the lit one, whatever `dark` has
+            (DARK, 2.0, [], ["a_0003_lit"]),
+            (DARK, 0.01, ["a_0003_lit"], []),
+        ],
+    )
+    def test_a_dark_photograph_of_another_exposure(
+        self,
+        export: ExportedDesign,
+        frames: tuple[Frame, ...],
+        perfect: Photographs,
+        simulated: LightField,
+        calibration: Path,
+        tmp_path: Path,
+        case: tuple[str, float, list[str], list[str]],
+    ) -> None:
+        """Stray light grows with the exposure; `dark` beside `dark_lit` would take off too much."""
+        phase, seconds, without, scaled = case
+        stray = 1000.0
+
+        def taken(image: np.ndarray, frame: Frame, taken_in: str) -> np.ndarray:
+            own = seconds if (taken_in, frame.stop) == (phase, 3) else 1.0
+            light = 50_000 if taken_in == DARK != phase else stray * own
+            return np.rint(100.0 * image + light).astype(np.uint16)
+
+        phases = (DARK, LIT) if phase == DARK else (DARK, DARK_LIT, LIT)
+        run = write_run(tmp_path / "dark", export, frames, perfect, phases, taken)
+        for frame in frames:
+            for name in phases:
+                own = seconds if (name, frame.stop) == (phase, 3) else 1.0
+                set_exposure(run, frame, name, own)
+        options = Options("off", brightness=2.57)
+        record = merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        half = record["based_on"]["a"]
+        assert half["without_dark"] == without
+        assert half["dark_scaled"] == scaled
+        off = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
+        assert (off.max() > 1) == bool(without)
 
     def test_one_run_of_two(
         self,

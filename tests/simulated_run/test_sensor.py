@@ -67,6 +67,14 @@ def test_saturation_and_bits() -> None:
     assert (sixteen == round((5000 + SENSOR.dark_electrons) * 65535 / 10_000)).all()
 
 
+def test_the_dark_signal_grows_with_the_exposure() -> None:
+    sensor = replace(SENSOR, bits=16, noise=0.0)
+    maps = pixel_maps(CAMERA, pixel_directions(CAMERA), sensor, seed=3)
+    for seconds in (0.5, 2.0):
+        image = recorded(sensor, maps, None, generator(3), seconds)
+        assert (image == round(seconds * sensor.dark_electrons * 65535 / 10_000)).all()
+
+
 def test_hot_pixels_are_hot_in_every_photograph() -> None:
     sensor = Sensor(grains=0, hot_share=1e-3, hot_electrons=4000.0)
     maps = pixel_maps(CAMERA, pixel_directions(CAMERA), sensor, seed=3)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.machine.record import TRUTH, read_machine
+from tbcad.runs.exposure import PhaseTimes
 from tbcad.runs.photographs import read_photograph, read_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
@@ -93,6 +95,32 @@ def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
     assert [(f.object_turn_deg, f.stop) for f in run.frames] == [(0, 2), (0, 3), (180, 2), (180, 3)]
     assert not run.built.machine.camera.distortion.any()
     assert subject.radius <= export.spec.prototype.stage.object_diameter_mm / 2
+
+
+def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> None:
+    """A dark photograph for each exposure; sidecars say it; a bright LED takes a short one."""
+    export = read_export(export_with_wind_up)
+    subject = simulate.run_object(export, None)
+    usual = RunOptions(stops=(20,), phases=("dark", "led_1", "lit"))
+    bright = replace(usual, led_brightness=100.0, times=PhaseTimes(leds_s=0.01, lit_s=0.5))
+    folders = []
+    for name, options in (("usual", usual), ("bright", bright)):
+        runs, phases = simulate.prepare_run(export, fdm_errors(), subject, options)
+        folders.append(tmp_path / name)
+        simulate.write_run(runs, phases, export_with_wind_up, folders[-1], lambda _: None)
+    before, after = (read_run(folder) for folder in folders)
+    assert after.record.phases == ("dark", "led_1", "dark_lit", "lit")
+    times = {one.phase: one.exposure_s for one in after.exposures.values()}
+    assert times == {"dark": 0.01, "led_1": 0.01, "dark_lit": 0.5, "lit": 0.5}
+    images = [
+        read_photograph(run, run.exposures[name]).astype(int)
+        for run in (before, after)
+        for name in ("a_0020_led_1", "a_0020_lit")
+    ]
+    led, lit, same, darker = images
+    assert np.abs(led - same).max() < 20  # noise
+    assert led.max() > 50
+    assert darker.max() == pytest.approx(lit.max() / 2, rel=0.1)
 
 
 def test_seeds_make_different_builds(export_with_wind_up: Path) -> None:

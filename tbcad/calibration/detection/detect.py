@@ -2,20 +2,28 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from tbcad.calibration.detection.detection import Detection, Reason, Rejected
 from tbcad.calibration.detection.expected import Expected, Room, maybe_hidden
-from tbcad.calibration.detection.matching import highlights_of, match, shift_of
+from tbcad.calibration.detection.matching import NoPairs, highlights_of, match, shift_of
 from tbcad.calibration.detection.motion import Move, find_move
 from tbcad.calibration.detection.noise import centroid_sigmas, gain, reading_variance
-from tbcad.calibration.detection.spots import ROUNDING, Spots, find_spots, joined_spots
+from tbcad.calibration.detection.nothing_found import no_highlights
+from tbcad.calibration.detection.spots import (
+    ROUNDING,
+    Spots,
+    Unmeasured,
+    find_spots,
+    joined_spots,
+)
 from tbcad.calibration.detection.verdicts import relative_light, verdicts
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
-from tbcad.runs.exposure import DARK, Frame, exposure_name
+from tbcad.runs.exposure import DARK, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16
 from tbcad.runs.photographs import Run, read_photograph
 from tbcad.simulate.parallel import THREADS
@@ -33,15 +41,42 @@ class _Read:
 
     Attributes:
         spots: of all LEDs.
+        unmeasured: what is bright besides.
         photographed: which LEDs' photographs could be read, (l,).
         faults: of the others, and of the dark one.
         dark: the dark photograph, if it could be read.
     """
 
     spots: Spots
+    unmeasured: Unmeasured
     photographed: Bools
     faults: tuple[str, ...]
     dark: Image16 | None
+
+
+@dataclass(frozen=True)
+class _Dark:
+    """A dark photograph, and its exposure time, s, if it is known."""
+
+    image: Image16
+    seconds: float | None
+
+    def at(self, run: Run, frame: Frame, led: int) -> tuple[Image16 | None, str | None]:
+        """What is subtracted from an LED's photograph, and what is to be said of it."""
+        phase = f"led_{led + 1}"
+        seconds = _seconds(run, frame, phase)
+        factor = dark_factor(self.seconds, seconds)
+        if factor == 1:
+            return self.image, None
+        fault = (
+            f"{exposure_name(frame, phase)} was exposed for {seconds:g} s, its dark photograph for "
+            f"{self.seconds:g} s, which is"
+        )
+        if factor is None:
+            return None, f"{fault} too short to be subtracted"
+        kind = self.image.dtype
+        scaled = np.minimum(np.rint(factor * self.image.astype(np.float32)), np.iinfo(kind).max)
+        return scaled.astype(kind), f"{fault} scaled"
 
 
 def detect(
@@ -70,7 +105,15 @@ def detect(
     spots = joined_spots([one.spots for one in read])
     photographed = np.array([one.photographed for one in read])
     faults = [*run.faults.values(), *(fault for one in read for fault in one.faults)]
-    expected, partner, found = match(prior, spots, dome, progress)
+    nothing = partial(
+        no_highlights,
+        unmeasured=sum((one.unmeasured for one in read), Unmeasured()),
+        photographs=int(photographed.sum()),
+    )
+    try:
+        expected, partner, found = match(prior, spots, dome, progress)
+    except NoPairs:
+        raise nothing(spots) from None
     counts = np.bincount(spots.frame, minlength=len(frames)).astype(np.float64)
     move = find_move(found, len(frames), counts)
     if move is not None:
@@ -89,6 +132,8 @@ def detect(
     _overrule(reasons, expected, photographed, move)
     faults += _dead_leds(machine, expected, reasons)
     used = np.array([reason is None for reason in reasons])
+    if not used.any():
+        raise nothing(spots, reasons=reasons)
     paired = np.where(used, partner, -1)
     sigma = _sigmas(spots.only(np.unique(paired[used])), spots, read)
     highlights = highlights_of(expected, paired, spots, sigma[np.maximum(partner, 0)])
@@ -106,32 +151,44 @@ def _read_frames(run: Run, leds: int, progress: Progress) -> list[_Read]:
     return found
 
 
-def _spare_dark(run: Run) -> Image16 | None:
+def _spare_dark(run: Run) -> _Dark | None:
     """A dark photograph for frames without one: hot pixels stay."""
     for frame in run.record.frames:
         image, _ = _photograph(run, frame, DARK)
         if image is not None:
-            return image
+            return _Dark(image, _seconds(run, frame, DARK))
     return None
 
 
-def _read_frame(run: Run, number: int, leds: int, spare: Image16 | None) -> _Read:
+def _seconds(run: Run, frame: Frame, phase: str) -> float | None:
+    """Exposure time of a photograph, s, if it is known."""
+    exposure = run.exposure(frame, phase)
+    return None if exposure is None else exposure.exposure_s
+
+
+def _read_frame(run: Run, number: int, leds: int, spare: _Dark | None) -> _Read:
     frame = run.record.frames[number]
     own, fault = _photograph(run, frame, DARK)
     faults = [] if fault is None else [fault]
     if own is None:
         what = "without one" if spare is None else "with that of another frame"
         faults.append(f"{exposure_name(frame, DARK)} is not there: its frame goes on {what}")
-    dark = spare if own is None else own
-    spots, there = [], np.zeros(leds, dtype=bool)
+    dark = spare if own is None else _Dark(own, _seconds(run, frame, DARK))
+    other_times = []
+    found, there = [], np.zeros(leds, dtype=bool)
     for led in range(leds):
         image, fault = _photograph(run, frame, f"led_{led + 1}")
         if fault is not None:
             faults.append(fault)
         if image is not None:
             there[led] = True
-            spots.append(find_spots(image, dark, number, led))
-    return _Read(joined_spots(spots), there, tuple(faults), own if number < 2 else None)
+            empty, fault = (None, None) if dark is None else dark.at(run, frame, led)
+            other_times += [] if fault is None else [fault]
+            found.append(find_spots(image, empty, number, led))
+    faults += other_times[:1]
+    spots, unmeasured = joined_spots([one for one, _ in found]), (other for _, other in found)
+    whole = sum(unmeasured, Unmeasured())
+    return _Read(spots, whole, there, tuple(faults), own if number < 2 else None)
 
 
 def _photograph(run: Run, frame: Frame, phase: str) -> tuple[Image16 | None, str | None]:

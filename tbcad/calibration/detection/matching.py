@@ -13,7 +13,6 @@ from tbcad.calibration.detection.expected import Expected, expected_highlights
 from tbcad.calibration.detection.spots import Spots
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints, Progress
 
@@ -25,6 +24,10 @@ FIRST_PX, NEAR_PX, FINAL_PX = 30.0, 10.0, 2.5
 FIRST_SIGMA_PX, SIGMA_PX = 2.0, 0.3
 FEW = 4  # highlights of a frame
 PHOTOGRAPH_PX = 1e5  # apart: spots of different photographs never pair
+
+
+class NoPairs(Exception):
+    """No spot is near any highlight that the machine should show."""
 
 
 def match(
@@ -43,7 +46,8 @@ def match(
         that was estimated on the way.
 
     Raises:
-        InputError: the spots fit no machine near the prior.
+        NoPairs: the spots fit no machine near the prior.
+        InputError: no machine explains them.
     """
     expected = expected_highlights(prior.mean, dome)
     some = np.unique(np.linspace(0, len(prior.mean.angle) - 1, FIRST_FRAMES).astype(np.int64))
@@ -73,10 +77,7 @@ def _common_shift(expected: Expected, spots: Spots) -> Floats:
     spot, highlight = pairs["i"], mine[pairs["j"]]
     shift = spots.pixel[spot] - _places(expected)[highlight]
     if not len(shift):
-        raise InputError(
-            "no highlight is within reach of its expected place: is this the run of another "
-            "export, or is the camera far out of place?"
-        )
+        raise NoPairs
     edges = np.arange(-SHIFT_PX, SHIFT_PX + BIN_PX, BIN_PX)
     count, _, _ = np.histogram2d(shift[:, 0], shift[:, 1], bins=[edges, edges])
     # A peak is often on an edge between bins: four bins count together.
@@ -144,4 +145,6 @@ def highlights_of(
 def _estimated(
     prior: Prior, expected: Expected, partner: Ints, spots: Spots, sigma: float
 ) -> Estimate:
+    if (partner < 0).all():
+        raise NoPairs
     return estimate(prior, highlights_of(expected, partner, spots, sigma))

@@ -17,6 +17,7 @@ from tbcad.types import Bools, Floats, Ints
 
 THRESHOLD = 0.02  # of the largest number: less is no spot
 NEIGHBOURS_PX = 1.5  # pixels that touch, also at a corner
+FULL = 1.0  # of the largest number: saturated
 MAX_BRIGHT = 200_000  # pixels: of more the light is not that of LEDs in balls
 # Radius of the disc whose light is summed: of a spot's own area, and of what spreads it.
 OF_SPOT, OF_SPREAD_PX = 1.4, 2.5
@@ -63,6 +64,29 @@ class Spots:
         return Spots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
 
 
+@dataclass(frozen=True)
+class Unmeasured:
+    """Numbers of what is bright and no spot.
+
+    Attributes:
+        large: clusters larger than a highlight.
+        saturated: of these, with a pixel at the largest number.
+        flooded: photographs with more bright pixels than LEDs in balls give.
+        black: photographs without any.
+    """
+
+    large: int = 0
+    saturated: int = 0
+    flooded: int = 0
+    black: int = 0
+
+    def __add__(self, other: "Unmeasured") -> "Unmeasured":
+        """Of both."""
+        return Unmeasured(
+            *(getattr(self, one.name) + getattr(other, one.name) for one in fields(self))
+        )
+
+
 def joined_spots(parts: list[Spots]) -> Spots:
     """All spots of several photographs."""
     if not parts:
@@ -73,8 +97,10 @@ def joined_spots(parts: list[Spots]) -> Spots:
     )
 
 
-def find_spots(image: Image16, dark: Image16 | None, frame: int, led: int) -> Spots:
-    """The spots of a photograph by one LED.
+def find_spots(
+    image: Image16, dark: Image16 | None, frame: int, led: int
+) -> tuple[Spots, Unmeasured]:
+    """The spots of a photograph by one LED, and what is bright besides.
 
     Args:
         image: (h, w, 3).
@@ -86,15 +112,15 @@ def find_spots(image: Image16, dark: Image16 | None, frame: int, led: int) -> Sp
     threshold = max(round(THRESHOLD * largest), 1)
     row, column = _bright(image, dark, threshold)
     if not 0 < len(row) <= MAX_BRIGHT:
-        return joined_spots([])
+        return joined_spots([]), Unmeasured(flooded=int(len(row) > 0), black=int(len(row) == 0))
     label = _clusters(row, column)
-    sums = [
-        _measured(image, dark, row[label == k], column[label == k])
-        for k in range(int(label.max()) + 1)
-    ]
+    places = [(row[label == k], column[label == k]) for k in range(int(label.max()) + 1)]
+    large = [place for place in places if _radius(place[0]) > MAX_RADIUS_PX]
+    clipped = sum(int(image[place].max() >= FULL * largest) for place in large)
+    sums = [_measured(image, dark, *one) for one in places if _radius(one[0]) <= MAX_RADIUS_PX]
     table = np.array([one for one in sums if one is not None]).reshape(-1, COLUMNS)
     light, radius, shot, spread, colours, full = table[:, 2:].T
-    return Spots(
+    found = Spots(
         frame=np.full(len(table), frame),
         led=np.full(len(table), led),
         pixel=table[:, :2],
@@ -105,6 +131,12 @@ def find_spots(image: Image16, dark: Image16 | None, frame: int, led: int) -> Sp
         colours=colours,
         full=full / largest,
     )
+    return found, Unmeasured(len(large), clipped)
+
+
+def _radius(row: Ints) -> float:
+    """Radius of the disc about a cluster, pixels, by the rows of its pixels."""
+    return float(OF_SPOT * np.sqrt(len(row) / np.pi) + OF_SPREAD_PX)
 
 
 def _bright(image: Image16, dark: Image16 | None, threshold: int) -> tuple[Ints, Ints]:
@@ -131,9 +163,7 @@ def _measured(
     image: Image16, dark: Image16 | None, row: Ints, column: Ints
 ) -> tuple[float, ...] | None:
     """Centroid, sums and largest number of a spot; None where there is nothing to measure."""
-    radius = OF_SPOT * np.sqrt(len(row) / np.pi) + OF_SPREAD_PX
-    if radius > MAX_RADIUS_PX:
-        return None
+    radius = _radius(row)
     half = int(np.ceil(radius)) + RING_PX + 1
     at = np.rint([column.mean(), row.mean()]).astype(int)
     first = np.maximum(at - half, 0)

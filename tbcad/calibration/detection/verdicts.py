@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.calibration.detection.detection import Reason
 from tbcad.calibration.detection.expected import Expected
-from tbcad.calibration.detection.spots import Spots
+from tbcad.calibration.detection.spots import FULL, Spots
 from tbcad.types import Bools, Floats, Ints
 
 # Light over what the same sphere shows of the same LED elsewhere, in the middle: an edge that hides
@@ -57,7 +57,7 @@ def verdicts(
         (on & (share < FAINT), Reason.FAINT),
         (on & _beside_others(expected, partner, spots), Reason.MERGED),
         (on & _doubled(spots)[spot], Reason.DOUBLE),
-        (on & (spots.full[spot] >= 1), Reason.SATURATED),
+        (on & (spots.full[spot] >= FULL), Reason.SATURATED),
         (~on & expected.inside, Reason.MISSING),
         (~on & expected.inside & hidden, Reason.HIDDEN),
         (~expected.inside, Reason.OUTSIDE),

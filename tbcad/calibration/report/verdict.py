@@ -1,12 +1,14 @@
 """Is this good? The verdict on a calibration in words and millimetres, and what to do if not."""
 
 import textwrap
+from collections import Counter
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.detection.detection import Detection, Reason
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.runs.exposure import exposure_name
 from tbcad.screen import WIDTH
@@ -20,6 +22,7 @@ MAX_NOISE, MAX_OUTLIERS = 3.0, 0.05  # noise over what is said, share left out: 
 MAX_RATIO = 2.0  # of what halves differ by to what they should
 PULLED = 5.0  # prior standard deviations: the process does not explain an error as large
 MANY = 5  # names in a line
+MOST_SATURATED = 0.1  # share of the highlights in the picture: more is too long an exposure
 
 
 class Answer(StrEnum):
@@ -108,6 +111,7 @@ def verdict_text(result: Calibration, judged: Verdict) -> str:
             f"{half.expected_mm:.3f} mm"
             for half in result.halves
         ),
+        *_not_used_lines(result.detection),
         *_outlier_lines(result),
         *(f"doubt: {one}" for one in judged.doubts),
         *_listed("fault", result.detection.faults),
@@ -187,7 +191,13 @@ def _steps(result: Calibration, enough: bool, doubted: bool, pulled: bool) -> tu
     steps = []
     if result.detection.faults:
         steps.append("photograph what is missing again: tbcad run --resume")
-    if not enough:
+    counts, used = _not_used(result.detection), len(result.detection.highlights)
+    if counts[Reason.SATURATED] > MOST_SATURATED * (used + counts.total()):
+        steps.append(
+            f"{counts[Reason.SATURATED]} highlights are saturated: photograph the LEDs again with "
+            "a shorter exposure (tbcad run --exposure-leds; --preflight-only says which is right)"
+        )
+    elif not enough:
         steps.append(
             "measure the caps' radii and give them as --measured, give the lens as --intrinsics "
             "(tbcad intrinsics), or use more LEDs (docs/calibration.md says what each brings)"
@@ -200,6 +210,18 @@ def _steps(result: Calibration, enough: bool, doubted: bool, pulled: bool) -> tu
     if pulled:
         steps.append("re-seat these parts, or name the process that made them with --process")
     return tuple(steps or ["tbcad merge"])
+
+
+def _not_used(detection: Detection) -> Counter[Reason]:
+    """Numbers of highlights that detection does not use, but those outside of the picture."""
+    reasons = (rejected.reason for rejected in detection.rejected)
+    return Counter(reason for reason in reasons if reason is not Reason.OUTSIDE)
+
+
+def _not_used_lines(detection: Detection) -> list[str]:
+    counts = _not_used(detection)
+    told = "; ".join(f"{number} {reason}" for reason, number in counts.most_common())
+    return [f"not used ({counts.total()}): {told}"] if told else []
 
 
 def _outlier_lines(result: Calibration) -> list[str]:

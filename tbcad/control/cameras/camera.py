@@ -1,9 +1,14 @@
 """What a run asks of a camera."""
 
+import math
+import re
 from dataclasses import dataclass
 from typing import Protocol
 
 from tbcad.runs.exposure import Setting
+
+NEAR = 1.5  # factor of exposure times: the coarsest cameras have steps of 2
+_TIME = re.compile(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?\s*s?$")
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,13 @@ class Camera(Protocol):
 
     released: bool
 
+    def expose(self, seconds: float) -> None:
+        """Set the exposure time of the photographs that follow.
+
+        Raises:
+            CameraFault: the camera cannot.
+        """
+
     def expect(self) -> None:
         """Get ready for a photograph: what was there before is none.
 
@@ -53,3 +65,16 @@ class Camera(Protocol):
 
     def close(self) -> None:
         """Give the camera up."""
+
+
+def shutter_seconds(text: str) -> float | None:
+    """Exposure time of a camera's shutter setting, as 1/60 or 0.0100s; None: it says none."""
+    match = _TIME.match(text)
+    if match is None or float(match[2] or 1) == 0 or float(match[1]) == 0:
+        return None
+    return float(match[1]) / float(match[2] or 1)
+
+
+def are_near(one: float, other: float) -> bool:
+    """Whether two exposure times are the same but for a camera's steps."""
+    return abs(math.log(one / other)) <= math.log(NEAR)

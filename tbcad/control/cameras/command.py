@@ -12,6 +12,7 @@ from tbcad.control.faults import CameraFault
 from tbcad.errors import InputError
 
 PLACE = "{output}"
+EXPOSURES = ("{exposure_s}", "{exposure_ms}", "{exposure_us}")
 EXAMPLE = "for example command:rpicam-still -o {output}.jpg"
 LONGEST_LINE = 200
 
@@ -36,6 +37,12 @@ class CommandCamera:
         if shutil.which(self._words[0]) is None:
             raise InputError(f"--camera command: there is no program {self._words[0]}: install it")
         self._timeout_s = timeout_s
+        self._exposure: dict[str, str] = {}
+
+    def expose(self, seconds: float) -> None:
+        """Give the command this time from now on."""
+        texts = f"{seconds:.6f}", f"{seconds * 1e3:.3f}", f"{seconds * 1e6:.0f}"
+        self._exposure = dict(zip(EXPOSURES, texts, strict=True))
 
     def expect(self) -> None:
         """Get ready: nothing to do."""
@@ -43,9 +50,9 @@ class CommandCamera:
     def photograph(self) -> Shot:
         """Run the command; whatever file it wrote at the output is the photograph."""
         with tempfile.TemporaryDirectory(prefix="tbcad-") as folder:
-            output = str(Path(folder, "photograph"))
-            self._run([word.replace(PLACE, output) for word in self._words])
-            files = [file for file in Path(folder).iterdir() if not file.name.startswith(".")]
+            fields = self._exposure | {PLACE: str(Path(folder, "photograph"))}
+            self._run([_filled(word, fields) for word in self._words])
+            files = sorted(file for file in Path(folder).iterdir() if not file.name.startswith("."))
             if len(files) != 1:
                 count = f"{len(files)} files" if files else "no file"
                 raise CameraFault(f"the camera's command wrote {count} at {PLACE}, one is needed")
@@ -77,3 +84,9 @@ class CommandCamera:
 
     def close(self) -> None:
         """Give up: nothing to do."""
+
+
+def _filled(word: str, fields: dict[str, str]) -> str:
+    for field, text in fields.items():
+        word = word.replace(field, text)
+    return word

@@ -4,10 +4,11 @@ Sources: python-gphoto2 2.6 (examples/capture-image.py, camera-config-values.py)
 camlibs/ptp2/config.c for the names of the settings.
 """
 
+import math
 from types import ModuleType
 from typing import Any
 
-from tbcad.control.cameras.camera import Shot
+from tbcad.control.cameras.camera import Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import suffix_of
 from tbcad.control.faults import CameraFault
 from tbcad.control.port import INSTALL
@@ -22,6 +23,8 @@ LOCKED = (
     *("imagesize", "imageformat", "imagequality"),
 )
 FOCUS, MANUAL = ("focusmode", "focusmode2"), "manual"
+SHUTTERS = ("shutterspeed", "shutterspeed2")
+MANUAL_EXPOSURE = "set the camera to manual exposure"
 AUTOFOCUS, OFF = "autofocus", "Off"  # of the driver, before each release
 
 
@@ -37,6 +40,7 @@ class GphotoCamera:
             InputError: the library is missing, or there is no camera, or its lens focuses itself.
         """
         self._gp = _library()
+        self._exposure_s: float | None = None
         try:
             self._connect()
         except CameraFault as error:
@@ -66,6 +70,43 @@ class GphotoCamera:
                     f"--camera gphoto2: {name} is {value}: set the lens to manual focus, for the "
                     "focus must not change"
                 )
+
+    def expose(self, seconds: float) -> None:
+        """Set the shutter to the nearest time that the camera has."""
+        if seconds == self._exposure_s:
+            return
+        for name in SHUTTERS:
+            times = self._shutter_times(name)
+            if times:
+                break
+        else:
+            raise CameraFault(f"its exposure cannot be set over USB: {MANUAL_EXPOSURE}")
+        text = min(times, key=lambda one: abs(math.log(times[one] / seconds)))
+        if not are_near(times[text], seconds):
+            shortest, longest = min(times.values()), max(times.values())
+            raise CameraFault(
+                f"it has no exposure near {seconds:g} s: the nearest is {text}, all are from "
+                f"{shortest:g} to {longest:g} s"
+            )
+        self._set(name, text)
+        if (value := self._setting(name)) != text:
+            raise CameraFault(f"{name} stays {value} when it is set to {text}: {MANUAL_EXPOSURE}")
+        self._exposure_s = seconds
+
+    def _shutter_times(self, name: str) -> dict[str, float]:
+        """Choices of a shutter setting with their times, s; none if it cannot be set."""
+        gp = self._gp
+        try:
+            widget = self._camera.get_single_config(name)
+            if widget.get_readonly() or widget.get_type() not in (
+                gp.GP_WIDGET_RADIO,
+                gp.GP_WIDGET_MENU,
+            ):
+                return {}
+            texts = [str(widget.get_choice(i)) for i in range(widget.count_choices())]
+        except gp.GPhoto2Error:
+            return {}
+        return {text: time for text in texts if (time := shutter_seconds(text)) is not None}
 
     def expect(self) -> None:
         """Get ready: nothing to do."""
@@ -106,6 +147,7 @@ class GphotoCamera:
         """Close the camera's session and open another."""
         self.close()
         self._connect()
+        self._exposure_s = None
         if (model := str(self._camera.get_abilities().model)) != self.model:
             raise CameraFault(f"another camera answers, {model} and not {self.model}")
 

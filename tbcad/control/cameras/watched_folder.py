@@ -31,6 +31,10 @@ class WatchedFolder:
         self._known: set[str] = set()
         self.released = True
 
+    def expose(self, seconds: float) -> None:
+        """Refuse: a relay tells a camera nothing."""
+        raise CameraFault(f"a camera on a relay cannot be told to expose for {seconds:g} s")
+
     def expect(self) -> None:
         """Remember which files are there."""
         self._known = self._names()

@@ -14,9 +14,11 @@ from PIL import Image
 from tbcad.calibration.detection.detect import detect
 from tbcad.calibration.detection.detection import Detection, Reason
 from tbcad.calibration.detection.expected import Room, expected_highlights
+from tbcad.calibration.detection.nothing_found import no_highlights
+from tbcad.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
-from tbcad.runs.exposure import exposure_name
+from tbcad.runs.exposure import PhaseTimes, exposure_name
 from tbcad.runs.photographs import read_run
 from tbcad.simulated_run.photographs import Chain
 from tbcad.types import Floats
@@ -154,6 +156,78 @@ def test_another_exposure_is_named_and_scaled(copied: Path, small: Small, whole:
     # Its light is as before, so it now seems twice too bright.
     mine = [one for one in found.rejected if (one.frame, one.led) == (5, 0)]
     assert Reason.MERGED in {one.reason for one in mine}
+
+
+@pytest.mark.parametrize(("seconds", "says"), [(2.0, "scaled"), (0.1, "too short")])
+def test_a_dark_photograph_of_another_exposure(
+    copied: Path, small: Small, whole: Detection, seconds: float, says: str
+) -> None:
+    frame = small.run.frames[3]
+    path = copied / "photographs" / f"{exposure_name(frame, 'dark')}.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "exposure_s": seconds}))
+    found = detected(copied, small)
+    (line,) = found.faults
+    name = exposure_name(frame, "led_1")
+    assert line.startswith(f"{name} was exposed for 1 s, its dark photograph for {seconds:g} s")
+    assert says in line
+    assert len(found.highlights) == pytest.approx(len(whole.highlights), abs=2)
+
+
+def test_brighter_leds_and_a_shorter_exposure_are_as_before(
+    write: Callable[[Small], Path], export_folder: Path, whole: Detection
+) -> None:
+    chain = Chain(led_light=100 * BRIGHT, times=PhaseTimes(leds_s=0.01, lit_s=1.0))
+    small = small_run(export_folder, STOPS, chain=chain)
+    found = detected(write(small), small)
+    assert len(found.highlights) == pytest.approx(len(whole.highlights), rel=0.02)
+    assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
+
+
+@pytest.mark.parametrize(
+    ("light", "says"),
+    [
+        (
+            100 * BRIGHT,
+            r"calibrate from: \d+ saturated: the light is saturated: photograph the LEDs",
+        ),
+        (BRIGHT / 1000, r"56 of 56 photographs by LEDs are black: most are too dark: see that"),
+    ],
+)
+def test_no_highlights_are_told_by_reason(
+    write: Callable[[Small], Path], export_folder: Path, light: float, says: str
+) -> None:
+    small = small_run(export_folder, STOPS, chain=Chain(led_light=light))
+    with pytest.raises(InputError, match=says):
+        detected(write(small), small)
+
+
+def test_spots_that_are_no_highlights_of_this_machine(
+    copied: Path, small: Small, export_folder: Path
+) -> None:
+    """A camera that looks elsewhere: nothing is near its place."""
+    camera = small.machine.camera
+    away = replace(camera, principal=camera.principal + 10 * camera.width_px)
+    prior = replace(small.prior, mean=replace(small.prior.mean, camera=away))
+    with pytest.raises(
+        InputError, match=r"\d+ where no highlight is expected; .*: is this the run"
+    ):
+        detect(read_run(copied), prior)
+
+
+def test_light_larger_than_a_highlight() -> None:
+    image = np.zeros((200, 300, 3), np.uint8)
+    image[20:80, 20:80] = 255
+    image[120:180, 120:180] = 100
+    image[50:54, 200:204] = 200
+    spots, other = find_spots(image, None, 0, 0)
+    assert len(spots) == 1
+    assert other == Unmeasured(large=2, saturated=1)
+    flood = np.full((800, 800, 3), 200, np.uint8)
+    assert find_spots(flood, None, 0, 0)[1] == Unmeasured(flooded=1)
+    assert find_spots(0 * flood, None, 0, 0)[1] == Unmeasured(black=1)
+    error = str(no_highlights(spots, other + other + Unmeasured(flooded=3), 4))
+    assert "4 larger than a highlight, 2 of them saturated" in error
+    assert "most are full of light: darken the room" in error
 
 
 def test_another_size_is_a_fault(copied: Path, small: Small) -> None:

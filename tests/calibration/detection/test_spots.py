@@ -20,7 +20,7 @@ def test_a_lens_that_darkens_one_side_does_not_shift_a_highlight() -> None:
     places = np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1) - PLACE
     spot = np.exp(-(places**2 / (2 * WIDTH_PX**2)).sum(axis=-1)) * np.exp(places @ SLOPE)
     image = np.rint(60_000 * spot / spot.max()).astype(np.uint16)
-    found = find_spots(np.dstack([image] * 3), None, 0, 0)
+    found, _ = find_spots(np.dstack([image] * 3), None, 0, 0)
     zero = np.zeros((1, 2))
     dome = np.diag(WIDTH_PX**2 - BLUR_PX**2)[None]
     sure = np.ones(1, dtype=bool)
