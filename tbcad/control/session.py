@@ -7,7 +7,6 @@ from functools import partial
 from itertools import groupby
 from pathlib import Path
 
-from tbcad.control.base import Base
 from tbcad.control.cameras.camera import Camera
 from tbcad.control.estimate import (
     Shots,
@@ -20,6 +19,7 @@ from tbcad.control.estimate import (
     size_text,
 )
 from tbcad.control.faults import CameraFault, MachineFault
+from tbcad.control.machine import Machine
 from tbcad.control.outcome import Outcome
 from tbcad.control.plan import Phase, Plan
 from tbcad.control.shooting import (
@@ -64,7 +64,7 @@ class RunOptions:
 class Session:
     """One machine and one run."""
 
-    def __init__(self, plan: Plan, options: RunOptions, base: Base, camera: Camera) -> None:
+    def __init__(self, plan: Plan, options: RunOptions, base: Machine, camera: Camera) -> None:
         """Run with a machine and a camera that are connected."""
         self._plan, self._options = plan, options
         self._base, self._camera = base, camera
@@ -96,7 +96,9 @@ class Session:
         trial = self._trial()
         if resume:
             self._check_same_run(folder, trial)
-        self._expected = expected_seconds(self._plan, remaining, trial.seconds)
+        self._expected = expected_seconds(
+            self._plan, remaining, trial.seconds + self._base.switch_s
+        )
         seconds = sum(self._expected.values())
         facts = trial.facts
         each = bytes_each(len(trial.shot.data), facts.width_px, facts.height_px)

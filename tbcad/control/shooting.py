@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from time import monotonic
 
-from tbcad.control.base import Base
 from tbcad.control.cameras.camera import Camera, Shot
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
 from tbcad.control.faults import CameraFault
+from tbcad.control.machine import Machine
 from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.runs.record import RunRecord
 
@@ -51,7 +51,7 @@ class Photograph:
         return float(match[1]) / float(match[2] or 1)
 
 
-def take(camera: Camera, base: Base) -> Photograph:
+def take(camera: Camera, base: Machine) -> Photograph:
     """Take one photograph.
 
     Raises:
