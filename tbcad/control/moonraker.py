@@ -144,7 +144,9 @@ class Moonraker:
         self, method: str, path: str, body: str | None, limit_s: float | None
     ) -> tuple[HTTPResponse, bytes]:
         to = self._address
-        connection = (HTTPSConnection if to.secure else HTTPConnection)(to.host, to.port, ANSWER_S)
+        connection = (HTTPSConnection if to.secure else HTTPConnection)(
+            to.host, to.port, timeout=ANSWER_S
+        )
         try:
             connection.connect()
             connection.sock.settimeout(limit_s)
