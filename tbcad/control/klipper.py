@@ -10,6 +10,7 @@ extras/stepper_enable.py and toolhead.py of Klipper; tried with both.
 
 from collections.abc import Callable
 from concurrent.futures import Future, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Thread
 from time import monotonic, sleep
@@ -24,7 +25,7 @@ INFO, SCRIPT = "/printer/info", "/printer/gcode/script"
 QUERY, ENDSTOPS = "/printer/objects/query", "/printer/query_endstops/status"
 READY, STARTUP, DISCONNECTED = "ready", "startup", "disconnected"
 NO_KLIPPER = (404, 503)  # before Klipper's first start, and after it ended
-READY_S = 30.0  # that Klipper needs to start
+STARTING_S = {STARTUP: 30.0, DISCONNECTED: 5.0}  # that a restart needs
 BACK_S = 20.0  # that Moonraker may be away for
 AGAIN_S = 0.5
 LOOK_S = 0.2  # between looks at the state while a script runs
@@ -33,13 +34,15 @@ TRIES = 2
 PIN_FIRST = "hold the base by hand and put the zero pin in first"
 SAFE = {
     STARTUP: f"the base is not held: {PIN_FIRST}, then wait until it is ready",
-    "error": f"the base may not be held: {PIN_FIRST}, then mend printer.cfg and say RESTART",
+    "error": (
+        f"the base may not be held: {PIN_FIRST}, then mend what it says and say FIRMWARE_RESTART"
+    ),
     "shutdown": (
         "the motor is off, or goes off with FIRMWARE_RESTART, and the base falls: "
         f"{PIN_FIRST}, then say FIRMWARE_RESTART"
     ),
     DISCONNECTED: (
-        "motor and lights stay as they are until Klipper starts again, which lets the base fall: "
+        "lights may be on; the motor is off, or goes off when Klipper starts, and the base falls: "
         f"{PIN_FIRST}, then start the service klipper"
     ),
 }
@@ -91,7 +94,7 @@ class Klipper:
         if not isinstance(info, dict) or "klippy_state" not in info:
             raise MachineFault(f"the server is not Moonraker: {ELSEWHERE}")
         begun = self._clock()
-        while (state := self.state()).name == STARTUP and self._clock() - begun < READY_S:
+        while self._clock() - begun < STARTING_S.get((state := self.state()).name, 0.0):
             sleep(AGAIN_S)
         if state.name != READY:
             raise MachineFault(f"{state.what}: {state.safe}")
@@ -201,12 +204,13 @@ class Klipper:
             raise MachineFault(f"Klipper refuses {line!r}: {fault}") from None
 
     def _until_back(self, fault: Unreachable, held: bool) -> None:
+        """Wait until Moonraker is there again, which finds Klipper some seconds later."""
         begun = self._clock()
         while self._clock() - begun < BACK_S:
-            try:
-                return self.check_held() if held else self.check_ready()
-            except Unreachable:
-                sleep(AGAIN_S)
+            with suppress(Unreachable):
+                if self.state().name not in STARTING_S:
+                    return self.check_held() if held else self.check_ready()
+            sleep(AGAIN_S)
         raise fault
 
 

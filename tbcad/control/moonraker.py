@@ -161,7 +161,7 @@ def _error_text(response: HTTPResponse, answer: Any) -> str:
     """What an answer without a result says."""
     error = answer.get("error") if isinstance(answer, dict) else None
     if isinstance(error, dict):
-        return str(error.get("message"))
+        return " ".join(str(error.get("message")).split())
     if (where := response.getheader("Location")) is not None:
         return f"the server sends us to {where}: name that address"
     return f"the server answers {response.status} {response.reason}: {ELSEWHERE}"

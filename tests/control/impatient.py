@@ -13,7 +13,7 @@ WAITS_S = {
     "grbl.LATE_S": 0.05,
     "klipper.LOOK_S": 0.01,
     "klipper.AGAIN_S": 0.01,
-    "klipper.READY_S": 1.0,
+    "klipper.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
     "klipper.BACK_S": 1.0,
     "cameras.watched_folder.POLL_S": 0.01,
     "cameras.watched_folder.QUIET_S": 0.05,

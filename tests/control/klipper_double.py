@@ -66,6 +66,7 @@ class KlipperDouble:
         self.stuck_switch = False
         self.away = False  # gives no answers
         self.asked = 0  # for the state
+        self.searching = 0  # answers until Moonraker has found Klipper
         self.print_state = ""
         self._gcode, self._lock = Lock(), RLock()
         self._forget()
@@ -294,6 +295,9 @@ class _Handler(BaseHTTPRequestHandler):
             return self._error(
                 *((404, "Not Found") if missing else (503, "Klippy Host not connected"))
             )
+        if printer.searching:
+            printer.searching -= 1
+            return self._error(404, "Not Found")
         match self.path:
             case "/printer/info":
                 printer.asked += 1

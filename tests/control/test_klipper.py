@@ -129,7 +129,7 @@ LED = "SET_PIN PIN=led_3 VALUE=1"
         (
             "disconnected",
             "stopped: Klipper is in state disconnected",
-            "until Klipper starts again, which lets the base fall: hold the base by hand",
+            "goes off when Klipper starts, and the base falls: hold the base by hand",
         ),
         ("error", f"stopped: Klipper refuses '{LED}': Timer too close", ""),
     ],
@@ -191,6 +191,14 @@ def test_connection_that_breaks_once(klipper_rig: Rig, capsys: pytest.CaptureFix
     assert tbcad(klipper_rig.words()) == 0
     check_every_photograph(klipper_rig.out, ALL)
     assert capsys.readouterr().err.count("once more") == 1
+
+
+def test_moonraker_that_begins_anew(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """It finds Klipper after it listens again."""
+    controller = klipper_rig.controller
+    at_line(klipper_rig, "M400", "drop", lambda: setattr(controller, "searching", 3))
+    assert tbcad(klipper_rig.words("--phases", "dark")) == 0
+    assert controller.searching == 0
 
 
 def test_moonraker_that_goes(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:

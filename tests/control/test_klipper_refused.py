@@ -145,7 +145,11 @@ def test_key(
             "\nPrinter is not ready\n",
             "Klipper is in state startup: Printer is not ready",
         ),
-        ("error", "Section 'x' is not valid\nmore", "then mend printer.cfg and say RESTART"),
+        (
+            "error",
+            "Section 'x' is not valid\nmore",
+            "then mend what it says and say FIRMWARE_RESTART",
+        ),
         ("shutdown", "Lost communication", "put the zero pin in first, then say FIRMWARE_RESTART"),
         ("disconnected", "", "put the zero pin in first, then start the service klipper"),
         ("unheard of", "", "put the zero pin in first"),
@@ -170,7 +174,7 @@ def test_klipper_that_never_started(klipper_rig: Rig, capsys: pytest.CaptureFixt
 def test_start_is_waited_for(klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     controller = klipper_rig.controller
     controller.state = "startup"
-    monkeypatch.setattr("tbcad.control.klipper.READY_S", 60.0)
+    monkeypatch.setattr("tbcad.control.klipper.STARTING_S", {"startup": 60.0})
 
     def start() -> None:
         until(lambda: controller.asked > 2)
