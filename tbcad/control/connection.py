@@ -5,11 +5,11 @@ from pathlib import Path
 
 from tbcad.control.base import Base
 from tbcad.control.grbl import Grbl
-from tbcad.control.klipper import Klipper
-from tbcad.control.klipper_base import KlipperBase
-from tbcad.control.klipper_files import read_klipper_files
+from tbcad.control.klipper.base import KlipperBase
+from tbcad.control.klipper.files import read_klipper_files
+from tbcad.control.klipper.host import Klipper
+from tbcad.control.klipper.moonraker import PREFIX, Moonraker, read_address
 from tbcad.control.machine import Machine
-from tbcad.control.moonraker import PREFIX, Moonraker, read_address
 from tbcad.control.plan import Plan
 from tbcad.control.port import SerialPort
 from tbcad.errors import InputError

@@ -112,7 +112,7 @@ def run_machine(
 
     Args:
         request: what is asked for.
-        port: of the controller.
+        port: of the controller, or "moonraker:" and a URL.
         camera: gphoto2, command:... or folder:...
         ask: asks the operator to do something.
         show: shows progress.

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tbcad.cli import run as tbcad
-from tbcad.control.klipper_base import PIECE_S
+from tbcad.control.klipper.base import PIECE_S
 from tests.control.rig import Rig, until
 from tests.control.run_checks import check_every_photograph, events
 
@@ -218,7 +218,7 @@ def test_moonraker_that_goes(klipper_rig: Rig, capsys: pytest.CaptureFixture[str
 def test_other_programs_motion_is_waited_for(
     klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tbcad.control.klipper.LATE_S", -1000.0)
+    monkeypatch.setattr("tbcad.control.klipper.host.LATE_S", -1000.0)
     controller = klipper_rig.controller
 
     def busy() -> None:

@@ -4,6 +4,7 @@ import json
 import socket
 import ssl
 from collections.abc import Iterator
+from dataclasses import astuple
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from threading import Thread
@@ -11,7 +12,7 @@ from threading import Thread
 import pytest
 
 from tbcad.cli import run as tbcad
-from tbcad.control import moonraker
+from tbcad.control.klipper import files, moonraker
 from tests.control.klipper_double import MOTOR
 from tests.control.rig import Rig, until
 
@@ -39,6 +40,9 @@ def words_to(rig: Rig, port: str) -> list[str]:
         ("moonraker:ftp://printer", "allowed is moonraker:http://HOST"),
         ("moonraker:http://", "allowed is moonraker:http://HOST"),
         ("moonraker:http://printer:99999", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://printer:0", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://prin ter", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://printer\n", "allowed is moonraker:http://HOST"),
         ("moonraker:http://[::1", "allowed is moonraker:http://HOST"),
         ("moonraker:http://user:secret@printer", "an API key goes into MOONRAKER_API_KEY"),
         ("moonraker:http://printer/?token=1", "an API key goes into MOONRAKER_API_KEY"),
@@ -174,7 +178,7 @@ def test_klipper_that_never_started(klipper_rig: Rig, capsys: pytest.CaptureFixt
 def test_start_is_waited_for(klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     controller = klipper_rig.controller
     controller.state = "startup"
-    monkeypatch.setattr("tbcad.control.klipper.STARTING_S", {"startup": 60.0})
+    monkeypatch.setattr("tbcad.control.klipper.host.STARTING_S", {"startup": 60.0})
 
     def start() -> None:
         until(lambda: controller.asked > 2)
@@ -238,13 +242,54 @@ def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig, option: str, value:
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
 
 
-def test_idle_printer_that_keeps_its_motor_on(klipper_rig: Rig) -> None:
-    from tbcad.control.klipper_files import lets_go
+@pytest.mark.parametrize(
+    ("settings", "status", "seconds"),
+    [
+        ({}, {}, 600.0),
+        ({"timeout": 300.0, "gcode": "\nm84\n"}, {}, 300.0),
+        ({"timeout": 300.0, "gcode": "M117 idle"}, {}, None),
+        ({"timeout": 1e7, "gcode": "\nM84\n"}, {}, None),
+        ({"timeout": 1e7, "gcode": "\nM84\n"}, {"idle_timeout": 60.0}, 60.0),
+    ],
+)
+def test_idle_printer(
+    settings: dict[str, object], status: dict[str, object], seconds: float | None
+) -> None:
+    """What is set, and what SET_IDLE_TIMEOUT changed since."""
+    assert files.idle_that_lets_go({"idle_timeout": settings}, status) == seconds
 
-    assert lets_go({}, 600.0)
-    assert lets_go({"idle_timeout": {"gcode": "\nm84\n"}}, 600.0)
-    assert not lets_go({"idle_timeout": {"gcode": "\nM84\n"}}, 1e7)
-    assert not lets_go({"idle_timeout": {"gcode": "M117 idle"}}, 600.0)
+
+@pytest.mark.parametrize(
+    ("wanted", "found", "same"),
+    [
+        ("13.50:1", [[13.5, 1.0]], True),
+        ("80:16, 2:1", [[80.0, 16.0], [2.0, 1.0]], True),
+        ("80:16, 2:1", [[80.0, 16.0]], False),
+        ("false", False, True),
+        ("no", True, False),
+        ("\nM117\n  idle", "M117\nidle", True),
+        ("0.8", "0.80000001", True),
+        ("^FILL_IN", "^ PG6", True),
+        ("^FILL_IN", "^", False),
+        ("FILL_IN", "!^PG6", True),
+    ],
+)
+def test_same_values(wanted: str, found: object, same: bool) -> None:
+    assert list(files.differences({"a": {"b": wanted}}, {"a": {"b": found}})) == (
+        [] if same else [f"b of [a] is {found!r}, not {wanted}"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("http://[::1]", ("::1", 80, "", False)),
+        ("https://printer/", ("printer", 443, "", True)),
+        ("HTTP://Printer:7125/one/", ("printer", 7125, "/one", False)),
+    ],
+)
+def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None:
+    assert astuple(moonraker.read_address(text)) == address
 
 
 def test_settings_cannot_be_sent(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,7 @@ Source: docs/external_api/ of Moonraker: introduction.md, authorization.md, prin
 
 import json
 import os
+import re
 import socket
 import ssl
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ KEY = "MOONRAKER_API_KEY"
 ANSWER_S = 5.0  # that a request may take which does not wait for the machine
 MOST_BYTES = 16_000_000  # of an answer; a large configuration has 200 kB
 UNAUTHORIZED = 401
+PORTS = {"http": 80, "https": 443}
+_URL = re.compile(r"https?://[\w.:\[\]-]+(?:/[\w./~-]*)?", re.ASCII | re.IGNORECASE)
 ELSEWHERE = "is this Moonraker? It listens at port 7125, as in moonraker:http://HOST:7125"
 FORM = "allowed is moonraker:http://HOST or moonraker:http://HOST:7125, with https too"
 
@@ -59,13 +62,13 @@ class Address:
 
     Attributes:
         host: name or number.
-        port: None for that of the scheme.
+        port: of the host.
         path: before those of the API, without a slash at its end.
         secure: whether by https.
     """
 
     host: str
-    port: int | None
+    port: int
     path: str
     secure: bool
 
@@ -76,16 +79,16 @@ def read_address(text: str) -> Address:
     Raises:
         InputError: it is none of a server.
     """
+    if any(sign in text for sign in "@?#"):
+        raise InputError(f"--port has more than a host: {FORM}; an API key goes into {KEY}")
     try:
         parts = urlsplit(text)
-        host, port = parts.hostname, parts.port
-    except ValueError:
-        host, port = None, None
-    if not host or parts.scheme not in ("http", "https") or not text.isascii():
+        port = parts.port or (PORTS[parts.scheme] if parts.port is None else 0)
+    except (ValueError, KeyError):
+        port = 0
+    if not port or not parts.hostname or _URL.fullmatch(text) is None:
         raise InputError(f"--port names {text!r:.60}: {FORM}")
-    if parts.username is not None or parts.query or parts.fragment or not text.isprintable():
-        raise InputError(f"--port has more than a host: {FORM}; an API key goes into {KEY}")
-    return Address(host, port, parts.path.rstrip("/"), parts.scheme == "https")
+    return Address(parts.hostname, port, parts.path.rstrip("/"), parts.scheme == "https")
 
 
 class Moonraker:

@@ -10,8 +10,14 @@ from math import ceil
 
 from tbcad.control.base import travel_s
 from tbcad.control.faults import ControllerReset, MachineFault
-from tbcad.control.klipper import MOTOR, PIN_FIRST, READY, Klipper
-from tbcad.control.klipper_files import CONFIG, STEPPER, KlipperFiles, differences, lets_go
+from tbcad.control.klipper.files import (
+    CONFIG,
+    STEPPER,
+    KlipperFiles,
+    differences,
+    idle_that_lets_go,
+)
+from tbcad.control.klipper.host import MOTOR, PIN_FIRST, READY, Klipper
 from tbcad.control.plan import Plan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
@@ -62,11 +68,10 @@ class KlipperBase:
                 f"the printer is not configured as {CONFIG} says: "
                 f"{', '.join(found[:SHOWN])}{more}: {INCLUDE}"
             )
-        idle = float(objects["idle_timeout"].get("idle_timeout", 0.0))
-        if lets_go(settings, idle):
+        if (idle_s := idle_that_lets_go(settings, objects["idle_timeout"])) is not None:
             raise InputError(
-                f"timeout of [idle_timeout] lets the motor go after {idle:g} s, and the base would "
-                f"fall: {INCLUDE}"
+                f"timeout of [idle_timeout] lets the motor go after {idle_s:g} s, and the base "
+                f"would fall: {INCLUDE}"
             )
         if MOTOR not in objects["stepper_enable"].get("steppers", {}):
             raise InputError("Klipper does not tell whether its motor is on: update Klipper")

@@ -17,7 +17,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from tbcad.control.faults import ControllerReset, MachineFault
-from tbcad.control.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
+from tbcad.control.klipper.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
 from tbcad.types import Progress
 
 MOTOR = "manual_stepper base"

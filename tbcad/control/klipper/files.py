@@ -22,6 +22,7 @@ TRY = {"1": "2", "home": "try_home"}
 """Words of STOP_ON_ENDSTOP for which a switch that is not reached is no error."""
 SAME = 1e-5
 LETS_GO = re.compile(r"\b(?:M84|M18|SET_STEPPER_ENABLE|MANUAL_STEPPER)\b", re.IGNORECASE)
+DEFAULT_IDLE_S = 600.0
 LEAST_IDLE_S = 86_400.0  # a run pauses for as long as the operator likes
 
 
@@ -112,6 +113,8 @@ def differences(wanted: dict[str, dict[str, str]], found: dict[str, Any]) -> Ite
 def _same(wanted: str, found: Any) -> bool:
     if FILL_IN in wanted:
         return _same_pin(wanted, str(found))
+    if isinstance(found, bool):
+        return RawConfigParser.BOOLEAN_STATES.get(wanted.lower()) is found
     numbers = _numbers(re.split(r"[,:]", wanted))
     if numbers is not None and (has := _numbers(found)) is not None:
         return len(numbers) == len(has) and all(
@@ -122,7 +125,7 @@ def _same(wanted: str, found: Any) -> bool:
 
 def _same_pin(wanted: str, found: str) -> bool:
     """Whether a pin is filled in, with the signs of the build if that has some."""
-    signs, name = found.rstrip("!^~ "), found.lstrip("!^~ ")
+    name = found.lstrip("!^~ ")
     signs = found.removesuffix(name).replace(" ", "")
     expected = wanted.removesuffix(FILL_IN).strip()
     return name not in ("", "None") and FILL_IN not in name and expected in ("", signs)
@@ -139,12 +142,14 @@ def _numbers(value: Any) -> list[float] | None:
         return None
 
 
-def lets_go(found: dict[str, Any], idle_s: float) -> bool:
-    """Whether an idle printer switches its motor off within a day.
+def idle_that_lets_go(settings: dict[str, Any], status: dict[str, Any]) -> float | None:
+    """Seconds after which an idle printer switches its motor off; None: not within a day.
 
     Args:
-        found: settings of the printer's configfile.
-        idle_s: that it is idle for before it does what is set there.
+        settings: of the printer's configfile.
+        status: of its object idle_timeout, as far as this Klipper has one: SET_IDLE_TIMEOUT counts.
     """
-    script = str(found.get("idle_timeout", {}).get("gcode", "M84"))
-    return idle_s < LEAST_IDLE_S and LETS_GO.search(script) is not None
+    set_up = settings.get("idle_timeout", {})
+    seconds = float(status.get("idle_timeout", set_up.get("timeout", DEFAULT_IDLE_S)))
+    stays = LETS_GO.search(str(set_up.get("gcode", "M84"))) is None
+    return None if stays or seconds >= LEAST_IDLE_S else seconds
