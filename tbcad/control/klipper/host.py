@@ -26,6 +26,7 @@ QUERY, ENDSTOPS = "/printer/objects/query", "/printer/query_endstops/status"
 READY, STARTUP, DISCONNECTED = "ready", "startup", "disconnected"
 NO_KLIPPER = (404, 503)  # before Klipper's first start, and after it ended
 STARTING_S = {STARTUP: 30.0, DISCONNECTED: 5.0}  # that a restart needs
+SWITCH_S = 60.0
 BACK_S = 20.0  # that Moonraker may be away for
 AGAIN_S = 0.5
 LOOK_S = 0.2  # between looks at the state while a script runs
@@ -124,8 +125,8 @@ class Klipper:
             raise MachineFault(f"{QUERY} tells no status: {ELSEWHERE}") from None
 
     def switch_pressed(self) -> bool:
-        """Whether the home switch is pressed."""
-        return bool(self._server.get(ENDSTOPS).get(MOTOR) == "TRIGGERED")
+        """Whether the home switch is pressed, when other G-code is done."""
+        return bool(self._server.get(ENDSTOPS, SWITCH_S).get(MOTOR) == "TRIGGERED")
 
     def check_ready(self) -> None:
         """Ask for the state.

@@ -106,14 +106,14 @@ class Moonraker:
             raise InputError(f"{KEY} is no API key: copy it from Moonraker's settings")
         self._headers = {"Content-Type": "application/json"} | ({"X-Api-Key": key} if key else {})
 
-    def get(self, path: str) -> Any:
+    def get(self, path: str, limit_s: float = ANSWER_S) -> Any:
         """Result of a GET request.
 
         Raises:
             Unreachable: there is no answer.
             Refused: the answer is an error.
         """
-        return self._result("GET", path, None, ANSWER_S)
+        return self._result("GET", path, None, limit_s)
 
     def post(self, path: str, body: dict[str, Any], limit_s: float | None = ANSWER_S) -> Any:
         """Result of a POST request, waited for without end if there is no limit.
