@@ -164,15 +164,19 @@ def solve_intrinsics(
     squares: tuple[int, int],
     size_mm: float,
     *,
+    charuco: str | None = None,
+    marker_mm: float | None = None,
     out: Path | str | None = None,
     detail: Progress = silent,
 ) -> SolvedLens:
-    """Solve the lens of a camera from photographs of a checkerboard.
+    """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
 
     Args:
         folder: with the photographs.
         squares: columns and rows of the board.
         size_mm: width of a square.
+        charuco: dictionary of a ChArUco board's markers, such as "4x4_50".
+        marker_mm: width of its markers.
         out: file to write, as OpenCV's YAML; None: none.
         detail: called with the name of each photograph.
 
@@ -180,10 +184,12 @@ def solve_intrinsics(
         InputError: too few boards are found, or the file cannot be written.
     """
     from tbcad.atomic_files import replace_files
+    from tbcad.calibration.intrinsics.boards import Board, parse_dictionary
     from tbcad.calibration.intrinsics.checkerboard import solve_lens
     from tbcad.calibration.intrinsics.opencv import opencv_text
 
-    solved = solve_lens(Path(folder), squares, size_mm, detail)
+    dictionary = None if charuco is None else parse_dictionary(charuco)
+    solved = solve_lens(Path(folder), Board(squares, size_mm, dictionary, marker_mm), detail)
     if out is not None:
         file = Path(out)
         text = opencv_text(solved.lens, solved.facts())

@@ -106,42 +106,58 @@ def calibrate(
 @app.command()
 def intrinsics(
     folder: Annotated[
-        Path, typer.Argument(metavar="FOLDER", help="Photographs of a checkerboard, one camera.")
+        Path, typer.Argument(metavar="FOLDER", help="Photographs of a board, one camera.")
     ],
     squares: Annotated[
         str, typer.Option(metavar="WxH", help="Squares of the board, columns x rows.")
     ] = "9x6",
     size: Annotated[float, typer.Option(min=0.1, max=1000, help="Width of a square, mm.")] = 5.0,
+    charuco: Annotated[
+        str | None,
+        typer.Option(metavar="DICTIONARY", help="Markers of a ChArUco board, for instance 4x4_50."),
+    ] = None,
+    marker: Annotated[
+        float | None, typer.Option(metavar="MM", help="Width of a ChArUco board's markers, mm.")
+    ] = None,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="File to write, YAML as OpenCV writes it.")
     ] = Path("camera.yml"),
     force: ForceFile = False,
     json: JsonResult = False,
 ) -> int:
-    """Solve the lens of a camera from photographs of a checkerboard.
+    """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
 
-    Writes focal lengths, principal point and distortion with their standard deviations, for
-    tbcad calibrate --intrinsics.
+    Boards may be partly out of the picture. Writes focal lengths, principal point and distortion
+    with their standard deviations, for tbcad calibrate --intrinsics.
     """
-    from tbcad.calibration.intrinsics.checkerboard import EDGE_SHARE, parse_squares
+    from tbcad.calibration.intrinsics.boards import parse_squares
+    from tbcad.calibration.intrinsics.checkerboard import EDGE_SHARE
 
     columns, rows = parse_squares(squares)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; name one with photographs of a checkerboard")
+        raise InputError(f"{folder}: no such folder; name one with photographs of a board")
     if out.exists() and not force:
         raise InputError(f"{out} exists: choose another name, or replace it with --force")
     from tbcad.api import solve_intrinsics
 
     with stages(1) as screen:
-        screen.stage("corners of checkerboards")
-        solved = solve_intrinsics(folder, (columns, rows), size, out=out, detail=screen.detail)
+        screen.stage("corners of boards")
+        solved = solve_intrinsics(
+            folder,
+            (columns, rows),
+            size,
+            charuco=charuco,
+            marker_mm=marker,
+            out=out,
+            detail=screen.detail,
+        )
     if json:
         print_json(_lens_record(solved, out))
         return 0
     lens, sigma = solved.lens, solved.sigma
     typer.echo(
-        f"{solved.boards} boards, {solved.rms_px:.3f} px root mean square; focal length "
-        f"{lens.focal[0]:.2f} +- {sigma[0]:.2f} px"
+        f"{solved.boards} boards, {solved.corners} corners ({solved.outliers} outliers left out), "
+        f"RMS {solved.rms_px:.3f} px; focal length {lens.focal[0]:.2f} +- {sigma[0]:.2f} px"
     )
     typer.echo(
         f"principal point {lens.principal[0]:.2f} +- {sigma[2]:.2f}, {lens.principal[1]:.2f} +- "

@@ -1,6 +1,5 @@
-"""A lens solved by OpenCV from photographs of a checkerboard (Zhang 2000)."""
+"""A lens solved by OpenCV from photographs of a board (Zhang 2000)."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,12 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from tbcad.calibration.intrinsics.boards import (
+    MIN_CORNERS,
+    Board,
+    BoardCorners,
+    find_corners,
+)
 from tbcad.calibration.intrinsics.lens import Lens
 from tbcad.calibration.intrinsics.opencv import cv
 from tbcad.errors import InputError
@@ -16,14 +21,16 @@ from tbcad.types import Floats, Progress
 
 MIN_BOARDS = 6
 """Photographs of the board: fewer do not tell focal length, principal point and distortion."""
-MIN_SQUARES, MAX_SQUARES = 4, 60
-SIZE_MM = (0.1, 1000.0)
 EPSILON, STEPS = 1e-6, 100
-WINDOW_SHARE, MAX_WINDOW = 0.4, 11
-"""Half width of the window in which a corner is refined: of the squares' spacing, and in pixels."""
-REFINED_PX = 1e-3
 EDGE_SHARE = 0.75
 """Of the distance from centre to corner of the picture, that the corners of boards should reach."""
+OUTLIER = 6.0
+"""Times the median distance from where the solution shows corners: one that is farther is none.
+
+By a normal distribution in the plane one corner in 10^11 is that far.
+"""
+ROUNDS = 3  # of leaving out corners
+NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 
 
 @dataclass(frozen=True)
@@ -34,84 +41,62 @@ class SolvedLens:
         lens: solved.
         boards: photographs that were used.
         unused: names of those in which no board was found.
+        corners: that were used.
+        outliers: corners left out, which are far from where the solution shows them.
         rms_px: root mean square distance of corners from where the solution shows them.
-        sigma: standard deviations of focal lengths, principal point and distortion, (9,).
+        sigma: standard deviations of `NAMES`, (9,), by leaving out one photograph after the other.
         reach: how far out corners lie, as a share of the distance from centre to corner.
     """
 
     lens: Lens
     boards: int
     unused: tuple[str, ...]
+    corners: int
+    outliers: int
     rms_px: float
     sigma: Floats
     reach: float
 
     def facts(self) -> dict[str, float | int | str]:
         """Further keys of its file."""
-        names = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-        deviations = {
-            f"sigma_{n}": float(f"{s:.6g}") for n, s in zip(names, self.sigma, strict=True)
-        }
-        return {"boards": self.boards, "rms_px": float(f"{self.rms_px:.6g}"), **deviations}
+        sigmas = {f"sigma_{n}": float(f"{s:.6g}") for n, s in zip(NAMES, self.sigma, strict=True)}
+        counts = {"boards": self.boards, "corners": self.corners, "outliers": self.outliers}
+        return {**counts, "rms_px": float(f"{self.rms_px:.6g}"), **sigmas}
 
 
-def parse_squares(text: str) -> tuple[int, int]:
-    """Columns and rows of squares of "9x6".
-
-    Raises:
-        InputError: it is no such text.
-    """
-    found = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", text)
-    columns, rows = (int(found[1]), int(found[2])) if found else (0, 0)
-    if not (min(columns, rows) >= MIN_SQUARES and max(columns, rows) <= MAX_SQUARES):
-        raise InputError(
-            f"--squares {text!r:.40}: allowed is for instance 9x6, {MIN_SQUARES} to {MAX_SQUARES} "
-            "squares each way: count the squares of the board"
-        )
-    return columns, rows
-
-
-def solve_lens(
-    folder: Path, squares: tuple[int, int], size_mm: float, progress: Progress
-) -> SolvedLens:
-    """Solve a lens from the photographs of a checkerboard in a folder.
+def solve_lens(folder: Path, board: Board, progress: Progress) -> SolvedLens:
+    """Solve a lens from the photographs of a board in a folder.
 
     Args:
         folder: with the photographs, all of one camera and size.
-        squares: columns and rows of the board.
-        size_mm: width of a square.
+        board: that they show, whole or in part.
         progress: called with the name of each photograph.
 
     Raises:
         InputError: too few boards are found, sizes differ, or the solution makes no sense.
     """
-    if not SIZE_MM[0] <= size_mm <= SIZE_MM[1]:
-        raise InputError(
-            f"--size {size_mm:g}: allowed is {SIZE_MM[0]:g} to {SIZE_MM[1]:g} mm: change it"
-        )
-    files = _photographs(folder)
-    corners, unused, size = [], [], None
+    cv()  # before any photograph is read
+    files, seen, size = _photographs(folder), dict[str, BoardCorners](), None
     for file in files:
         progress(file.name)
         grey = _grey(file)
         size = _same_size(file, grey, size)
-        found = _corners(grey, (squares[0] - 1, squares[1] - 1))
-        if found is None:
-            unused.append(file.name)
-        else:
-            corners.append(found)
-    if len(corners) < MIN_BOARDS or size is None:
+        corners = find_corners(grey, board)
+        if corners is not None:
+            seen[file.name] = corners
+    if size is None or len(seen) < MIN_BOARDS:
         raise InputError(
-            f"{folder}: the whole board of {squares[0]} x {squares[1]} squares was found in "
-            f"{len(corners)} of {len(files)} photographs, {MIN_BOARDS} are needed: photograph it "
-            "tilted, in all parts of the picture, with a white border; count squares, not corners"
+            f"{folder}: a {board.words} was found in {len(seen)} of {len(files)} photographs, "
+            f"{MIN_BOARDS} are needed: photograph it tilted, in all parts of the picture, with a "
+            "white border; count squares, not corners"
         )
-    return _solved(corners, squares, size_mm, size, tuple(unused))
+    unused = tuple(file.name for file in files if file.name not in seen)
+    return solve_corners([*seen.values()], size, unused)
 
 
 def _photographs(folder: Path) -> list[Path]:
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; name one with photographs of a checkerboard")
+        raise InputError(f"{folder}: no such folder; name one with photographs of a board")
     return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
 
 
@@ -134,50 +119,128 @@ def _same_size(file: Path, grey: Any, size: tuple[int, int] | None) -> tuple[int
     return found
 
 
-def _corners(grey: Any, inner: tuple[int, int]) -> Any:
-    """Corners within the board, (n, 2); None where it is not found whole."""
-    cv2 = cv()
-    flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE
-    seen, corners = cv2.findChessboardCornersSB(grey, inner, flags=flags)
-    if not seen:
-        return None
-    rough = np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2)
-    grid = rough.reshape(inner[1], inner[0], 2)
-    spacing = min(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1))
-    window = int(np.clip(spacing * WINDOW_SHARE, 2, MAX_WINDOW))
-    stop = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, STEPS, REFINED_PX
-    return cv2.cornerSubPix(grey, rough, (window, window), (-1, -1), stop).reshape(-1, 2)
+@dataclass(frozen=True)
+class _Solution:
+    """What OpenCV finds: the values of `NAMES`, and turn and shift of each board."""
+
+    values: Floats
+    poses: list[tuple[Floats, Floats]]
+
+    def distances(self, boards: list[BoardCorners]) -> list[Floats]:
+        """Of corners from where the solution shows them, pixels, (n,) for each board."""
+        matrix, coefficients = _matrix(self.values), self.values[4:]
+        shown = [
+            cv().projectPoints(board.places, *pose, matrix, coefficients)[0].reshape(-1, 2)
+            for board, pose in zip(boards, self.poses, strict=True)
+        ]
+        return [
+            np.linalg.norm(one - board.pixels, axis=1)
+            for one, board in zip(shown, boards, strict=True)
+        ]
 
 
-def _solved(
-    corners: list[Any],
-    squares: tuple[int, int],
-    size_mm: float,
-    size: tuple[int, int],
-    unused: tuple[str, ...],
+def solve_corners(
+    seen: list[BoardCorners], size: tuple[int, int], unused: tuple[str, ...] = ()
 ) -> SolvedLens:
+    """Solve a lens from corners of boards.
+
+    Args:
+        seen: in each photograph.
+        size: columns and rows of the photographs.
+        unused: names of photographs without a board.
+
+    Raises:
+        InputError: they are of no lens.
+    """
+    boards = without_outliers(seen, size)
+    solution = _solution(boards, size)
+    lens = Lens(
+        focal=solution.values[:2],
+        principal=solution.values[2:4],
+        distortion=solution.values[4:],
+        width_px=size[0],
+        height_px=size[1],
+    ).checked("the solved lens")
+    pixels, off = (
+        np.concatenate([board.pixels for board in boards]),
+        np.concatenate(solution.distances(boards)),
+    )
+    half = np.array(size) / 2
+    return SolvedLens(
+        lens=lens,
+        boards=len(boards),
+        unused=unused,
+        corners=len(pixels),
+        outliers=sum(len(board.pixels) for board in seen) - len(pixels),
+        rms_px=float(np.sqrt(np.mean(off**2))),
+        sigma=_sigma(boards, size, solution.values),
+        reach=float(np.linalg.norm(pixels - half, axis=1).max() / np.linalg.norm(half)),
+    )
+
+
+def without_outliers(seen: list[BoardCorners], size: tuple[int, int]) -> list[BoardCorners]:
+    """Corners near where the solution shows them, of boards that keep enough of them.
+
+    In rounds: a corner that is none pulls its board's pose, so that others seem far at first.
+    """
+    boards = seen
+    for _ in range(ROUNDS):
+        solution = _solution(boards, size)
+        limit = OUTLIER * np.median(np.concatenate(solution.distances(boards)))
+        near = [
+            board.but(off > limit)
+            for board, off in zip(seen, solution.distances(seen), strict=True)
+        ]
+        seen, boards = _enough(seen, near), _enough(near, near)
+    return boards
+
+
+def _enough(boards: list[BoardCorners], near: list[BoardCorners]) -> list[BoardCorners]:
+    """Boards of which enough corners are near."""
+    kept = [b for b, one in zip(boards, near, strict=True) if len(one.pixels) >= MIN_CORNERS]
+    if len(kept) < MIN_BOARDS:
+        raise InputError(
+            f"the corners of {len(near) - len(kept)} of {len(near)} boards are not where any "
+            "lens shows them: is --squares the board's, and the board flat?"
+        )
+    return kept
+
+
+def _sigma(boards: list[BoardCorners], size: tuple[int, int], values: Floats) -> Floats:
+    """Standard deviations by the jackknife over photographs (Efron 1981), (9,).
+
+    Corners of one photograph share errors: the board's bend, focus, light. OpenCV's own figures
+    take each corner as independent.
+    """
+    n = len(boards)
+    others = np.array(
+        [_solution(boards[:k] + boards[k + 1 :], size, values).values for k in range(n)]
+    )
+    squares = (others - others.mean(axis=0)) ** 2
+    return np.asarray(np.sqrt((n - 1) / n * squares.sum(axis=0)))
+
+
+def _matrix(values: Floats) -> Floats:
+    fx, fy, cx, cy = values[:4]
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def _solution(
+    boards: list[BoardCorners], size: tuple[int, int], start: Floats | None = None
+) -> _Solution:
     cv2 = cv()
-    columns, rows = squares[0] - 1, squares[1] - 1
-    board = np.zeros((columns * rows, 3), dtype=np.float32)
-    board[:, :2] = size_mm * np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
-    boards = [board] * len(corners)
     stop = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, STEPS, EPSILON
+    matrix = None if start is None else _matrix(start)
+    coefficients = None if start is None else start[4:].copy()
+    flags = 0 if start is None else cv2.CALIB_USE_INTRINSIC_GUESS
+    places, pixels = [board.places for board in boards], [board.pixels for board in boards]
     try:
-        rms, matrix, coefficients, _, _, sigma, _, _ = cv2.calibrateCameraExtended(
-            boards, corners, size, None, None, criteria=stop
+        _, matrix, coefficients, turns, shifts = cv2.calibrateCamera(
+            places, pixels, size, matrix, coefficients, flags=flags, criteria=stop
         )
     except cv2.error as error:
         raise InputError(
             f"OpenCV finds no lens: {str(error).strip().splitlines()[0]:.120}"
         ) from None
-    lens = Lens(
-        focal=matrix[[0, 1], [0, 1]],
-        principal=matrix[:2, 2],
-        distortion=np.asarray(coefficients).ravel()[:5],
-        width_px=size[0],
-        height_px=size[1],
-    ).checked("the solved lens")
-    half = np.array(size) / 2
-    reach = np.linalg.norm(np.concatenate(corners) - half, axis=1).max() / np.linalg.norm(half)
-    deviations = np.asarray(sigma).ravel()[:9]
-    return SolvedLens(lens, len(corners), unused, float(rms), deviations, float(reach))
+    values = np.concatenate([matrix[[0, 1], [0, 1]], matrix[:2, 2], np.ravel(coefficients)[:5]])
+    return _Solution(values, list(zip(turns, shifts, strict=True)))

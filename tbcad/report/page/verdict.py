@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from pydantic import Field
-from tbcad_verify.report.as_made import AsMade
+from tbcad_verify.report.as_made import NOT_MODELLED, AsMade
 from tbcad_verify.report.key_figures import KEY_FIGURES
 
 from tbcad.formats.checked_files import Finite, Record, read_json
@@ -148,8 +148,9 @@ def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
     yield "</tbody></table>"
     yield (
         "<p class=note>Larger margins give larger yields: <code>tbcad build --for-process</code>; "
-        "causes: <code>tbcad tolerance</code>.</p></div>"
+        "causes: <code>tbcad tolerance</code>.</p>"
     )
+    yield f"<p class=note>Left out, for n = 18: {escape(NOT_MODELLED)}.</p></div>"
 
 
 def checks_html(verdict: Verdict | None) -> Iterator[str]:

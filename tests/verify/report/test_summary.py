@@ -1,4 +1,4 @@
-"""The end of a verification: at most twelve lines of 80 columns, whatever was found."""
+"""The end of a verification: at most thirteen lines of 80 columns, whatever was found."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
-    assert "diamond 98% 60, cnc 0% 58.9, sla 0% 51.4, fdm 0% 42" in lines[-6]
+    assert "diamond 98% 60, cnc 0% 58.9, sla 0% 51.4, fdm 0% 42" in lines[-7]
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"

@@ -118,7 +118,7 @@ class Report:
 
         Args:
             console: to print to.
-            output: "summary" (at most twelve lines), "full" (every check before it), "quiet" (the
+            output: "summary" (at most thirteen lines), "full" (every check before it), "quiet" (the
                 verdict), or "json" (the summary for other programs).
         """
         if output == "full":

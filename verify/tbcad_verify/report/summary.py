@@ -1,4 +1,4 @@
-"""The summary of a verification: at most twelve lines of 80 columns."""
+"""The summary of a verification: at most thirteen lines of 80 columns."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tbcad_verify.report.text import MORE, WIDTH, figure, limit_text, listed_nam
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
 
-MAX_LINES = 12
+MAX_LINES = 13
 NOTE_LINES = 2  # of them, at most
 FAILURE_LINES = 6  # of them, at most
 AS_MADE_LINES = 2  # of them, where something failed: making it comes later
