@@ -16,6 +16,7 @@ import math
 import re
 from collections.abc import Callable
 from configparser import RawConfigParser
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock, RLock, Thread
@@ -146,8 +147,10 @@ class KlipperDouble:
             for line in text.splitlines():
                 self.lines.append(line)
                 self.on_line(len(self.lines))
-                self._inject(self.fault(len(self.lines), line))
                 if self.state != "ready":
+                    raise Shutdown
+                self._inject(self.fault(len(self.lines), line))
+                if self.state != "ready" and line != "M400":
                     raise Shutdown
                 self._line(line)
 
@@ -179,8 +182,9 @@ class KlipperDouble:
             case "G4":
                 self._end = self._begin() + float(rest.removeprefix("P")) / 1000
                 self._until(self._end - QUEUE_S)
-            case "M400":
-                self._until(self._end)
+            case "M400":  # ends without an error in a shutdown
+                with suppress(Shutdown):
+                    self._until(self._end)
                 self.see(self.machine)
             case "M84":
                 self.let_go()

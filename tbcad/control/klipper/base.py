@@ -164,7 +164,8 @@ class KlipperBase:
         try:
             if (state := self._klipper.state()).name != READY:
                 return f"{state.what}: {state.safe}"
-            self._klipper.script(*off, f"{RELEASE}0", DONE, limit_s=SECURE_S)
+            self._klipper.script(*off, f"{RELEASE}0", DONE, held=False, limit_s=SECURE_S)
+            self._klipper.check_held()
         except ControllerReset as fault:
             return f"{fault}: {PIN_FIRST}"
         except MachineFault as fault:
