@@ -155,21 +155,30 @@ def test_refused_line(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> N
     assert tbcad(klipper_rig.words()) == 1
     out = capsys.readouterr().out
     assert "stopped: Klipper refuses 'G4 P0': Timer too close" in out
+    assert not klipper_rig.controller.machine.lights
     assert "LOOK AT THE MACHINE" not in out
     assert tbcad(klipper_rig.resume()) == 0
     check_every_photograph(klipper_rig.out, ALL)
 
 
-def test_shutdown_in_a_motion(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = klipper_rig.controller.lines
+@pytest.mark.parametrize("before", ["MOVE=", "G4 P0"])
+def test_shutdown_while_something_is_waited_for(
+    klipper_rig: Rig, before: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """M400 ends without an error then: nothing may be photographed after it."""
+    controller = klipper_rig.controller
 
     def fault(number: int, line: str) -> str | None:
-        later = "SET_PIN PIN=lamp VALUE=1" in lines
-        return "shutdown" if later and line == "M400" and "MOVE=" in lines[-2] else None
+        later = "SET_PIN PIN=lamp VALUE=1" in controller.lines
+        return "shutdown" if later and line == "M400" and before in controller.lines[-2] else None
 
-    klipper_rig.controller.fault = fault
-    assert tbcad(klipper_rig.words("--runs", "a")) == 1
+    controller.fault = fault
+    assert tbcad(klipper_rig.words()) == 1
     assert "stopped: Klipper is in state shutdown" in capsys.readouterr().out
+    controller.fault = lambda number, line: None
+    controller.restart()
+    assert tbcad(klipper_rig.resume()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
 
 
 @pytest.mark.parametrize("act", ["let_go", "restart"])
