@@ -49,7 +49,8 @@ def run(
     Args:
         exports: folder that `build` wrote.
         out: folder of the run: new, or with `resume` the one to go on with.
-        port: serial port of the controller, with GRBL 1.1 or grblHAL.
+        port: serial port of the controller, with GRBL 1.1 or grblHAL, or "moonraker:" and the URL
+            of Moonraker, for Klipper.
         ask: called with what a person must do, such as turn the object; whether it is done.
         camera: "gphoto2", "command:PROGRAM ... {output}" or "folder:PATH".
         phases: names of the lights with commas between, "leds" for all LEDs; None: all.

@@ -23,7 +23,11 @@ def run(
     folder: Exports,
     port: Annotated[
         str | None,
-        typer.Option(metavar="PORT", help="Serial port of the controller, such as /dev/ttyUSB0."),
+        typer.Option(
+            metavar="PORT",
+            help="Serial port of the controller, such as /dev/ttyUSB0; Klipper: "
+            "moonraker:http://HOST:7125.",
+        ),
     ] = None,
     camera: Annotated[
         str,
@@ -141,8 +145,8 @@ def run(
         raise InputError("--json is about --dry-run: leave it out, or add --dry-run")
     if port is None:
         raise InputError(
-            "--port is missing: name the controller's serial port, such as /dev/ttyUSB0, or look "
-            "at what would be done with --dry-run"
+            "--port is missing: name the controller's serial port, such as /dev/ttyUSB0, or "
+            "moonraker:http://HOST for Klipper, or look at what would be done with --dry-run"
         )
     if not yes and not sys.stdin.isatty():
         raise InputError(

@@ -23,6 +23,8 @@ SHOWN = 4
 class Base:
     """Motions and lights of one machine."""
 
+    switch_s = 0.02  # two lines
+
     def __init__(self, grbl: Grbl, plan: Plan) -> None:
         """Drive a machine as its export says."""
         self._grbl, self._plan = grbl, plan

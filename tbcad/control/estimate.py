@@ -16,7 +16,7 @@ SPARE = 1.1  # of disk: a lit object takes more bytes than the dark
 LEAST_BYTES_PER_PX = 0.3  # of a lit object as a JPEG: the first photograph may be a dark one
 CAPTURE_S = 2.0  # of a camera that is not yet known, beyond its exposure
 BYTES_PER_PX = 1.0  # likewise: a large JPEG; dark photographs take less
-SWITCH_S = 0.05  # two lines to the controller and a photograph to the disk
+WRITE_S = 0.03  # a photograph to the disk
 MINUTE, HOUR = 60, 3600
 
 
@@ -41,7 +41,7 @@ class Shots:
 
 def expected_seconds(plan: Plan, remaining: Iterable[Shots], capture_s: float) -> dict[str, float]:
     """Expected duration of each position, s, by its title."""
-    each = plan.motion.light_s + capture_s + SWITCH_S
+    each = plan.motion.light_s + capture_s + WRITE_S
     return {
         shots.title: travel + plan.motion.settle_s + len(shots.phases) * each
         for shots, travel in _with_travel(plan, remaining)

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
-from tbcad.control.base import Base
 from tbcad.control.cameras.choice import (
     check_camera_name,
     check_can_expose,
     connected_camera,
 )
+from tbcad.control.connection import machine_at
 from tbcad.control.estimate import (
     BYTES_PER_PX,
     CAPTURE_S,
@@ -21,10 +21,9 @@ from tbcad.control.estimate import (
     expected_seconds,
 )
 from tbcad.control.faults import MachineFault
-from tbcad.control.grbl import Grbl
+from tbcad.control.machine import Machine
 from tbcad.control.outcome import Outcome
 from tbcad.control.plan import Plan, read_control_plan
-from tbcad.control.port import SerialPort
 from tbcad.control.selection import Preflight, RunOptions, chosen_frames, chosen_phases
 from tbcad.control.session import Ask, Session, Show
 from tbcad.errors import InputError
@@ -123,7 +122,7 @@ def run_machine(
 
     Args:
         request: what is asked for.
-        port: of the controller.
+        port: of the controller, or "moonraker:" and a URL.
         camera: gphoto2, command:... or folder:...
         ask: asks the operator to do something.
         show: shows progress.
@@ -141,9 +140,7 @@ def run_machine(
     check_camera_name(camera)
     check_can_expose(camera, options.times)
     with ExitStack() as stack:
-        line = SerialPort(port)
-        stack.callback(line.close)
-        base = Base(Grbl(line, note), plan)
+        base = machine_at(port, request.exports, plan, note, stack)
         with _faults_as_input_errors(port):
             base.connect()
             base.check_settings(send=send_settings)
@@ -171,7 +168,7 @@ def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
 
 
 @contextmanager
-def _secured(base: Base) -> Iterator[None]:
+def _secured(base: Machine) -> Iterator[None]:
     """Hold the base and switch lights off if an error comes through."""
     try:
         yield

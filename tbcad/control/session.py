@@ -6,7 +6,6 @@ from functools import partial
 from itertools import groupby
 from pathlib import Path
 
-from tbcad.control.base import Base
 from tbcad.control.cameras.camera import Camera, Shot
 from tbcad.control.estimate import (
     Shots,
@@ -19,6 +18,7 @@ from tbcad.control.estimate import (
     size_text,
 )
 from tbcad.control.faults import CameraFault, MachineFault
+from tbcad.control.machine import Machine
 from tbcad.control.outcome import Outcome
 from tbcad.control.plan import Plan
 from tbcad.control.selection import Preflight, RunOptions
@@ -48,7 +48,7 @@ Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
 class Session:
     """One machine and one run."""
 
-    def __init__(self, plan: Plan, options: RunOptions, base: Base, camera: Camera) -> None:
+    def __init__(self, plan: Plan, options: RunOptions, base: Machine, camera: Camera) -> None:
         """Run with a machine and a camera that are connected."""
         self._plan, self._options = plan, options
         self._base, self._camera = base, camera
@@ -95,7 +95,7 @@ class Session:
             if look == "only":
                 return
         each_s = sum(one.seconds for one in trials.values()) / len(trials)
-        self._expected = expected_seconds(self._plan, remaining, each_s)
+        self._expected = expected_seconds(self._plan, remaining, each_s + self._base.switch_s)
         seconds = sum(self._expected.values())
         facts = trial.facts
         each = bytes_each(len(trial.shot.data), facts.width_px, facts.height_px)

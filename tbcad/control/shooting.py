@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from time import monotonic
 
-from tbcad.control.base import Base
 from tbcad.control.cameras.camera import Camera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
 from tbcad.control.faults import CameraFault
+from tbcad.control.machine import Machine
 from tbcad.control.plan import Phase
 from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.runs.record import RunRecord
@@ -58,7 +58,7 @@ class Photograph:
 
 
 @contextmanager
-def light_on(base: Base, phase: Phase, seconds: float) -> Iterator[None]:
+def light_on(base: Machine, phase: Phase, seconds: float) -> Iterator[None]:
     """Have the light of a phase on, and let it settle for some seconds."""
     outputs = () if phase.output is None else (phase.output,)
     for output in outputs:
@@ -76,7 +76,7 @@ def light_on(base: Base, phase: Phase, seconds: float) -> Iterator[None]:
 
 
 def taken_twice(
-    camera: Camera, base: Base, seconds: float | None, check: Callable[[Photograph], None]
+    camera: Camera, base: Machine, seconds: float | None, check: Callable[[Photograph], None]
 ) -> Photograph:
     """A photograph that passes a check; a second one, over a new session, if the first fails.
 
@@ -94,7 +94,7 @@ def taken_twice(
     return photograph
 
 
-def take(camera: Camera, base: Base, seconds: float | None = None) -> Photograph:
+def take(camera: Camera, base: Machine, seconds: float | None = None) -> Photograph:
     """Take one photograph.
 
     Args:

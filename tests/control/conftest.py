@@ -13,13 +13,14 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import home_angles
-from tbcad.prototype.electronics.outputs import phases
+from tbcad.prototype.electronics.outputs import lights, phases
+from tbcad.prototype.files import klipper
 from tbcad.prototype.files.gcode import gcode_program, write_program
 from tbcad.prototype.files.settings import settings, settings_lines, write_settings
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.prototype import MotionSpec
 from tests.control.impatient import WAITS_S
-from tests.control.rig import Rig, connected_rig
+from tests.control.rig import Rig, connected_rig, klipper_rig_of
 from tests.exported_files import edit_json
 from tests.prototype_exports import write_export
 
@@ -54,6 +55,8 @@ def export(
     stops = [dict(zip(columns, (stop, angle, WIND_UP_DEG), strict=True)) for stop, angle in angles]
     write_table(folder / "stops.csv", columns, stops)
     write_program(folder / "rotation_plan.nc", gcode_program(layout, drive, motion, LEDS))
+    if motion.controller == "grblhal":
+        _write_klipper_files(folder, layout, drive, motion)
     lines = settings_lines("settings", settings(drive, motion, home_angles(layout, motion)))
     write_settings(folder / "grbl_settings.txt", lines)
     lit = [{"name": one.name, "output": one.output} for one in phases(LEDS, motion)]
@@ -61,6 +64,16 @@ def export(
     edit_json(folder / "prototype.json", lambda value: value.update(controller=controller))
     edit_json(folder / "design.json", lambda value: _quick(value, motion))
     return folder
+
+
+def _write_klipper_files(
+    folder: Path, layout: PrototypeLayout, drive: Drive, motion: MotionSpec
+) -> None:
+    program = gcode_program(layout, drive, motion, LEDS)
+    lines = klipper.klipper_program(program, motion, home_angles(layout, motion))
+    write_program(folder / klipper.PROGRAM, [*lines])
+    config = klipper.klipper_config(drive, motion, lights(LEDS, motion))
+    write_program(folder / klipper.CONFIG, [*config])
 
 
 def _quick(design: dict, motion: MotionSpec) -> None:
@@ -108,3 +121,18 @@ def plain_rig(plain_export: Path, tmp_path: Path, switch_deg: float) -> Iterator
     found = connected_rig(plain_export, tmp_path, switch_deg, "grbl", angle=0.0)
     yield found
     found.controller.close()
+
+
+@pytest.fixture
+def klipper_rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
+    found = klipper_rig_of(control_export, tmp_path, switch_deg)
+    yield found
+    found.controller.close()
+
+
+@pytest.fixture(params=["rig", "klipper_rig"])
+def either_rig(request: pytest.FixtureRequest) -> Rig:
+    """With grblHAL, and with Klipper."""
+    found = request.getfixturevalue(request.param)
+    assert isinstance(found, Rig)
+    return found

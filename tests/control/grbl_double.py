@@ -63,7 +63,9 @@ class _Motion:
 
 
 class GrblDouble(threading.Thread):
-    """A controller; `name` is the port to open."""
+    """A controller; `port` is the port to open."""
+
+    lines_before = 12  # from the connection to the first photograph
 
     def __init__(
         self,

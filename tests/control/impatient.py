@@ -11,6 +11,10 @@ WAITS_S = {
     "grbl.SILENCE_S": 1.0,
     "grbl.BANNER_S": 1.0,
     "grbl.LATE_S": 0.05,
+    "klipper.host.LOOK_S": 0.01,
+    "klipper.host.AGAIN_S": 0.01,
+    "klipper.host.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
+    "klipper.host.BACK_S": 1.0,
     "cameras.watched_folder.POLL_S": 0.01,
     "cameras.watched_folder.QUIET_S": 0.05,
 }

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
 from tbcad.control.plan import read_settings
 from tests.control.grbl_double import GrblDouble, Machine
+from tests.control.klipper_double import KlipperDouble, printer_settings
 
 ROOT = Path(__file__).parents[2]
 SIZE = (416, 310)  # of the export's camera
@@ -53,12 +55,12 @@ class Rig:
     """A controller, and a picture of what it shows.
 
     Attributes:
-        controller: on a pseudo-terminal.
+        controller: on a pseudo-terminal; or a port of loopback.
         export: that describes the machine.
         folder: for pictures and runs.
     """
 
-    controller: GrblDouble
+    controller: Any
     export: Path
     folder: Path
 
@@ -126,15 +128,28 @@ def connected_rig(
     view: Callable[[Machine], bytes] = scene_of,
 ) -> Rig:
     """A rig whose controller shows the camera what its machine looks like."""
-    (folder / "view").mkdir()
-    picture = folder / "view" / PICTURE
-
-    def see(machine: Machine) -> None:
-        put(picture, view(machine))
-
     settings = read_settings(export / "grbl_settings.txt") | {3: 0.0, 11: 0.01}
-    controller = GrblDouble(settings, switch_deg, firmware, angle=angle, see=see)
-    see(controller.machine)
+    see = _seen(folder, view)
+    return _started(
+        GrblDouble(settings, switch_deg, firmware, angle=angle, see=see), export, folder
+    )
+
+
+def klipper_rig_of(export: Path, folder: Path, switch_deg: float) -> Rig:
+    """A rig whose printer is configured as the build says."""
+    settings = printer_settings(export / "klipper.cfg")
+    return _started(
+        KlipperDouble(settings, switch_deg, see=_seen(folder, scene_of)), export, folder
+    )
+
+
+def _seen(folder: Path, view: Callable[[Machine], bytes]) -> Callable[[Machine], None]:
+    (folder / "view").mkdir()
+    return lambda machine: put(folder / "view" / PICTURE, view(machine))
+
+
+def _started(controller: Any, export: Path, folder: Path) -> Rig:
+    controller.see(controller.machine)
     controller.start()
     return Rig(controller, export, folder)
 

@@ -13,7 +13,6 @@ from tests.control.rig import Rig, until
 from tests.control.run_checks import check_every_photograph, content, journal
 
 PER_STOP = 12
-SETTLED = 12  # lines before the first photograph of a process
 PHOTOGRAPH = 4  # lines
 DELAY_S = 0.008  # in which a photograph comes from the camera to the disk
 
@@ -23,7 +22,7 @@ def killed_run(rig: Rig, camera: str, stops: int, kills: int, seed: int) -> None
     random = np.random.default_rng(seed)
     each = PER_STOP * stops // kills * PHOTOGRAPH  # lines, so that all kills come in time
     words = rig.words(camera=camera, stops=f"1-{stops}")
-    for lines in random.integers(1, SETTLED + each, kills).tolist():
+    for lines in random.integers(1, rig.controller.lines_before + each, kills).tolist():
         kill_after(rig, words, lines, random.uniform(0, DELAY_S))
         if (rig.out / "run.json").is_file():
             words = rig.words("--resume", camera=camera, stops=None)
@@ -70,8 +69,8 @@ def check_killed_run(
     assert content(rig.out) == killed
 
 
-def test_five_kills(rig: Rig) -> None:
-    check_killed_run(rig, rig.copying, stops=1, kills=5, seed=1, whole=tbcad)
+def test_five_kills(either_rig: Rig) -> None:
+    check_killed_run(either_rig, either_rig.copying, stops=1, kills=5, seed=1, whole=tbcad)
 
 
 @pytest.mark.slow

@@ -16,10 +16,10 @@ from tests.control.run_checks import OUTPUTS, check_every_photograph, events
 ALL = 2 * 2 * len(OUTPUTS)
 
 
-def test_every_photograph_of_a_run(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tbcad(rig.words()) == 0
-    check_every_photograph(rig.out, ALL)
-    assert events(rig.out) == ["started", *["taken"] * ALL, "finished"]
+def test_every_photograph_of_a_run(either_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    assert tbcad(either_rig.words()) == 0
+    check_every_photograph(either_rig.out, ALL)
+    assert events(either_rig.out) == ["started", *["taken"] * ALL, "finished"]
     assert capsys.readouterr().out.startswith(f"COMPLETE: {ALL} of {ALL} photographs")
 
 

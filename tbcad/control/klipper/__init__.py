@@ -1,0 +1,1 @@
+"""Klipper behind Moonraker, as the controller of a run."""
