@@ -198,8 +198,8 @@ def zero(machine: Machine) -> Text:
             if homes
             else "",
             ("Unlock the controller by $X. " if homes else "")
-            + "Jog by 0.1 degrees, so that the motor holds the base (if not, change $4), and pull the "
-            "zero pin out. "
+            + "Jog by 0.1 degrees, so that the motor holds the base (if not, change $4), and pull "
+            "the zero pin out. "
             "Jog a little in the positive direction. If the base turns against the disc's arrow, "
             "set $3 as "
             "the file's comment says.",
