@@ -202,16 +202,13 @@ def test_interrupted_dwell(rig: Rig) -> None:
     resting = Event()
 
     def slow(number: int, line: str) -> None:
-        if line.startswith("G4") and controller.lines[-2].startswith("G1 X"):
-            controller.run_at(0.001)
+        if line.startswith("G4") and controller.lines[-2].startswith("M65"):  # at rest
+            controller.run_at(1e-6)
             resting.set()
 
     controller.fault = slow
     process = rig.start(rig.words("--phases", "lit", "--runs", "a", stops="1"))
     until(resting.is_set)
-    controller.run_at(FAST)
-    until(lambda: not controller.moving)
-    controller.run_at(1e-6)
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=30)
     assert process.returncode == 1
@@ -249,6 +246,16 @@ def test_reset_or_silent_alarm_at_the_start(plain_rig: Rig) -> None:
     """GRBL answers nothing but a reset after a hard limit."""
     plain_rig.controller.stop_by_limit()
     assert tbcad(plain_rig.words(stops="1")) == 0
+
+
+def test_alarm_after_which_grbl_answers_a_reset_only(
+    plain_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain_rig.controller.fault = at_first("G1 X", "alarm", 8)
+    assert tbcad(plain_rig.words(stops="1")) == 1
+    out = capsys.readouterr().out
+    assert "ALARM:1: a limit switch was pressed in mid-motion" in out
+    assert "LOOK AT THE MACHINE" not in out
 
 
 def test_base_that_does_not_stop_is_not_let_fall(

@@ -211,7 +211,7 @@ def _parsed(text: str) -> tuple[dict[int, float], list[str]]:
         elif not COMMENT.fullmatch(line):
             faults.append(f"line {number} is no setting")
     order = list(values)
-    if 20 in order and (22 not in order or order.index(22) > order.index(20)):
+    if values.get(20) and (22 not in order or order.index(22) > order.index(20)):
         faults.append("$20 before $22, which GRBL refuses")
     return values, faults
 
