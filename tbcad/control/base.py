@@ -1,13 +1,15 @@
 """The base and its lights, driven by a controller."""
 
+from math import inf
 from time import sleep
 
-from tbcad.control.faults import MachineFault
-from tbcad.control.grbl import SYNC, Grbl
+from tbcad.control.faults import PIN_FIRST, MachineFault
+from tbcad.control.grbl import HOME, SYNC, Grbl
 from tbcad.control.messages import Status
 from tbcad.control.plan import SETTINGS, Plan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
+from tbcad.types import Progress
 
 SEEK_SETTING, TRAVEL_SETTING = 25, (130, 131, 132, 133)
 HOMING_SPARE_S = 30.0  # to find the switch again slowly, and to pull off
@@ -15,7 +17,7 @@ HOMING_SEARCH = 1.5  # times the travel: as far as GRBL searches for the switch
 PLACE_DEG = 0.05  # a controller reports steps of 0.02 degrees
 PLACE_TRIES = 5  # a report may be from just before the end of a motion
 SAME = 1e-4  # of settings, relative to their values
-MOVING = ("Run", "Jog", "Home")
+FIRMWARES = {"grblhal": "grblHAL", "grbl": "GRBL 1.1"}
 UNLOCK = "$X"
 SHOWN = 4
 
@@ -32,26 +34,44 @@ class Base:
         self._at = plan.program.start.angle_deg
 
     def connect(self) -> None:
-        """Wait until the controller answers.
+        """Wait until the controller answers, and tells that it has the build's firmware.
+
+        Nothing is set before: settings have other meanings in another firmware.
 
         Raises:
-            MachineFault: it does not.
+            MachineFault: it does not answer.
+            InputError: it has another firmware.
         """
         self._grbl.connect()
+        wanted, found = self._plan.firmware, self._grbl.firmware()
+        if found == wanted:
+            return
+        name, told = FIRMWARES[wanted], self._grbl.greeting
+        again = f"build again with --set prototype.motion.controller={found}, or " if found else ""
+        raise InputError(
+            f"the controller is {FIRMWARES.get(found, 'neither grblHAL nor GRBL 1.1')} "
+            f"({told!r:.60}), the build is for {name}; nothing was set: {again}put {name} on the "
+            "board"
+        )
 
     def settings_that_differ(self) -> dict[int, tuple[float | None, float]]:
-        """Settings of the controller that are not the export's: by number, found and wanted."""
+        """Settings of the controller that are not the export's: by number, found and wanted.
+
+        A board without a setting is without what the setting switches off by zero.
+        """
         found = self._grbl.settings()
         return {
             number: (found.get(number), wanted)
             for number, wanted in self._plan.settings.items()
-            if number not in found or abs(found[number] - wanted) > SAME * max(1.0, abs(wanted))
+            if (number in found or wanted)
+            and abs(found.get(number, inf) - wanted) > SAME * max(1.0, abs(wanted))
         }
 
-    def check_settings(self, *, send: bool) -> None:
+    def check_settings(self, note: Progress, *, send: bool) -> None:
         """Compare the controller's settings with the export's.
 
         Args:
+            note: told each setting that is sent, and what it was.
             send: set those that differ, instead of refusing.
 
         Raises:
@@ -59,12 +79,13 @@ class Base:
         """
         differing = self.settings_that_differ()
         if send:
-            for number, (_, wanted) in differing.items():
+            for number, (was, wanted) in differing.items():
                 self._grbl.command(f"${number}={wanted:.7g}")
+                note(f"${number} was {_shown(was)}, is {wanted:g}")
             differing = self.settings_that_differ()
         if differing:
             shown = [
-                f"${number} is {'missing' if found is None else f'{found:g}'}, not {wanted:g}"
+                f"${number} is {_shown(found)}, not {wanted:g}"
                 for number, (found, wanted) in [*differing.items()][:SHOWN]
             ]
             raise InputError(
@@ -79,7 +100,7 @@ class Base:
         if not program.homes and status is not None and status.state == "Alarm":
             self._grbl.command(UNLOCK)
         for line in program.known_angle:
-            if line == "$H":
+            if line == HOME:
                 seconds = self._homing_s()
                 self._grbl.command(line, expected_s=seconds, silent_s=seconds)
             else:
@@ -153,20 +174,31 @@ class Base:
     def secure(self) -> str:
         """Hold the base and switch all lights off; return what could not be done, if anything."""
         try:
-            self._grbl.hold()
-            status = self._grbl.status_in_alarm()
-            if status is None:
-                return "the controller does not answer: lights may be on; switch its supply off"
-            if status.state in MOVING:
-                return f"the base did not stop ({status.state}): a reset would let it fall"
-            if status.state != "Idle":
-                self._grbl.reset()
-                self._grbl.command(UNLOCK)
-            self.lights_off()
-            self._grbl.command("M9")
+            wrong = self._hold_and_darken()
         except MachineFault as fault:
-            return f"lights may be on: {fault}"
+            wrong = f"lights may be on: {fault}"
+        except KeyboardInterrupt:
+            wrong = "interrupted before all was safe: lights may be on, the base may move"
+        return wrong and f"{wrong}; {PIN_FIRST}"
+
+    def _hold_and_darken(self) -> str:
+        """What is wrong, if anything."""
+        self._grbl.hold()
+        status = self._grbl.status_in_alarm()
+        if status is None:
+            return "the controller does not answer: lights may be on"
+        if not status.resting:
+            return f"the base did not stop ({status.state}): a reset would let it fall"
+        if status.state != "Idle" or self._grbl.pending:
+            self._grbl.reset()
+            self._grbl.command(UNLOCK)
+        self.lights_off()
+        self._grbl.command("M9")
         return ""
+
+
+def _shown(value: float | None) -> str:
+    return "missing" if value is None else f"{value:g}"
 
 
 def travel_s(degrees: float, plan: Plan) -> float:

@@ -2,6 +2,11 @@
 
 from tbcad.errors import one_line
 
+PIN_FIRST = (
+    "leave the supply on, for only the motor holds the base: zero pin in first, or the base falls"
+)
+"""What is safe when a machine does not do what it is told."""
+
 
 class MachineFault(Exception):
     """The base cannot go on: the run stops here, and can be resumed."""

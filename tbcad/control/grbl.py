@@ -3,7 +3,12 @@
 All lines of a run may be sent twice: places are absolute, outputs are set and not toggled. So a
 line whose `ok` is lost is sent once more, when the controller says that it is idle. `$C` is never
 sent: it ends in a soft reset, which clears G92.
-Source: doc/markdown/interface.md and commands.md of GRBL 1.1h.
+
+Both leave `?` unanswered while they home, grblHAL unless bit 12 of $10 is set, and GRBL 1.1 after
+ALARM:1 and ALARM:2. A soft reset (0x18) is read at once in all states. In mid-motion it lets the
+motor go; during homing it stops the base at once, as the switch would, with the motor on.
+Sources: doc/markdown/interface.md and commands.md, grbl/limits.c, protocol.c and st_go_idle of
+stepper.c of GRBL 1.1h; machine_limits.c, motion_control.c, stepper.c and report.c of grblHAL core.
 """
 
 from collections import deque
@@ -11,12 +16,13 @@ from collections.abc import Callable
 from time import monotonic
 
 from tbcad.control.faults import ControllerReset, MachineFault
-from tbcad.control.grbl_codes import alarm_meaning, error_meaning
-from tbcad.control.messages import Message, Status, parse
+from tbcad.control.grbl_codes import STATES, alarm_meaning, error_meaning
+from tbcad.control.messages import RESTING, Message, Status, firmware_of, parse
 from tbcad.control.port import Port
 from tbcad.types import Progress
 
 RESET, HOLD, QUERY = b"\x18", b"!", b"?"
+HOME, BUILD_INFO = "$H", "$I"
 SYNC = "G4 P0.01"  # waits until all motions before it are done
 STATUS_S = 0.2  # 5 Hz, as often as GRBL may be asked
 SILENCE_S = 3.0  # without any answer the controller is gone
@@ -26,7 +32,6 @@ LATE_S = 0.3  # answers to a line that was given up come within this
 TRIES = 2
 MAX_LINE = 79
 GONE = "the controller does not answer: is it plugged in and switched on?"
-RESTING = ("Idle", "Alarm", "Sleep", "Check")
 
 
 class Grbl:
@@ -44,6 +49,8 @@ class Grbl:
         self._unread, self._messages = b"", deque[Message]()
         self._asked = self._heard = clock()
         self._held = False
+        self._stopped = False  # by an alarm, since when GRBL may answer a reset only
+        self.pending = ""
         self.last: Status | None = None
         self.greeting = ""
 
@@ -51,7 +58,8 @@ class Grbl:
         """Wait until the controller answers, and begin afresh; return its status.
 
         A controller that did not begin anew when the port was opened may have part of a line from
-        a program that was killed: a soft reset at rest clears it and keeps the motor on.
+        a program that was killed: a soft reset at rest clears it and keeps the motor on. One that
+        is silent homes, or was stopped by an alarm, which a soft reset ends as well.
 
         Raises:
             MachineFault: nothing answers, or no GRBL does.
@@ -66,12 +74,19 @@ class Grbl:
             self._ask()
         if self.greeting:
             self.forget()  # grblHAL tells after its greeting that it must home
-        elif self.status_in_alarm() is not None:
+        else:
             self.hold()
             self.reset()
         if (status := self.status_in_alarm()) is None:
             raise MachineFault(GONE)
         return status
+
+    def firmware(self) -> str:
+        """Firmware of the controller, as it tells: grblhal, grbl or "" (neither)."""
+        found = firmware_of([self.greeting])
+        if found == "grblhal":
+            return found
+        return firmware_of([self.greeting, *(one.text for one in self.command(BUILD_INFO))])
 
     def status(self) -> Status:
         """A fresh status report.
@@ -89,7 +104,7 @@ class Grbl:
             if asked and message.status is not None:
                 return message.status
             self._refuse(message, "?")
-        raise MachineFault(GONE)
+        raise MachineFault(self._gone(SILENCE_S))
 
     def command(self, line: str, expected_s: float = 0.0, silent_s: float = 0.0) -> list[Message]:
         """Send a line and wait until it is taken; return what else came meanwhile.
@@ -106,13 +121,23 @@ class Grbl:
         if len(line) > MAX_LINE:
             raise MachineFault(f"{line!r} is longer than {MAX_LINE} characters")
         self._drain(line)
+        self.pending = line
         for _ in range(TRIES):
             self._port.write(line.encode("ascii") + b"\n")
             if (answer := self._answer(line, expected_s, silent_s)) is not None:
+                self.pending = ""
                 return answer
             self._note(f"{line}: no ok came; once more")
             self._drain(line, LATE_S)
-        raise MachineFault(f"{line!r}: the controller is idle but sends no ok: look at its cable")
+        state = self.last.state if self.last else "Idle"
+        raise MachineFault(
+            f"{line!r}: the controller is {state.lower()} but sends no ok: {STATES[state]}"
+        )
+
+    def _gone(self, seconds: float) -> str:
+        """The fault of a silence, with the state that it began in."""
+        state = "homing" if self.pending == HOME else self.last.state if self.last else "unknown"
+        return f"{GONE} (silent for {seconds:.0f} s; its last state: {state})"
 
     def _answer(self, line: str, expected_s: float, silent_s: float) -> list[Message] | None:
         """What came before the `ok`; None if it is lost."""
@@ -130,7 +155,7 @@ class Grbl:
                 if message.status is not None:
                     idle = self._idle_since(message.status, idle, now)
             elif now - self._heard > SILENCE_S + silent_s:
-                raise MachineFault(f"{line!r}: {GONE}")
+                raise MachineFault(f"{line!r}: {self._gone(now - self._heard)}")
             if idle is not None and now - idle > LOST_OK_S + expected_s:
                 return None
             self._ask(began)
@@ -148,26 +173,28 @@ class Grbl:
         return {one.code: one.value for one in self.command("$$") if one.kind == "setting"}
 
     def hold(self) -> None:
-        """Bring a motion to rest, if there is one; the place stays known."""
-        status = self.status_in_alarm()
-        if status is None or status.state in RESTING:
-            return
-        if status.state == "Home":  # no hold there, and a reset would let the base fall
-            self._until_rest(None)
-            return
-        self._port.write(HOLD)
-        self._until_rest(SILENCE_S)
+        """Bring a motion to rest, if there is one; the place stays known, but for homing."""
+        if self.pending == HOME or self._stopped:  # may be silent, and knows no hold
+            self.reset()
+        elif (status := self.status_in_alarm()) is not None and not status.resting:
+            if status.state == "Home":
+                self.reset()
+                return
+            self._port.write(HOLD)
+            self._until_rest()
 
     def reset(self) -> None:
-        """Reset the controller, which must be at rest, and wait for its greeting."""
+        """Reset the controller, which must rest or home, and wait for its greeting."""
         self._port.write(RESET)
         begun = self._clock()
         while self._clock() - begun < BANNER_S:
             message = self._next()
             if message and message.kind == "banner":
+                self.greeting = message.text
+                self.pending, self._stopped = "", False
                 self.forget()
                 return
-        raise MachineFault("the controller does not greet after a reset")
+        raise MachineFault(f"{GONE} (no greeting after a reset)")
 
     def forget(self) -> None:
         """Ignore whatever was sent until now, or is about to come."""
@@ -185,27 +212,27 @@ class Grbl:
                 return message.status
         return None
 
-    def _until_rest(self, limit_s: float | None) -> None:
+    def _until_rest(self) -> None:
         begun = self._clock()
-        while limit_s is None or self._clock() - begun < limit_s:
+        while self._clock() - begun < SILENCE_S:
             status = self.status_in_alarm()
-            if status is None or status.state in RESTING:
-                return
-            if status.state == "Hold" and not status.substate:
+            if status is None or status.resting:
                 return
 
     def _refuse(self, message: Message, line: str) -> None:
         """Raise what ends a run."""
         if message.kind == "error":
+            self.pending = ""
             meaning = error_meaning(message.code)
             raise MachineFault(f"the controller refuses {line!r}: {message.text}: {meaning}")
         if message.kind == "alarm":
+            self._stopped = True
             meaning = alarm_meaning(message.code)
             raise MachineFault(f"the controller stopped at {line!r}: {message.text}: {meaning}")
         if message.kind == "banner":
             raise ControllerReset(
                 f"the controller began anew at {line!r} ({message.text}): it has forgotten its "
-                "angle; look at its supply and cable"
+                "angle, and the motor may have let go; zero pin in before you touch supply or cable"
             )
 
     def _drain(self, line: str, seconds: float = 0.0) -> None:

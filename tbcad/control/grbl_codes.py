@@ -41,9 +41,9 @@ ERRORS = {
     39: "the value is out of range: has the board so many outputs?",
     45: "a limit switch is pressed: only homing is allowed",
     46: "the controller must be homed",
-    49: "the self test failed: switch the controller off and on",
-    50: "the emergency stop is pressed",
-    51: "the motor's driver reports a fault",
+    49: "the self test failed: zero pin in, then switch the controller off and on",
+    50: "the emergency stop is pressed: zero pin in before it is released",
+    51: "the motor's driver reports a fault and may let go: zero pin in before you touch it",
     52: "the setting is out of range",
     53: "the setting is not available on this board",
     58: "the board has no such output",
@@ -60,16 +60,23 @@ ALARMS = {
     7: "homing was interrupted by the safety door",
     8: "homing: the pull-off did not release the switch; look at its wiring, or enlarge $27",
     9: "homing: the switch was not found; look at its wiring, $5 and $23",
-    10: "the emergency stop is pressed",
+    10: "the emergency stop is pressed: zero pin in before it is released",
     11: "the controller must be homed",
     12: "a limit switch is pressed",
-    16: "the self test failed: switch the controller off and on",
-    17: "the motor's driver reports a fault",
+    16: "the self test failed: zero pin in, then switch the controller off and on",
+    17: "the motor's driver reports a fault and may let go: zero pin in before you touch it",
     18: "homing is set wrongly",
     20: "an output expander does not answer",
     21: "the memory of the settings failed",
     22: "a buffer overflowed",
 }
+STATES = {
+    "Idle": "look at its cable",
+    "Alarm": "it is locked, and takes $X or $H only",
+    "Check": "it moves nothing in check mode: reset it",
+    "Sleep": "its motor is off, and the base may have fallen: zero pin in, then start again",
+}
+"""What a controller that rests, and answers a line by nothing, wants."""
 UNKNOWN = "its meaning is in the manual of the controller's firmware"
 
 

@@ -3,6 +3,7 @@
 from typing import Protocol
 
 from tbcad.control.program import Move
+from tbcad.types import Progress
 
 
 class Machine(Protocol):
@@ -17,8 +18,8 @@ class Machine(Protocol):
     def connect(self) -> None:
         """Wait until the controller answers."""
 
-    def check_settings(self, *, send: bool) -> None:
-        """Refuse settings that are not the build's by an InputError, or send those that differ."""
+    def check_settings(self, note: Progress, *, send: bool) -> None:
+        """Refuse settings that are not the build's by an InputError, or send and tell them."""
 
     def home(self) -> None:
         """Bring the base to a known angle, all lights off."""

@@ -9,7 +9,9 @@ from typing import Literal
 
 Kind = Literal["ok", "error", "alarm", "banner", "status", "setting", "other"]
 AXES = "XYZABC"
+RESTING = ("Idle", "Alarm", "Sleep", "Check")
 _BANNER = re.compile(r"Grbl(HAL)? \d", re.IGNORECASE)
+_FIRMWARES = {"grblhal": re.compile(r"grblhal", re.I), "grbl": re.compile(r"Grbl 1\.1\w? \['\$'")}
 _CODE = re.compile(r"(error|ALARM):(\d+)")
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)")
 _PLACES = ("MPos", "WPos", "WCO")
@@ -28,6 +30,12 @@ class Status:
     state: str
     substate: int | None = None
     places: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing moves: Hold:1, Door:2 and Door:3 still do."""
+        held = {"Hold": (0, None), "Door": (0, 1, None)}.get(self.state)
+        return self.state in RESTING if held is None else self.substate in held
 
     def place(self, kind: str, axis: str) -> float | None:
         """Coordinate of an axis, if it is reported."""
@@ -52,6 +60,14 @@ class Message:
     code: int = 0
     value: float = 0.0
     status: Status | None = None
+
+
+def firmware_of(texts: list[str]) -> str:
+    """Firmware that a greeting, and the answers to $I, tell: grblhal, grbl or "" (neither).
+
+    A grblHAL that is built to be compatible greets as GRBL 1.1 does, and tells by $I.
+    """
+    return next((name for name, form in _FIRMWARES.items() if any(map(form.search, texts))), "")
 
 
 def parse(line: str) -> Message:

@@ -2,10 +2,14 @@
 
 import errno
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from contextlib import suppress
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from tbcad.control.faults import MachineFault
 from tbcad.errors import InputError
+
+if TYPE_CHECKING:
+    from serial import Serial
 
 BAUD = 115_200  # of GRBL 1.1 and grblHAL; boards with USB of their own take any
 READ_S, WRITE_S = 0.02, 2.0
@@ -45,6 +49,7 @@ class SerialPort:
             )
         except (OSError, ValueError) as error:
             raise InputError(f"{name} cannot be opened: {opening_reason(error)}") from None
+        _keep_line_up(self._port)
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
@@ -57,6 +62,20 @@ class SerialPort:
     def close(self) -> None:
         """Give the port up."""
         self._port.close()
+
+
+def _keep_line_up(port: "Serial") -> None:
+    """Leave DTR up when the port is closed: boards that begin anew when it rises let the motor go.
+
+    So only the first opening after the board was plugged in resets it. Source: termios(3), HUPCL.
+    """
+    with suppress(ImportError):
+        import termios
+
+        with suppress(OSError, termios.error):
+            modes = termios.tcgetattr(port.fileno())
+            modes[2] &= ~termios.HUPCL
+            termios.tcsetattr(port.fileno(), termios.TCSANOW, modes)
 
 
 def _checked(action: Callable[[], Result]) -> Result:

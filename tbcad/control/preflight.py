@@ -8,7 +8,6 @@ takes an exposure time, others are tried.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import label, maximum
@@ -128,7 +127,7 @@ def look(phase: str, image: Image16, dark: Image16 | None) -> Seen:
 
 
 def _image(phase: str, shot: Shot) -> Image16:
-    return decoded_image(Path(f"{phase}{shot.suffix}"), shot.data, "see to the camera")
+    return decoded_image(shot.data, f"{phase}{shot.suffix}")
 
 
 def _level(image: Image16) -> Floats:

@@ -143,8 +143,8 @@ def run_machine(
         base = machine_at(port, request.exports, plan, note, stack)
         with _faults_as_input_errors(port):
             base.connect()
-            base.check_settings(send=send_settings)
-        with _secured(base):
+            base.check_settings(note, send=send_settings)
+        with _secured(base, note):
             chosen = connected_camera(camera, timeout_s)
             stack.callback(chosen.close)
             session = Session(plan, options, base, chosen)
@@ -168,12 +168,13 @@ def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
 
 
 @contextmanager
-def _secured(base: Machine) -> Iterator[None]:
-    """Hold the base and switch lights off if an error comes through."""
+def _secured(base: Machine, note: Progress) -> Iterator[None]:
+    """Hold the base and switch lights off if an error comes through; tell what is not safe."""
     try:
         yield
     except BaseException:
-        base.secure()
+        if unsafe := base.secure():
+            note(f"LOOK AT THE MACHINE: {unsafe}")
         raise
 
 

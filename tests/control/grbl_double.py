@@ -2,9 +2,13 @@
 
 It knows states, `ok`, `error:n` and `ALARM:n`, realtime characters, 128 bytes of receive buffer, a
 planner of 15 motions, soft reset, homing, soft limits, G92, and the outputs of M64, M65, M8 and M9.
+While it homes it is silent, grblHAL unless bit 12 of $10 is set; a hold comes after it, a reset
+ends it by ALARM:6. A reset in mid-motion and an alarm let the motor go, unless $37 of grblHAL keeps
+it on; sleep does always. After ALARM:1 and 2 it takes a reset only, and GRBL answers nothing else.
 Its time runs faster than the clock. Faults are injected by a function that sees each line.
-Sources: doc/markdown/interface.md, commands.md and settings.md of GRBL 1.1h; grbl/gcode.c and
-protocol.c there; report.c and gcode.c of grblHAL core for its banner, M64 and M65.
+Sources: doc/markdown/interface.md, commands.md and settings.md of GRBL 1.1h; grbl/gcode.c,
+limits.c, protocol.c and stepper.c there; report.c, gcode.c, machine_limits.c, motion_control.c and
+stepper.c of grblHAL core.
 """
 
 import math
@@ -24,6 +28,12 @@ BANNERS = {
     "grblhal": "GrblHAL 1.1f ['$' or '$HELP' for help]",
     "grbl": "Grbl 1.1h ['$' for help]",
 }
+BUILD_INFO = {
+    "grblhal": ("[VER:1.1f.20260818:]", "[OPT:VNMSL,35,1024,4,0]", "[FIRMWARE:grblHAL]"),
+    "grbl": ("[VER:1.1h.20190830:]", "[OPT:V,15,128]"),
+}
+REPORTS_HOMING = 1 << 12  # of $10, in grblHAL
+LOCKED = "[MSG:'$H'|'$X' to unlock]"
 WORD = re.compile(r"([A-Z])\s*(-?\d+\.?\d*)")
 KNOWN = {
     *("G0", "G1", "G4", "G21", "G54", "G90", "G92", "G92.1", "G94"),
@@ -43,11 +53,13 @@ class Machine:
         angle: of the base, degrees, as it truly is.
         lights: outputs that are on.
         relay: whether the camera's release is closed.
+        let_go: how often the motor let go of the base.
     """
 
     angle: float
     lights: set[int] = field(default_factory=set)
     relay: bool = False
+    let_go: int = 0
 
 
 @dataclass
@@ -94,6 +106,7 @@ class GrblDouble(threading.Thread):
         tty.setraw(self._slave)
         self.port = os.ttyname(self._slave)
         self.firmware, self.switch_deg = firmware, switch_deg
+        self.greeting = BANNERS[firmware]
         self._speed, self._since, self._until_then = speed, monotonic(), 0.0
         self.settings = dict(settings)
         self.machine = Machine(angle)
@@ -104,6 +117,7 @@ class GrblDouble(threading.Thread):
         self.overflows = 0
         self.homed = False
         self.held = 0
+        self.outputs = OUTPUTS
         self.deaf = False  # to a feed hold
         self.boots = False  # whether opening its port lets it begin anew, as many boards do
         self.on_line: Callable[[int], None] = lambda number: None
@@ -119,6 +133,8 @@ class GrblDouble(threading.Thread):
         self._wait: Callable[[], bool] | None = None
         self._done: Callable[[], None] = lambda: None
         self._reply = True
+        self._homing: _Motion | None = None
+        self._hold_later, self._blocked = False, False
         self._offset, self._feed, self._checking = 0.0, 0.0, False
 
     @property
@@ -149,6 +165,19 @@ class GrblDouble(threading.Thread):
         os.close(self._master)
         os.close(self._slave)
 
+    def put_into(self, state: str) -> None:
+        """Sleep, check mode or an open door, by a person at the machine."""
+        if state == "Sleep":
+            self._sleep()
+        elif state == "Check":
+            self._check()
+        else:
+            self.state = state
+
+    def stop_by_limit(self) -> None:
+        """A switch is pressed."""
+        self._halt(1)
+
     def _say(self, text: str) -> None:
         if not self._silent:
             os.write(self._master, text.encode() + b"\r\n")
@@ -178,6 +207,7 @@ class GrblDouble(threading.Thread):
                     self._rx.append(byte)
 
     def _hold(self) -> None:
+        self._hold_later = self.state == "Home"
         if self._motion is None or self.deaf:
             return
         self.held += 1
@@ -189,17 +219,33 @@ class GrblDouble(threading.Thread):
 
     def reset(self) -> None:
         """Soft reset: what moved is lost; digital outputs stay as they are."""
-        moving = self._motion is not None
-        if moving:
+        if self._motion is not None:
             self._mpos = self._motion.at(self.now)
             self._follow()
+            self._halt(3)
+        elif self._homing is not None:
+            self.machine.angle = self._homing.at(self.now)
+            self._alarm(6)
         self._clear()
         self.machine.relay = False
         self._say("")
-        self._say(BANNERS[self.firmware])
-        self.state = "Alarm" if moving or self.state == "Alarm" else "Idle"
-        if self.state == "Alarm":
-            self._say("ALARM:3" if moving else "ALARM:11")
+        self._say(self.greeting)
+        if self.state in ("Alarm", "Sleep"):
+            self.state = "Alarm"
+            self._say(LOCKED)
+        elif not self.state.startswith("Door"):
+            self.state = "Idle"
+
+    def _alarm(self, code: int) -> None:
+        self.state = "Alarm"
+        self._say(f"ALARM:{code}")
+
+    def _halt(self, code: int) -> None:
+        """An alarm that lets the motor go, unless grblHAL is told to keep it on."""
+        self._alarm(code)
+        self._blocked = code in (1, 2)
+        if self.firmware == "grbl" or not self.settings.get(37):
+            self.machine.let_go += 1
 
     def unplug(self) -> None:
         """Answer nothing any more."""
@@ -217,13 +263,15 @@ class GrblDouble(threading.Thread):
         self.machine.relay = False
         self.homed = False
         self._say("")
-        self._say(BANNERS[self.firmware])
+        self._say(self.greeting)
         self.state = "Alarm" if self.settings.get(22) else "Idle"
         if self.state == "Alarm":
             self._say("ALARM:11")
 
     def _report(self) -> None:
-        if self.state == "Home" and self.firmware == "grbl":
+        plain = self.firmware == "grbl"
+        reports = not plain and int(self.settings.get(10, 0)) & REPORTS_HOMING
+        if (self.state == "Home" and not reports) or (plain and self._blocked):
             return
         place = self._motion.at(self.now) if self._motion else self._mpos
         state = "Run" if self._motion else self.state
@@ -248,7 +296,9 @@ class GrblDouble(threading.Thread):
             self._wait = None
             self._done()
             self._ok()
-        if self.state.startswith("Hold") or b"\n" not in self._rx:
+        if self._blocked or self.state.startswith(("Hold", "Sleep")):
+            return
+        if b"\n" not in self._rx:
             return
         end = self._rx.index(b"\n")
         line = self._rx[:end].decode("ascii")
@@ -272,8 +322,7 @@ class GrblDouble(threading.Thread):
         elif fault == "error":
             self._say("error:1")
         elif fault == "alarm":
-            self.state = "Alarm"
-            self._say("ALARM:1")
+            self._halt(1)
         elif (error := self._run_line(line)) is not None:
             self._say(f"error:{error}")
         elif self._wait is None:
@@ -307,9 +356,14 @@ class GrblDouble(threading.Thread):
     def _system(self, line: str) -> int | None:
         if line == "$H":
             return self._home()
-        if line in ("$$", "$X", "$C"):
-            {"$$": self._list, "$X": self._unlock, "$C": self._check}[line]()
-            return None
+        if line in ("$$", "$X", "$C", "$I", "$SLP"):
+            return {
+                "$$": self._list,
+                "$X": self._unlock,
+                "$C": self._check,
+                "$I": self._tell,
+                "$SLP": self._sleep,
+            }[line]()
         if match := re.fullmatch(r"\$(\d+)=(-?[\d.]+)", line):
             if self.state not in ("Idle", "Alarm") or self._motion:
                 return 8
@@ -321,20 +375,33 @@ class GrblDouble(threading.Thread):
         for number, value in sorted(self.settings.items()):
             self._say(f"${number}={value:.3f}")
 
-    def _unlock(self) -> None:
+    def _tell(self) -> None:
+        for text in BUILD_INFO[self.firmware]:
+            self._say(text)
+
+    def _sleep(self) -> None:
+        """Sleep lets the motor go, whatever the settings are."""
+        self.state = "Sleep"
+        self.machine.let_go += 1
+
+    def _unlock(self) -> int | None:
+        if self.state.startswith("Door"):
+            return 13
         self.state = "Idle"
+        return None
 
     def _check(self) -> None:
         if self._checking:
             self.reset()
         else:
-            self._checking = True
+            self._checking, self.state = True, "Check"
 
     def _home(self) -> int | None:
         if not self.settings.get(22):
             return 5
         self.state = "Home"
         seconds = abs(self.machine.angle - self.switch_deg) / self.settings[25] * 60
+        self._homing = _Motion(self.machine.angle, self.switch_deg, self.now, seconds)
         end = self.now + seconds
 
         def found() -> None:
@@ -342,7 +409,8 @@ class GrblDouble(threading.Thread):
             self._mpos = -self.settings[130] + pull_off
             self._zero = self.switch_deg + pull_off - self._mpos
             self._follow()
-            self.state, self.homed = "Idle", True
+            self._homing = None
+            self.state, self.homed = "Hold:0" if self._hold_later else "Idle", True
 
         self._when(lambda: self.now >= end, found)
         return None
@@ -380,7 +448,7 @@ class GrblDouble(threading.Thread):
     def _output(self, output: int, *, on: bool) -> int | None:
         if self.firmware == "grbl":
             return 20
-        if output >= OUTPUTS:
+        if output >= self.outputs:
             return 39
         (self.machine.lights.add if on else self.machine.lights.discard)(output)
         return None
@@ -394,9 +462,8 @@ class GrblDouble(threading.Thread):
         if not self._feed:
             return 22
         if self.settings.get(20) and not -self.settings[130] <= target <= 0:
-            self.state = "Alarm"
-            self._say("ALARM:2")
             self._planner.clear()
+            self._halt(2)
             return None
         begin = self._planner[-1].end if self._planner else self._mpos
         begin = self._motion.end if self._motion and not self._planner else begin

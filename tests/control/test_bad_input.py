@@ -9,6 +9,7 @@ import pytest
 
 from tbcad.cli import run as tbcad
 from tbcad.control.port import opening_reason
+from tests.control.grbl_double import BANNERS
 from tests.control.rig import Rig
 from tests.exported_files import edit_json
 
@@ -106,9 +107,54 @@ def test_settings_that_differ(rig: Rig, capsys: pytest.CaptureFixture[str]) -> N
     del rig.controller.settings[27]
     line = refused(rig.words(), capsys)
     assert "$1 is 25, not 255, $27 is missing, not 2: send them with --send-settings" in line
+    capsys.readouterr()
     assert tbcad(rig.words("--send-settings", "--phases", "dark", stops="1")) == 0
+    assert "$1 was 25, is 255\n$27 was missing, is 2\n" in capsys.readouterr().err
     assert rig.controller.settings[1] == 255
     assert [line for line in rig.controller.lines if "=" in line] == ["$1=255", "$27=2"]
+
+
+def test_setting_that_a_board_has_not_is_as_good_as_off(rig: Rig) -> None:
+    for number in (49, 62):
+        del rig.controller.settings[number]
+    assert tbcad(rig.words("--phases", "dark", stops="1")) == 0
+
+
+@pytest.mark.parametrize(
+    ("greeting", "says"),
+    [
+        ("Grbl 1.1h ['$' for help]", "is GRBL 1.1 (\"Grbl 1.1h ['$' for help]\")"),
+        ("Grbl 3.7 [FluidNC v3.7.8 (wifi) '$' for help]", "is neither grblHAL nor GRBL 1.1"),
+        ("Grbl 0.9j ['$' for help]", "is neither grblHAL nor GRBL 1.1"),
+    ],
+)
+@pytest.mark.parametrize("boots", [True, False])
+def test_controller_of_another_kind_is_sent_no_setting(
+    rig: Rig, greeting: str, says: str, boots: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig.controller.firmware, rig.controller.greeting = "grbl", greeting
+    rig.controller.boots = boots
+    line = refused(rig.words("--send-settings"), capsys)
+    assert says in line
+    assert "put grblHAL on the board" in line
+    assert ("--set prototype.motion.controller=grbl" in line) == ("1.1h" in greeting)
+    assert not any("=" in sent for sent in rig.controller.lines)
+
+
+def test_build_for_another_controller_is_refused(
+    plain_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain_rig.controller.firmware = "grblhal"
+    plain_rig.controller.greeting = BANNERS["grblhal"]
+    line = refused(plain_rig.words("--send-settings"), capsys)
+    assert "is grblHAL" in line
+    assert "--set prototype.motion.controller=grblhal" in line
+    assert not any("=" in sent for sent in plain_rig.controller.lines)
+
+
+def test_grblhal_that_greets_as_grbl_is_known_by_its_build_info(rig: Rig) -> None:
+    rig.controller.greeting = "Grbl 1.1f ['$' for help]"
+    assert tbcad(rig.words("--phases", "dark", stops="1")) == 0
 
 
 def test_full_disk_is_foreseen(

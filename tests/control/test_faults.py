@@ -1,15 +1,22 @@
 """Faults in mid-run: what can go on goes on, what cannot stops with lights off, nothing is lost."""
 
 import errno
+import re
+import shutil
 import signal
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Event
+from unittest.mock import patch
 
 import pytest
 
 from tbcad.cli import run as tbcad
+from tbcad.control.base import Base
+from tbcad.control.plan import read_settings
 from tbcad.runs import writing
+from tests.control.grbl_double import GrblDouble
 from tests.control.rig import Rig, until
 from tests.control.run_checks import check_every_photograph, events
 
@@ -75,7 +82,7 @@ def test_controller_stops(
 
 
 def test_reset_in_mid_motion(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    """The program is told by the banner, before its `ok` would come."""
+    """The program is told by alarm and banner, before its `ok` would come."""
     rig.controller.run_at(20.0)
     moves: list[str] = []
 
@@ -85,7 +92,7 @@ def test_reset_in_mid_motion(rig: Rig, capsys: pytest.CaptureFixture[str]) -> No
 
     rig.controller.fault = fault
     assert tbcad(rig.words("--phases", "dark", "--runs", "a", stops="1,9")) == 1
-    assert "began anew" in capsys.readouterr().out
+    assert "ALARM:3: reset in mid-motion: the angle is lost" in capsys.readouterr().out
     rig.controller.fault = lambda number, line: None
     rig.controller.run_at(FAST)
     assert tbcad(rig.resume()) == 0
@@ -97,7 +104,9 @@ def test_unplugged(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
     assert tbcad(rig.words()) == 1
     out = capsys.readouterr().out
     assert "stopped: 'M64 P3': the controller does not answer" in out
-    assert "LOOK AT THE MACHINE: the controller does not answer: lights may be on" in out
+    assert "LOOK AT THE MACHINE: the controller does not answer: lights may be on; " in out
+    assert "leave the supply on, for only the motor holds the base: zero pin in first" in out
+    assert "switch" not in out.replace("is it plugged in and switched on?", "")
     assert len(out.splitlines()) <= 12
     rig.controller.plug_in()
     assert tbcad(rig.resume()) == 0
@@ -107,9 +116,9 @@ def test_unplugged(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
 def test_refused_line_names_line_code_and_meaning(
     rig: Rig, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rig.controller.firmware = "grbl"  # a board without outputs
+    rig.controller.outputs = 1  # a board with one
     assert tbcad(rig.words()) == 1
-    assert "refuses 'M65 P1': error:20: the command is not supported" in capsys.readouterr().out
+    assert "refuses 'M65 P1': error:39: the value is out of range" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
@@ -135,6 +144,118 @@ def test_interrupt_holds_base_and_switches_lights_off(rig: Rig, kind: signal.Sig
     rig.controller.run_at(FAST)
     assert tbcad(rig.resume()) == 0
     check_every_photograph(rig.out, 2)
+
+
+@pytest.mark.parametrize("reports", [True, False])
+def test_interrupted_homing_stops_with_the_motor_on(rig: Rig, reports: bool) -> None:
+    """The controller answers nothing while it homes, unless bit 12 of $10 is set."""
+    controller = rig.controller
+    if not reports:
+        edit_settings(rig, controller, lambda text: text.replace("$10=4607", "$10=511"))
+    begun = controller.machine.angle
+    controller.on_line = lambda number: controller.run_at(
+        0.1 if controller.lines[-1] == "$H" else FAST
+    )
+    process = rig.start(rig.words())
+    until(lambda: controller.state == "Home")
+    asked = len(controller.asked)
+    until(lambda: len(controller.asked) > asked)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=30)
+    assert "stopped by the operator" in out
+    assert "LOOK AT THE MACHINE" not in out
+    assert not controller.homed
+    assert begun > controller.machine.angle > controller.switch_deg
+    assert (controller.machine.let_go, controller.state) == (0, "Idle")
+    assert not controller.machine.lights
+    controller.on_line = lambda number: None
+    controller.run_at(FAST)
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, ALL)
+
+
+def edit_settings(rig: Rig, controller: GrblDouble, how: Callable[[str], str]) -> None:
+    """Another grbl_settings.txt, in a copy of the export, and the same on the controller."""
+    rig.export = Path(shutil.copytree(rig.export, rig.folder / "export"))
+    path = rig.export / "grbl_settings.txt"
+    path.write_text(how(path.read_text()))
+    controller.settings |= read_settings(path)
+
+
+def test_homing_that_does_not_end(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """The time-out names the state; the base is stopped by a reset, and lights are off."""
+    edit_settings(rig, rig.controller, lambda text: text.replace("$10=4607", "$10=511"))
+    rig.controller.on_line = lambda number: rig.controller.run_at(
+        0.01 if rig.controller.lines[-1] == "$H" else FAST
+    )
+    with patch.object(Base, "_homing_s", lambda self: 0.1):
+        assert tbcad(rig.words()) == 1
+    out = capsys.readouterr().out
+    assert re.search(r"'\$H': the controller does not answer: .*; its last state: homing\)", out)
+    assert "LOOK AT THE MACHINE" not in out
+    assert rig.controller.machine.let_go == 0
+
+
+def test_interrupted_dwell(rig: Rig) -> None:
+    """The lines that switch lights off do not wait for its end."""
+    controller = rig.controller
+    resting = Event()
+
+    def slow(number: int, line: str) -> None:
+        if line.startswith("G4") and controller.lines[-2].startswith("M65"):  # at rest
+            controller.run_at(1e-6)
+            resting.set()
+
+    controller.fault = slow
+    process = rig.start(rig.words("--phases", "lit", "--runs", "a", stops="1"))
+    until(resting.is_set)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "LOOK AT THE MACHINE" not in out
+    assert controller.machine.let_go == 0
+
+
+@pytest.mark.parametrize(
+    ("state", "says"),
+    [
+        ("Sleep", "the controller is sleep but sends no ok: its motor is off"),
+        ("Check", "the controller is Check"),
+        ("Door:1", "error:13: the safety door is open"),
+    ],
+)
+def test_state_that_stops_a_run_is_named(
+    rig: Rig, state: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    controller = rig.controller
+    homed: list[int] = []
+
+    def fault(number: int, line: str) -> None:
+        if line.startswith("G1 X") and len(homed) < 1:
+            homed.append(number)
+            controller.put_into(state)
+
+    controller.fault = fault
+    assert tbcad(rig.words("--phases", "lit", "--runs", "a", stops="1")) == 1
+    out = capsys.readouterr().out
+    assert says in out
+    assert ("zero pin in" in out) == (state != "Check")
+
+
+def test_reset_or_silent_alarm_at_the_start(plain_rig: Rig) -> None:
+    """GRBL answers nothing but a reset after a hard limit."""
+    plain_rig.controller.stop_by_limit()
+    assert tbcad(plain_rig.words(stops="1")) == 0
+
+
+def test_alarm_after_which_grbl_answers_a_reset_only(
+    plain_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain_rig.controller.fault = at_first("G1 X", "alarm", 8)
+    assert tbcad(plain_rig.words(stops="1")) == 1
+    out = capsys.readouterr().out
+    assert "ALARM:1: a limit switch was pressed in mid-motion" in out
+    assert "LOOK AT THE MACHINE" not in out
 
 
 def test_base_that_does_not_stop_is_not_let_fall(

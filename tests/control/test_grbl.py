@@ -130,3 +130,14 @@ def test_port_is_ours_alone(grbl: Grbl, double: GrblDouble) -> None:
 
     with pytest.raises(InputError, match="another program uses it"):
         SerialPort(double.port)
+
+
+def test_line_stays_up_when_the_port_is_closed(double: GrblDouble) -> None:
+    """Else the next start would reset the board, and the motor would let the base go."""
+    termios = pytest.importorskip("termios")
+    with open(double.port, "rb", buffering=0) as line:
+        modes = termios.tcgetattr(line)
+        modes[2] |= termios.HUPCL
+        termios.tcsetattr(line, termios.TCSANOW, modes)
+        SerialPort(double.port).close()
+        assert not termios.tcgetattr(line)[2] & termios.HUPCL

@@ -63,7 +63,7 @@ def replaced(name: str, old: str, new: str) -> Callable[[Path], object]:
         (replaced("rotation_plan.nc", "(stop 2 of", "(stop 9 of"), "not numbered from 1"),
         (replaced("rotation_plan.nc", "M0 (MSG, turn", "M1 (MSG, turn"), "is no program of tbcad"),
         (replaced("rotation_plan.nc", "G92 X", "G92 Y"), "sets no angle"),
-        (replaced("grbl_settings.txt", "$1=255", "motor on"), "line 3 is no setting"),
+        (replaced("grbl_settings.txt", "$1=255", "motor on"), "line 5 is no setting"),
         (
             lambda folder: edit_csv(folder / "stops.csv", lambda rows: rows.pop()),
             "another number of stops",

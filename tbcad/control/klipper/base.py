@@ -17,10 +17,11 @@ from tbcad.control.klipper.files import (
     differences,
     idle_that_lets_go,
 )
-from tbcad.control.klipper.host import MOTOR, PIN_FIRST, READY, Klipper
+from tbcad.control.klipper.host import HOLD_FIRST, MOTOR, READY, Klipper
 from tbcad.control.plan import Plan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
+from tbcad.types import Progress
 
 RELEASE = "SET_PIN PIN=release VALUE="
 MILLISECONDS = 1000
@@ -52,7 +53,7 @@ class KlipperBase:
         if self._klipper.objects("print_stats")["print_stats"].get("state") in BUSY:
             raise MachineFault("the printer prints a file: wait for its end, or cancel it")
 
-    def check_settings(self, *, send: bool) -> None:
+    def check_settings(self, note: Progress, *, send: bool) -> None:
         """Compare the printer's configuration with the build's.
 
         Raises:
@@ -167,9 +168,9 @@ class KlipperBase:
             self._klipper.script(*off, f"{RELEASE}0", DONE, held=False, limit_s=SECURE_S)
             self._klipper.check_held()
         except ControllerReset as fault:
-            return f"{fault}: {PIN_FIRST}"
+            return f"{fault}: {HOLD_FIRST}"
         except MachineFault as fault:
-            return f"lights may be on: {fault}: before any supply is cut, {PIN_FIRST}"
+            return f"lights may be on: {fault}: before any supply is cut, {HOLD_FIRST}"
         return ""
 
 

@@ -32,19 +32,19 @@ AGAIN_S = 0.5
 LOOK_S = 0.2  # between looks at the state while a script runs
 LATE_S = 5.0  # longer than expected: another program's G-code comes first
 TRIES = 2
-PIN_FIRST = "hold the base by hand and put the zero pin in first"
+HOLD_FIRST = "hold the base by hand and put the zero pin in first"
 SAFE = {
-    STARTUP: f"the base is not held: {PIN_FIRST}, then wait until it is ready",
+    STARTUP: f"the base is not held: {HOLD_FIRST}, then wait until it is ready",
     "error": (
-        f"the base may not be held: {PIN_FIRST}, then mend what it says and say FIRMWARE_RESTART"
+        f"the base may not be held: {HOLD_FIRST}, then mend what it says and say FIRMWARE_RESTART"
     ),
     "shutdown": (
         "the motor is off, or goes off with FIRMWARE_RESTART, and the base falls: "
-        f"{PIN_FIRST}, then say FIRMWARE_RESTART"
+        f"{HOLD_FIRST}, then say FIRMWARE_RESTART"
     ),
     DISCONNECTED: (
         "lights may be on; the motor is off, or goes off when Klipper starts, and the base falls: "
-        f"{PIN_FIRST}, then start the service klipper"
+        f"{HOLD_FIRST}, then start the service klipper"
     ),
 }
 """What is safe to do in each state that is not ready."""
@@ -67,7 +67,7 @@ class State:
     @property
     def safe(self) -> str:
         """What is safe to do."""
-        return SAFE.get(self.name, f"the base may not be held: {PIN_FIRST}")
+        return SAFE.get(self.name, f"the base may not be held: {HOLD_FIRST}")
 
 
 class Klipper:

@@ -131,7 +131,8 @@ def wiring(machine: Machine) -> Text:
             "whose input is the controller's output.",
             *(_line(machine, row) for row in machine.wiring),
             _no_lamps(machine),
-            "Never plug or unplug the motor with the supply on: that destroys drivers. No "
+            "Never plug or unplug the motor with the supply on: that destroys drivers, and the "
+            "base falls. Zero pin in before the supply is switched off. No "
             "wire goes "
             "to the base.",
         ),
@@ -197,7 +198,8 @@ def zero(machine: Machine) -> Text:
             if homes
             else "",
             ("Unlock the controller by $X. " if homes else "")
-            + "Jog by 0.1 degrees, so that the motor holds the base, and pull the zero pin out. "
+            + "Jog by 0.1 degrees, so that the motor holds the base (if not, change $4), and pull "
+            "the zero pin out. "
             "Jog a little in the positive direction. If the base turns against the disc's arrow, "
             "set $3 as "
             "the file's comment says.",
@@ -208,8 +210,9 @@ def zero(machine: Machine) -> Text:
             if homes
             else "Jog until the zero pin goes in, and switch the controller on there: that is its "
             "zero.",
-            "Pull the zero pin out, and keep the motor powered. Before the supply is switched off, "
-            "send the base to zero and put the pin in.",
+            "Pull the zero pin out, and keep the motor powered. Before the supply is switched off "
+            "or unplugged, its fuse taken out, or the controller reset or restarted, send the base "
+            "to zero and put the pin in.",
             _without_power(machine),
         ),
         lines(
@@ -341,9 +344,10 @@ def first(machine: Machine) -> Text:
             "on.",
         ),
         lines(
-            f"The base swings from {low:.0f} to {high:.0f} degrees and touches nothing. Keep a "
-            f"hand at the "
-            "switch of the supply the first time.",
+            f"The base swings from {low:.0f} to {high:.0f} degrees and touches nothing. The first "
+            "time, keep a hand at Ctrl-C of tbcad run, or at the sender's feed hold (Klipper: "
+            "pause), which stop it with the motor on. The supply's switch, an emergency stop in "
+            "it, its plug and its fuse let it fall.",
             "The number of photographs is the same in both runs.",
             "Afterwards the base is at zero and the zero pin in, before the supply is "
             "switched off.",

@@ -2,7 +2,12 @@
 
 Klipper drives the base as a manual stepper whose millimetres are degrees, without any kinematics.
 Its G4 takes milliseconds, SPEED is a second's, and SET_PIN waits for the motion as moves do.
-Sources: klippy/extras/manual_stepper.py and output_pin.py; Config_Reference.md, G-Codes.md.
+
+Two things would let the motor go. Without [idle_timeout] Klipper sends M84 after 600 s without
+motion, as in a pause. And a shutdown takes a stepper's enable_pin back, but leaves a static output
+as it is: so the driver is enabled by one.
+Sources: klippy/extras/manual_stepper.py, output_pin.py, idle_timeout.py, stepper_enable.py and
+static_digital_output.py; Config_Reference.md, G-Codes.md.
 """
 
 import re
@@ -18,6 +23,7 @@ PROGRAM, CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
 STEPPER = "MANUAL_STEPPER STEPPER=base"
 SEARCH = 1.5  # travel of the search for the switch, over the travel, as GRBL has it
 MINUTE_S, MILLISECONDS = 60, 1000
+IDLE_S = 86_400  # of a day, after which Klipper tells that it is idle, and does no more
 MESSAGE = re.compile(r"M0 \(MSG, (.*?)[,.?]? [Tt]hen resume\)")
 PIN = "FILL_IN"  # what the user's board has
 
@@ -65,14 +71,21 @@ def _homing(motion: MotionSpec, angles: HomeAngles) -> Iterator[str]:
 def klipper_config(drive: Drive, motion: MotionSpec, lights: tuple[Light, ...]) -> Iterator[str]:
     """A configuration to include; pins of the board are left to fill in."""
     yield "# base of the prototype: degrees for millimetres; fill in the pins of the board"
+    yield "# zero pin in before RESTART, FIRMWARE_RESTART or the supply's switch: they let it fall"
     yield "[printer]"
     yield "kinematics: none"
     yield "max_velocity: 1000"
     yield "max_accel: 1000"
     yield "[pause_resume]"
     yield "[respond]"
+    yield "[idle_timeout]"
+    yield f"timeout: {IDLE_S}"
+    yield "gcode:"
+    yield '    RESPOND MSG="idle, the motor stays on"'
+    yield "[static_digital_output base_enable]"
+    yield f"pins: {PIN}"  # not enable_pin of the stepper, which a shutdown takes back
     yield "[manual_stepper base]"
-    yield from (f"{name}_pin: {PIN}" for name in ("step", "dir", "enable"))
+    yield from (f"{name}_pin: {PIN}" for name in ("step", "dir"))
     yield f"endstop_pin: ^{PIN}"  # normally closed to ground: high when pressed
     yield "rotation_distance: 360"
     yield f"gear_ratio: {drive.ratio:.7g}:1"

@@ -47,5 +47,9 @@ def test_configuration() -> None:
     )
     lines = list(klipper_config(drive, MOTION, lights(2, MOTION)))
     assert f"gear_ratio: {drive.ratio:g}:1" in lines
+    idle = lines.index("[idle_timeout]")
+    assert lines[idle + 2 : idle + 4] == ["gcode:", '    RESPOND MSG="idle, the motor stays on"']
+    assert "[static_digital_output base_enable]" in lines
+    assert not any(line.startswith("enable_pin") for line in lines)  # a shutdown takes it back
     pins = [line for line in lines if line.startswith("[output_pin")]
     assert pins == [f"[output_pin {name}]" for name in ("release", "lamp", "led_1", "led_2")]

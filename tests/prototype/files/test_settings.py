@@ -49,8 +49,27 @@ def test_grbl_refuses_soft_limits_before_homing(drive: Drive) -> None:
     assert order.index(22) < order.index(20)
 
 
-def test_no_homing_with_grbl(drive: Drive) -> None:
-    assert not {20, 21, 22, 44} & set(of(drive, MotionSpec(controller="grbl")))
+def test_grbl_has_no_homing_and_no_setting_that_it_does_not_know(drive: Drive) -> None:
+    """GRBL 1.1 has $0 to $32 and those of X, Y and Z."""
+    found = of(drive, MotionSpec(controller="grbl"))
+    assert {found[number] for number in (20, 21, 22)} == {0}
+    assert all(number <= 32 or number >= 100 for number in found)
+    assert found[10] == 1
+
+
+@pytest.mark.parametrize(("axis", "bit"), [("X", 1), ("A", 8)])
+def test_motor_stays_on_and_homing_is_reported(drive: Drive, axis: str, bit: int) -> None:
+    """In grblHAL $37 keeps motors on in alarms, bit 12 of $10 reports while it homes."""
+    found = of(drive, MotionSpec(axis=axis))
+    assert (found[1], found[37], found[62]) == (255, bit, 0)
+    assert int(found[10]) & 1 << 12
+
+
+@pytest.mark.parametrize("controller", ["grblhal", "grbl"])
+def test_another_life_of_the_board_is_undone(drive: Drive, controller: str) -> None:
+    found = of(drive, MotionSpec(controller=controller))
+    assert (found[13], found[32]) == (0, 0)  # inches; laser or lathe
+    assert int(found[10]) & 1
 
 
 def test_homing_is_no_faster_than_the_base(drive: Drive) -> None:
@@ -60,6 +79,7 @@ def test_homing_is_no_faster_than_the_base(drive: Drive) -> None:
 
 def test_lines(drive: Drive) -> None:
     lines = list(settings_lines("title", settings(drive, MotionSpec(), ANGLES)))
-    assert lines[:3] == ["(title)", "(motor always on, for the base falls without it)", "$1=255"]
+    assert lines[0] == "(title)"
+    assert lines[3:5] == ["(motor always on, for the base falls without it)", "$1=255"]
     assert max(map(len, lines)) < 80
     assert all(line.startswith(("(", "$")) for line in lines)

@@ -89,6 +89,7 @@ DWELL = r"G4 P0\.500\n"
 WORDS = (
     *("G28", "G2 X1.0000", "Y5000", "G93", "G10 L2 P1 X5.0000", "G55", "M7", "G20", "G91", "M30"),
     *("G0 X1.0000", "G1 X1.0000 (hold on!)", "$H"),
+    *("M18", "M84", "$SLP", "$1=25", "$37=0", "!"),  # by which the motor lets go, or runs no longer
 )
 
 PROGRAMS: tuple[Mutation, ...] = (
@@ -526,7 +527,19 @@ HOMING: tuple[Mutation, ...] = (
             ("the motor turned off", r"\$1=.*", "$1=25", "$1 is 25"),
             ("homing of all axes", r"\$45=.*", "$45=3", "$45 is 3"),
             ("homing too fast", r"\$25=.*", "$25=3000", "homing at 3000"),
-            ("a setting too many", r"\$26=", "$32=1\n$26=", "$32 is not needed"),
+            ("a setting too many", r"\$26=", "$30=1\n$26=", "$30 is not needed"),
+            ("the board's enable inverted", r"\$26=", "$4=1\n$26=", "$4 is not needed"),
+            ("the motor off in alarms", r"\$37=.*", "$37=0", "$37 is 0"),
+            ("the motor on of no axis", r"\$37=.*\n", "", "$37 is missing"),
+            ("sleep", r"\$62=.*", "$62=1", "$62 is 1"),
+            ("silent homing", r"\$10=.*", "$10=511", "$10 is 511"),
+            ("reports of GRBL", r"\$10=.*", "$10=1", "$10 is 1"),
+            ("reports in inches", r"\$13=.*", "$13=1", "$13 is 1"),
+            ("a laser", r"\$32=.*", "$32=1", "$32 is 1"),
+            ("a lathe", r"\$32=.*", "$32=2", "$32 is 2"),
+            ("too short a pulse", r"\$0=.*", "$0=1", "$0 is 1"),
+            ("switches without pull-up", r"\$18=.*", "$18=1", "$18 is 1"),
+            ("many passes of homing", r"\$43=.*", "$43=9", "$43 is 9"),
             ("a setting twice", r"\$26=", "$22=1\n$26=", "$22 is there twice"),
             ("no setting at all", r"\$26=", "G28\n$26=", "is no setting"),
         )
@@ -580,6 +593,48 @@ HOMING: tuple[Mutation, ...] = (
             ("another switch", r"SET_POSITION=-\S+", "SET_POSITION=-50", "deg at the switch"),
             ("never turned", r'RESPOND MSG="turn.*\nPAUSE\n', "", "is another"),
             ("a foreign line", r"(?=; stop 1 )", "G28\n", "is none that a plan has"),
+            *(
+                (f"motor off by {line}", r"(?=; stop 2 )", f"{line}\n", "is none that a plan has")
+                for line in (
+                    *("M84", "M18", "m84", "M112", "HOLD", "SET_IDLE_TIMEOUT TIMEOUT=1"),
+                    *("SET_STEPPER_ENABLE STEPPER=base ENABLE=0", "RESTART", "FIRMWARE_RESTART"),
+                    "MANUAL_STEPPER STEPPER=base ENABLE=0",
+                )
+            ),
+        )
+    ),
+    *(
+        fails(
+            f"klipper.cfg: {name}",
+            "klipper.cfg",
+            text_of("klipper.cfg", pattern, new, 1),
+            "klipper",
+            words,
+        )
+        for name, pattern, new, words in (
+            ("no idle timeout", r"\[idle_timeout\]\n.*\n.*\n.*\n", "", "no [idle_timeout]"),
+            ("the default at idle", r"gcode:\n.*\n", "", "no [idle_timeout] with a gcode"),
+            *(
+                (f"{line} at idle", r"    RESPOND .*", f"    {line}", "may let the motor go")
+                for line in (
+                    *("M84", "M18", "m84", "HOLD", "{% if 1 %}M84{% endif %}"),
+                    "SET_STEPPER_ENABLE STEPPER=base ENABLE=0",
+                    "MANUAL_STEPPER STEPPER=base ENABLE=0",
+                )
+            ),
+            ("M84 after a message", r"(    RESPOND .*)", r"\1\n    M84", "does 'M84'"),
+            ("M84 beside gcode", r"gcode:\n.*\n", "gcode: M84\n", "gcode of [idle_timeout]"),
+            ("gcode twice", r"(?=\[static)", "gcode:\n    M84\n", "gcode of [idle_timeout]"),
+            ("idle twice", r"\Z", "[idle_timeout]\ngcode:\n", "[idle_timeout] is twice"),
+            ("a macro", r"\Z", "[gcode_macro RESPOND]\ngcode:\n    M84\n", "[gcode_macro RESPOND]"),
+            ("a timer", r"\Z", "[delayed_gcode off]\ngcode:\n    M84\n", "[delayed_gcode off]"),
+            ("an include", r"\A", "[include more.cfg]\n", "[include more.cfg]"),
+            ("homing of its own", r"\Z", "[homing_override]\ngcode:\n", "[homing_override]"),
+            ("a saved section", r"\Z", "#*# [idle_timeout]\n", "is none that a configuration has"),
+            ("another separator", r"timeout: ", "timeout = ", "is none that a configuration has"),
+            ("an enable pin", r"(dir_pin.*)", r"\1\nenable_pin: PA1", "enable_pin of [manual_st"),
+            ("no enable", r"\[static.*\n.*\n", "", "a shutdown lets the motor go"),
+            ("another output", r"\[output_pin lamp\]", "[output_pin lamb]", "pins are others"),
         )
     ),
     fails(

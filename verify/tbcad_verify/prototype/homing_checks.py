@@ -34,6 +34,9 @@ SETTING = re.compile(r"\$(\d{1,3})=(-?\d+(?:\.\d+)?(?:e-?\d+)?)")
 COMMENT = re.compile(r"\([^()]{1,76}\)")
 SHARE = 1e-6
 FULL_STEPS = 200.0
+PULSE_US = 10.0
+PLACES = 1.0  # bit of $10 in both firmwares: the machine's place
+HAL_DEFAULT, REPORTS_HOMING = 511, 4096  # bits 0 to 8, and 12: grblHAL core, settings.h
 MAX_STEPS_S = 30_000.0  # that GRBL makes
 MAX_SEEK_DEG_MIN = 720.0
 PULL_OFF_DEG = 2.0
@@ -166,16 +169,24 @@ def _settings(context: PrototypeContext) -> Iterator[str]:
     motion, drive = context.export.spec.prototype.motion, context.prototype.drive
     axis = AXES.index(motion.axis)
     expected: dict[int, float] = {
+        0: PULSE_US,
         1: 255,
         3: 0,
+        10: PLACES,
+        13: 0,
+        32: 0,
         100 + axis: FULL_STEPS * motion.microsteps * drive.ratio / 360,
         110 + axis: motion.feed_deg_min,
         120 + axis: motion.acceleration_deg_s2,
     }
     mask = float(1 << axis)
-    if motion.controller == "grblhal":
+    if motion.controller == "grbl":
+        expected |= {20: 0, 21: 0, 22: 0}
+    else:
+        # The motor on in alarms; no sleep; pulled-up inputs; reports while it homes.
+        expected |= {37: mask, 62: 0, 18: 0, 10: HAL_DEFAULT | REPORTS_HOMING, 43: 1}
         expected |= {5: XYZ & ~(1 << axis), 20: 1, 21: 1, 22: 1, 23: mask, 27: PULL_OFF_DEG}
-        expected |= {44: mask, 45: 0, 46: 0}
+        expected |= {44: mask} | dict.fromkeys(range(45, 50), 0.0)
     for number, value in expected.items():
         if not math.isclose(values.get(number, math.nan), value, rel_tol=SHARE):
             yield f"${number} is {values.get(number, 'missing')}, not {value:g}"
@@ -200,7 +211,7 @@ def _parsed(text: str) -> tuple[dict[int, float], list[str]]:
         elif not COMMENT.fullmatch(line):
             faults.append(f"line {number} is no setting")
     order = list(values)
-    if 20 in order and (22 not in order or order.index(22) > order.index(20)):
+    if values.get(20) and (22 not in order or order.index(22) > order.index(20)):
         faults.append("$20 before $22, which GRBL refuses")
     return values, faults
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.gcode_checks import homing
 from tbcad_verify.prototype.gcode_machine import run_program
+from tbcad_verify.prototype.klipper_config import OUTPUT, STEPPER, lets_go, parsed_config
 from tbcad_verify.record.prototype import KLIPPER, KLIPPER_CONFIG
 from tbcad_verify.report.checks import Check, CheckName, at_most, require, short_list
 
@@ -122,7 +123,10 @@ def _step(state: _State, told: dict[str, str], switch: float) -> Iterator[str]:
 
 def _config(context: PrototypeContext) -> Iterator[str]:
     text = require(context.prototype.klipper_config, f"there is no {KLIPPER_CONFIG}")
-    values = dict(re.findall(r"^(\w+): (\S+)$", text, re.M))
+    sections, faults = parsed_config(text)
+    yield from faults
+    yield from lets_go(sections)
+    values = sections.get(STEPPER, {})
     motion, drive = context.export.spec.prototype.motion, context.prototype.drive
     ratio = re.fullmatch(rf"({NUMBER}):1", values.get("gear_ratio", ""))
     expected = {
@@ -138,5 +142,5 @@ def _config(context: PrototypeContext) -> Iterator[str]:
     if not ratio or not math.isclose(float(ratio[1]), drive.ratio, rel_tol=1e-5):
         yield f"gear_ratio is {values.get('gear_ratio')}"
     pins = ["release", "lamp", *(f"led_{k + 1}" for k in range(len(context.prototype.leds)))]
-    if re.findall(r"^\[output_pin (\w+)\]$", text, re.M) != pins:
+    if [name.split()[1] for name in sections if name.startswith(OUTPUT)] != pins:
         yield "its output pins are others"
