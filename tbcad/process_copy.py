@@ -8,6 +8,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, TypeAlias
 
 from tbcad.background import end_with_parent, pause
+from tbcad.loading import held_signals
 from tbcad.types import Progress
 
 Serve: TypeAlias = Callable[[Connection], None]
@@ -23,15 +24,16 @@ def copied_process(serve: Serve) -> Iterator[Connection]:
     context = multiprocessing.get_context("fork")
     pipe, other = context.Pipe()
     process: BaseProcess = context.Process(target=_run, args=(serve, other, pipe))
-    with pause():
-        process.start()
-    other.close()
     try:
-        with pipe:
-            yield pipe
+        with pause(), held_signals():  # Python drops an interrupt in what it does after a copy
+            process.start()
+        other.close()
+        yield pipe
     finally:
-        process.kill()
-        process.join()
+        if process.pid is not None:
+            process.kill()  # before the pipe is closed, of which it would complain
+            process.join()
+        pipe.close()
 
 
 def next_result(pipe: Connection, progress: Progress, ended: str) -> Any:

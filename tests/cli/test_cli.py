@@ -230,7 +230,9 @@ def _accept_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def test_interrupt_is_reported_in_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("delay_s", [0.0, 0.05, 0.15, 0.4])
+def test_interrupt_is_reported_in_one_line(tmp_path: Path, delay_s: float) -> None:
+    """At any moment, also while native libraries are loaded, which is after the first line."""
     build = subprocess.Popen(
         [*COMMAND, "build", "--n", "12", "--out", str(tmp_path / "exports")],
         stderr=subprocess.PIPE,
@@ -240,7 +242,7 @@ def test_interrupt_is_reported_in_one_line(tmp_path: Path) -> None:
     )
     assert build.stderr is not None
     build.stderr.readline()
-    time.sleep(0.1)
+    time.sleep(delay_s)
     build.send_signal(signal.SIGINT)
     _, errors = build.communicate(timeout=60)
     assert build.returncode == 130
