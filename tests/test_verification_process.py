@@ -34,7 +34,7 @@ def test_a_refusal_is_raised(tmp_path: Path) -> None:
     with (
         own_process(),
         verification_process() as verify_there,
-        pytest.raises(BadExport, match="missing"),
+        pytest.raises(BadExport, match="is an empty folder, no build"),
     ):
         verify_there(tmp_path, lambda _: None)
 

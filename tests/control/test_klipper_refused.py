@@ -209,7 +209,7 @@ def test_printer_that_prints(klipper_rig: Rig, capsys: pytest.CaptureFixture[str
         (MOTOR, "endstop_pin", "^!PA1", "endstop_pin of [manual_stepper base] is '^!PA1', not ^"),
         (MOTOR, "endstop_pin", "PA1", "endstop_pin of [manual_stepper base] is 'PA1', not ^"),
         (MOTOR, "dir_pin", "FILL_IN", "dir_pin of [manual_stepper base] is 'FILL_IN'"),
-        (MOTOR, "enable_pin", None, "enable_pin of [manual_stepper base] is missing"),
+        (MOTOR, "dir_pin", None, "dir_pin of [manual_stepper base] is missing"),
         ("printer", "kinematics", "corexy", "kinematics of [printer] is 'corexy', not none"),
         ("output_pin led_4", None, None, "[output_pin led_4] is missing"),
         ("idle_timeout", "timeout", 600.0, "idle_timeout"),

@@ -101,6 +101,8 @@ def test_of_another_host_stay_while_they_change(tmp_path: Path, folder: Path) ->
 HANGS = """
 import signal, sys
 sys.path[:0] = [{root!r}]
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by what started the tests?
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from pathlib import Path
 from tbcad.cli import app, run
 from tbcad.output.folder import replacing
