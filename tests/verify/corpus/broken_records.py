@@ -170,6 +170,12 @@ RECORDS: tuple[Mutation, ...] = (
         json_file(MANIFEST, lambda m: m.update(schema="x")),
         "schema is x, this version verifies tbcad-manifest/1",
     ),
+    refused(
+        "a manifest of a capture",
+        MANIFEST,
+        json_file(MANIFEST, lambda m: m.update(kind="capture")),
+        "kind",
+    ),
     fails("a part forgotten", JSON, design(no_meshes), "mirrors found", "missing: b0001"),
     fails("no STEP in the record", JSON, design(without("step")), "manifest", "shell_a.step"),
     fails("no 3MF in the record", JSON, design(without("3mf")), "manifest", "shell_a.3mf"),

@@ -158,8 +158,9 @@ class Entry(Strict):
 
 
 class Manifest(Strict):
-    """manifest.json: every file of the export."""
+    """manifest.json: every file of the export. Builds of earlier versions tell no kind."""
 
+    kind: Literal["build"] = "build"
     files: dict[str, Entry] = Field(min_length=1)
 
     @field_validator("files", mode="before")
