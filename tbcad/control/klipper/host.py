@@ -51,6 +51,10 @@ SAFE = {
 LET_GO = "Klipper has let the motor go (M84, a restart, or idle_timeout): the angle is lost"
 
 
+class Disconnected(MachineFault):
+    """Moonraker has no Klipper."""
+
+
 @dataclass(frozen=True)
 class State:
     """State of Klipper: ready, startup, error, shutdown or disconnected; and its message."""
@@ -135,7 +139,7 @@ class Klipper:
             MachineFault: it is not ready.
         """
         if (state := self.state()).name != READY:
-            raise MachineFault(state.what)
+            raise (Disconnected if state.name == DISCONNECTED else MachineFault)(state.what)
 
     def check_held(self) -> None:
         """Ask whether the motor is on.
@@ -186,15 +190,30 @@ class Klipper:
     ) -> None:
         begun = self._clock()
         late = begun + expected_s + LATE_S
-        if held:
-            self.check_held()
+        self._look(answer, self.check_held if held else self.check_ready)
         while not wait([answer], LOOK_S).done:
-            self.check_ready()
+            self._look(answer, self.check_ready)
             if (now := self._clock()) - begun > limit_s:
                 raise MachineFault("Klipper is busy with another program's G-code")
             if now > late:
                 late = float("inf")
                 self._note("Klipper takes long: does another program give it G-code?")
+
+    def _look(self, answer: "Future[Any]", check: Callable[[], None]) -> None:
+        """Check the state; a Moonraker that begins anew also breaks the answer's connection.
+
+        Until it has found Klipper it says that Klipper is disconnected, so the answer decides
+        which of both has gone: of a Klipper that ended, Moonraker tells as an error.
+        """
+        try:
+            check()
+        except (Disconnected, Refused) as fault:
+            if isinstance(fault, Refused) and fault.code not in NO_KLIPPER:
+                raise
+            wait([answer], BACK_S)
+            if answer.done() and isinstance(lost := answer.exception(), Unreachable):
+                raise lost from None
+            raise
 
     def _refuse(self, line: str, answer: "Future[Any]") -> None:
         """Raise what ends a run; Moonraker calls the error of a Klipper that shut down unknown."""
