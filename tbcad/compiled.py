@@ -21,7 +21,12 @@ def compiled_loop(function: Function) -> Function:
     return _compiled(function, error_model="numpy")
 
 
-def _compiled(function: Function, **options: str) -> Function:
+def compiled_sum(function: Function) -> Function:
+    """The same, and sums may be taken in another order: equal bits on equal processors only."""
+    return _compiled(function, error_model="numpy", fastmath=True)
+
+
+def _compiled(function: Function, **options: str | bool) -> Function:
     try:
         result: Function = njit(nogil=True, cache=True, **options)(function)
     except RuntimeError:  # no folder that may be written: compile in every process

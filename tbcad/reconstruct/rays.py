@@ -1,0 +1,134 @@
+"""The rays of a light field that meet the capture sphere, as the fit takes them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.types import Bools, Ints
+
+Singles = NDArray[np.float32]
+
+LEAST_CHORD_MM = 0.03
+GRAZING = 0.1  # share of the rays, with the shortest way through the capture sphere
+DARKEST = 0.02  # of white: less is called dark whatever the noise
+NOISE = 4.0  # times the standard deviation is brighter than the background's noise
+
+
+@dataclass(frozen=True)
+class CapturedRays:
+    """n rays and what was photographed along them.
+
+    Attributes:
+        entry: where they enter the capture sphere, mm, (n, 3).
+        direction: unit vectors, (n, 3).
+        length: of their way through the sphere, mm, (n,).
+        colour: red, green, blue, 0 to 1, (n, 3).
+        mirror: number of their mirror among those of all cameras, (n,).
+        weight: of their squared errors in a fit, (n,).
+        footprint: change of entry and of direction for a pixel's step right and down, (n, 4, 3);
+            or (1, 4, 3) of zeros where a pixel is a single ray.
+        capture_mm: diameter of the capture sphere.
+    """
+
+    entry: Singles
+    direction: Singles
+    length: Singles
+    colour: Singles
+    mirror: NDArray[np.int32]
+    weight: Singles
+    footprint: Singles
+    capture_mm: float
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.length)
+
+    def dark_level(self) -> float:
+        """Brightness, 0 to 1, below which a ray sees the background.
+
+        Rays that graze the capture sphere see it, but for few: their median and four times the
+        standard deviation that their median deviation stands for.
+        """
+        count = max(int(GRAZING * len(self)), 1)
+        grazing = self.colour[np.argpartition(self.length, count - 1)[:count]].max(axis=1)
+        middle = np.median(grazing)
+        sigma = 1.4826 * np.median(np.abs(grazing - middle))
+        return float(max(middle + NOISE * sigma, DARKEST))
+
+
+def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
+    """The rays of a light field.
+
+    Args:
+        source: the light field.
+        footprint: whether a pixel is more than its central ray.
+    """
+    before = 0
+    parts = []
+    for frame in source.frames.values():
+        parts.append(_of_frame(frame, before, source.capture_mm / 2, footprint))
+        before += len(frame.u)
+    joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    prints = joined.pop() if footprint else np.zeros((1, 4, 3), dtype=np.float32)
+    weight = np.ones(len(joined[0]), dtype=np.float32)
+    return CapturedRays(*joined, weight, prints, source.capture_mm)
+
+
+def entries(
+    origin: NDArray[np.floating], direction: NDArray[np.floating], radius: float
+) -> tuple[Singles, Singles]:
+    """Where rays (..., 3) enter a sphere about the origin, and how long they stay; 0: they miss."""
+    o, d = origin.astype(np.float64), direction.astype(np.float64)
+    middle = -np.einsum("...x,...x->...", o, d)
+    half = np.sqrt(np.maximum(middle**2 - np.einsum("...x,...x->...", o, o) + radius**2, 0))
+    entry = o + (middle - half)[..., None] * d
+    return entry.astype(np.float32), (2 * half).astype(np.float32)
+
+
+def _of_frame(
+    frame: Frame, before: int, radius: float, footprint: bool
+) -> list[NDArray[np.generic]]:
+    planes = frame.read(slice(None))
+    mirror, direction = planes["mirror"], planes["direction"]
+    entry, length = entries(planes["origin"], direction, radius)
+    seen = (mirror > 0) & (length > LEAST_CHORD_MM)
+    columns = [
+        entry[seen],
+        direction[seen],
+        length[seen],
+        planes["colour"][seen] / np.float32(255),
+        mirror[seen].astype(np.int32) - 1 + before,
+    ]
+    if footprint:
+        columns.append(_footprints(entry, direction, np.where(seen, mirror, 0))[seen])
+    return columns
+
+
+def _footprints(entry: Singles, direction: Singles, mirror: NDArray[np.uint16]) -> Singles:
+    """Change of both by a step right and down inside a mirror, (h, w, 4, 3)."""
+    return np.stack(
+        [_steps(values, mirror, axis) for values in (entry, direction) for axis in (1, 0)], axis=2
+    )
+
+
+def _steps(values: Singles, mirror: NDArray[np.uint16], axis: int) -> Singles:
+    """Mean difference to the neighbours of the same mirror along an axis; 0 without any."""
+    ahead = np.diff(values, axis=axis)
+    same: Bools = np.equal(*_neighbours(mirror, axis))
+    total = np.zeros_like(values)
+    number: Ints = np.zeros(mirror.shape, dtype=np.int64)
+    for sums, counts in zip(_neighbours(total, axis), _neighbours(number, axis), strict=True):
+        np.add(sums, np.where(same[..., None], ahead, 0), out=sums)
+        np.add(counts, same, out=counts)
+    return total / np.maximum(number, 1)[..., None].astype(np.float32)
+
+
+def _neighbours(
+    values: NDArray[np.generic], axis: int
+) -> tuple[NDArray[np.generic], NDArray[np.generic]]:
+    """All but the last, and all but the first, along an axis."""
+    front, back = [slice(None)] * values.ndim, [slice(None)] * values.ndim
+    front[axis], back[axis] = slice(None, -1), slice(1, None)
+    return values[tuple(front)], values[tuple(back)]
