@@ -14,7 +14,7 @@ from tbcad.simulate.parallel import THREADS, chunks
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bytes, Floats
 
-STRIDE = 0.3  # distances of nodes between samples
+STRIDE = 0.45  # distances of nodes between samples
 RAYS_PER_CHUNK = 1 << 13
 
 
