@@ -109,10 +109,11 @@ METHODS = (
 )
 MethodOption = Annotated[Literal["nearest", "blend"], typer.Option(help=f"{METHODS}.")]
 MethodOfView = Annotated[
-    Literal["nearest", "blend", "depth"] | None,
+    Literal["nearest", "blend", "depth", "field"] | None,
     typer.Option(
-        help=f"{METHODS}; depth, the default: a blend at the depth that the light field itself "
-        "shows."
+        help=f"{METHODS}; depth: a blend at the depth that the light field itself shows; field: "
+        "the field of tbcad reconstruct. By default field where field.npz is in the capture's "
+        "folder, else depth."
     ),
 ]
 Scheduler = Annotated[
