@@ -107,7 +107,10 @@ METHODS = (
     "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "
     "virtual cameras that see the same point"
 )
-MethodOption = Annotated[Literal["nearest", "blend"], typer.Option(help=f"{METHODS}.")]
+MethodOfStudy = Annotated[
+    Literal["nearest", "blend", "field"],
+    typer.Option(help=f"{METHODS}; field: a coarse field that is fitted to all rays in seconds."),
+]
 MethodOfView = Annotated[
     Literal["nearest", "blend", "depth", "field"] | None,
     typer.Option(

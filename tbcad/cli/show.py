@@ -125,10 +125,10 @@ class _Shown(NamedTuple):
     tiles: "MirrorTiles | None"
     method: "MethodAtRest" = "depth"
 
-    def words(self) -> str:
-        """What is shown, and how."""
-        how = self.method if self.pictured is self.tiles else "field"
-        return f"{self.file} by method {how}"
+    @property
+    def how(self) -> str:
+        """The method of all views."""
+        return self.method if self.pictured is self.tiles else "field"
 
 
 @contextmanager
@@ -182,7 +182,7 @@ def _show_views(shown: _Shown, start: "Query", port: int, open_page: bool, json:
         if json:
             print_json({"address": server.address})
         else:
-            typer.echo(f"{server.address} shows {shown.words()}; Ctrl-C ends it")
+            typer.echo(f"{server.address} shows {shown.file} by method {shown.how}; Ctrl-C ends it")
         if open_page:
             _open(server.address)
         return _serve(server)
@@ -223,7 +223,7 @@ def _write_turntable(
     if json:
         print_json({"turntable": str(out), "bytes": size, "views": columns * rows})
     else:
-        typer.echo(f"{out}: {columns * rows} views of {shown.words()}, {size / 1e6:.1f} MB")
+        typer.echo(f"{out}: {columns * rows} views by method {shown.how}, {size / 1e6:.1f} MB")
     return 0
 
 

@@ -131,7 +131,7 @@ def view(
     """
     check_is_capture(capture_folder)
     files = ViewFiles(tuple(depth_files or ()), normals_file, opacity_file)
-    by_default = method is surface is light is None
+    by_default = method is None and surface is None and light is None
     choice = _choice("field" if by_default and files.of_field else method, surface)
     from tbcad.reconstruct.beside import wanted_field
     from tbcad.simulate.capture.light_field import LightField
