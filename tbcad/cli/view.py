@@ -291,7 +291,7 @@ def _view(
         return synthesise(shown, at).image
     if choice.surface == "depth":
         picture, found = depth_views(tiles, progress=progress).of(at, shown)
-        write_depth(files.depth, found, picture.image)
+        write_depth(files.depth, found.png, lambda: found.ply(picture.image))
         return picture.image
     on_object = scene is not None and choice.surface == "object"
     depth = depth_along_rays(scene) if scene is not None and on_object else None

@@ -1,6 +1,6 @@
 """What a view can be written as besides its picture: depth, normals and opacity."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,7 +10,6 @@ from tbcad.cli.compared_pictures import compared_files
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
-    from tbcad.depth.depth_map import DepthMap
     from tbcad.optics.camera import Camera
     from tbcad.reconstruct.field import Field
     from tbcad.types import Bytes
@@ -71,25 +70,33 @@ class ViewFiles(NamedTuple):
             typer.echo(f"{file}: {what}")
 
 
-def write_depth(files: tuple[Path, ...], depth: "DepthMap", image: "Bytes") -> None:
-    """Write the depth of a view with its picture (h, w, 3), as PNG or PLY."""
+def write_depth(
+    files: tuple[Path, ...], png: Callable[[], bytes], ply: Callable[[], bytes]
+) -> None:
+    """Write the depth of a view, each file by what makes its kind."""
     from tbcad.atomic_files import replace_files
 
     for file in files:
-        content = depth.ply(image) if file.suffix.lower() == ".ply" else depth.png()
+        content = ply() if file.suffix.lower() == ".ply" else png()
         replace_files(file.parent, {file.name: content})
 
 
 def field_view(made: "Field", at: "Camera", files: ViewFiles) -> "Bytes":
     """The picture of a field (h, w, 3), and what else is asked for of it."""
     from tbcad.atomic_files import replace_files
-    from tbcad.depth.field_files import field_depth, normals_png, opacity_png
-    from tbcad.reconstruct.picture import field_picture
+    from tbcad.reconstruct.picture import field_normals, field_picture, normals_png, opacity_png
+    from tbcad.simulate.scene.depth_files import depth_ply, depth_png
 
     picture = field_picture(made, at)
-    write_depth(files.depth, field_depth(picture, at, made.grid.width_mm), picture.image)
+    depth = picture.depth(at)
+    write_depth(
+        files.depth,
+        lambda: depth_png(depth, made.grid.width_mm),
+        lambda: depth_ply(at, depth, picture.image),
+    )
     if files.normals is not None:
-        replace_files(files.normals.parent, {files.normals.name: normals_png(picture, at)})
+        content = normals_png(field_normals(made, at, picture))
+        replace_files(files.normals.parent, {files.normals.name: content})
     if files.opacity is not None:
         replace_files(files.opacity.parent, {files.opacity.name: opacity_png(picture)})
     return picture.image

@@ -22,6 +22,7 @@ const viewer = {
   inFlight: 0,
   wanted: false, // whether the state has changed since the last request
   turning: false,
+  smaller: true, // whether slow views may be made smaller while they move
   step: 1, // by which width and height are divided while views move
   interval: 0, // ms from one picture to the next, while they move; 0: not known
   draws: [], // times of the last pictures
@@ -32,8 +33,8 @@ const clamped = (name, value) =>
   Math.min(Math.max(value, data.limits[name][0]), data.limits[name][1]);
 
 function size() {
-  if (viewer.interval > SLOW_MS) viewer.step = 2;
-  else if (viewer.interval < QUICK_MS) viewer.step = 1;
+  if (viewer.interval < QUICK_MS || !viewer.smaller) viewer.step = 1;
+  else if (viewer.interval > SLOW_MS) viewer.step = 2;
   return ["width", "height"].map((side) => Math.round(data.start[side] / viewer.step));
 }
 
