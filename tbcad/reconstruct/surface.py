@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
-from tbcad.geometry.vectors import dot, norm
+from tbcad.geometry.vectors import norm
 from tbcad.optics.geodesic import geodesic
 from tbcad.reconstruct.field import Field
 from tbcad.reconstruct.fit import NUMBERS, medium_of
@@ -226,17 +226,15 @@ def _free(embree: Any, points: Singles, toward: Singles) -> Bools:
 
 
 def _bodies(points: Singles, faces: Ints, least: float) -> tuple[Singles, Ints]:
-    """The surfaces of all bodies of at least that size, mm; hollows in them are left out."""
+    """The surfaces of all bodies of at least that size, mm."""
     v = len(points)
     ends = np.concatenate([faces[:, :2], faces[:, 1:]]).T
     graph = coo_array((np.ones(ends.shape[1], dtype=np.int8), ends), shape=(v, v))
     count, label = connected_components(graph, directed=False)
-    a, b, c = (points[faces[:, k]].astype(np.float64) for k in range(3))
-    volume = np.bincount(label[faces[:, 0]], dot(a, np.cross(b, c)), count)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)
-    kept = ((volume > 0) & (norm(high - low) >= least))[label]
+    kept = (norm(high - low) >= least)[label]
     number = np.cumsum(kept) - 1
     return np.asarray(points[kept]), number[faces[kept[faces[:, 0]]]]
 

@@ -61,7 +61,7 @@ def test_a_shell_is_full_inside() -> None:
     thick = made_of(lambda at: BELOW + STEEP * (0.5 - abs(np.linalg.norm(at, axis=1) - 6.5)))
     mesh = field_mesh(thick, 1.0)
     assert mesh.body_count == 1
-    assert mesh.volume == pytest.approx(4 / 3 * np.pi * 7**3, rel=0.01)
+    assert mesh.volume == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.01)
 
 
 def test_below_a_dome_it_is_full_as_far_as_nothing_is_seen() -> None:
