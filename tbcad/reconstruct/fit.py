@@ -7,7 +7,7 @@ their order: the result is the same, to the last bit, on any number of threads.
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from math import cos, pi
+from math import ceil, cos, pi
 from os import cpu_count
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from tbcad.reconstruct.adam import Columns, Moments, adam, unbiased_size
 from tbcad.reconstruct.field import Field
-from tbcad.reconstruct.grid import Grid, resampled
+from tbcad.reconstruct.grid import LONGEST_LEAP, Grid, resampled
 from tbcad.reconstruct.hull import hull
 from tbcad.reconstruct.marching import GLOSSY, MATT, Medium, Pixels, add_gradient, spans
 from tbcad.reconstruct.rays import CapturedRays, Singles
@@ -78,12 +78,6 @@ class Settings:
     stride: float = 0.6
     places: Singles = field(default_factory=lambda: CENTRAL)
     seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Refuse rays of a pixel that are no two halves."""
-        rays = self.places.shape[1]
-        if rays > 1 and rays % 2:
-            raise ValueError(f"{rays} rays a pixel: give 1 or an even number")
 
 
 @dataclass
@@ -175,11 +169,12 @@ def _epochs(
     pool: ThreadPoolExecutor,
 ) -> Iterator[State]:
     """The epochs of a level that are left."""
-    first, last = all_spans(rays, state.grid, pool)
+    final = state.level + 1 == len(settings.levels)
+    places = settings.places if final else CENTRAL
+    first, last = all_spans(rays, state.grid, pool, rays.spread_mm(places))
     wanted = first >= 0 if used is None else (first >= 0) & used
     ray = np.flatnonzero(wanted)
-    final = state.level + 1 == len(settings.levels)
-    pixels = _pixels(rays, (first, last), settings.places if final else CENTRAL)
+    pixels = _pixels(rays, (first, last), places)
     epochs = settings.levels[state.level].epochs
     count = len(ray) // min(settings.batch, len(ray) // FEWEST_STEPS + 1) + 1
     parts = np.zeros((PARTS, *state.values.shape), dtype=np.float32)
@@ -198,15 +193,20 @@ def _epochs(
         yield state
 
 
-def all_spans(rays: CapturedRays, grid: Grid, pool: ThreadPoolExecutor) -> tuple[Singles, Singles]:
-    """Where all rays may meet something first and last, (n,) each."""
+def all_spans(
+    rays: CapturedRays, grid: Grid, pool: ThreadPoolExecutor, around_mm: float = 0.0
+) -> tuple[Singles, Singles]:
+    """Where all rays may meet something within that distance first and last, (n,) each."""
     leap, size = grid.leap, max(-(-len(rays) // PARTS), 1)
+    near = min(1 + ceil(around_mm / grid.pitch_mm), LONGEST_LEAP - 1)
 
     def part(at: int) -> tuple[Singles, Singles]:
         here = slice(at, at + size)
-        return spans(rays.entry[here], rays.direction[here], rays.length[here], leap, grid.width_mm)
+        return spans(
+            rays.entry[here], rays.direction[here], rays.length[here], leap, grid.width_mm, near
+        )
 
-    spans(rays.entry[:0], rays.direction[:0], rays.length[:0], leap, grid.width_mm)  # compile
+    part(len(rays))  # compiled before any thread
     found = list(pool.map(part, range(0, len(rays), size)))
     first, last = (np.concatenate(one) for one in zip(*found, strict=True))
     return first, last
@@ -294,13 +294,10 @@ def medium_of(made: Field, stride: float) -> Medium:
 
 
 def squared_error(rays: CapturedRays, which: Bools, made: Field, settings: Settings) -> float:
-    """Mean squared error, summed over the colours, of some pixels (n,) by a field; NaN of none.
-
-    Of pixels of several rays it is without the spread of the few that are followed, as in a fit.
-    """
+    """Mean squared error, summed over the colours, of some pixels (n,) by a field; NaN of none."""
     ray = np.flatnonzero(which)
     with workers() as pool:
-        first, last = all_spans(rays, made.grid, pool)
+        first, last = all_spans(rays, made.grid, pool, rays.spread_mm(settings.places))
         pixels = _pixels(rays, (first, last), settings.places)
         parts = np.zeros((PARTS, *made.values.shape), dtype=np.float32)
         medium = medium_of(made, settings.stride)

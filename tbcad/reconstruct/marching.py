@@ -57,7 +57,7 @@ class Pixels(NamedTuple):
         weight: of their squared errors, (n,).
         footprint: change of entry and direction for a pixel's step right and down, (n, 4, 3), or
             (1, 4, 3) of zeros.
-        places: of k rays in a pixel, from its centre, pixels, (p, k, 2): one of p at random.
+        places: of k rays in a pixel, from its centre, pixels, (p, k, 2); one of p for each pixel.
     """
 
     entry: Singles
@@ -72,7 +72,12 @@ class Pixels(NamedTuple):
 
 @compiled_sum
 def spans(
-    entry: Singles, direction: Singles, length: Singles, leap: NDArray[np.uint8], width: float
+    entry: Singles,
+    direction: Singles,
+    length: Singles,
+    leap: NDArray[np.uint8],
+    width: float,
+    near: int,
 ) -> tuple[Singles, Singles]:
     """Where rays come near cells with all corners first and last, mm from their entry; -1: never.
 
@@ -82,6 +87,7 @@ def spans(
         length: of the rays in the sphere, mm, (n,).
         leap: of a grid, (k, k, k).
         width: of its cube, mm.
+        near: how many cells away from them is near; 1 or more, so that no part of them is left out.
     """
     first = np.full(len(entry), np.float32(-1))
     last = np.full(len(entry), np.float32(-1))
@@ -96,11 +102,11 @@ def spans(
             away = leap[
                 min(max(x, 0), cells - 1), min(max(y, 0), cells - 1), min(max(z, 0), cells - 1)
             ]
-            if away <= 1:
+            if away <= near:
                 if first[i] < 0:
                     first[i] = t
                 last[i] = t + np.float32(0.5) / scale
-            t += max(np.float32(away) - np.float32(1), np.float32(0.5)) / scale
+            t += max(np.float32(away) - np.float32(near), np.float32(0.5)) / scale
     return first, last
 
 
@@ -311,14 +317,14 @@ def add_gradient(
 ) -> tuple[float, int]:
     """Add half the gradient of the weighted squared errors of pixels.
 
-    A pixel's light is the mean of several rays. Half of them give the error by which the other
-    half is differentiated, so that the mean of all gradients is that of the mean light, however
-    few rays there are.
+    A pixel's light is the mean of the rays at its places, always the same ones: by other places
+    in each step the variance inside of pixels would be noise in the gradient, which does not
+    fade, or, with the error of the same rays, an error that smooths.
 
     Args:
         ray: numbers of the pixels, (b,).
         pixels: all of them.
-        seed: of the first sample's place, and of the rays in a pixel.
+        seed: of each ray's first sample.
         medium: the field.
         gradient: what is added to, (v, 4 or 13).
 
@@ -332,13 +338,14 @@ def add_gradient(
     slot = np.empty((k, most, 6), dtype=np.float32)
     toward, begin = np.empty((k, 3), dtype=np.float32), np.empty(3, dtype=np.float32)
     count, light = np.empty(k, dtype=np.int64), np.empty((k, 3), dtype=np.float32)
-    off = np.empty((2, 3), dtype=np.float32)
+    off = np.empty(3, dtype=np.float32)
     loss, followed = 0.0, 0
     wide = footprint.shape[0] > 1
     for q in range(len(ray)):
         i = ray[q]
+        kind = _mixed(i, 0) % np.uint32(kinds)
         state = _mixed(i, seed)
-        kind = state % np.uint32(kinds)
+        off[:] = -colour[i]
         for j in range(k):
             state = _mixed(state, j)
             jitter = np.float32(state >> np.uint32(8)) / np.float32(1 << 24)
@@ -352,18 +359,11 @@ def add_gradient(
                 begin, toward[j], (first[i], last[i]), jitter, medium, at[j], slot[j]
             )
             followed += count[j]
-        for axis in range(3):
-            off[0, axis] = off[1, axis] = -colour[i, axis]
-            for j in range(k):
-                off[j % 2, axis] += light[j, axis] / np.float32(max(k // 2, 1))
-            if k == 1:
-                off[1, axis] = off[0, axis]
-            loss += weight[i] * off[0, axis] * off[1, axis]
-            off[0, axis] *= weight[i] / np.float32(k)
-            off[1, axis] *= weight[i] / np.float32(k)
+            off += light[j] / np.float32(k)
+        loss += weight[i] * (off * off).sum()
+        off *= weight[i] / np.float32(k)
         for j in range(k):
-            other = off[1 - j % 2]
-            by, seen = (other[0], other[1], other[2]), (light[j, 0], light[j, 1], light[j, 2])
+            by, seen = (off[0], off[1], off[2]), (light[j, 0], light[j, 1], light[j, 2])
             _back(at[j], slot[j], count[j], seen, by, toward[j], medium, gradient)
     return loss, followed
 
