@@ -52,7 +52,7 @@ def test_a_ball_is_found_with_its_radius_and_colour(order: int) -> None:
     made = fitted(rays_of([BALL], 30_000), replace(SMALL, order=order))
     assert made.order == order
     found = toward(BALL.centre, made)
-    assert found[:, 3].min() > 0.93
+    assert found[:, 3].min() > 0.9
     assert np.abs(found[:, 4] - BALL.radius).mean() < 0.7 * made.grid.pitch_mm
     assert np.abs(found[:, :3] - BALL.colour).max() < 0.06
 
@@ -79,9 +79,9 @@ def test_rays_that_are_left_out_are_predicted() -> None:
     assert error.mean() < 3 * last.loss
 
 
-def test_nothing_is_an_empty_field() -> None:
-    made = fitted(rays_of([], 3_000), TINY)
-    assert toward((0, 0, 0), made)[:, 3].max() == 0
+def test_photographs_of_nothing_are_refused() -> None:
+    with pytest.raises(InputError, match="nothing"):
+        fitted(rays_of([], 3_000), TINY)
 
 
 def test_the_loss_falls() -> None:
@@ -143,5 +143,5 @@ def test_a_state_keeps_its_values_while_the_fit_goes_on() -> None:
 
 
 def test_an_odd_number_of_rays_in_a_pixel_is_refused() -> None:
-    with pytest.raises(InputError, match="even"):
+    with pytest.raises(ValueError, match="even"):
         Settings(places=np.zeros((4, 3, 2), np.float32))

@@ -68,7 +68,7 @@ def plane(n: int) -> np.ndarray:
 
 @pytest.mark.parametrize(("k", "n"), [(2, 9), (8, 44), (9, 4), (14, 86), (60, 100)])
 def test_linear_values_stay_linear_on_other_lattices(k: int, n: int) -> None:
-    assert resampled(plane(k), n) == pytest.approx(plane(n), abs=1e-5)
+    assert np.abs(resampled(plane(k), n) - plane(n)).max() < 1e-5
     ends = np.array(list(product([0, n // 2, n - 1], repeat=3)), np.uint16)
     assert Grid(n, WIDTH, ends).sampled(plane(k)) == pytest.approx(
         plane(n)[tuple(ends.T)], abs=1e-5

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tbcad.errors import InputError
 from tbcad.reconstruct.hull import MOST_DARK, hull
 from tbcad.reconstruct.rays import CapturedRays
 from tests.ray_fields import RADIUS, Ball, rays_of
@@ -29,7 +30,9 @@ def test_a_ball_is_in_its_hull_and_little_else(radius: float) -> None:
     away = np.linalg.norm(places - centre, axis=-1)
     assert inside[away < radius].all()
     limit = radius / np.sqrt(1 - MOST_DARK**2)
-    most = limit + pitch * (1 + 2 * np.sqrt(3) / 2)  # the dilation; lines pass a node half a cell away
+    most = limit + pitch * (
+        1 + 2 * np.sqrt(3) / 2
+    )  # the dilation; lines pass a node half a cell away
     assert (away[inside] < most).mean() > 0.998
 
 
@@ -41,8 +44,15 @@ def test_two_balls_are_two_hulls() -> None:
         assert inside[np.linalg.norm(places - [5 * side, 0, 0], axis=-1) < 2].all()
 
 
-def test_nothing_has_no_hull() -> None:
-    assert not hull_of(rays_of([], 5_000))[0].any()
+def test_photographs_of_nothing_are_refused() -> None:
+    with pytest.raises(InputError, match="nothing brighter than"):
+        hull_of(rays_of([], 5_000))
+
+
+def test_photographs_without_background_are_refused() -> None:
+    everywhere = np.random.default_rng(0).uniform(0.3, 1, (5_000, 3)).astype(np.float32)
+    with pytest.raises(InputError, match="dark background"):
+        hull_of(replace(rays_of([], 5_000), colour=everywhere))
 
 
 def test_a_ball_that_almost_fills_the_capture_sphere_is_not_background() -> None:

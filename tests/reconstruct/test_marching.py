@@ -17,7 +17,6 @@ from tbcad.reconstruct.marching import (
     LEAST_LIGHT,
     LEAST_OPACITY,
     MATT,
-    MOST_SAMPLES,
     Medium,
     Pixels,
     _mixed,
@@ -60,7 +59,9 @@ def slab(number: float, step: float) -> Medium:
     """Cells from z = -3 to 2, all the same."""
     grid = cube(21)
     grid = Grid(21, WIDTH, grid.place[(grid.points[:, 2] >= -3) & (grid.points[:, 2] <= 2)])
-    return Medium(WIDTH, step, grid.row, grid.leap, filled(grid, lambda at: np.full(len(at), number)))
+    return Medium(
+        WIDTH, step, grid.row, grid.leap, filled(grid, lambda at: np.full(len(at), number))
+    )
 
 
 @pytest.mark.parametrize("number", [0.02, 0.3, 0.9])
@@ -98,7 +99,10 @@ def test_a_ball_becomes_half_opaque_at_its_surface() -> None:
     assert found[:, 4] == pytest.approx(expected, abs=0.05)
     miss = np.cross(direction, [0.3, 0.5, 0.8])
     miss *= 6.4 / np.linalg.norm(miss, axis=1, keepdims=True)
-    beside = composited(*single(miss - 7 * direction, direction, np.full(300, 14)), medium_of(Field(grid, values), 0.1))
+    beside = composited(
+        *single(miss - 7 * direction, direction, np.full(300, 14)),
+        medium_of(Field(grid, values), 0.1),
+    )
     assert beside[:, 3].max() < 0.02
 
 
@@ -118,7 +122,7 @@ def test_leaps_pass_no_cell_that_has_all_corners(n: int, seed: int, columns: int
     made = sparse(n, seed, columns)
     step = 0.37
     medium = Medium(WIDTH, step, made.grid.row, made.grid.leap, made.values)
-    at, slot = np.empty((MOST_SAMPLES, 4), np.float32), np.empty((MOST_SAMPLES, 6), np.float32)
+    at, slot = np.empty((200, 4), np.float32), np.empty((200, 6), np.float32)
     for entry, direction in zip(*lines(10, seed), strict=True):
         length = -2 * entry @ direction
         found = march(*single(entry, direction), (0.0, length), 0.5, medium, at, slot)
