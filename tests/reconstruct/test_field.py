@@ -79,6 +79,12 @@ def huge_header() -> bytes:
         return buffer.getvalue()
 
 
+def single_array() -> bytes:
+    with io.BytesIO() as buffer:
+        np.save(buffer, np.zeros(3))
+        return buffer.getvalue()
+
+
 def bomb() -> bytes:
     """A member that says it unpacks to 5 GB."""
     content = bytearray(WHOLE)
@@ -92,7 +98,7 @@ V = len(PLACE)
 DAMAGED = {
     "empty": b"",
     "text": b"no archive at all",
-    "a single array": (lambda b: (np.save(b, np.zeros(3)), b.getvalue())[1])(io.BytesIO()),
+    "a single array": single_array(),
     "cut off": WHOLE[: len(WHOLE) // 2],
     "without its last byte": WHOLE[:-1],
     "another schema": archive(schema=np.array("tbcad-field/9")),
