@@ -21,6 +21,7 @@ from scipy import ndimage
 
 from tbcad.depth.view import depth_views
 from tbcad.optics.camera import Camera
+from tbcad.reconstruct.choice import chosen
 from tbcad.reconstruct.field import Field
 from tbcad.reconstruct.fit import Settings, fit
 from tbcad.reconstruct.picture import field_picture
@@ -43,7 +44,6 @@ VIEWS, FEW = 24, 4
 GOLDEN = np.pi * (3 - 5**0.5)  # angle between viewpoints, which then spread evenly
 BLUR_PX, NOISE = 0.45, 2  # standard deviations: of lens and diffraction, and of 255
 NEAR_PX = 12  # of the silhouette: farther away is background
-TRUTH_SAMPLES = 4
 METHODS = ("nearest", "depth", "field")
 
 
@@ -166,9 +166,11 @@ def viewpoints(count: int) -> list[Camera]:
 
 
 def fitted(source: LightField) -> tuple[Field, float]:
-    """A field with the settings that nobody chose for this object, and the processor seconds of its fit."""
+    """A field by weights that held-out mirrors choose, and the processor seconds of all of it."""
     start = time.process_time()
-    *_, last = fit(captured_rays(source), Settings())
+    rays = captured_rays(source)
+    settings, _ = chosen(rays, Settings(), (0, 1), lambda _: None)
+    *_, last = fit(rays, settings)
     return last.field(), time.process_time() - start
 
 
@@ -217,13 +219,13 @@ def line(name: str, results: dict[str, Result], seconds: float) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def rows(export: ExportedDesign, chosen: dict[str, Subject], views: int) -> Iterator[str]:
+def rows(export: ExportedDesign, wanted: dict[str, Subject], views: int) -> Iterator[str]:
     """The table, line by line."""
     cameras = viewpoints(views)
     with tempfile.TemporaryDirectory() as folder:
-        for name, subject in chosen.items():
+        for name, subject in wanted.items():
             scene = scene_of(subject, Path(folder))
-            truths = [to_bytes(pinhole_picture(scene, at, TRUTH_SAMPLES)) for at in cameras]
+            truths = [to_bytes(pinhole_picture(scene, at, 4)) for at in cameras]
             sharp = photographed(export, scene)
             for kind, source in ((name, sharp), (f"- {name}, blurred", blurred(sharp))):
                 made, seconds = fitted(source)
@@ -238,9 +240,9 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help=f"{FEW} viewpoints instead of {VIEWS}")
     options = parser.parse_args()
     every = subjects(options.meshes)
-    chosen = {name: every[name] for name in options.only or every}
+    wanted = {name: every[name] for name in options.only or every}
     print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}", flush=True)
-    for row in rows(read_export(options.export), chosen, FEW if options.quick else VIEWS):
+    for row in rows(read_export(options.export), wanted, FEW if options.quick else VIEWS):
         print(row, flush=True)
 
 

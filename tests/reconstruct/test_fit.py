@@ -11,22 +11,14 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.reconstruct import fit as fitting
 from tbcad.reconstruct.field import Field, field_bytes
-from tbcad.reconstruct.fit import Level, Settings, State, fit, medium_of, predicted
+from tbcad.reconstruct.fit import Level, Settings, State, fit, medium_of, squared_error
 from tbcad.reconstruct.marching import composited
 from tbcad.reconstruct.rays import CapturedRays
 from tests.ray_fields import RADIUS, Ball, rays_of
 
 BALL = Ball((1.0, 0.5, -0.5), 5.0, (0.8, 0.4, 0.2))
 TWO = [Ball((-4.0, 0, 0), 2.5, (0.9, 0.1, 0.1)), Ball((4.0, 1, 0), 3.0, (0.1, 0.2, 0.9))]
-# The weights are those of batches of 30,000 rays, for fewer: both count a step.
-FEWER = 400 / 30_000
-SMALL = Settings(
-    levels=(Level(14, 3), Level(28, 5)),
-    batch=400,
-    smooth_density=2e-4 * FEWER,
-    smooth_colour=2e-3 * FEWER,
-    sparse=3e-3 * FEWER,
-)
+SMALL = Settings(levels=(Level(14, 3), Level(28, 5)), batch=400)
 TINY = Settings(levels=(Level(8, 2), Level(12, 2)), batch=500)
 
 
@@ -71,12 +63,9 @@ def test_rays_that_are_left_out_are_predicted() -> None:
     rays = rays_of([BALL], 30_000)
     used = np.arange(30_000) % 10 > 0
     *_, last = fit(rays, SMALL, used)
-    with ThreadPoolExecutor(1) as pool:
-        found = predicted(rays, np.flatnonzero(~used), medium_of(last.field(), 0.6), pool)
-        assert predicted(rays, np.arange(0), medium_of(last.field(), 0.6), pool).shape == (0, 3)
-    error = ((found - rays.colour[~used]) ** 2).sum(axis=1)
-    assert error.mean() < 0.01
-    assert error.mean() < 3 * last.loss
+    error = squared_error(rays, ~used, last.field(), SMALL)
+    assert error < 0.005
+    assert np.isnan(squared_error(rays, np.zeros(30_000, bool), last.field(), SMALL))
 
 
 def test_photographs_of_nothing_are_refused() -> None:
