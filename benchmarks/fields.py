@@ -41,7 +41,7 @@ from tbcad.types import Bytes
 
 CAPTURE_MM, DISTANCE_MM, SIZE = 60.0, 640.0, (640, 480)
 VIEWS, FEW = 24, 4
-GOLDEN = np.pi * (3 - 5**0.5)  # angle between viewpoints, which then spread evenly
+GOLDEN = np.pi * (3 - 5**0.5)  # between viewpoints, which spread evenly
 BLUR_PX, NOISE = 0.45, 2  # standard deviations: of lens and diffraction, and of 255
 NEAR_PX = 12  # of the silhouette: farther away is background
 METHODS = ("nearest", "depth", "field")
