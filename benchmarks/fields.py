@@ -169,8 +169,7 @@ def fitted(source: LightField) -> tuple[Field, float]:
     """A field by weights that held-out mirrors choose, and the processor seconds of all of it."""
     start = time.process_time()
     rays = captured_rays(source)
-    settings, _ = chosen(rays, Settings(), (0, 1), lambda _: None)
-    *_, last = fit(rays, settings)
+    *_, last = fit(rays, chosen(rays, Settings(), (0, 1), lambda _: None)[0])
     return last.field(), time.process_time() - start
 
 
