@@ -42,6 +42,9 @@ def simulated(export: Path, folder: Path, rounds: int, subject: Path | None) -> 
 
     yield photographs(export, folder, rounds, subject)
     yield views(capture, rounds)
+    from reconstruction import reconstruction
+
+    yield reconstruction(export, capture, folder, rounds)
 
 
 def main() -> None:

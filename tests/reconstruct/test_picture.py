@@ -1,11 +1,14 @@
 """Pictures of a ball's field: depth, opacity and normals against closed forms."""
 
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tbcad.reconstruct.field import Field
+from tbcad.reconstruct.grid import Grid
 from tbcad.reconstruct.picture import (
     FieldPicture,
     field_normals,
@@ -77,3 +80,28 @@ def test_of_nothing_there_is_a_black_picture_without_depth() -> None:
     assert not picture.image.any()
     assert np.isnan(picture.depth(VIEW)).all()
     assert np.isnan(field_normals(nothing(), VIEW, picture)).all()
+
+
+def test_cameras_that_look_away_or_past_it_see_nothing() -> None:
+    backward = replace(VIEW, forward=-VIEW.forward)
+    aside = replace(VIEW, pinhole=VIEW.pinhole + 3 * WIDTH_MM * VIEW.right)
+    for view in (backward, aside):
+        picture = field_picture(ball(), view)
+        assert not picture.image.any()
+        assert not picture.opacity.any()
+        assert np.isnan(picture.distance).all()
+
+
+def test_a_ball_beside_the_middle_is_where_the_camera_projects_it() -> None:
+    made = ball(steep=40.0)
+    shift = np.array([3, -4, 5])  # nodes
+    grid = made.grid
+    lattice = np.full((grid.n,) * 3, made.values[:, 0].min(), np.float32)
+    lattice[tuple(grid.place.T)] = made.values[:, 0]
+    every = np.argwhere(np.ones_like(lattice, bool)).astype(np.uint16)
+    values = np.tile(made.values[0], (len(every), 1))
+    values[:, 0] = np.roll(lattice, shift, axis=(0, 1, 2)).ravel()
+    picture = field_picture(Field(Grid(grid.n, grid.width_mm, every), values), VIEW)
+    rows, columns = np.nonzero(picture.opacity > 0.5)
+    expected = VIEW.project(shift * PITCH)
+    assert [columns.mean(), rows.mean()] == pytest.approx(expected, abs=0.5)
