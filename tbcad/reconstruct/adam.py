@@ -90,9 +90,7 @@ def adam(
             gradient += columns.smooth[c] * rough
             if c == 0:
                 slope = (one + x / np.sqrt(x * x + SOFTNESS)) / np.float32(2)
-                gradient += (
-                    np.float32(sparse) * slope / (one + max(x + x, np.float32(0)))
-                )
+                gradient += np.float32(sparse) * slope / (one + max(x + x, np.float32(0)))
             mean = b1 * moments.mean[v, c] + (one - b1) * gradient
             square = b2 * moments.square[v, c] + (one - b2) * gradient * gradient
             moments.mean[v, c], moments.square[v, c] = mean, square

@@ -1,0 +1,266 @@
+"""A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from math import log10
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.reconstruct.beside import FACT, light_field_fingerprint
+from tbcad.reconstruct.checkpoint import (
+    Checkpoint,
+    read_checkpoint,
+    settings_of,
+    settings_record,
+    write_checkpoint,
+)
+from tbcad.reconstruct.field import Field
+from tbcad.reconstruct.fit import (
+    CENTRAL,
+    Level,
+    Settings,
+    State,
+    all_spans,
+    fit,
+    medium_of,
+    predicted,
+    workers,
+)
+from tbcad.reconstruct.hull import hull
+from tbcad.reconstruct.marching import Singles
+from tbcad.reconstruct.options import Options
+from tbcad.reconstruct.places import pixel_places
+from tbcad.reconstruct.rays import CapturedRays, captured_rays
+from tbcad.reconstruct.start import start
+from tbcad.reconstruct.uncertainty import with_weights
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.types import Bools, Ints, Progress
+from tbcad.version import __version__
+
+READING, CHOICE = "rays and hull", "choice by mirrors left out"
+LEFT_OUT = 0.02  # share of the mirrors that the fit does not see
+LEAST_MIRRORS = 10  # with fewer none is left out
+WHITE = 255
+COLOURS = 3
+LARGEST_DB = 99.0  # of colours that are equal
+
+
+@dataclass(frozen=True)
+class Told:
+    """Who is told of a reconstruction under way.
+
+    Attributes:
+        stage: of each stage, by its name.
+        detail: of each epoch.
+        field: likewise, with the field as it is.
+    """
+
+    stage: Progress
+    detail: Progress
+    field: Callable[[Field], None] = lambda _: None
+
+
+def asked_for(source: LightField, options: Options, last: Field | None = None) -> dict[str, Any]:
+    """All that a field follows from.
+
+    Args:
+        source: the light field.
+        options: how it is reconstructed.
+        last: the field that the fit starts from.
+    """
+    return {
+        "tbcad": __version__,
+        "options": asdict(options),
+        FACT: light_field_fingerprint(source),
+        "started_from": None if last is None else last.facts[FACT],
+    }
+
+
+def reconstruction(
+    source: LightField,
+    options: Options,
+    told: Told,
+    part: Path | None = None,
+    last: Field | None = None,
+) -> Field:
+    """Fit a field to the rays of a light field; its facts say how it was made.
+
+    Args:
+        source: the light field.
+        options: how.
+        told: of progress.
+        part: where the checkpoint is written after each epoch, and from which an interrupted fit
+            goes on; None: there is none.
+        last: field of the frame before, to start from.
+
+    Raises:
+        InputError: no ray shows anything, or the checkpoint is of another fit.
+    """
+    told.stage(READING)
+    asked = asked_for(source, options, last)
+    settings = _settings(source, options)
+    saved = None
+    if part is not None and part.exists():
+        saved = read_checkpoint(part, asked, settings.places)
+    rays = _rays(source, settings.places is not CENTRAL)
+    used = used_rays(rays, options.seed)
+    with workers() as pool:
+        inside = _hull(rays, pool)
+    if saved is None:
+        settings = _chosen(rays, settings, options, told, last)
+        state = start(inside, last, rays.capture_mm, settings)
+    else:
+        settings, state = saved.settings, saved.state
+    epochs = fit(rays, settings, used, state)
+    for reached in _followed(epochs, settings, state.level, told):
+        state = reached
+        if part is not None:
+            write_checkpoint(part, Checkpoint(asked, settings, state))
+    made = state.field()
+    return replace(made, facts=asked | _facts(source, rays, used, made, inside, settings))
+
+
+def level_name(level: Level) -> str:
+    """A grid as a stage."""
+    return f"grid of {level.nodes} nodes"
+
+
+def levels(options: Options) -> tuple[Level, ...]:
+    """The usual grids, in proportion to the finest that is asked for."""
+    usual = Settings().levels
+    finest = usual[-1]
+    return tuple(
+        Level(
+            round(one.nodes * options.nodes / finest.nodes),
+            max(round(one.epochs * options.epochs / finest.epochs), 1),
+        )
+        for one in usual
+    )
+
+
+def _settings(source: LightField, options: Options) -> Settings:
+    """As asked, before anything is chosen: exact rays are single ones, pixels have an area."""
+    blur = source.facts.get("blur_px", 0) if options.blur_px is None else options.blur_px
+    exact = source.facts.get("samples") == 1 and not blur
+    places = CENTRAL if exact else pixel_places(float(blur))
+    return Settings(
+        levels(options), order=int(options.order == "1"), places=places, seed=options.seed
+    )
+
+
+def _rays(source: LightField, footprint: bool) -> CapturedRays:
+    rays = captured_rays(source, footprint)
+    if not len(rays):
+        raise InputError(
+            "no ray of the light field meets the capture sphere: capture again, or merge a run "
+            "with more photographs"
+        )
+    return with_weights(rays, source)
+
+
+def _hull(rays: CapturedRays, pool: ThreadPoolExecutor) -> Bools:
+    dark = rays.dark_level()
+    inside = hull(rays, pool) if (rays.colour.max(axis=1) >= dark).any() else np.zeros(1, bool)
+    if not inside.any():
+        raise InputError(
+            f"the photographs show nothing brighter than {WHITE * dark:.0f} of {WHITE}, by which "
+            "the background is told: light the object, or expose longer"
+        )
+    return inside
+
+
+def used_rays(rays: CapturedRays, seed: int) -> Bools:
+    """Which rays (n,) the fit sees: those of some mirrors are left out, to judge it by."""
+    mirrors = np.unique(rays.mirror)
+    if len(mirrors) < LEAST_MIRRORS:
+        return np.ones(len(rays), dtype=bool)
+    count = max(round(LEFT_OUT * len(mirrors)), 1)
+    out = np.random.default_rng([seed, len(mirrors)]).choice(mirrors, count, replace=False)
+    return ~np.isin(rays.mirror, out)
+
+
+def _chosen(
+    rays: CapturedRays, settings: Settings, options: Options, told: Told, last: Field | None
+) -> Settings:
+    """Weights and order by mirrors left out; those of the first frame hold for all frames."""
+    if last is not None:
+        before = settings_of(last.facts["chosen"], settings.places)
+        return replace(before, levels=settings.levels, seed=settings.seed)
+    told.stage(CHOICE)
+    return settings
+
+
+def _followed(
+    states: Iterator[State], settings: Settings, level: int, told: Told
+) -> Iterator[State]:
+    """Each state, told of; the stages are the grids."""
+    told.stage(level_name(settings.levels[level]))
+    for state in states:
+        level = state.level
+        epochs = settings.levels[level].epochs
+        told.detail(f"epoch {state.epoch} of {epochs}, {decibels(state.loss / COLOURS):.1f} dB")
+        told.field(state.field())
+        yield state
+        if state.epoch == epochs and level + 1 < len(settings.levels):
+            told.stage(level_name(settings.levels[level + 1]))
+
+
+def _facts(
+    source: LightField,
+    rays: CapturedRays,
+    used: Bools,
+    made: Field,
+    inside: Bools,
+    settings: Settings,
+) -> dict[str, Any]:
+    with workers() as pool:
+        out = np.flatnonzero(~used)
+        error = np.square(_seen(rays, out, made, settings, pool) - rays.colour[out])
+        missed = _unexplained(rays, start(inside, None, rays.capture_mm, settings), pool)
+    return {
+        "object": source.facts.get("object"),
+        "chosen": settings_record(settings),
+        "rays": len(rays),
+        "rays_a_pixel": settings.places.shape[1],
+        "node_count": len(made.grid),
+        "unexplained_light": missed,
+        "mirrors_left_out": len(np.unique(rays.mirror[out])),
+        "psnr_left_out_db": decibels(float(error.mean())) if len(out) else None,
+    }
+
+
+def decibels(error: float) -> float:
+    """Peak signal-to-noise ratio of a mean squared error of colours from 0 to 1."""
+    return -10 * log10(error) if error > 0 else LARGEST_DB
+
+
+def _unexplained(rays: CapturedRays, first: State, pool: ThreadPoolExecutor) -> float:
+    """Share of the light brighter than the background on rays past the first grid."""
+    light = rays.colour.max(axis=1)
+    light[light < rays.dark_level()] = 0
+    past = all_spans(rays, first.grid, pool)[0] < 0
+    return float(light[past].sum(dtype=np.float64) / light.sum(dtype=np.float64))
+
+
+def _seen(
+    rays: CapturedRays, which: Ints, made: Field, settings: Settings, pool: ThreadPoolExecutor
+) -> Singles:
+    """Colours (k, 3) of some pixels (k,), each the mean of its rays."""
+    wide = len(rays.footprint) > 1
+    prints = rays.footprint[which] if wide else rays.footprint
+    medium, every = medium_of(made, settings.stride), np.arange(len(which))
+    found = []
+    for place in settings.places[0]:
+        moved = [np.einsum("kcx,c->kx", prints[:, two], place) for two in (slice(2), slice(2, 4))]
+        of_place = replace(
+            rays,
+            entry=rays.entry[which] + moved[0],
+            direction=rays.direction[which] + moved[1],
+            length=rays.length[which],
+        )
+        found.append(predicted(of_place, every, medium, pool))
+    return np.asarray(np.mean(found, axis=0))
