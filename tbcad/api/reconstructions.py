@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,6 +12,8 @@ from tbcad.api.arguments import silent
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
+    from trimesh import Trimesh
+
     from tbcad.reconstruct.field import Field
     from tbcad.reconstruct.options import Options
     from tbcad.simulate.capture.light_field import LightField
@@ -23,6 +25,10 @@ PREVIEW_DEG, PREVIEW_MM, PREVIEW_PX = (30.0, 30.0), 640.0, (480, 360)
 # each node of the finest cube.
 PIXEL_BYTES, NODE_BYTES = 300, 110
 EVERY: Literal["all"] = "all"
+SURFACE = "surface"
+# For the time left: of a pixel that is read, of a pixel and node by each epoch, and of the surface.
+READ_S, EPOCH_S, SURFACE_S, CHOICE_EPOCHS = 2e-6, 2e-8, 10.0, 6
+RAYS_OF_WIDE = 4
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,12 @@ class Wanted:
         """Where the surface of a frame is written, or that of the capture itself."""
         return [self._numbered(file, number) for file in self.meshes]
 
+    def part_file(self, number: int | None) -> Path:
+        """The checkpoint of that field."""
+        from tbcad.reconstruct.checkpoint import part_file
+
+        return part_file(self.field_file(number))
+
     def _numbered(self, file: Path, number: int | None) -> Path:
         return file.with_stem(f"{file.stem}-{number}") if self.frame == EVERY else file
 
@@ -82,7 +94,16 @@ class Reconstructed:
     file: Path
     field: Field
     kept: bool
-    meshes: dict[str, Any] = field(default_factory=dict)
+    meshes: dict[str, Any]
+
+    def record(self) -> dict[str, Any]:
+        """For other programs."""
+        return {
+            "file": str(self.file),
+            "kept": self.kept,
+            **self.field.facts,
+            "meshes": self.meshes,
+        }
 
 
 def reconstruct(
@@ -163,12 +184,12 @@ def _reconstructed(
     last: Field | None,
     how: tuple[Options, Progress, Progress],
 ) -> Reconstructed:
-    from tbcad.reconstruct.checkpoint import check_same, part_file
+    from tbcad.reconstruct.checkpoint import check_same
     from tbcad.reconstruct.field import read_field, write_field
     from tbcad.reconstruct.reconstruction import Told, asked_for, reconstruction
 
     options, stage, detail = how
-    file, part = wanted.field_file(number), part_file(wanted.field_file(number))
+    file, part = wanted.field_file(number), wanted.part_file(number)
     kept = wanted.resume and file.exists()
     if kept:
         made = read_field(file)
@@ -205,7 +226,6 @@ def checked_frames(wanted: Wanted) -> list[int | None]:
         InputError: as said.
     """
     from tbcad.output.single_files import check_file
-    from tbcad.reconstruct.checkpoint import part_file
     from tbcad.simulate.capture.sequence import NAME, frame_count
     from tbcad.simulate.image_files import check_image_path
 
@@ -223,17 +243,15 @@ def checked_frames(wanted: Wanted) -> list[int | None]:
         if file.absolute() in taken:
             raise InputError(f"{file} is named twice: choose another name")
         taken.add(file.absolute())
-    for part in (part_file(wanted.field_file(number)) for number in numbers):
+    for part in map(wanted.part_file, numbers):
         if part.exists() and not (wanted.resume or wanted.force):
             raise InputError(f"{part} exists: go on with --resume, or begin anew with --force")
     return numbers
 
 
-def _files(
-    wanted: Wanted, numbers: list[int | None]
-) -> list[tuple[Path, tuple[str, ...], bool]]:
+def _files(wanted: Wanted, numbers: list[int | None]) -> list[tuple[Path, tuple[str, ...], bool]]:
     """Each file to write, its suffixes, and whether it may exist."""
-    files = []
+    files: list[tuple[Path, tuple[str, ...], bool]] = []
     may_be = wanted.force or wanted.resume
     if wanted.preview is not None:
         files.append((wanted.preview, (".png",), may_be))
@@ -245,6 +263,41 @@ def _files(
     return files
 
 
+def expected_seconds(
+    wanted: Wanted, options: Options, numbers: list[int | None]
+) -> dict[str, float]:
+    """About how long each stage takes, by its title, on two cores."""
+    from tbcad.reconstruct.reconstruction import CHOICE, READING, level_name, levels
+    from tbcad.simulate.capture.light_field import LightField
+
+    with LightField.open(wanted.capture) as source:
+        count = pixels(source)
+    ray = 1 if source.facts.get("samples") == 1 else RAYS_OF_WIDE
+    of_fit = {
+        level_name(one): EPOCH_S * ray * count * one.nodes * one.epochs for one in levels(options)
+    }
+    of_frame = {
+        READING: READ_S * count,
+        CHOICE: CHOICE_EPOCHS * next(iter(of_fit.values())),
+        **of_fit,
+    }
+    if wanted.meshes:
+        of_frame[SURFACE] = SURFACE_S
+    if wanted.frame != EVERY:
+        return of_frame
+    return {
+        f"frame {number}: {stage}": seconds
+        for number in numbers
+        for stage, seconds in of_frame.items()
+        if number == 0 or stage not in (CHOICE, next(iter(of_fit)))
+    }
+
+
+def pixels(source: LightField) -> int:
+    """Number of all pixels of both photographs."""
+    return sum(frame.camera.width_px * frame.camera.height_px for frame in source.frames.values())
+
+
 def check_memory(source: LightField, options: Options) -> None:
     """Refuse what this computer has no memory for.
 
@@ -253,12 +306,12 @@ def check_memory(source: LightField, options: Options) -> None:
     """
     from tbcad.doctor import available_memory_gb
 
-    pixels = sum(frame.camera.width_px * frame.camera.height_px for frame in source.frames.values())
-    needed = (PIXEL_BYTES * pixels + NODE_BYTES * options.nodes**3) / 1e9
+    count = pixels(source)
+    needed = (PIXEL_BYTES * count + NODE_BYTES * options.nodes**3) / 1e9
     free = available_memory_gb()
     if free is not None and needed > free:
         raise InputError(
-            f"memory is short: {needed:.1f} GB are needed for {pixels} pixels and --nodes "
+            f"memory is short: {needed:.1f} GB are needed for {count} pixels and --nodes "
             f"{options.nodes}, {free:.1f} GB are free: end other programs, or take fewer nodes"
         )
 
@@ -270,4 +323,30 @@ def _meshes(
     files = [file for file in wanted.mesh_files(number) if wanted.force or not file.exists()]
     if not files:
         return {}
-    raise InputError("no meshes yet")
+    from tbcad.atomic_files import replace_files
+    from tbcad.reconstruct.mesh_files import mesh_file
+    from tbcad.reconstruct.surface import field_mesh
+
+    stage(SURFACE)
+    if (level := made.facts["surface_level"]) is None:
+        raise InputError(
+            f"{wanted.field_file(number)} is empty, without a surface: leave out --mesh"
+        )
+    surface = field_mesh(made, level, made.facts["resolved_mm"])
+    for file in files:
+        replace_files(file.parent, {file.name: mesh_file(surface, file.suffix)})
+    known = {"triangles": len(surface.faces), **_distances(surface, source, wanted, number)}
+    return {str(file): known for file in files}
+
+
+def _distances(
+    surface: Trimesh, source: LightField, wanted: Wanted, number: int | None
+) -> dict[str, float]:
+    """How far a surface is from the true one, if the capture has it as it stood."""
+    from tbcad.reconstruct.mesh_distance import mesh_distance
+    from tbcad.reconstruct.rays import captured_rays
+    from tbcad.simulate.capture.files import OBJECT, read_object
+
+    if number is not None or not (wanted.folder / OBJECT).is_file():
+        return {}
+    return asdict(mesh_distance(surface, read_object(wanted.folder), captured_rays(source)))

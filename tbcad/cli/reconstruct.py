@@ -1,7 +1,5 @@
 """The command that reconstructs an object from all rays of a light field."""
 
-import shlex
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -122,11 +120,11 @@ def reconstruct(
         with stages(expected_seconds(wanted, options, numbers)) as screen:
             done = reconstructed(wanted, options, screen.stage, screen.detail)
     except KeyboardInterrupt:
-        if not any(wanted.part_file(number).exists() for number in numbers):
+        parts = [str(part) for part in map(wanted.part_file, numbers) if part.exists()]
+        if not parts:
             raise
-        words = [*(word for word in sys.argv[1:] if word not in ("--resume", "--force"))]
-        again = shlex.join(["tbcad", *words, "--resume"])
-        typer.echo(f"tbcad: stopped; what is done is kept, go on with: {again}", err=True)
+        kept = f"{parts[0]} keeps what is done: go on with the same options and --resume"
+        typer.echo(f"tbcad: stopped; {kept}", err=True)
         raise typer.Exit(INTERRUPTED) from None
     record = {"schema": "tbcad-reconstruct/1", "fields": [one.record() for one in done]}
     print_result(record, (line for one in done for line in _lines(one)), json)
@@ -152,4 +150,10 @@ def _lines(one: "Reconstructed") -> Iterator[str]:
     word = "was there already" if one.kept else "written"
     yield f"{one.file}: {word}, {facts['node_count']} nodes on grids of {grids} along an edge"
     for file, known in one.meshes.items():
-        yield f"{file}: {known}"
+        yield f"{file}: {known['triangles']} triangles"
+        if "mean_mm" in known:
+            yield (
+                f"  from the true object: mean {known['mean_mm']:.3f} mm, 95 % within "
+                f"{known['percentile_95_mm']:.3f} mm, at most {known['hausdorff_mm']:.2f} mm, "
+                "where rays see it"
+            )

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
 STOPPING = ("SIGTERM", "SIGHUP")
 
 

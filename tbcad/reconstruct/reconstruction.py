@@ -36,6 +36,7 @@ from tbcad.reconstruct.options import Options
 from tbcad.reconstruct.places import pixel_places
 from tbcad.reconstruct.rays import CapturedRays, captured_rays
 from tbcad.reconstruct.start import start
+from tbcad.reconstruct.surface import best_level, resolved_mm
 from tbcad.reconstruct.uncertainty import with_weights
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.types import Bools, Ints, Progress
@@ -230,7 +231,17 @@ def _facts(
         "unexplained_light": missed,
         "mirrors_left_out": len(np.unique(rays.mirror[out])),
         "psnr_left_out_db": decibels(float(error.mean())) if len(out) else None,
+        "surface_level": _surface_level(made, rays, used),
+        "resolved_mm": resolved_mm(rays),
     }
+
+
+def _surface_level(made: Field, rays: CapturedRays, used: Bools) -> float | None:
+    """Density of the surface, 1/mm, by rays left out, or by all; None: there is no surface."""
+    try:
+        return best_level(made, rays, np.ones_like(used) if used.all() else ~used)
+    except InputError:
+        return None
 
 
 def decibels(error: float) -> float:
