@@ -17,10 +17,8 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.reconstruct.marching import Singles
 from tbcad.reconstruct.rays import CapturedRays
-from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tbcad.types import Floats
-
-FACT = "ray_sigma_mm"  # of a merged run: by camera, of each mirror, null where it is not known
 
 
 def with_weights(rays: CapturedRays, source: LightField) -> CapturedRays:
@@ -28,14 +26,16 @@ def with_weights(rays: CapturedRays, source: LightField) -> CapturedRays:
 
     Args:
         rays: with footprints.
-        source: their light field; without that fact all rays keep their weights.
+        source: their light field; without that fact all rays keep their weights. Mirrors of which
+            it says nothing count as the worst of the others.
 
     Raises:
         InputError: its fact does not fit its mirrors.
     """
-    if FACT not in source.facts or len(rays.footprint) != len(rays):
+    sigmas = _sigmas(source)
+    if np.isnan(sigmas).all() or len(rays.footprint) != len(rays):
         return rays
-    sigma = _sigmas(source)[rays.mirror]
+    sigma = np.where(np.isnan(sigmas), np.nanmax(sigmas), sigmas)[rays.mirror]
     width_squared = pixel_areas(rays)
     weight = width_squared / (width_squared + 6 * sigma**2)
     return replace(rays, weight=np.where(sigma == 0, 1, weight).astype(np.float32))
@@ -50,23 +50,20 @@ def pixel_areas(rays: CapturedRays) -> Singles:
 
 
 def _sigmas(source: LightField) -> Floats:
-    """Root mean square error of the rays of all mirrors at the object, mm, (m,).
-
-    Mirrors of which the calibration says nothing are as the worst of the others.
-    """
-    told = source.facts[FACT]
+    """Root mean square error of the rays of all mirrors at the object, mm, (m,); NaN: unknown."""
+    told = source.facts.get(RAY_SIGMAS, {})
     try:
         columns = [
-            np.array([np.nan if one is None else float(one) for one in told[name]])
-            for name in source.frames
+            np.array(told.get(name, [None] * len(frame.u)), dtype=np.float64)
+            for name, frame in source.frames.items()
         ]
         if [len(one) for one in columns] != [len(frame.u) for frame in source.frames.values()]:
             raise ValueError("another number of mirrors")
         sigma = np.concatenate(columns)
-        if (sigma < 0).any() or np.isinf(sigma).any() or np.isnan(sigma).all():
+        if (sigma < 0).any() or np.isinf(sigma).any():
             raise ValueError("numbers that cannot be")
-    except (KeyError, TypeError, ValueError) as fault:
+    except (AttributeError, TypeError, ValueError) as fault:
         raise InputError(
-            f"the light field's {FACT} does not fit its mirrors ({fault}): merge the run again"
+            f"the light field's {RAY_SIGMAS} does not fit its mirrors ({fault}): merge again"
         ) from None
-    return np.where(np.isnan(sigma), np.nanmax(sigma), sigma)
+    return sigma
