@@ -1,6 +1,6 @@
 """A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from math import log10
@@ -44,6 +44,7 @@ from tbcad.version import __version__
 
 READING, CHOICE = "rays and hull", "choice by mirrors left out"
 LEFT_OUT = 0.02  # share of the mirrors that the fit does not see
+LEAST_STEPS = 5  # in an epoch: with one or two of its largest steps a fit may lose everything
 LEAST_MIRRORS = 10  # with fewer none is left out
 WHITE = 255
 COLOURS = 3
@@ -109,6 +110,7 @@ def reconstruction(
         saved = read_checkpoint(part, asked, settings.places)
     rays = _rays(source, settings.places is not CENTRAL)
     used = used_rays(rays, options.seed)
+    settings = replace(settings, batch=min(settings.batch, -(-len(rays) // LEAST_STEPS)))
     with workers() as pool:
         inside = _hull(rays, pool)
     if saved is None:
@@ -116,12 +118,17 @@ def reconstruction(
         state = start(inside, last, rays.capture_mm, settings)
     else:
         settings, state = saved.settings, saved.state
-    epochs = fit(rays, settings, used, state)
-    for reached in _followed(epochs, settings, state.level, told):
+    told.stage(level_name(settings.levels[state.level]))
+    for reached in fit(rays, settings, used, state):
         state = reached
         if part is not None:
             write_checkpoint(part, Checkpoint(asked, settings, state))
+        _tell(state, settings, told)
     made = state.field()
+    if not len(made.grid):
+        raise InputError(
+            f"nothing is left of the object after --epochs {options.epochs}: take more of them"
+        )
     return replace(made, facts=asked | _facts(source, rays, used, made, inside, settings))
 
 
@@ -195,19 +202,13 @@ def _chosen(
     return settings
 
 
-def _followed(
-    states: Iterator[State], settings: Settings, level: int, told: Told
-) -> Iterator[State]:
-    """Each state, told of; the stages are the grids."""
-    told.stage(level_name(settings.levels[level]))
-    for state in states:
-        level = state.level
-        epochs = settings.levels[level].epochs
-        told.detail(f"epoch {state.epoch} of {epochs}, {decibels(state.loss / COLOURS):.1f} dB")
-        told.field(state.field())
-        yield state
-        if state.epoch == epochs and level + 1 < len(settings.levels):
-            told.stage(level_name(settings.levels[level + 1]))
+def _tell(state: State, settings: Settings, told: Told) -> None:
+    """Tell of an epoch that is done, and of the next grid if it was the last of this one."""
+    epochs = settings.levels[state.level].epochs
+    told.detail(f"epoch {state.epoch} of {epochs}, {decibels(state.loss / COLOURS):.1f} dB")
+    told.field(state.field())
+    if state.epoch == epochs and state.level + 1 < len(settings.levels):
+        told.stage(level_name(settings.levels[state.level + 1]))
 
 
 def _facts(
