@@ -14,6 +14,7 @@ number x between the nodes, 0 where a cell lacks a node.
 
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -23,6 +24,7 @@ import numpy as np
 
 from tbcad.atomic_files import replace_files
 from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.reconstruct.grid import Grid
 from tbcad.reconstruct.marching import GLOSSY, MATT, SOFTNESS, Singles
 from tbcad.types import Floats
@@ -32,6 +34,21 @@ SUFFIX = ".npz"
 NAME = "field.npz"  # beside a light field, which it then shows
 MOST_NODES = 1024  # along an edge
 MOST_BYTES = 4 << 30
+MOST_NUMBER = 1e6
+UNREADABLE = (
+    ArithmeticError,
+    AttributeError,
+    EOFError,
+    KeyError,
+    MemoryError,
+    NotImplementedError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True)
@@ -102,7 +119,7 @@ def read_field(path: Path) -> Field:
                 raise ValueError("it unpacks to more than 4 GB")
         with np.load(path, allow_pickle=False) as store:
             return _checked({name: store[name] for name in store.files})
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
+    except UNREADABLE as fault:
         raise InputError(
             f"{path} is no field that tbcad wrote ({fault}): write it again with "
             "`tbcad reconstruct`"
@@ -113,7 +130,7 @@ def _checked(arrays: dict[str, Any]) -> Field:
     if str(arrays["schema"]) != SCHEMA:
         raise ValueError(f"its schema is not {SCHEMA}")
     n, width, place = int(arrays["nodes"]), float(arrays["capture_mm"]), arrays["node"]
-    if not 2 <= n <= MOST_NODES or not 0 < width < np.inf:
+    if arrays["nodes"].dtype.kind not in "iu" or not 2 <= n <= MOST_NODES or not 0 < width < np.inf:
         raise ValueError("its lattice cannot be")
     v = len(place)
     columns = [arrays["density"].reshape(v, 1), arrays["colour"].reshape(v, 3)]
@@ -125,8 +142,9 @@ def _checked(arrays: dict[str, Any]) -> Field:
     order = (place.astype(np.int64) * [n * n, n, 1]).sum(axis=1)
     if (np.diff(order) <= 0).any():
         raise ValueError("its nodes are not in ascending order")
-    if values.dtype != np.float32 or not np.isfinite(values).all():
-        raise ValueError("its numbers are not finite, or of another kind")
-    return Field(
-        Grid(n, width, place), np.ascontiguousarray(values), json.loads(str(arrays["facts"]))
-    )
+    if values.dtype != np.float32 or not (np.abs(values) < MOST_NUMBER).all():
+        raise ValueError("its numbers are too large, or of another kind")
+    facts = parse_json(str(arrays["facts"]))
+    if not isinstance(facts, dict):
+        raise ValueError("its facts are no object")
+    return Field(Grid(n, width, place), np.ascontiguousarray(values), facts)

@@ -76,6 +76,12 @@ class Settings:
     places: Singles = field(default_factory=lambda: CENTRAL)
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        """Refuse rays of a pixel that are no two halves."""
+        rays = self.places.shape[1]
+        if rays > 1 and rays % 2:
+            raise ValueError(f"{rays} rays a pixel: give 1 or an even number")
+
 
 @dataclass
 class State:
@@ -112,7 +118,7 @@ def workers() -> ThreadPoolExecutor:
 def fit(
     rays: CapturedRays, settings: Settings, used: Bools | None = None, state: State | None = None
 ) -> Iterator[State]:
-    """Fit a field; each epoch's state is given before the next.
+    """Fit a field; each epoch's state is given before the next, which changes it.
 
     Args:
         rays: what was captured.
@@ -148,7 +154,8 @@ def finer(state: State, settings: Settings) -> State:
     known = grid.sampled(coarse.dense(np.ones(len(coarse), dtype=np.float32)))
     columns = [grid.sampled(coarse.dense(values[:, 0], UNKNOWN * NUMBERS[0]))]
     columns += [
-        grid.sampled(coarse.dense(column)) / np.maximum(known, 0.05) for column in values[:, 1:].T
+        grid.sampled(coarse.dense(column)) / np.maximum(known, np.float32(0.05))
+        for column in values[:, 1:].T
     ]
     return _begun(state.level + 1, grid, np.stack(columns, axis=1).astype(np.float32))
 
@@ -175,6 +182,7 @@ def _epochs(
     epochs = settings.levels[state.level].epochs
     count = len(ray) // settings.batch + 1
     parts = np.zeros((PARTS, *state.values.shape), dtype=np.float32)
+    add_gradient(ray[:0], pixels, 0, medium_of(state.field(), settings.stride), parts[0])  # compile
     while state.epoch < epochs:
         random = np.random.default_rng([settings.seed, state.level, state.epoch])
         batches = np.array_split(random.permutation(ray), count)
@@ -196,6 +204,7 @@ def all_spans(rays: CapturedRays, grid: Grid, pool: ThreadPoolExecutor) -> tuple
         here = slice(at, at + size)
         return spans(rays.entry[here], rays.direction[here], rays.length[here], leap, grid.width_mm)
 
+    spans(rays.entry[:0], rays.direction[:0], rays.length[:0], leap, grid.width_mm)  # compile
     found = list(pool.map(part, range(0, len(rays), size)))
     first, last = (np.concatenate(one) for one in zip(*found, strict=True))
     return first, last
@@ -227,6 +236,8 @@ def _step(
             columns, settings.sparse,
         )  # fmt: skip
 
+    if state.step == 1:
+        part(slice(0, 0))  # compiled before any thread
     list(pool.map(part, chunks(count, max(-(-count // PARTS), 1))))
     state.values = changed
 
@@ -268,4 +279,4 @@ def predicted(rays: CapturedRays, which: Ints, medium: Medium, pool: ThreadPoolE
         here = which[at : at + size]
         return composited(rays.entry[here], rays.direction[here], rays.length[here], medium)[:, :3]
 
-    return np.concatenate(list(pool.map(part, range(0, len(which), size))))
+    return np.concatenate([part(len(which)), *pool.map(part, range(0, len(which), size))])

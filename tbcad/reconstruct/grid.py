@@ -65,7 +65,7 @@ class Grid:
         if not whole.any():
             return np.full(whole.shape, LONGEST_LEAP, dtype=np.uint8)
         away = ndimage.distance_transform_cdt(~whole, "chessboard")
-        return np.minimum(away, LONGEST_LEAP).astype(np.uint8)
+        return np.asarray(np.minimum(away, LONGEST_LEAP), dtype=np.uint8)
 
     @cached_property
     def neighbours(self) -> NDArray[np.int32]:
@@ -77,7 +77,7 @@ class Grid:
     @property
     def points(self) -> Floats:
         """Places of the nodes, mm, (v, 3)."""
-        return self.place * self.pitch_mm - self.width_mm / 2
+        return np.asarray(self.place * self.pitch_mm - self.width_mm / 2, dtype=np.float64)
 
     def dense(self, values: NDArray[np.float32], missing: float = 0.0) -> NDArray[np.float32]:
         """Values of the nodes (v,) on the whole lattice, (n, n, n)."""
@@ -88,7 +88,7 @@ class Grid:
     def sampled(self, lattice: NDArray[np.float32]) -> NDArray[np.float32]:
         """A lattice (k, k, k) over the same cube at the nodes, linearly, (v,)."""
         at = self.place.T * ((len(lattice) - 1) / (self.n - 1))
-        return np.asarray(ndimage.map_coordinates(lattice, at, order=1))
+        return np.asarray(ndimage.map_coordinates(lattice, at, order=1, mode="nearest"))
 
 
 def resampled(lattice: NDArray[np.float32], n: int) -> NDArray[np.float32]:

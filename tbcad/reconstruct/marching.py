@@ -11,7 +11,7 @@ The gradient is what differentiation of these sums gives, sample by sample from 
 Nothing here depends on threads: each call has its own samples and its own sums.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from tbcad.compiled import compiled_sum
 
 Singles = NDArray[np.float32]
 
-MOST_SAMPLES = 1024  # of a ray, that hold something
 SOFTNESS = np.float32(1e-2)  # q above, 1/mm^2
 LEAST_OPACITY = np.float32(2e-4)  # of a sample, less is nothing
 LEAST_LIGHT = np.float32(2e-3)  # that is let through, less is not followed
@@ -75,7 +74,7 @@ class Pixels(NamedTuple):
 def spans(
     entry: Singles, direction: Singles, length: Singles, leap: NDArray[np.uint8], width: float
 ) -> tuple[Singles, Singles]:
-    """Where rays meet cells with all corners first and last, mm from where they enter; -1: never.
+    """Where rays come near cells with all corners first and last, mm from their entry; -1: never.
 
     Args:
         entry: where rays enter the capture sphere, mm, (n, 3).
@@ -97,7 +96,7 @@ def spans(
             away = leap[
                 min(max(x, 0), cells - 1), min(max(y, 0), cells - 1), min(max(z, 0), cells - 1)
             ]
-            if away == 0:
+            if away <= 1:
                 if first[i] < 0:
                     first[i] = t
                 last[i] = t + np.float32(0.5) / scale
@@ -106,7 +105,7 @@ def spans(
 
 
 @compiled_sum
-def _turned(values: Singles, row: int, colour: int, direction: Singles) -> float:
+def _turned(values: Singles, row: int, colour: int, direction: Singles) -> Any:
     """A colour of a node in a direction, of a field of first order."""
     first = 1 + 3 * colour
     sloped = values[row, first] * direction[0] + values[row, first + 1] * direction[1]
@@ -118,11 +117,11 @@ def march(
     entry: Singles,
     direction: Singles,
     span: tuple[float, float],
-    jitter: float,
+    jitter: Any,
     medium: Medium,
     at: Singles,
     slot: Singles,
-) -> tuple[int, float, float, float, float]:
+) -> tuple[int, Any, Any, Any, Any]:
     """Follow one ray; the samples that hold something are left in `at` and `slot`.
 
     Args:
@@ -144,7 +143,7 @@ def march(
     through, red, green, blue = one, zero, zero, zero
     count = 0
     t, last, stride = np.float32(span[0] + jitter * step), np.float32(span[1]), np.float32(step)
-    while t <= last and count < MOST_SAMPLES:
+    while t <= last and count < len(at):
         x = (entry[0] + direction[0] * t + half) * scale
         y = (entry[1] + direction[1] * t + half) * scale
         z = (entry[2] + direction[2] * t + half) * scale
@@ -192,6 +191,12 @@ def march(
 
 
 @compiled_sum
+def _most_samples(medium: Medium) -> int:
+    """Samples on the longest way through the cube."""
+    return int(2 * medium.width / medium.step) + 2
+
+
+@compiled_sum
 def composited(
     entry: Singles,
     direction: Singles,
@@ -206,8 +211,9 @@ def composited(
         These five, (n, 5); NaN for the place on rays that are less than half opaque.
     """
     result = np.zeros((len(entry), 5), dtype=np.float32)
-    at = np.empty((MOST_SAMPLES, 4), dtype=np.float32)
-    slot = np.empty((MOST_SAMPLES, 6), dtype=np.float32)
+    most = _most_samples(medium)
+    at = np.empty((most, 4), dtype=np.float32)
+    slot = np.empty((most, 6), dtype=np.float32)
     first, last = spans(entry, direction, length, medium.leap, medium.width)
     for i in range(len(entry)):
         result[i, 4] = np.nan
@@ -324,8 +330,9 @@ def add_gradient(
     """
     entry, direction, first, last, colour, weight, footprint, places = pixels
     kinds, k = places.shape[0], places.shape[1]
-    at = np.empty((k, MOST_SAMPLES, 4), dtype=np.float32)
-    slot = np.empty((k, MOST_SAMPLES, 6), dtype=np.float32)
+    most = _most_samples(medium)
+    at = np.empty((k, most, 4), dtype=np.float32)
+    slot = np.empty((k, most, 6), dtype=np.float32)
     toward, begin = np.empty((k, 3), dtype=np.float32), np.empty(3, dtype=np.float32)
     count, light = np.empty(k, dtype=np.int64), np.empty((k, 3), dtype=np.float32)
     off = np.empty((2, 3), dtype=np.float32)
@@ -365,7 +372,7 @@ def add_gradient(
 
 
 @compiled_sum
-def _mixed(number: int, seed: int) -> np.uint32:
+def _mixed(number: Any, seed: int) -> np.uint32:
     """A number of 32 bits that looks random (C. Wellons, lowbias32, 2018; with a seed)."""
     x = np.uint32(np.uint32(number) ^ np.uint32(np.uint32(seed) * np.uint32(0x9E3779B9)))
     x = np.uint32((x ^ (x >> np.uint32(16))) * np.uint32(0x7FEB352D))

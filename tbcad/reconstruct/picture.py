@@ -63,6 +63,7 @@ def field_picture(made: Field, view: Camera, stride: float = STRIDE) -> FieldPic
 
 def _in_threads(entry: Singles, direction: Singles, length: Singles, medium: Medium) -> Singles:
     parts = chunks(len(length), RAYS_PER_CHUNK)
+    composited(entry[:0], direction[:0], length[:0], medium)  # compiled before any thread
     with ThreadPoolExecutor(THREADS) as pool:
         found = pool.map(lambda at: composited(entry[at], direction[at], length[at], medium), parts)
         return np.concatenate([np.zeros((0, 5), dtype=np.float32), *found])

@@ -1,17 +1,20 @@
 """The rays of a light field that meet the capture sphere, as the fit takes them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.errors import InputError
 from tbcad.simulate.capture.light_field import Frame, LightField
 from tbcad.types import Bools, Ints
 
 Singles = NDArray[np.float32]
 
 LEAST_CHORD_MM = 0.03
-GRAZING = 0.1  # share of the rays, with the shortest way through the capture sphere
+GRAZING = 0.01  # share of the rays, with the shortest way through the capture sphere
+LOWEST, SIGMAS_BETWEEN = 0.05, 0.97  # a quantile, and from there to the quartile if normal
 DARKEST = 0.02  # of white: less is called dark whatever the noise
 NOISE = 4.0  # times the standard deviation is brighter than the background's noise
 
@@ -48,14 +51,13 @@ class CapturedRays:
     def dark_level(self) -> float:
         """Brightness, 0 to 1, below which a ray sees the background.
 
-        Rays that graze the capture sphere see it, but for few: their median and four times the
-        standard deviation that their median deviation stands for.
+        Few of the rays that graze the capture sphere see anything else: their lower quartile, and
+        four times the standard deviation that the spread below it stands for.
         """
         count = max(int(GRAZING * len(self)), 1)
         grazing = self.colour[np.argpartition(self.length, count - 1)[:count]].max(axis=1)
-        middle = np.median(grazing)
-        sigma = 1.4826 * np.median(np.abs(grazing - middle))
-        return float(max(middle + NOISE * sigma, DARKEST))
+        low, quarter = np.quantile(grazing, (LOWEST, 0.25))
+        return float(max(quarter + NOISE * (quarter - low) / SIGMAS_BETWEEN, DARKEST))
 
 
 def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
@@ -64,16 +66,22 @@ def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
     Args:
         source: the light field.
         footprint: whether a pixel is more than its central ray.
+
+    Raises:
+        InputError: no ray meets the capture sphere.
     """
-    before = 0
-    parts = []
+    before, parts = 0, []
     for frame in source.frames.values():
         parts.append(_of_frame(frame, before, source.capture_mm / 2, footprint))
         before += len(frame.u)
-    joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
-    prints = joined.pop() if footprint else np.zeros((1, 4, 3), dtype=np.float32)
-    weight = np.ones(len(joined[0]), dtype=np.float32)
-    return CapturedRays(*joined, weight, prints, source.capture_mm)
+    entry, direction, length, colour, mirror, *prints = (
+        np.concatenate(columns) for columns in zip(*parts, strict=True)
+    )
+    if not len(length):
+        raise InputError("no ray of the light field meets its capture sphere: capture again")
+    wide = prints[0] if prints else np.zeros((1, 4, 3), dtype=np.float32)
+    weight = np.ones(len(length), dtype=np.float32)
+    return CapturedRays(entry, direction, length, colour, mirror, weight, wide, source.capture_mm)
 
 
 def entries(
@@ -83,13 +91,12 @@ def entries(
     o, d = origin.astype(np.float64), direction.astype(np.float64)
     middle = -np.einsum("...x,...x->...", o, d)
     half = np.sqrt(np.maximum(middle**2 - np.einsum("...x,...x->...", o, o) + radius**2, 0))
-    entry = o + (middle - half)[..., None] * d
-    return entry.astype(np.float32), (2 * half).astype(np.float32)
+    start = np.maximum(middle - half, 0)  # what lies behind the origin is not seen
+    entry = o + start[..., None] * d
+    return entry.astype(np.float32), np.maximum(middle + half - start, 0).astype(np.float32)
 
 
-def _of_frame(
-    frame: Frame, before: int, radius: float, footprint: bool
-) -> list[NDArray[np.generic]]:
+def _of_frame(frame: Frame, before: int, radius: float, footprint: bool) -> list[NDArray[Any]]:
     planes = frame.read(slice(None))
     mirror, direction = planes["mirror"], planes["direction"]
     entry, length = entries(planes["origin"], direction, radius)
@@ -122,12 +129,10 @@ def _steps(values: Singles, mirror: NDArray[np.uint16], axis: int) -> Singles:
     for sums, counts in zip(_neighbours(total, axis), _neighbours(number, axis), strict=True):
         np.add(sums, np.where(same[..., None], ahead, 0), out=sums)
         np.add(counts, same, out=counts)
-    return total / np.maximum(number, 1)[..., None].astype(np.float32)
+    return np.asarray(total / np.maximum(number, 1)[..., None], dtype=np.float32)
 
 
-def _neighbours(
-    values: NDArray[np.generic], axis: int
-) -> tuple[NDArray[np.generic], NDArray[np.generic]]:
+def _neighbours(values: NDArray[Any], axis: int) -> tuple[NDArray[Any], NDArray[Any]]:
     """All but the last, and all but the first, along an axis."""
     front, back = [slice(None)] * values.ndim, [slice(None)] * values.ndim
     front[axis], back[axis] = slice(None, -1), slice(1, None)
