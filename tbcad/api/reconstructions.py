@@ -240,9 +240,9 @@ def checked_frames(wanted: Wanted) -> list[int | None]:
     for file, suffixes, may_be in _files(wanted, numbers):
         check_image_path(file, True, suffixes)
         check_file(file, may_be, inputs)
-        if file.absolute() in taken:
+        if (place := file.parent.resolve() / file.name) in taken:
             raise InputError(f"{file} is named twice: choose another name")
-        taken.add(file.absolute())
+        taken.add(place)
     for part in map(wanted.part_file, numbers):
         if part.exists() and not (wanted.resume or wanted.force):
             raise InputError(f"{part} exists: go on with --resume, or begin anew with --force")

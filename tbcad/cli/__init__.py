@@ -36,7 +36,7 @@ from tbcad.cli import view as _view  # noqa: F401 - adds its command
 from tbcad.cli.app import app
 from tbcad.cli.examples import add_examples
 from tbcad.cli.help_order import order_help
-from tbcad.cli.stopping import INTERRUPTED, signals_as_interrupt
+from tbcad.cli.stopping import INTERRUPTED, Stopped, signals_as_interrupt
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.own_process import own_process
@@ -72,6 +72,9 @@ def _run(arguments: list[str]) -> int:
         text = str(error) if isinstance(error, InputError) else usage_error_text(error)
         sys.stderr.write(f"tbcad: {text}\n")
         return 2
+    except Stopped as stop:
+        sys.stderr.write(f"tbcad: stopped; {stop}\n")
+        return INTERRUPTED
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:  # as typer returns it, too

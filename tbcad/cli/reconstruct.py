@@ -10,7 +10,7 @@ from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_capture
 from tbcad.cli.options import ForceFile, JsonResult
 from tbcad.cli.output_mode import print_result
-from tbcad.cli.stopping import INTERRUPTED
+from tbcad.cli.stopping import Stopped
 from tbcad.errors import InputError
 from tbcad.screen import stages
 
@@ -124,8 +124,7 @@ def reconstruct(
         if not parts:
             raise
         kept = f"{parts[0]} keeps what is done: go on with the same options and --resume"
-        typer.echo(f"tbcad: stopped; {kept}", err=True)
-        raise typer.Exit(INTERRUPTED) from None
+        raise Stopped(kept) from None
     record = {"schema": "tbcad-reconstruct/1", "fields": [one.record() for one in done]}
     print_result(record, (line for one in done for line in _lines(one)), json)
     return 0

@@ -9,6 +9,10 @@ INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard o
 STOPPING = ("SIGTERM", "SIGHUP")
 
 
+class Stopped(Exception):
+    """A command was stopped and has kept something; its text says what, and how to go on."""
+
+
 @contextmanager
 def signals_as_interrupt() -> Iterator[None]:
     """Let a kill or a closed terminal raise KeyboardInterrupt during the block.

@@ -13,8 +13,8 @@ from tbcad.errors import InputError
 from tbcad.reconstruct.checkpoint import part_file
 from tbcad.reconstruct.field import read_field
 from tbcad.reconstruct.options import EPOCHS, NODES, Options
-from tbcad.reconstruct.reconstruction import levels, used_rays
 from tbcad.reconstruct.rays import captured_rays
+from tbcad.reconstruct.reconstruction import levels, used_rays
 from tbcad.simulate.capture.light_field import LightField
 from tests.ball_captures import RADIUS_MM, ball, four  # noqa: F401 - fixtures
 
