@@ -1,4 +1,4 @@
-"""Views of a light field."""
+"""Views of a light field or a field."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 from tbcad.api.arguments import silent
+from tbcad.errors import InputError
 
 if TYPE_CHECKING:
     from tbcad.depth.view import DepthViews
+    from tbcad.optics.camera import Camera
+    from tbcad.reconstruct.field import Field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import Method, SynthesisedView
@@ -16,29 +19,32 @@ if TYPE_CHECKING:
 
 
 class Views:
-    """Many views of one light field: what they share is made once, when it is first needed.
+    """Many views of one light field or field: what they share is made once, when first needed.
 
     >>> views = tbcad.Views(light_field)
     >>> pictures = [views.view(azimuth, 30).image for azimuth in range(0, 360, 4)]
     """
 
     def __init__(
-        self, light_field: LightField, *, quick: bool = False, progress: Progress = silent
+        self, source: LightField | Field, *, quick: bool = False, progress: Progress = silent
     ) -> None:
         """Read nothing yet.
 
         Args:
-            light_field: in memory, or in a file that stays open.
-            quick: look for the depth on fewer planes and at fewer points: a sixth of the time.
+            source: a light field, in memory or in a file that stays open; or a field.
+            quick: look for the depth of a light field on fewer planes and at fewer points: a sixth
+                of the time.
             progress: called with the state of what is made once.
         """
-        self._light_field, self._quick, self._progress = light_field, quick, progress
+        self._source, self._quick, self._progress = source, quick, progress
 
     @cached_property
     def _tiles(self) -> MirrorTiles:
+        from tbcad.reconstruct.field import Field
         from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
-        return MirrorTiles(self._light_field)
+        assert not isinstance(self._source, Field)
+        return MirrorTiles(self._source)
 
     @cached_property
     def _depths(self) -> DepthViews:
@@ -54,51 +60,72 @@ class Views:
         *,
         distance_mm: float = 640.0,
         size: tuple[int, int] = (640, 480),
-        method: Method | Literal["depth"] = "depth",
+        method: Method | Literal["depth"] | None = None,
     ) -> SynthesisedView:
         """One of them, as `tbcad.view`.
 
         Raises:
             InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the
-                object.
+                object; a method is named for a field.
         """
         from math import radians
 
+        from tbcad.reconstruct.field import Field
         from tbcad.simulate.scene.viewpoint import camera_around_object
+
+        source, angles = self._source, (radians(azimuth_deg), radians(elevation_deg))
+        capture_mm = source.grid.width_mm if isinstance(source, Field) else source.capture_mm
+        camera = camera_around_object(*angles, distance_mm, capture_mm, size)
+        if not isinstance(source, Field):
+            return self._of_light_field(camera, method or "depth")
+        if method is not None:
+            raise InputError(f"method {method!r} is for a light field: leave it out for a field")
+        return _of_field(source, camera)
+
+    def _of_light_field(self, camera: Camera, method: Method | Literal["depth"]) -> SynthesisedView:
         from tbcad.simulate.views.synthesis import synthesise
 
-        angles = radians(azimuth_deg), radians(elevation_deg)
-        capture_mm = self._light_field.capture_mm
-        camera = camera_around_object(*angles, distance_mm, capture_mm, size)
         if method == "depth":
             return self._depths.of(camera)[0]
         return synthesise(self._tiles, camera, method)
 
 
+def _of_field(made: Field, camera: Camera) -> SynthesisedView:
+    import numpy as np
+
+    from tbcad.reconstruct.picture import field_picture
+    from tbcad.simulate.views.synthesis import SynthesisedView
+
+    image = field_picture(made, camera).image
+    return SynthesisedView(image.astype(np.float32), np.ones(image.shape[:2], dtype=np.bool_))
+
+
 def view(
-    light_field: LightField,
+    source: LightField | Field,
     azimuth_deg: float = 0.0,
     elevation_deg: float = 30.0,
     *,
     distance_mm: float = 640.0,
     size: tuple[int, int] = (640, 480),
-    method: Method | Literal["depth"] = "depth",
+    method: Method | Literal["depth"] | None = None,
 ) -> SynthesisedView:
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
     Args:
-        light_field: in memory, or in an open file.
+        source: a light field, in memory or in an open file; or the field of `tbcad.reconstruct`,
+            the best where there is one.
         azimuth_deg: of the camera about z, from x.
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.
         size: columns and rows of the picture.
-        method: "nearest" rays, the quickest; "blend" on a plane; or a blend at the "depth" that
-            the light field itself shows, the best, for which the pictures of all virtual cameras
-            are made first. `Views` keeps them for further views.
+        method: of a light field: "nearest" rays, the quickest; "blend" on a plane; or a blend at
+            the "depth" that the light field itself shows, the best and the default, for which the
+            pictures of all virtual cameras are made first. `Views` keeps them for further views.
 
     Raises:
-        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object.
+        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object; a
+            method is named for a field.
     """
-    return Views(light_field).view(
+    return Views(source).view(
         azimuth_deg, elevation_deg, distance_mm=distance_mm, size=size, method=method
     )

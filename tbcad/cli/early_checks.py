@@ -10,6 +10,7 @@ from tbcad.errors import InputError
 
 DESIGN_FILE = "design.json"
 LIGHT_FIELD_FILE = "lightfield.h5"
+FIELD_FILE = "field.npz"
 RUN_FILE = "run.json"
 MACHINE_FILE = "machine.json"
 CALIBRATION_FILE = "calibration.json"

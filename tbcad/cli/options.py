@@ -107,12 +107,16 @@ METHODS = (
     "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "
     "virtual cameras that see the same point"
 )
-MethodOption = Annotated[Literal["nearest", "blend"], typer.Option(help=f"{METHODS}.")]
+MethodOfStudy = Annotated[
+    Literal["nearest", "blend", "field"],
+    typer.Option(help=f"{METHODS}; field: a coarse field that is fitted to all rays in seconds."),
+]
 MethodOfView = Annotated[
-    Literal["nearest", "blend", "depth"] | None,
+    Literal["nearest", "blend", "depth", "field"] | None,
     typer.Option(
-        help=f"{METHODS}; depth, the default: a blend at the depth that the light field itself "
-        "shows."
+        help=f"{METHODS}; depth: a blend at the depth that the light field itself shows; field: "
+        "the field of tbcad reconstruct. By default field where field.npz is in the capture's "
+        "folder, else depth."
     ),
 ]
 Scheduler = Annotated[

@@ -1,12 +1,13 @@
 """The command that shows an export or a light field in the browser."""
 
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import DESIGN_FILE, LIGHT_FIELD_FILE
+from tbcad.cli.early_checks import DESIGN_FILE, FIELD_FILE, LIGHT_FIELD_FILE
 from tbcad.cli.options import (
     Azimuth,
     Distance,
@@ -22,8 +23,12 @@ from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tbcad.reconstruct.field import Field
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.viewer.query import Query
-    from tbcad.viewer.render import MethodAtRest
+    from tbcad.viewer.render import MethodAtRest, ViewRenderer
     from tbcad.viewer.server import ViewServer
 
 REPORT_FILE = "report.html"
@@ -35,7 +40,9 @@ def show(
     folder: Annotated[
         Path,
         typer.Argument(
-            metavar="FOLDER", help="Folder written by tbcad build, or by tbcad capture or merge."
+            metavar="FOLDER",
+            help="Folder written by tbcad build, or by tbcad capture or merge; or the file of "
+            "tbcad reconstruct.",
         ),
     ],
     azimuth: Azimuth = 0.0,
@@ -47,7 +54,7 @@ def show(
         Path | None,
         typer.Option(
             help="Write a page that turns the object, to send to somebody, instead of showing the "
-            "light field: an HTML file of at most 6 MB, which opens from disk.",
+            "light field or field: an HTML file of at most 6 MB, which opens from disk.",
         ),
     ] = None,
     frames: Annotated[
@@ -76,11 +83,11 @@ def show(
     force: ForceFile = False,
     json: JsonResult = False,
 ) -> int:
-    """Show an export or a light field in the browser.
+    """Show an export, a light field or a field in the browser.
 
-    Of an export, opens report.html. Of a light field, opens a page on which dragging moves the
-    viewpoint and the wheel changes the distance; sliders set aperture and focus. tbcad makes the
-    views and answers this computer alone; it goes on until Ctrl-C.
+    Of an export, opens report.html. Of a light field or a field, opens a page on which dragging
+    moves the viewpoint and the wheel changes the distance; of a light field sliders set aperture
+    and focus. tbcad makes the views and answers this computer alone; it goes on until Ctrl-C.
     """
     file = folder / LIGHT_FIELD_FILE if folder.is_dir() else folder
     if not file.is_file():
@@ -91,8 +98,57 @@ def show(
 
     start = Query(azimuth, elevation, distance, width=width, height=height)
     if turntable is not None:
-        return _write_turntable(file, turntable, start, (frames, rows), method, force, json)
-    return _show_light_field(file, start, method, http_port, open_page, json)
+        from tbcad.viewer.turntable import check_turntable_path
+
+        check_turntable_path(turntable, force)
+    from tbcad.viewer.render import capture_mm
+
+    with _shown(file, method) as shown:
+        start.check(capture_mm(shown.pictured))
+        if turntable is not None:
+            return _write_turntable(shown, turntable, start, (frames, rows), json)
+        return _show_views(shown, start, http_port, open_page, json)
+
+
+class _Shown(NamedTuple):
+    """What is shown.
+
+    Attributes:
+        file: of the light field, or of a field without one.
+        pictured: what views are made from.
+        tiles: the light field; None: there is a field alone.
+        method: of views of a light field.
+    """
+
+    file: Path
+    pictured: "MirrorTiles | Field"
+    tiles: "MirrorTiles | None"
+    method: "MethodAtRest" = "depth"
+
+    @property
+    def how(self) -> str:
+        """The method of all views."""
+        return self.method if self.pictured is self.tiles else "field"
+
+
+@contextmanager
+def _shown(file: Path, method: "MethodAtRest | Literal['field'] | None") -> "Iterator[_Shown]":
+    """A light field, with the field that is asked for or beside it; or a field."""
+    from tbcad.reconstruct.beside import wanted_field
+    from tbcad.reconstruct.field import SUFFIX, read_field
+    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.views.mirror_tiles import MirrorTiles
+
+    if file.suffix.lower() == SUFFIX:
+        if method not in (None, "field"):
+            raise InputError(f"--method {method} is for a light field: leave it out for {file}")
+        yield _Shown(file, read_field(file), None)
+        return
+    with LightField.open(file) as source:
+        tiles = MirrorTiles(source)
+        made = wanted_field(method, file, source)
+        how: MethodAtRest = "depth" if method is None or method == "field" else method
+        yield _Shown(file, made or tiles, tiles, how)
 
 
 def _show_report(folder: Path, open_page: bool, json: bool) -> int:
@@ -119,31 +175,28 @@ def _show_report(folder: Path, open_page: bool, json: bool) -> int:
     return 0
 
 
-def _show_light_field(
-    file: Path,
-    start: "Query",
-    method: "MethodAtRest | None",
-    port: int,
-    open_page: bool,
-    json: bool,
-) -> int:
-    from tbcad.simulate.capture.light_field import LightField
-    from tbcad.viewer.render import Renderer
+def _show_views(shown: _Shown, start: "Query", port: int, open_page: bool, json: bool) -> int:
     from tbcad.viewer.server import ViewServer
 
-    with LightField.open(file) as source:
-        start.check(source.capture_mm)
-        with stages(1) as screen:
-            screen.stage("pictures of the virtual cameras")
-            renderer = Renderer(source, method or "depth", screen.detail)
-        with ViewServer(renderer, _title(file), start, port) as server:
-            if json:
-                print_json({"address": server.address})
-            else:
-                typer.echo(f"{server.address} shows {file}; Ctrl-C ends it")
-            if open_page:
-                _open(server.address)
-            return _serve(server)
+    with ViewServer(_renderer(shown), _title(shown.file), start, port) as server:
+        if json:
+            print_json({"address": server.address})
+        else:
+            typer.echo(f"{server.address} shows {shown.file} by method {shown.how}; Ctrl-C ends it")
+        if open_page:
+            _open(server.address)
+        return _serve(server)
+
+
+def _renderer(shown: _Shown) -> "ViewRenderer":
+    from tbcad.reconstruct.field import Field
+    from tbcad.viewer.render import FieldRenderer, Renderer
+
+    if isinstance(shown.pictured, Field):
+        return FieldRenderer(shown.pictured, shown.tiles)
+    with stages(1) as screen:
+        screen.stage("pictures of the virtual cameras")
+        return Renderer(shown.pictured.source, shown.method, screen.detail)
 
 
 def _serve(server: "ViewServer") -> int:
@@ -156,41 +209,21 @@ def _serve(server: "ViewServer") -> int:
 
 
 def _write_turntable(
-    file: Path,
-    out: Path,
-    start: "Query",
-    views: tuple[int, int],
-    method: "MethodAtRest | None",
-    force: bool,
-    json: bool,
+    shown: _Shown, out: Path, start: "Query", views: tuple[int, int], json: bool
 ) -> int:
-    from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.viewer.turntable import (
-        Turntable,
-        check_turntable_path,
-        even_elevations,
-        write_turntable,
-    )
+    from tbcad.viewer.turntable import Turntable, even_elevations, write_turntable
 
-    check_turntable_path(out, force)
-    with stages(1) as screen, LightField.open(file) as source:
-        start.check(source.capture_mm)
-        tiles = MirrorTiles(source)
-        columns, rows = views
-        table = Turntable(
-            columns,
-            even_elevations(rows, start.elevation),
-            start.distance,
-            (start.width, start.height),
-            method or "depth",
-        )
+    columns, rows = views
+    elevations = even_elevations(rows, start.elevation)
+    size_px = start.width, start.height
+    table = Turntable(columns, elevations, start.distance, size_px, shown.method)
+    with stages(1) as screen:
         screen.stage("turntable")
-        size = write_turntable(out, tiles, table, _title(file), screen.detail)
+        size = write_turntable(out, shown.pictured, table, _title(shown.file), screen.detail)
     if json:
         print_json({"turntable": str(out), "bytes": size, "views": columns * rows})
     else:
-        typer.echo(f"{out}: {columns * rows} views, {size / 1e6:.1f} MB")
+        typer.echo(f"{out}: {columns * rows} views by method {shown.how}, {size / 1e6:.1f} MB")
     return 0
 
 
@@ -202,6 +235,6 @@ def _open(address: str) -> None:
 
 
 def _title(file: Path) -> str:
-    """The name of the capture's folder, or of a light field that lies alone."""
+    """The name of the capture's folder, or of a light field or field that lies alone."""
     file = file.resolve()
-    return file.parent.name if file.name == LIGHT_FIELD_FILE else file.stem
+    return file.parent.name if file.name in (LIGHT_FIELD_FILE, FIELD_FILE) else file.stem

@@ -10,7 +10,7 @@ from tbcad.cli.app import app
 from tbcad.cli.early_checks import check_is_object
 from tbcad.cli.options import (
     Distance,
-    MethodOption,
+    MethodOfStudy,
     ObjectFile,
     PaintOption,
     Scheduler,
@@ -22,6 +22,7 @@ from tbcad.cli.study_command import Work, of_design, of_export
 if TYPE_CHECKING:
     from tbcad.simulate.scene.object import SceneObject
     from tbcad.simulate.study.pixels import Sensor
+    from tbcad.simulate.study.viewpoints import StudyMethod
     from tbcad.spec.design import Spec
 
 study = typer.Typer(
@@ -120,7 +121,7 @@ def ssim_command(
     unit: UnitOption = None,
     paint: PaintOption = "own",
     sensors: Sensors = None,
-    method: MethodOption = "nearest",
+    method: MethodOfStudy = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
 ) -> Work:
@@ -132,7 +133,7 @@ def ssim_command(
     simulated = _sensors(sensors, spec)
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     subject = _subject(object_file, spec.optics.capture_diameter_mm, paint, up, unit)
-    return partial(ssim, spec, subject, simulated, places, method)
+    return partial(ssim, spec, subject, simulated, places, _by(method))
 
 
 @study.command("balance")
@@ -143,7 +144,7 @@ def balance_command(
         list[int] | None,
         typer.Option("--n", help="Subdivision; repeatable. By default eight from 6 to 33."),
     ] = None,
-    method: MethodOption = "nearest",
+    method: MethodOfStudy = "nearest",
     views: Annotated[
         int, typer.Option(help="Number of viewpoints, evenly over the hemisphere.")
     ] = 12,
@@ -153,7 +154,7 @@ def balance_command(
     from tbcad.simulate.study.balance import balance, parse_subdivisions
 
     wanted = parse_subdivisions(ns)
-    return partial(balance, spec, wanted, views, distance, method)
+    return partial(balance, spec, wanted, views, distance, _by(method))
 
 
 @study.command("prototype")
@@ -164,7 +165,7 @@ def prototype_command(
     up: UpOption = None,
     unit: UnitOption = None,
     paint: PaintOption = "own",
-    method: MethodOption = "nearest",
+    method: MethodOfStudy = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
     samples: Annotated[
@@ -180,7 +181,7 @@ def prototype_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = _subject(object_file, export.capture_mm, paint, up, unit)
-    return partial(prototype_vs_shell, export, subject, places, method, samples)
+    return partial(prototype_vs_shell, export, subject, places, _by(method), samples)
 
 
 @study.command("low-pass")
@@ -238,6 +239,14 @@ def calibration_command(folder: Path) -> Work:
 
     export = read_export(folder)
     return partial(calibration_study, export)
+
+
+def _by(method: MethodOfStudy) -> "StudyMethod":
+    if method != "field":
+        return method
+    from tbcad.reconstruct.quick import BY_FIELD
+
+    return BY_FIELD
 
 
 def _subject(

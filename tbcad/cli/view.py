@@ -9,7 +9,6 @@ import typer
 from tbcad.cli.app import app
 from tbcad.cli.compared_pictures import (
     check_pictures,
-    compared_files,
     has_object,
     scene_of,
     true_picture,
@@ -29,6 +28,7 @@ from tbcad.cli.options import (
     OutPicture,
     Width,
 )
+from tbcad.cli.view_files import ViewFiles, field_view, write_depth
 from tbcad.errors import InputError
 from tbcad.screen import stages
 
@@ -57,6 +57,9 @@ class _Choice(NamedTuple):
     reason: str
 
 
+BY_DEFAULT = _Choice("field", None, "its file is in the capture's folder")
+
+
 @app.command()
 def view(
     capture_folder: Capture,
@@ -81,6 +84,16 @@ def view(
             help="Also write the depth that is found: as PNG of 16 bits, or as points (PLY); "
             "repeatable.",
         ),
+    ] = None,
+    normals_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--normals", metavar="FILE", help="Of a field: also write the surface's normals (PNG)."
+        ),
+    ] = None,
+    opacity_file: Annotated[
+        Path | None,
+        typer.Option("--opacity", metavar="FILE", help="Of a field: also write the opacity (PNG)."),
     ] = None,
     light: Annotated[
         Path | None,
@@ -117,18 +130,18 @@ def view(
     PSNR and SSIM.
     """
     check_is_capture(capture_folder)
-    choice, files = _choice(method, surface), depth_files or []
+    files = ViewFiles(tuple(depth_files or ()), normals_file, opacity_file)
+    by_default = method is None and surface is None and light is None
+    choice = _choice("field" if by_default and files.of_field else method, surface)
+    from tbcad.reconstruct.beside import wanted_field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
     check_pictures(capture_folder, out, force, light)
-    _check_depth(files, out, choice, force, (capture_folder, light))
+    files.check(out, choice.method, force, (capture_folder, light))
+    _check_light(light, light_turn, light_format, choice)
     if frame is not None and (light is not None or surface == "object"):
         raise InputError("--frame has its own light and place: leave out --light and --surface")
-    if light is None and light_turn:
-        raise InputError(f"--light-turn {light_turn:g} turns no light: add --light")
-    if light is None and light_format is not None:
-        raise InputError(f"--light-format {light_format} is of no light: add --light")
     if choice.surface == "object" and not has_object(capture_folder):
         raise InputError(f"{capture_folder} has no object: leave out --surface object")
     wanted = None if light is None else _environment(light, light_turn, light_format)
@@ -139,11 +152,14 @@ def view(
         scene, tiles = scene_of(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)
+        asked = None if by_default and not files.of_field else choice.method
+        made = wanted_field(asked, capture_folder, source, frame)
+        choice = BY_DEFAULT if made is not None and asked is None else choice
         screen.stage("view")
-        if choice.surface == "depth":
-            picture = _depth_view(tiles, shown, at, files, screen.detail)
+        if made is not None:
+            picture = field_view(made, at, files)
         else:
-            picture = _view(shown, at, choice, scene)
+            picture = _view((tiles, shown), at, choice, scene, files, screen.detail)
         screen.stage("truth")
         truth, same_lamps = None, None
         if scene is not None and relit is not None and wanted is not None:
@@ -159,8 +175,7 @@ def view(
         ssim = _ssim(same_lamps, picture)
         if not isnan(ssim):
             typer.echo(f"SSIM {ssim:.4f} against one lit by the same lamps")
-    for file in files:
-        typer.echo(f"{file}: depth")
+    files.tell()
     return 0
 
 
@@ -216,21 +231,32 @@ def _ssim(truth: "Bytes", picture: "Bytes") -> float:
     return image_quality(truth, picture).ssim
 
 
+def _check_light(
+    light: Path | None, turn: float, kind: LightFormat | None, choice: _Choice
+) -> None:
+    if light is None and turn:
+        raise InputError(f"--light-turn {turn:g} turns no light: add --light")
+    if light is None and kind is not None:
+        raise InputError(f"--light-format {kind} is of no light: add --light")
+    if light is not None and choice.method == "field":
+        raise InputError(f"--light {light}: a field has its own light: leave out --method field")
+
+
 def _choice(method: str | None, surface: Surface | None) -> _Choice:
-    """What is wanted: a blend at the depth that is found, if nothing else is said.
+    """What is wanted: a blend at the depth that is found, if nothing is said and found.
 
     Raises:
         InputError: method and surface exclude each other.
     """
-    if method == "nearest" and surface is not None:
-        raise InputError(f"--method nearest asks for no surface: leave out --surface {surface}")
+    if method in ("nearest", "field") and surface is not None:
+        raise InputError(f"--method {method} asks for no surface: leave out --surface {surface}")
     if method == "depth" and surface not in (None, "depth"):
         raise InputError(
             f"--method depth finds the surface itself: leave out --surface {surface}, or choose "
             "--method blend"
         )
-    if method == "nearest":
-        return _Choice("nearest", None, "as --method says")
+    if method in ("nearest", "field"):
+        return _Choice(method, None, "as --method says")
     if surface in ("plane", "object"):
         reason = f"--surface {surface} is for a blend" if method is None else "as --method says"
         return _Choice("blend", surface, reason)
@@ -238,46 +264,35 @@ def _choice(method: str | None, surface: Surface | None) -> _Choice:
     return _Choice("depth", "depth", reason)
 
 
-def _check_depth(
-    files: list[Path], out: Path, choice: _Choice, force: bool, inputs: tuple[Path | None, ...]
-) -> None:
-    from tbcad.output.single_files import check_file
-    from tbcad.simulate.image_files import check_image_path
+def _view(
+    fields: tuple["MirrorTiles", "MirrorTiles"],
+    at: "Camera",
+    choice: _Choice,
+    scene: "Scene | None",
+    files: ViewFiles,
+    progress: "Progress",
+) -> "Bytes":
+    """The picture by nearest rays or blended, and files of the depth that is found for it.
 
-    if choice.surface != "depth" and files:
-        raise InputError(f"--depth {files[0]}: no depth is looked for: add --method depth")
-    for k, file in enumerate(files):
-        check_image_path(file, force, (".png", ".ply"))
-        check_file(file, force, inputs)
-        if file in (out, *compared_files(out), *files[:k]):
-            raise InputError(f"--depth {file}: another file of this command: choose another name")
-
-
-def _view(tiles: "MirrorTiles", at: "Camera", choice: _Choice, scene: "Scene | None") -> "Bytes":
-    """The picture by nearest rays, or blended on the plane or on the object."""
+    Args:
+        fields: the light field, and the one of the same rays whose colours are shown.
+        at: the viewpoint.
+        choice: how.
+        scene: the object.
+        files: of the depth.
+        progress: called with what the depth needs first.
+    """
+    from tbcad.depth.view import depth_views
     from tbcad.simulate.scene.ray_casting import depth_along_rays
     from tbcad.simulate.views.synthesis import synthesise
 
+    tiles, shown = fields
     if choice.method == "nearest":
-        return synthesise(tiles, at).image
+        return synthesise(shown, at).image
+    if choice.surface == "depth":
+        picture, found = depth_views(tiles, progress=progress).of(at, shown)
+        write_depth(files.depth, found.png, lambda: found.ply(picture.image))
+        return picture.image
     on_object = scene is not None and choice.surface == "object"
     depth = depth_along_rays(scene) if scene is not None and on_object else None
-    return synthesise(tiles, at, "blend", depth).image
-
-
-def _depth_view(
-    tiles: "MirrorTiles",
-    shown: "MirrorTiles",
-    at: "Camera",
-    files: list[Path],
-    progress: "Progress",
-) -> "Bytes":
-    """The picture at the depth that is found, in the colours that are shown; and files of it."""
-    from tbcad.atomic_files import replace_files
-    from tbcad.depth.view import depth_views
-
-    picture, depth = depth_views(tiles, progress=progress).of(at, shown)
-    for file in files:
-        content = depth.ply(picture.image) if file.suffix.lower() == ".ply" else depth.png()
-        replace_files(file.parent, {file.name: content})
-    return picture.image
+    return synthesise(shown, at, "blend", depth).image

@@ -1,10 +1,8 @@
 """The depth of a view as a surface: for a blend, as points, and as files."""
 
 from dataclasses import dataclass, replace
-from io import BytesIO
 
 import numpy as np
-import trimesh
 from PIL import Image
 
 from tbcad.compiled import compiled_loop
@@ -12,13 +10,12 @@ from tbcad.datasets.pinhole_pictures import PinholePictures
 from tbcad.depth.plane_sweep import FINE, Sweep, swept_depth
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.scene.depth_files import depth_ply, depth_png, depth_points
 from tbcad.types import Bytes, Floats
 
 # A plane that is less different than a middling one, by colour, is no surface but empty or even.
 MIN_CONFIDENCE = 3.0
 BLACK = 8  # of 255: no brighter is the background, which is matt black
-FRONT = 65535  # the number of the capture sphere's front in a PNG of 16 bits; 0 is unknown
 
 
 @dataclass(frozen=True)
@@ -44,36 +41,27 @@ class DepthMap:
         away = plane + np.nan_to_num(self.depth)
         return _along(away, self.view.axes, self.view.pixel_pitch, np.ascontiguousarray(direction))
 
+    def known(self) -> Floats:
+        """Depth (h, w), NaN where no plane stands out as well."""
+        return np.where(self.confidence > MIN_CONFIDENCE, self.depth, np.nan)
+
     def points(self) -> Floats:
         """Points (h, w, 3) of the surface, mm; NaN where it is not known."""
-        along = view_directions(self.view)
-        along /= (along @ self.view.forward)[..., None]
-        plane = -float(self.view.pinhole @ self.view.forward)
-        points = self.view.pinhole + (plane + self.depth)[..., None] * along
-        return np.where((self.confidence > MIN_CONFIDENCE)[..., None], points, np.nan)
+        return depth_points(self.view, self.known())
 
     def png(self) -> bytes:
         """The depth as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
-        share = 0.5 - self.depth / self.capture_mm
-        number = np.rint(1 + (FRONT - 1) * np.clip(share, 0, 1))
-        number = np.where(self.confidence > MIN_CONFIDENCE, number, 0)
-        with BytesIO() as buffer:
-            Image.fromarray(number.astype(np.uint16)).save(buffer, "PNG")
-            return buffer.getvalue()
+        return depth_png(self.known(), self.capture_mm)
 
     def ply(self, image: Bytes) -> bytes:
         """The points that are known as PLY, with the colours of a picture of the view (h, w, 3).
 
         What is black there is left out: the background, whose depth nothing shows.
         """
-        points = self.points().reshape(-1, 3)
         size = self.view.width_px, self.view.height_px
-        smaller = Image.fromarray(image).resize(size, Image.Resampling.BOX)
-        colours = np.asarray(smaller).reshape(-1, 3)
-        kept = np.isfinite(points).all(axis=1) & (colours.max(axis=1) > BLACK)
-        cloud = trimesh.PointCloud(points[kept], colors=colours[kept])
-        content = cloud.export(file_type="ply")
-        return content if isinstance(content, bytes) else content.encode("ascii")
+        smaller = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
+        bright = smaller.max(axis=2) > BLACK
+        return depth_ply(self.view, np.where(bright, self.known(), np.nan), smaller)
 
 
 @compiled_loop

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.optimize.views import mean_ssim
+from tbcad.optimize.views import ViewsBy, mean_ssim
 from tbcad.simulate.study.pixels import Sensor, count_pixels
 from tbcad.simulate.study.sweep import spec_with
 from tbcad.spec.design import FIT, Spec
@@ -125,7 +125,9 @@ def placed(spec: Spec, place: Place) -> Spec:
     return Spec.model_validate(moved.model_dump(by_alias=True))
 
 
-def evaluate(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+def evaluate(
+    spec: Spec, ssim_within: Limits | None, place: Place, method: ViewsBy = "nearest"
+) -> Candidate:
     """Design the mirrors of a place, and count pixels.
 
     Args:
@@ -133,12 +135,13 @@ def evaluate(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
         ssim_within: limits within which views are compared, too, since it takes longest; None:
             nowhere.
         place: what is varied.
+        method: of the views that are compared.
     """
     try:
         designed = design(placed(spec, place))
         figures = figures_of(designed)
         if ssim_within and ssim_within.excess(figures) == 0:
-            figures = replace(figures, ssim=mean_ssim(designed))
+            figures = replace(figures, ssim=mean_ssim(designed, method))
         return Candidate(place, figures)
     except ValidationError as error:
         return Candidate(place, None, error.errors()[0]["msg"])

@@ -24,6 +24,7 @@ from tbcad.optimize.candidate import (
     rounded,
 )
 from tbcad.optimize.store import read_store, store_bytes
+from tbcad.optimize.views import ViewsBy
 from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
@@ -61,6 +62,7 @@ class Search:
         max_size_mm: longest side of the machine; None: of the first design's.
         max_view_angle_deg: of the lens; None: what the first design needs.
         front: whether places are searched, too, where one of several objectives counts most.
+        method: of the views that are compared, where SSIM is an objective.
     """
 
     spec: Spec
@@ -69,6 +71,7 @@ class Search:
     max_size_mm: float | None = None
     max_view_angle_deg: float | None = None
     front: bool = False
+    method: ViewsBy = "nearest"
 
     def limits(self, start: Figures) -> Limits:
         """What candidates must keep, by the figures of the first design."""
@@ -79,6 +82,8 @@ class Search:
     def key(self) -> str:
         """What judgements depend on: those of another design are of no use."""
         text = json.dumps(spec_dict(self.spec), sort_keys=True)
+        if self.method != "nearest":
+            text += self.method
         return sha256(text.encode()).hexdigest()
 
 
@@ -235,7 +240,9 @@ def _judge(
     """Candidates at places, of which only those are worked out that the store does not have."""
     wanted = limits if "ssim" in asked.objectives else None
     new = [p for p in dict.fromkeys(places) if _is_open(asked.objectives, limits, judged.get(p))]
-    for one in run_units(partial(evaluate, asked.spec, wanted), new, scheduler):
+    for one in run_units(
+        partial(evaluate, asked.spec, wanted, method=asked.method), new, scheduler
+    ):
         judged[one.place] = one
     if store and new:
         replace_files(store.parent, {store.name: store_bytes(asked.key(), judged)})

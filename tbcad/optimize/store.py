@@ -38,7 +38,9 @@ def read_store(store: Path, key: str) -> dict[Place, Candidate]:
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
     if not known:
-        raise InputError(f"{store}: of another design: name another --out, or remove the file")
+        raise InputError(
+            f"{store}: of another design or method: name another --out, or remove the file"
+        )
     return {one.place: one for one in found}
 
 

@@ -1,27 +1,35 @@
 """How like the truth the views of a design are: the aim `ssim`, without any file or CAD kernel.
 
 Viewpoints, object and method are those of `tbcad study ssim` as it is called without options, so
-that both give the same figure.
+that both give the same figure; by a field, of the study with `--method field`.
 """
 
 from dataclasses import dataclass
 from functools import cache
 from threading import Lock
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
+from tbcad.reconstruct.quick import BY_FIELD
 from tbcad.simulate.capture.traced_frame import traced_light_field
 from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, ground_truths, viewpoints_around
+from tbcad.simulate.study.viewpoints import (
+    ELEVATIONS_DEG,
+    ground_truths,
+    viewpoints_around,
+    views_by,
+)
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
 from tbcad.types import Bytes
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
+
+ViewsBy: TypeAlias = Literal["nearest", "field"]
 
 _one_at_a_time = Lock()  # candidates that begin together share the truth
 
@@ -41,15 +49,19 @@ class Truth:
     pictures: list[Bytes]
 
 
-def mean_ssim(design: MirrorDesign) -> float:
-    """Mean SSIM of views by nearest rays, over the frame, from the stated viewpoints."""
+def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:
+    """Mean SSIM of views over the frame, from the stated viewpoints.
+
+    Args:
+        design: the mirrors.
+        method: views by the nearest rays, or by a coarse field that is fitted to all rays.
+    """
     with _one_at_a_time:
         truth = _truth(design.spec.optics.capture_diameter_mm)
     tiles = MirrorTiles(traced_light_field(design, truth.scene))
+    picture_of = views_by(BY_FIELD if method == "field" else method, tiles, truth.scene)
     views = zip(truth.cameras, truth.pictures, strict=True)
-    return float(
-        np.mean([image_quality(real, synthesise(tiles, at).image).ssim for at, real in views])
-    )
+    return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
 
 
 @cache

@@ -1,13 +1,16 @@
 """The field beside a light field: its file, and whether it is of that light field."""
 
 import json
+import warnings
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tbcad.errors import InputError
+from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.reconstruct.field import NAME, Field, read_field
+from tbcad.simulate.capture.light_field import NAME as LIGHT_FIELD
 from tbcad.simulate.capture.light_field import SCHEMA, Frame, LightField
 
 FACT = "light_field"  # of a field: the fingerprint of what it was fitted to
@@ -26,7 +29,7 @@ def light_field_fingerprint(source: LightField) -> str:
     return digest.hexdigest()
 
 
-def _content(frame: Frame) -> list[np.ndarray]:  # type: ignore[type-arg]
+def _content(frame: Frame) -> list[NDArray[np.generic]]:
     camera, mirrors = frame.camera, frame.mirrors
     rows = [np.asarray(frame.planes[name][::ROWS_APART]) for name in ("origin", "direction")]
     place = np.stack([camera.pinhole, camera.forward, camera.right])
@@ -53,3 +56,32 @@ def field_of(file: Path, source: LightField) -> Field:
     if made.facts[FACT] != light_field_fingerprint(source):
         raise InputError(f"{file} is of another capture, or of an older one: {again}")
     return made
+
+
+def wanted_field(
+    method: str | None, capture: Path, source: LightField, frame: int | None = None
+) -> Field | None:
+    """The field that views are made from; None: the light field itself.
+
+    Args:
+        method: "field", None for the default, or another one.
+        capture: folder of the capture, or its light field's file.
+        source: the light field, or a frame of it.
+        frame: its number; None: there is one only.
+
+    By default a field that lies beside the light field; one that is of no use is told in a warning.
+
+    Raises:
+        InputError: as `field_of`, when a field is asked for.
+    """
+    file = field_file(capture if capture.is_dir() else capture.parent, frame)
+    if method == "field":
+        return field_of(file, source)
+    beside = capture.is_dir() or capture.name == LIGHT_FIELD
+    if method is not None or not beside or not file.is_file():
+        return None
+    try:
+        return field_of(file, source)
+    except InputError as fault:
+        warnings.warn(PlausibilityWarning(f"{fault}; it is not used here"), stacklevel=2)
+        return None

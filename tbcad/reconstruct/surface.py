@@ -36,6 +36,7 @@ MOST_TRIED = 100_000  # held rays
 OFF_NODES = 2e-3  # of the number: points so near to a node would be points of no distance
 SEEN_FROM = 2  # directions at least: one ray may slip through between two nodes
 SMOOTHED = 1.0  # nodes, the boundary of what is not seen
+RIM = 0.1  # nodes from the capture sphere, where everything ends
 STEEP = 10.0  # number across it, for each node or so
 SPECK_NODES = 3.0  # smallest body that is kept, when no capture says it
 OUTSIDE, INSIDE = 1.5, 3.0  # of a point, where its colour's rays begin and end, nodes
@@ -136,11 +137,15 @@ def _empty(made: Field, level: float) -> InputError:
 
 
 def _lattice(made: Field) -> tuple[Singles, float]:
-    """Numbers of the nodes, with a border of nothing, and its first corner along each axis, mm."""
-    nothing = NUMBERS[0]
-    dense = made.grid.dense(made.values[:, 0], nothing)
-    corner = -made.grid.width_mm / 2 - made.grid.pitch_mm
-    return np.pad(dense, 1, constant_values=nothing), corner
+    """Numbers of the nodes, with a border of nothing, and its first corner along each axis, mm.
+
+    They fall toward the capture sphere, past which no ray tells anything.
+    """
+    grid, nothing = made.grid, NUMBERS[0]
+    inside = (grid.width_mm / 2 - norm(grid.points)) / grid.pitch_mm - RIM
+    number = np.minimum(made.values[:, 0], STEEP * inside)
+    dense = grid.dense(np.maximum(number, nothing).astype(np.float32), nothing)
+    return np.pad(dense, 1, constant_values=nothing), -grid.width_mm / 2 - grid.pitch_mm
 
 
 def _contour(
@@ -229,7 +234,7 @@ def _bodies(points: Singles, faces: Ints, least: float) -> tuple[Singles, Ints]:
     np.maximum.at(high, label, points)
     kept = ((volume > 0) & (norm(high - low) >= least))[label]
     number = np.cumsum(kept) - 1
-    return points[kept], number[faces[kept[faces[:, 0]]]]
+    return np.asarray(points[kept]), number[faces[kept[faces[:, 0]]]]
 
 
 def _colours(made: Field, mesh: trimesh.Trimesh) -> Bytes:

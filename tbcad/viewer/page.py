@@ -7,19 +7,22 @@ from tbcad.viewer.query import Query, limits
 from tbcad.web_page import BEGIN, web_page
 
 
-def viewer_page(title: str, start: Query, capture_mm: float, method: str) -> str:
+def viewer_page(
+    title: str, start: Query, capture_mm: float, method: str, *, lens: bool = True
+) -> str:
     """The page that asks a server for views.
 
     Args:
-        title: name of the light field.
+        title: name of the light field, or of a field without one.
         start: the first view.
         capture_mm: diameter of the capture sphere.
         method: of views that do not move.
+        lens: whether there are views by a lens: of a light field.
     """
     allowed = limits(capture_mm)
     first = {name: getattr(start, name) for name in allowed}
-    data = {"start": first, "limits": allowed, "method": method}
-    return filled("viewer", title, data, kind=": light field")
+    data = {"start": first, "limits": allowed, "method": method, "lens": lens}
+    return filled("viewer", title, data, kind=": light field" if lens else ": field")
 
 
 def filled(

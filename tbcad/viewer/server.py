@@ -1,4 +1,4 @@
-"""A server for one page on this computer: it makes the views of a light field.
+"""A server for one page on this computer: it makes the views of a light field or a field.
 
 Only programs of this computer reach it, at an address with a random word in it. A page of another
 site that guesses the port, or has its own name point to this computer, is refused: the word is
@@ -17,7 +17,7 @@ from typing import Any
 from tbcad.errors import InputError
 from tbcad.viewer.page import viewer_page
 from tbcad.viewer.query import Query, parse_query
-from tbcad.viewer.render import Renderer, Superseded
+from tbcad.viewer.render import Superseded, ViewRenderer
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
@@ -39,7 +39,7 @@ TEXT, HTML, JPEG = "text/plain; charset=utf-8", "text/html; charset=utf-8", "ima
 
 
 class ViewServer(ThreadingHTTPServer):
-    """Serves one light field until it is shut down.
+    """Serves one light field or field until it is shut down.
 
     Attributes:
         renderer: makes the views.
@@ -51,12 +51,12 @@ class ViewServer(ThreadingHTTPServer):
     allow_reuse_address = False
     request_queue_size = MAX_CONNECTIONS
 
-    def __init__(self, renderer: Renderer, title: str, start: Query, port: int = 0) -> None:
+    def __init__(self, renderer: ViewRenderer, title: str, start: Query, port: int = 0) -> None:
         """Listen on this computer alone.
 
         Args:
             renderer: makes the views.
-            title: name of the light field.
+            title: name of what is shown.
             start: the first view.
             port: 0 for any that is free.
 
@@ -64,7 +64,10 @@ class ViewServer(ThreadingHTTPServer):
             InputError: the port is taken.
         """
         self.renderer = renderer
-        self.page = viewer_page(title, start, renderer.capture_mm, renderer.method).encode("utf-8")
+        page = viewer_page(
+            title, start, renderer.capture_mm, renderer.method, lens=renderer.lens is not None
+        )
+        self.page = page.encode("utf-8")
         self.token = secrets.token_urlsafe(TOKEN_BYTES)
         self._free = BoundedSemaphore(MAX_CONNECTIONS)
         try:

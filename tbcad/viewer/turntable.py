@@ -15,12 +15,14 @@ from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.output.single_files import check_file
+from tbcad.reconstruct.field import Field
+from tbcad.reconstruct.picture import field_picture
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
 from tbcad.types import Bytes, Progress
 from tbcad.viewer.page import filled
-from tbcad.viewer.render import MethodAtRest
+from tbcad.viewer.render import MethodAtRest, capture_mm
 
 MAX_BYTES = 6_000_000
 BEGIN = "<!doctype html>\n<!-- tbcad turntable -->"
@@ -39,7 +41,7 @@ class Turntable:
         elevations_deg: a row of views each.
         distance: of the camera from the middle of the object, mm.
         size: columns and rows of a picture.
-        method: how they are made.
+        method: how those of a light field are made.
     """
 
     columns: int
@@ -68,14 +70,14 @@ def check_turntable_path(file: Path, force: bool) -> None:
 
 
 def write_turntable(
-    file: Path, tiles: MirrorTiles, table: Turntable, title: str, progress: Progress
+    file: Path, shown: MirrorTiles | Field, table: Turntable, title: str, progress: Progress
 ) -> int:
-    """Write the page; its size in bytes.
+    """Write the page of a light field or a field; its size in bytes.
 
     Raises:
         InputError: it cannot be written, or so many views do not fit into MAX_BYTES.
     """
-    picture, pictures = _maker(tiles, table, progress), []
+    picture, pictures = _maker(shown, table, progress), []
     for k, elevation in enumerate(table.elevations_deg):
         progress(f"row {k + 1} of {len(table.elevations_deg)}, elevation {elevation:.0f} degrees")
         pictures.append([picture(elevation, i) for i in range(table.columns)])
@@ -115,25 +117,34 @@ def turntable_page(
         "frames": frames,
     }
     views = sum(map(len, frames))
-    about = f"{views} views of {table.size[0]} x {table.size[1]} pixels from a light field."
+    about = f"{views} views of {table.size[0]} x {table.size[1]} pixels."
     return filled("turntable", title, data, begin=BEGIN, images="data: blob:", about=about)
 
 
 def _maker(
-    tiles: MirrorTiles, table: Turntable, progress: Progress
+    shown: MirrorTiles | Field, table: Turntable, progress: Progress
 ) -> Callable[[float, int], Bytes]:
     """What makes the picture of an elevation, degrees, and a column."""
-    capture = tiles.source.capture_mm
+    of_camera = _pictures(shown, table.method, progress)
+    capture = capture_mm(shown)
 
-    def camera(elevation: float, column: int) -> Camera:
+    def picture(elevation: float, column: int) -> Bytes:
         place = 2 * np.pi * column / table.columns, float(np.radians(elevation)), table.distance
-        return camera_around_object(*place, capture, table.size)
+        return of_camera(camera_around_object(*place, capture, table.size))
 
-    method = table.method
+    return picture
+
+
+def _pictures(
+    shown: MirrorTiles | Field, method: MethodAtRest, progress: Progress
+) -> Callable[[Camera], Bytes]:
+    """What makes the picture (h, w, 3) of a camera."""
+    if isinstance(shown, Field):
+        return lambda camera: field_picture(shown, camera).image
     if method == "depth":
-        views = depth_views(tiles, QUICK, progress)
-        return lambda elevation, column: views.of(camera(elevation, column))[0].image
-    return lambda elevation, column: synthesise(tiles, camera(elevation, column), method).image
+        views = depth_views(shown, QUICK, progress)
+        return lambda camera: views.of(camera)[0].image
+    return lambda camera: synthesise(shown, camera, method).image
 
 
 def _webp(image: Bytes, quality: int) -> str:

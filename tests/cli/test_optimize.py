@@ -13,7 +13,9 @@ from tbcad.spec.design import Spec
 from tests.exported_files import read_csv
 
 
-def closed_form(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+def closed_form(
+    spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
+) -> Candidate:
     """More pixels with a larger ellipsoid, in place of mirrors, which take long."""
     axis = place[2]
     return Candidate(place, Figures(axis, 2 * axis, axis / 100, 100 / axis, 276, 89))
@@ -55,7 +57,9 @@ def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_search_that_was_stopped_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def stopped(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+    def stopped(
+        spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
+    ) -> Candidate:
         if place[2] > 130:
             raise KeyboardInterrupt
         return closed_form(spec, ssim_within, place)

@@ -111,7 +111,7 @@ def test_a_turntable_is_written_and_not_replaced(
     assert told == {"turntable": str(file), "bytes": file.stat().st_size, "views": 8}
     refused(words, "exists", capsys)
     assert run(["show", *words, "--force"]) == 0
-    assert "8 views, 0.0 MB" in capsys.readouterr().out
+    assert "8 views by method depth, 0.0 MB" in capsys.readouterr().out
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent otherwise")

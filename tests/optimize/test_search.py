@@ -29,7 +29,9 @@ SPEC = load_spec(None, ["n=4", "shell.wall_mm=4"])
 BEST = (123.0, -140.0, 111.5, 1.3, 1.15)
 
 
-def closed_form(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+def closed_form(
+    spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
+) -> Candidate:
     """Pixels are most at BEST; the machine grows with x; there is none with a small axis."""
     if place[2] < 60:
         return Candidate(place, None, "the ellipsoid is too small: enlarge it")
@@ -86,7 +88,9 @@ def test_a_search_that_was_stopped_ends_like_one_that_was_not(tmp_path: Path) ->
 def test_judgements_are_not_made_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = search(asked(120), tmp_path / "store.jsonl")
 
-    def never(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+    def never(
+        spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
+    ) -> Candidate:
         raise AssertionError(place)
 
     monkeypatch.setattr(search_module, "evaluate", never)
@@ -155,7 +159,9 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
     search(asked(80), store)
     again: list[Place] = []
 
-    def with_ssim(spec: Spec, ssim_within: Limits | None, place: Place) -> Candidate:
+    def with_ssim(
+        spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
+    ) -> Candidate:
         again.append(place)
         one = closed_form(spec, ssim_within, place)
         assert ssim_within

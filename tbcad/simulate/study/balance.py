@@ -5,7 +5,6 @@ through the origin; a matt surface sends the same light in all directions, a glo
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.traced_frame import traced_light_field
 from tbcad.simulate.image_quality import image_quality_map
 from tbcad.simulate.scene.object import patterned_ball
-from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays, prepared_scene
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.study.paper import with_lens_of_table_i
 from tbcad.simulate.study.pixels import Sensor, count_pixels, virtual_cameras
 from tbcad.simulate.study.plots import Panel, Series
@@ -23,12 +22,13 @@ from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import MAX_N, try_design
 from tbcad.simulate.study.tables import Record, Table
 from tbcad.simulate.study.viewpoints import (
+    StudyMethod,
     ground_truths,
     object_masks,
     viewpoints_over_hemisphere,
+    views_by,
 )
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method, synthesise
 from tbcad.spec.design import Spec
 from tbcad.types import Bools, Bytes, Progress
 
@@ -90,7 +90,7 @@ def balance(
     ns: tuple[int, ...],
     views: int,
     distance_mm: float,
-    method: Method,
+    method: StudyMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
     """The study: SSIM of views over n at the design's sensor, for four objects.
@@ -132,7 +132,7 @@ def _of_n(
     n: int,
     seen: list[Subject],
     cameras: list[Camera],
-    method: Method,
+    method: StudyMethod,
     progress: Progress,
 ) -> list[Record]:
     """A row for each object, or for what a refusal of the design says."""
@@ -163,14 +163,13 @@ def _counts(design: MirrorDesign) -> Record:
 
 
 def ssim_on_object(
-    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: Method
+    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: StudyMethod
 ) -> float:
     """Mean local SSIM where the object is, over all views."""
     tiles = MirrorTiles(traced_light_field(design, subject.scene))
-    depth = depth_along_rays(subject.scene) if method == "blend" else None
-    view = partial(synthesise, tiles, method=method, depth=depth)
+    view = views_by(method, tiles, subject.scene)
     values = [
-        image_quality_map(truth, view(at).image)[1][mask].mean()
+        image_quality_map(truth, view(at))[1][mask].mean()
         for at, truth, mask in zip(cameras, subject.truths, subject.masks, strict=True)
     ]
     return float(np.mean(values))
@@ -199,7 +198,7 @@ def _figure(best: Record) -> Figure:
     return Figure(f"{best['object']}: best n", "", best["n"], where="section 6")
 
 
-def _panel(table: Table, seen: list[Subject], method: Method) -> Panel:
+def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> Panel:
     styles = ("C0o-", "C0s--", "C1o-", "C1s--")
     series = tuple(
         Series(

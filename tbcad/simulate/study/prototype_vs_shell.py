@@ -13,9 +13,8 @@ from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.study.plots import Panel, Series
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.tables import Table
-from tbcad.simulate.study.viewpoints import Viewpoints, ground_truths, view_quality
+from tbcad.simulate.study.viewpoints import StudyMethod, Viewpoints, ground_truths, view_quality
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method
 from tbcad.types import Floats, Progress
 
 LEVEL = 0.95
@@ -43,7 +42,7 @@ def prototype_vs_shell(
     export: ExportedDesign,
     subject: SceneObject,
     viewpoints: Viewpoints,
-    method: Method,
+    method: StudyMethod,
     samples: int = 3,
     progress: Progress = lambda _: None,
 ) -> Study:

@@ -24,9 +24,14 @@ from tbcad.simulate.study.plots import Panel, Series
 from tbcad.simulate.study.study import Figure, Study
 from tbcad.simulate.study.sweep import try_design
 from tbcad.simulate.study.tables import Cell, Record, Table
-from tbcad.simulate.study.viewpoints import QUALITY, Viewpoints, ground_truths, view_quality
+from tbcad.simulate.study.viewpoints import (
+    QUALITY,
+    StudyMethod,
+    Viewpoints,
+    ground_truths,
+    view_quality,
+)
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method
 from tbcad.spec.design import Spec
 from tbcad.types import Bytes, Progress
 
@@ -69,7 +74,7 @@ def ssim(
     subject: SceneObject,
     sensors: tuple[Sensor, ...],
     viewpoints: Viewpoints,
-    method: Method,
+    method: StudyMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
     """The study: captures with every sensor, and views of each against the truth.
@@ -100,7 +105,7 @@ def _compared(
     scene: Scene,
     viewpoints: Viewpoints,
     truths: list[Bytes],
-    method: Method,
+    method: StudyMethod,
     progress: Progress,
     sensor: Sensor,
 ) -> list[Record]:

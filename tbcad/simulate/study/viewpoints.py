@@ -1,5 +1,6 @@
 """Viewpoints around the object, and the quality of a light field's views from there."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
+from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.image_quality import equivalent_blur_px, image_quality_map
 from tbcad.simulate.scene.ground_truth import GOLDEN_ANGLE, pinhole_picture
@@ -21,6 +23,26 @@ MAX_AZIMUTHS, MAX_VIEWS = 360, 1000
 # What is measured of a view: SSIM over the frame and where the object is; standard deviation of
 # the Gaussian that blurs the truth as the view is blurred, at the object's centre; object's share.
 QUALITY = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "object_share")
+
+
+@dataclass(frozen=True)
+class OwnMethod:
+    """How views are made, by a room above this one.
+
+    Attributes:
+        name: of the method.
+        views: of a light field: what makes the picture (h, w, 3) of a camera.
+    """
+
+    name: str
+    views: Callable[[LightField], Callable[[Camera], Bytes]]
+
+    def __str__(self) -> str:
+        """Return the name."""
+        return self.name
+
+
+StudyMethod = Method | OwnMethod
 
 
 @dataclass(frozen=True)
@@ -98,12 +120,26 @@ def _object_mask(depth: DepthFunction, view: Camera) -> Bools:
     return np.isfinite(distance).reshape(direction.shape[:2])
 
 
+def views_by(method: StudyMethod, tiles: MirrorTiles, scene: Scene) -> Callable[[Camera], Bytes]:
+    """What makes the picture (h, w, 3) of a camera.
+
+    Args:
+        method: how.
+        tiles: the light field.
+        scene: the object, whose depth a blend takes.
+    """
+    if isinstance(method, OwnMethod):
+        return method.views(tiles.source)
+    depth = depth_along_rays(scene) if method == "blend" else None
+    return lambda view: synthesise(tiles, view, method, depth).image
+
+
 def view_quality(
     tiles: MirrorTiles,
     scene: Scene,
     views: list[Camera],
     truths: list[Bytes],
-    method: Method,
+    method: StudyMethod,
     progress: Progress,
 ) -> dict[str, Floats]:
     """The light field's views against the truth: QUALITY, each (v,).
@@ -116,12 +152,10 @@ def view_quality(
         method: how the views are made.
         progress: called with each step.
     """
-    depth = depth_along_rays(scene) if method == "blend" else None
-    masks, qualities = object_masks(scene, views), []
+    picture_of, masks, qualities = views_by(method, tiles, scene), object_masks(scene, views), []
     for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
         progress(f"view {k + 1} of {len(views)}")
-        picture = synthesise(tiles, view, method, depth).image
-        qualities.append(picture_quality(view, truth, picture, mask))
+        qualities.append(picture_quality(view, truth, picture_of(view), mask))
     return {name: np.array([quality[name] for quality in qualities]) for name in QUALITY}
 
 

@@ -6,8 +6,9 @@ const DRAG_DEG = 0.4, KEY_DEG = 5, TURN_DEG = 40;
 const WHEEL_STEP = 1.1;
 // Without movement for so long, the best picture is asked for.
 const STILL_MS = 180;
-// Views that take longer than this are asked for at half the width and height while they move.
-const SLOW_MS = 100;
+// Views that take longer than this, 15 a second, are asked for at half the width and height while
+// they move; at the full size again when they take less than a fifth, as they have a quarter of the pixels.
+const SLOW_MS = 1000 / 15, QUICK_MS = SLOW_MS / 5;
 const SMOOTHING = 0.85;
 
 const byId = (id) => document.getElementById(id);
@@ -22,6 +23,7 @@ const viewer = {
   wanted: false, // whether the state has changed since the last request
   turning: false,
   smaller: true, // whether slow views may be made smaller while they move
+  step: 1, // by which width and height are divided while views move
   interval: 0, // ms from one picture to the next, while they move; 0: not known
   draws: [], // times of the last pictures
   last: null, // what the picture that is shown was asked for with
@@ -31,8 +33,9 @@ const clamped = (name, value) =>
   Math.min(Math.max(value, data.limits[name][0]), data.limits[name][1]);
 
 function size() {
-  const step = viewer.smaller && viewer.interval > SLOW_MS ? 2 : 1;
-  return [Math.round(data.start.width / step), Math.round(data.start.height / step)];
+  if (viewer.interval < QUICK_MS || !viewer.smaller) viewer.step = 1;
+  else if (viewer.interval > SLOW_MS) viewer.step = 2;
+  return ["width", "height"].map((side) => Math.round(data.start[side] / viewer.step));
 }
 
 function query(still) {
@@ -193,10 +196,16 @@ byId("turn").addEventListener("click", () => turn(!viewer.turning));
 byId("home").addEventListener("click", home);
 
 [canvas.width, canvas.height] = [data.start.width, data.start.height];
-const atRest = {
-  depth: "a blend at the depth that is found", blend: "a blend on the plane", nearest: "nearest rays",
+for (const part of document.querySelectorAll(".lens")) part.hidden = !data.lens;
+const [moving, atRest] = {
+  field: ["the field in larger steps", "the field"],
+  depth: ["the nearest virtual cameras", "a blend at the depth that is found"],
+  blend: ["the nearest virtual cameras", "a blend on the plane"],
+  nearest: ["the nearest virtual cameras", "nearest rays"],
 }[data.method];
-byId("how").textContent = `While it moves: the nearest virtual cameras, or 9 pinholes of the lens at half size; `
-  + `smaller where this computer is slow. At rest: ${atRest}, or 69 pinholes.`;
+const [few, many] = data.lens ? [", or 9 pinholes of the lens at half size", ", or 69 pinholes"] : ["", ""];
+const empty = data.method === "field" ? "" : " Black: no captured ray is near.";
+byId("how").textContent = `While it moves: ${moving}${few}; smaller where this computer is slow. `
+  + `At rest: ${atRest}${many}.${empty}`;
 show();
 ask(true).then(() => { document.documentElement.dataset.ready = "true"; });

@@ -1,5 +1,6 @@
 """Frames of an object that turns, against captures of the turned object."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tbcad.simulate.capture.sequence import sequence_frame
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
+from tests.viewer.fields import write_ball
 
 FRAMES, TURN_DEG = 4, 120.0
 SMALL = ["--width", "96", "--height", "72"]
@@ -100,3 +102,16 @@ def test_damaged_sequences_are_refused(captured: Path, tmp_path: Path) -> None:
             del store["a/pixel"]
         with pytest.raises(InputError, match="damaged sequence"):
             sequence_frame(source, tmp_path, 0)
+
+
+def test_a_frame_is_shown_by_its_own_field(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "turning"
+    shutil.copytree(captured, folder)
+    with LightField.open(folder) as source:
+        write_ball(sequence_frame(source, folder, 1), folder, frame=1)
+    for number, method in (("0", "depth"), ("1", "field")):
+        words = ["view", str(folder), *SMALL, "--frame", number, "--force"]
+        assert run([*words, "--out", str(tmp_path / "v.png")]) == 0
+        assert f"method {method}: " in capsys.readouterr().out
