@@ -186,7 +186,7 @@ def _reconstructed(
 ) -> Reconstructed:
     from tbcad.reconstruct.checkpoint import check_same
     from tbcad.reconstruct.field import read_field, write_field
-    from tbcad.reconstruct.reconstruction import Told, asked_for, reconstruction
+    from tbcad.reconstruct.fitted import Told, asked_for, reconstruction
 
     options, stage, detail = how
     file, part = wanted.field_file(number), wanted.part_file(number)
@@ -267,7 +267,7 @@ def expected_seconds(
     wanted: Wanted, options: Options, numbers: list[int | None]
 ) -> dict[str, float]:
     """About how long each stage takes, by its title, on two cores."""
-    from tbcad.reconstruct.reconstruction import CHOICE, READING, level_name, levels
+    from tbcad.reconstruct.fitted import CHOICE, READING, level_name, levels
     from tbcad.simulate.capture.light_field import LightField
 
     with LightField.open(wanted.capture) as source:

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from tbcad.api import reconstruct
 from tbcad.cli import run
-from tbcad.reconstruct import reconstruction
+from tbcad.reconstruct import fitted
 from tbcad.reconstruct.options import Options
 from tests.ball_captures import ball, four  # noqa: F401 - fixtures
 
@@ -35,10 +36,14 @@ def test_field_picture_and_verdict(
     assert {file.name for file in tmp_path.iterdir()} == {"it", "p.png"}
     reconstruct(capture, out=tmp_path / "f.npz", options=Options(24, 3, "0"))
     assert (tmp_path / "f.npz").read_bytes() == (capture / "field.npz").read_bytes()
-    assert run(["reconstruct", str(capture), *SMALL, "--resume"]) == 0
+    mesh = tmp_path / "ball.ply"
+    assert run(["reconstruct", str(capture), *SMALL, "--mesh", str(mesh), "--resume"]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0].startswith("PSNR ")
-    assert f"{capture / 'field.npz'}: was there already" in shown[-1]
+    assert f"{capture / 'field.npz'}: was there already" in shown[3]
+    triangles = len(trimesh.load_mesh(mesh).faces)
+    assert shown[4] == f"{mesh}: {triangles} triangles"
+    assert 0 < float(shown[5].removeprefix("  from the true object: mean ").split()[0]) < 2
 
 
 def test_a_light_field_alone(ball: Path, tmp_path: Path) -> None:  # noqa: F811
@@ -68,7 +73,7 @@ def test_a_stop_says_how_to_go_on(
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(reconstruction, "_tell", stopped)
+    monkeypatch.setattr(fitted, "_tell", stopped)
     assert run(["reconstruct", str(capture), *SMALL]) == 130
     line = capsys.readouterr().err.splitlines()[-1]
     assert line.startswith("tbcad: stopped; ")

@@ -12,9 +12,9 @@ from tbcad.api import reconstruct
 from tbcad.errors import InputError
 from tbcad.reconstruct.checkpoint import part_file
 from tbcad.reconstruct.field import read_field
+from tbcad.reconstruct.fitted import levels, used_rays
 from tbcad.reconstruct.options import EPOCHS, NODES, Options
 from tbcad.reconstruct.rays import captured_rays
-from tbcad.reconstruct.reconstruction import levels, used_rays
 from tbcad.simulate.capture.light_field import LightField
 from tests.ball_captures import RADIUS_MM, ball, four  # noqa: F401 - fixtures
 
@@ -59,7 +59,7 @@ def test_same_bytes_on_any_number_of_threads(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for name in ("fit", "reconstruction"):
+    for name in ("fit", "fitted"):
         pool = f"tbcad.reconstruct.{name}.workers"
         monkeypatch.setattr(pool, lambda: ThreadPoolExecutor(threads))
     reconstruct(ball, out=tmp_path / "again.npz", options=SMALL)
@@ -84,6 +84,23 @@ def test_same_bytes_after_a_stop(
     assert out.read_bytes() == made.read_bytes()
     assert [file.name for file in tmp_path.iterdir()] == ["field.npz"]
     assert len(told) == sum(level.epochs for level in levels(SMALL)) - epochs
+
+
+@pytest.mark.parametrize("epochs", [2, 3, 4])
+def test_same_bytes_after_a_stop_where_pixels_have_an_area(
+    epochs: int,
+    ball: Path,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    """The grids before the last have single rays: also where the stop is between them."""
+    options = Options(nodes=16, epochs=2, order="1", blur_px=0.4)
+    whole, out = tmp_path / "whole.npz", tmp_path / "field.npz"
+    reconstruct(ball, out=whole, options=options)
+    assert read_field(whole).facts["rays_a_pixel"] == 4
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(ball, out=out, options=options, detail=stopped_after(epochs))
+    reconstruct(ball, out=out, options=options, resume=True)
+    assert out.read_bytes() == whole.read_bytes()
 
 
 def test_a_checkpoint_of_other_options_is_refused(ball: Path, tmp_path: Path) -> None:  # noqa: F811

@@ -1,6 +1,6 @@
 """A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from math import log10
@@ -119,7 +119,7 @@ def reconstruction(
     else:
         settings, state = saved.settings, saved.state
     told.stage(level_name(settings.levels[state.level]))
-    for reached in fit(rays, settings, used, state):
+    for reached in _epochs(rays, settings, used, state):
         state = reached
         if part is not None:
             write_checkpoint(part, Checkpoint(asked, settings, state))
@@ -200,6 +200,25 @@ def _chosen(
         return replace(before, levels=settings.levels, seed=settings.seed)
     told.stage(CHOICE)
     return settings
+
+
+def _epochs(rays: CapturedRays, settings: Settings, used: Bools, state: State) -> Iterator[State]:
+    """The epochs that are left; coarse grids, which show no pixel's area, by single rays."""
+    coarse = len(settings.levels) - 2
+    single = replace(settings, places=CENTRAL)
+    if not _passed(state, coarse, settings):
+        for reached in fit(rays, single, used, state):
+            state = reached
+            yield state
+            if _passed(state, coarse, settings):
+                break
+    yield from fit(rays, settings, used, state)
+
+
+def _passed(state: State, level: int, settings: Settings) -> bool:
+    """Whether all epochs of a level are done."""
+    here = state.level == level and state.epoch == settings.levels[level].epochs
+    return here or state.level > level
 
 
 def _tell(state: State, settings: Settings, told: Told) -> None:
