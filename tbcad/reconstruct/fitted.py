@@ -46,7 +46,6 @@ READING, CHOICE = "rays and hull", "choice by mirrors left out"
 LEFT_OUT = 0.02  # share of the mirrors that the fit does not see
 LEAST_STEPS = 5  # in an epoch: with one or two of its largest steps a fit may lose everything
 LEAST_MIRRORS = 10  # with fewer none is left out
-WHITE = 255
 COLOURS = 3
 LARGEST_DB = 99.0  # of colours that are equal
 
@@ -108,11 +107,11 @@ def reconstruction(
     saved = None
     if part is not None and part.exists():
         saved = read_checkpoint(part, asked, settings.places)
-    rays = _rays(source, settings.places is not CENTRAL)
+    rays = with_weights(captured_rays(source, settings.places is not CENTRAL), source)
     used = used_rays(rays, options.seed)
     settings = replace(settings, batch=min(settings.batch, -(-len(rays) // LEAST_STEPS)))
     with workers() as pool:
-        inside = _hull(rays, pool)
+        inside = hull(rays, pool)
     if saved is None:
         settings = _chosen(rays, settings, options, told, last)
         state = start(inside, last, rays.capture_mm, settings)
@@ -160,27 +159,6 @@ def _settings(source: LightField, options: Options) -> Settings:
     )
 
 
-def _rays(source: LightField, footprint: bool) -> CapturedRays:
-    rays = captured_rays(source, footprint)
-    if not len(rays):
-        raise InputError(
-            "no ray of the light field meets the capture sphere: capture again, or merge a run "
-            "with more photographs"
-        )
-    return with_weights(rays, source)
-
-
-def _hull(rays: CapturedRays, pool: ThreadPoolExecutor) -> Bools:
-    dark = rays.dark_level()
-    inside = hull(rays, pool) if (rays.colour.max(axis=1) >= dark).any() else np.zeros(1, bool)
-    if not inside.any():
-        raise InputError(
-            f"the photographs show nothing brighter than {WHITE * dark:.0f} of {WHITE}, by which "
-            "the background is told: light the object, or expose longer"
-        )
-    return inside
-
-
 def used_rays(rays: CapturedRays, seed: int) -> Bools:
     """Which rays (n,) the fit sees: those of some mirrors are left out, to judge it by."""
     mirrors = np.unique(rays.mirror)
@@ -199,7 +177,8 @@ def _chosen(
         before = settings_of(last.facts["chosen"], settings.places)
         return replace(before, levels=settings.levels, seed=settings.seed)
     told.stage(CHOICE)
-    return settings
+    best = settings
+    return best if options.order == "auto" else replace(best, order=settings.order)
 
 
 def _epochs(rays: CapturedRays, settings: Settings, used: Bools, state: State) -> Iterator[State]:

@@ -12,7 +12,7 @@ from tbcad.api import reconstruct
 from tbcad.errors import InputError
 from tbcad.reconstruct.checkpoint import part_file
 from tbcad.reconstruct.field import read_field
-from tbcad.reconstruct.fitted import levels, used_rays
+from tbcad.reconstruct.fitted import Told, levels, reconstruction, used_rays
 from tbcad.reconstruct.options import EPOCHS, NODES, Options
 from tbcad.reconstruct.rays import captured_rays
 from tbcad.simulate.capture.light_field import LightField
@@ -162,3 +162,26 @@ def test_facts_tell_how_it_was_made(made: Path) -> None:
     }  # fmt: skip
     assert [level["nodes"] for level in facts["chosen"]["levels"]] == [10, 17, 24]
     assert json.dumps(facts)
+
+
+@pytest.mark.parametrize("case", ["dark", "away"])
+def test_what_shows_nothing_is_refused(case: str, ball: Path) -> None:  # noqa: F811
+    source = LightField.read(ball)
+    for frame in source.frames.values():
+        frame.planes["colour" if case == "dark" else "mirror"][:] = 0
+    message = {
+        "dark": "show nothing brighter than",
+        "away": "no ray of the light field meets its capture sphere",
+    }[case]
+    with pytest.raises(InputError, match=message):
+        reconstruction(source, SMALL, Told(print, print))
+
+
+def test_light_that_no_hull_explains(ball: Path) -> None:  # noqa: F811
+    """A bright mirror that no other confirms is outside of the hull."""
+    source = LightField.read(ball)
+    frame = source.frames["a"]
+    alone = frame.planes["mirror"] == 20
+    frame.planes["colour"][alone] = 200
+    facts = reconstruction(source, Options(nodes=72, epochs=1), Told(print, print)).facts
+    assert 0.0003 < facts["unexplained_light"] < 0.1
