@@ -17,12 +17,13 @@ from tbcad.reconstruct.adam import Columns, Moments, adam, unbiased_size
 from tbcad.reconstruct.field import Field
 from tbcad.reconstruct.grid import Grid, resampled
 from tbcad.reconstruct.hull import hull
-from tbcad.reconstruct.marching import GLOSSY, MATT, Medium, Pixels, add_gradient, composited, spans
+from tbcad.reconstruct.marching import GLOSSY, MATT, Medium, Pixels, add_gradient, spans
 from tbcad.reconstruct.rays import CapturedRays, Singles
 from tbcad.simulate.parallel import chunks
 from tbcad.types import Bools, Ints
 
 PARTS = 8  # of a batch and of the nodes
+FEWEST_STEPS = 40  # of an epoch
 CENTRAL = np.zeros((1, 1, 2), dtype=np.float32)
 FIRST_NUMBER, FIRST_COLOUR = 0.05, 0.4  # of the density; of the colours
 NUMBERS = (-3.0, 60.0)
@@ -53,10 +54,11 @@ class Settings:
     Attributes:
         levels: from coarse to fine.
         order: of the view dependence of colours, 0 or 1.
-        smooth_density: weight of the total variation of the numbers.
-        smooth_colour: weight of the squared differences of colours.
-        sparse: weight of the density's logarithm.
-        batch: rays of a step.
+        smooth_density: weight of the total variation of the numbers, against the squared errors of
+            as many rays as there are nodes.
+        smooth_colour: weight of the squared differences of colours, likewise.
+        sparse: weight of the density's logarithm, likewise.
+        batch: rays of a step, at most.
         steps: of the numbers and of the colours, largest.
         last_steps: of both at the end.
         stride: between samples of a ray, in distances of nodes.
@@ -66,9 +68,9 @@ class Settings:
 
     levels: tuple[Level, ...] = (Level(60, 2), Level(100, 3), Level(144, 5))
     order: int = 0
-    smooth_density: float = 2e-4
-    smooth_colour: float = 2e-3
-    sparse: float = 3e-3
+    smooth_density: float = 5e-5
+    smooth_colour: float = 5e-4
+    sparse: float = 5e-4
     batch: int = 30_000
     steps: tuple[float, float] = (0.5, 0.03)
     last_steps: tuple[float, float] = (0.005, 0.0005)
@@ -151,10 +153,10 @@ def finer(state: State, settings: Settings) -> State:
     number = coarse.dense(values[:, 0], 10 * NUMBERS[0])
     near = ndimage.binary_dilation(ndimage.maximum_filter(number, 3) > KEPT_NUMBER)
     grid = Grid.about(resampled(near.astype(np.float32), level.nodes) > BORDER, coarse.width_mm)
-    known = grid.sampled(coarse.dense(np.ones(len(coarse), dtype=np.float32)))
-    columns = [grid.sampled(coarse.dense(values[:, 0], UNKNOWN * NUMBERS[0]))]
+    known = np.maximum(grid.sampled(coarse.dense(np.ones(len(coarse), dtype=np.float32))), 0.05)
+    columns: list[Singles] = [grid.sampled(coarse.dense(values[:, 0], UNKNOWN * NUMBERS[0]))]
     columns += [
-        grid.sampled(coarse.dense(column)) / np.maximum(known, np.float32(0.05))
+        np.asarray(grid.sampled(coarse.dense(column)) / known, dtype=np.float32)
         for column in values[:, 1:].T
     ]
     return _begun(state.level + 1, grid, np.stack(columns, axis=1).astype(np.float32))
@@ -175,12 +177,9 @@ def _epochs(
     first, last = all_spans(rays, state.grid, pool)
     wanted = first >= 0 if used is None else (first >= 0) & used
     ray = np.flatnonzero(wanted)
-    pixels = Pixels(
-        rays.entry, rays.direction, first, last, rays.colour, rays.weight, rays.footprint,
-        settings.places,
-    )  # fmt: skip
+    pixels = _pixels(rays, first, last, settings)
     epochs = settings.levels[state.level].epochs
-    count = len(ray) // settings.batch + 1
+    count = len(ray) // min(settings.batch, len(ray) // FEWEST_STEPS + 1) + 1
     parts = np.zeros((PARTS, *state.values.shape), dtype=np.float32)
     add_gradient(ray[:0], pixels, 0, medium_of(state.field(), settings.stride), parts[0])  # compile
     while state.epoch < epochs:
@@ -190,7 +189,8 @@ def _epochs(
         for k, batch in enumerate(batches):
             medium = medium_of(state.field(), settings.stride)
             error += _gradient(pixels, medium, batch, state.step, parts, pool)
-            _step(settings, state, (state.epoch * count + k + 1) / (epochs * count), parts, pool)
+            progress = (state.epoch * count + k + 1) / (epochs * count)
+            _step(settings, state, progress, len(batch) / len(state.grid), parts, pool)
         state.epoch += 1
         state.loss = error / max(len(ray), 1)
         yield state
@@ -210,6 +210,13 @@ def all_spans(rays: CapturedRays, grid: Grid, pool: ThreadPoolExecutor) -> tuple
     return first, last
 
 
+def _pixels(rays: CapturedRays, first: Singles, last: Singles, settings: Settings) -> Pixels:
+    return Pixels(
+        rays.entry, rays.direction, first, last, rays.colour, rays.weight, rays.footprint,
+        settings.places,
+    )  # fmt: skip
+
+
 def _gradient(
     pixels: Pixels, medium: Medium, batch: Ints, seed: int, parts: Singles, pool: ThreadPoolExecutor
 ) -> float:
@@ -223,17 +230,32 @@ def _gradient(
 
 
 def _step(
-    settings: Settings, state: State, progress: float, parts: Singles, pool: ThreadPoolExecutor
+    settings: Settings,
+    state: State,
+    progress: float,
+    share: float,
+    parts: Singles,
+    pool: ThreadPoolExecutor,
 ) -> None:
-    """One step of Adam on the gradient in `parts`, which is empty afterwards."""
-    columns = _columns(settings, state, progress)
+    """One step of Adam on the gradient in `parts`, which is empty afterwards.
+
+    Args:
+        settings: of the fit.
+        state: changed.
+        progress: share of the level's steps that are done.
+        share: rays of the batch for each node.
+        parts: of the gradient of the batch.
+        pool: of threads.
+    """
+    state.step += 1
+    columns = _columns(settings, state, progress, share)
     changed = np.empty_like(state.values)
     neighbours, count = state.grid.neighbours, len(state.grid)
 
     def part(nodes: slice) -> None:
         adam(
             (nodes.start, nodes.stop), state.values, changed, parts, state.moments, neighbours,
-            columns, settings.sparse,
+            columns, settings.sparse * share,
         )  # fmt: skip
 
     if state.step == 1:
@@ -242,8 +264,8 @@ def _step(
     state.values = changed
 
 
-def _columns(settings: Settings, state: State, progress: float) -> Columns:
-    """What holds for the columns of the values when this share of a level's steps is done."""
+def _columns(settings: Settings, state: State, progress: float, share: float) -> Columns:
+    """What holds for the columns of the values."""
     final = state.level + 1 == len(settings.levels)
     slowing = 0.5 * (1 + cos(pi * progress)) if final else 1.0
     number, colour = (
@@ -251,13 +273,12 @@ def _columns(settings: Settings, state: State, progress: float) -> Columns:
         for large, small in zip(settings.steps, settings.last_steps, strict=True)
     )
     rest = state.values.shape[1] - 1
-    slopes = rest - 3
-    state.step += 1
+    smooth = settings.smooth_colour * share
     return Columns(
         unbiased_size(_column(number, *[colour] * rest), state.step),
-        _column(settings.smooth_density, *[settings.smooth_colour] * rest),
-        _column(NUMBERS[0], *[COLOURS[0]] * 3, *[SLOPES[0]] * slopes),
-        _column(NUMBERS[1], *[COLOURS[1]] * 3, *[SLOPES[1]] * slopes),
+        _column(settings.smooth_density * share, *[smooth] * rest),
+        _column(NUMBERS[0], *[COLOURS[0]] * 3, *[SLOPES[0]] * (rest - 3)),
+        _column(NUMBERS[1], *[COLOURS[1]] * 3, *[SLOPES[1]] * (rest - 3)),
     )
 
 
@@ -271,12 +292,17 @@ def medium_of(made: Field, stride: float) -> Medium:
     return Medium(grid.width_mm, stride * grid.pitch_mm, grid.row, grid.leap, made.values)
 
 
-def predicted(rays: CapturedRays, which: Ints, medium: Medium, pool: ThreadPoolExecutor) -> Singles:
-    """Colours (k, 3) of the central rays of some pixels (k,)."""
-    size = max(-(-len(which) // PARTS), 1)
+def squared_error(rays: CapturedRays, which: Bools, made: Field, settings: Settings) -> float:
+    """Mean squared error, summed over the colours, of some pixels (n,) by a field; NaN of none.
 
-    def part(at: int) -> Singles:
-        here = which[at : at + size]
-        return composited(rays.entry[here], rays.direction[here], rays.length[here], medium)[:, :3]
-
-    return np.concatenate([part(len(which)), *pool.map(part, range(0, len(which), size))])
+    Of pixels of several rays it is without the spread of the few that are followed, as in a fit.
+    """
+    ray = np.flatnonzero(which)
+    with workers() as pool:
+        first, last = all_spans(rays, made.grid, pool)
+        pixels = _pixels(rays, first, last, settings)
+        parts = np.zeros((PARTS, *made.values.shape), dtype=np.float32)
+        medium = medium_of(made, settings.stride)
+        add_gradient(ray[:0], pixels, 0, medium, parts[0])  # compile
+        total = _gradient(pixels, medium, ray, 0, parts, pool)
+    return total / len(ray) if len(ray) else float("nan")

@@ -214,13 +214,10 @@ def composited(
     most = _most_samples(medium)
     at = np.empty((most, 4), dtype=np.float32)
     slot = np.empty((most, 6), dtype=np.float32)
-    first, last = spans(entry, direction, length, medium.leap, medium.width)
     for i in range(len(entry)):
         result[i, 4] = np.nan
-        if first[i] < 0:
-            continue
         count, through, red, green, blue = march(
-            entry[i], direction[i], (first[i], last[i]), 0.5, medium, at, slot
+            entry[i], direction[i], (0.0, length[i]), 0.5, medium, at, slot
         )
         result[i, 0], result[i, 1], result[i, 2] = red, green, blue
         result[i, 3] = 1 - through

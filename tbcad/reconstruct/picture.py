@@ -17,7 +17,7 @@ from tbcad.simulate.parallel import THREADS, chunks
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.types import Bytes, Floats
 
-STRIDE = 0.3  # distances of nodes between samples
+STRIDE = 0.45  # distances of nodes between samples
 RAYS_PER_CHUNK = 1 << 13
 SMOOTHED = 1.2  # nodes, standard deviation: the opacity whose gradient gives normals
 BEFORE = 1.0  # nodes: where it is taken, in front of where the ray is half opaque

@@ -7,6 +7,8 @@ from tbcad.mirrors.array import design
 from tbcad.optimize import views
 from tbcad.optimize.candidate import Limits, evaluate, place_of
 from tbcad.optimize.views import mean_ssim
+from tbcad.reconstruct import quick
+from tbcad.reconstruct.fit import Level, Settings
 from tbcad.reconstruct.quick import BY_FIELD
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.study.pixels import Sensor
@@ -49,13 +51,14 @@ def test_views_are_compared_within_the_limits_only(size_mm: float, measured: boo
     assert evaluate(SPEC, None, place_of(SPEC)).figures.ssim is None  # type: ignore[union-attr]
 
 
-def test_by_a_coarse_field_it_is_the_figure_of_that_study() -> None:
-    viewpoints = viewpoints_around((15.0,), 2, 640.0)
+def test_by_a_coarse_field_it_is_the_figure_of_that_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(quick, "QUICK", Settings(levels=(Level(24, 1),), batch=3000))
+    monkeypatch.setattr(views, "AZIMUTHS", 1)
+    viewpoints = viewpoints_around((15.0,), 1, 640.0)
     fixed = SPEC.model_copy(update={"camera": SPEC.camera.model_copy(update={"hfov_deg": 89.0})})
     study = ssim(fixed, built_in_object(60.0), (Sensor(208, 155),), viewpoints, BY_FIELD)
     expected = study.tables[0].numbers("ssim").mean()
     made = design(fixed)
-    assert mean_ssim(made, "field") == expected
-    assert mean_ssim(made, "field") != mean_ssim(made)
+    assert mean_ssim(made, "field") == expected != mean_ssim(made)
     assert 0.3 < expected < 0.99
     assert "; field." in study.tables[0].notes[0]
