@@ -1,5 +1,6 @@
 """A very small capture of a ball, and of two frames of it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,9 +8,33 @@ import trimesh
 
 from tbcad.cli import run
 from tbcad.mirrors.record import write_record
+from tbcad.reconstruct import fitted
+from tbcad.reconstruct.choice import Trial
+from tbcad.reconstruct.fit import Settings
+from tbcad.reconstruct.rays import CapturedRays
+from tbcad.types import Progress
 from tests.mirror_arrays import mirror_design
 
 RADIUS_MM = 15.0
+
+
+def without_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No trials, which take long: one is told of, and the settings stay as they are."""
+
+    def unchanged(
+        _: CapturedRays, settings: Settings, orders: tuple[int, ...], told: Progress
+    ) -> tuple[Settings, list[Trial]]:
+        told("trial 1")
+        kept = replace(settings, order=orders[-1])
+        return kept, [Trial(kept, 0.5)]
+
+    monkeypatch.setattr(fitted, "chosen", unchanged)
+
+
+@pytest.fixture(autouse=True)
+def quick_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For all tests of a module that imports this."""
+    without_trials(monkeypatch)
 
 
 @pytest.fixture(scope="session")

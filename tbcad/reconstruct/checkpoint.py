@@ -26,11 +26,13 @@ class Checkpoint:
     Attributes:
         asked: all that the result follows from: options, light field, version.
         settings: that were chosen.
+        trials: by which.
         state: after its last epoch.
     """
 
     asked: dict[str, Any]
     settings: Settings
+    trials: list[dict[str, Any]]
     state: State
 
 
@@ -60,6 +62,7 @@ def write_checkpoint(file: Path, kept: Checkpoint) -> None:
         "schema": SCHEMA,
         "asked": kept.asked,
         "settings": settings_record(kept.settings),
+        "trials": kept.trials,
         "level": state.level,
         "epoch": state.epoch,
         "step": state.step,
@@ -93,7 +96,8 @@ def read_checkpoint(file: Path, asked: dict[str, Any], places: Singles) -> Check
         if record["schema"] != SCHEMA:
             raise ValueError(f"its schema is not {SCHEMA}")
         check_same(file, record["asked"], asked)
-        return Checkpoint(asked, settings_of(record["settings"], places), _state(record, arrays))
+        settings = settings_of(record["settings"], places)
+        return Checkpoint(asked, settings, record["trials"], _state(record, arrays))
     except InputError:
         raise
     except Exception as fault:  # zip, numpy and JSON raise many kinds

@@ -18,6 +18,7 @@ from tbcad.reconstruct.checkpoint import (
     settings_record,
     write_checkpoint,
 )
+from tbcad.reconstruct.choice import chosen
 from tbcad.reconstruct.field import Field
 from tbcad.reconstruct.fit import (
     CENTRAL,
@@ -26,12 +27,10 @@ from tbcad.reconstruct.fit import (
     State,
     all_spans,
     fit,
-    medium_of,
-    predicted,
+    squared_error,
     workers,
 )
 from tbcad.reconstruct.hull import hull
-from tbcad.reconstruct.marching import Singles
 from tbcad.reconstruct.options import Options
 from tbcad.reconstruct.places import pixel_places
 from tbcad.reconstruct.rays import CapturedRays, captured_rays
@@ -39,12 +38,11 @@ from tbcad.reconstruct.start import start
 from tbcad.reconstruct.surface import best_level, resolved_mm
 from tbcad.reconstruct.uncertainty import with_weights
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.types import Bools, Ints, Progress
+from tbcad.types import Bools, Progress
 from tbcad.version import __version__
 
 READING, CHOICE = "rays and hull", "choice by mirrors left out"
 LEFT_OUT = 0.02  # share of the mirrors that the fit does not see
-LEAST_STEPS = 5  # in an epoch: with one or two of its largest steps a fit may lose everything
 LEAST_MIRRORS = 10  # with fewer none is left out
 COLOURS = 3
 LARGEST_DB = 99.0  # of colours that are equal
@@ -109,26 +107,27 @@ def reconstruction(
         saved = read_checkpoint(part, asked, settings.places)
     rays = with_weights(captured_rays(source, settings.places is not CENTRAL), source)
     used = used_rays(rays, options.seed)
-    settings = replace(settings, batch=min(settings.batch, -(-len(rays) // LEAST_STEPS)))
     with workers() as pool:
         inside = hull(rays, pool)
     if saved is None:
-        settings = _chosen(rays, settings, options, told, last)
+        settings, trials = _chosen(rays, settings, options, told, last)
         state = start(inside, last, rays.capture_mm, settings)
     else:
-        settings, state = saved.settings, saved.state
+        settings, trials, state = saved.settings, saved.trials, saved.state
     told.stage(level_name(settings.levels[state.level]))
     for reached in _epochs(rays, settings, used, state):
         state = reached
         if part is not None:
-            write_checkpoint(part, Checkpoint(asked, settings, state))
+            write_checkpoint(part, Checkpoint(asked, settings, trials, state))
         _tell(state, settings, told)
     made = state.field()
     if not len(made.grid):
         raise InputError(
             f"nothing is left of the object after --epochs {options.epochs}: take more of them"
         )
-    return replace(made, facts=asked | _facts(source, rays, used, made, inside, settings))
+    facts = _facts(rays, used, made, inside, settings)
+    about = {"object": source.facts.get("object"), "trials": trials}
+    return replace(made, facts=asked | about | facts)
 
 
 def level_name(level: Level) -> str:
@@ -171,14 +170,21 @@ def used_rays(rays: CapturedRays, seed: int) -> Bools:
 
 def _chosen(
     rays: CapturedRays, settings: Settings, options: Options, told: Told, last: Field | None
-) -> Settings:
-    """Weights and order by mirrors left out; those of the first frame hold for all frames."""
+) -> tuple[Settings, list[dict[str, Any]]]:
+    """Weights and order by mirrors left out, and the trials; the first frame's hold for all."""
     if last is not None:
         before = settings_of(last.facts["chosen"], settings.places)
-        return replace(before, levels=settings.levels, seed=settings.seed)
+        return replace(before, levels=settings.levels, seed=settings.seed), last.facts["trials"]
     told.stage(CHOICE)
-    best = settings
-    return best if options.order == "auto" else replace(best, order=settings.order)
+    orders = (0, 1) if options.order == "auto" else (settings.order,)
+    # Trials are coarse: they show no pixel's area.
+    single = replace(settings, places=CENTRAL)
+    best, trials = chosen(rays, single, orders, told.detail)
+    tried = [
+        {"order": one.settings.order, "smooth_density": one.settings.smooth_density,
+         "loss": one.loss} for one in trials
+    ]  # fmt: skip
+    return replace(best, places=settings.places), tried
 
 
 def _epochs(rays: CapturedRays, settings: Settings, used: Bools, state: State) -> Iterator[State]:
@@ -210,26 +216,19 @@ def _tell(state: State, settings: Settings, told: Told) -> None:
 
 
 def _facts(
-    source: LightField,
-    rays: CapturedRays,
-    used: Bools,
-    made: Field,
-    inside: Bools,
-    settings: Settings,
+    rays: CapturedRays, used: Bools, made: Field, inside: Bools, settings: Settings
 ) -> dict[str, Any]:
     with workers() as pool:
-        out = np.flatnonzero(~used)
-        error = np.square(_seen(rays, out, made, settings, pool) - rays.colour[out])
         missed = _unexplained(rays, start(inside, None, rays.capture_mm, settings), pool)
+    error = squared_error(rays, ~used, made, settings)
     return {
-        "object": source.facts.get("object"),
         "chosen": settings_record(settings),
         "rays": len(rays),
         "rays_a_pixel": settings.places.shape[1],
         "node_count": len(made.grid),
         "unexplained_light": missed,
-        "mirrors_left_out": len(np.unique(rays.mirror[out])),
-        "psnr_left_out_db": decibels(float(error.mean())) if len(out) else None,
+        "mirrors_left_out": len(np.unique(rays.mirror[~used])),
+        "psnr_left_out_db": None if used.all() else decibels(error / COLOURS),
         "surface_level": _surface_level(made, rays, used),
         "resolved_mm": resolved_mm(rays),
     }
@@ -254,23 +253,3 @@ def _unexplained(rays: CapturedRays, first: State, pool: ThreadPoolExecutor) -> 
     light[light < rays.dark_level()] = 0
     past = all_spans(rays, first.grid, pool)[0] < 0
     return float(light[past].sum(dtype=np.float64) / light.sum(dtype=np.float64))
-
-
-def _seen(
-    rays: CapturedRays, which: Ints, made: Field, settings: Settings, pool: ThreadPoolExecutor
-) -> Singles:
-    """Colours (k, 3) of some pixels (k,), each the mean of its rays."""
-    wide = len(rays.footprint) > 1
-    prints = rays.footprint[which] if wide else rays.footprint
-    medium, every = medium_of(made, settings.stride), np.arange(len(which))
-    found = []
-    for place in settings.places[0]:
-        moved = [np.einsum("kcx,c->kx", prints[:, two], place) for two in (slice(2), slice(2, 4))]
-        of_place = replace(
-            rays,
-            entry=rays.entry[which] + moved[0],
-            direction=rays.direction[which] + moved[1],
-            length=rays.length[which],
-        )
-        found.append(predicted(of_place, every, medium, pool))
-    return np.asarray(np.mean(found, axis=0))

@@ -13,7 +13,7 @@ from tbcad.api import reconstruct
 from tbcad.cli import run
 from tbcad.reconstruct import fitted
 from tbcad.reconstruct.options import Options
-from tests.ball_captures import ball, four  # noqa: F401 - fixtures
+from tests.ball_captures import ball, four, quick_choice  # noqa: F401 - fixtures
 
 SMALL = ("--nodes", "24", "--epochs", "3", "--order", "0")
 

@@ -16,7 +16,7 @@ from tbcad.reconstruct.fitted import Told, levels, reconstruction, used_rays
 from tbcad.reconstruct.options import EPOCHS, NODES, Options
 from tbcad.reconstruct.rays import captured_rays
 from tbcad.simulate.capture.light_field import LightField
-from tests.ball_captures import RADIUS_MM, ball, four  # noqa: F401 - fixtures
+from tests.ball_captures import RADIUS_MM, ball, four, quick_choice, without_trials  # noqa: F401 - fixtures
 
 SMALL = Options(nodes=24, epochs=3, order="0")
 
@@ -24,7 +24,9 @@ SMALL = Options(nodes=24, epochs=3, order="0")
 @pytest.fixture(scope="module")
 def made(ball: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:  # noqa: F811
     out = tmp_path_factory.mktemp("made") / "field.npz"
-    reconstruct(ball, out=out, options=SMALL)
+    with pytest.MonkeyPatch.context() as patch:
+        without_trials(patch)
+        reconstruct(ball, out=out, options=SMALL)
     return out
 
 
@@ -32,8 +34,8 @@ def stopped_after(epochs: int) -> Callable[[str], None]:
     """What ends a reconstruction as Ctrl-C does, when so many epochs are done."""
     left = [epochs]
 
-    def detail(_: str) -> None:
-        left[0] -= 1
+    def detail(text: str) -> None:
+        left[0] -= text.startswith("epoch")
         if left[0] == 0:
             raise KeyboardInterrupt
 
@@ -157,6 +159,8 @@ def test_mirrors_left_out_are_whole_and_few(ball: Path) -> None:  # noqa: F811
 
 def test_facts_tell_how_it_was_made(made: Path) -> None:
     facts = read_field(made).facts
+    assert facts["trials"] == [{"order": 0, "smooth_density": 5e-5, "loss": 0.5}]
+    assert facts["chosen"]["order"] == 0
     assert facts["options"] == {
         "nodes": 24, "epochs": 3, "order": "0", "blur_px": None, "seed": 0,
     }  # fmt: skip
