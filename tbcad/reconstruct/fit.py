@@ -62,7 +62,8 @@ class Settings:
         steps: of the numbers and of the colours, largest.
         last_steps: of both at the end.
         stride: between samples of a ray, in distances of nodes.
-        places: of the rays of a pixel, (p, k, 2).
+        places: of the rays of a pixel on the finest grid, (p, k, 2); coarser ones, which do not
+            resolve a pixel, take its central ray.
         seed: of the random order.
     """
 
@@ -177,7 +178,8 @@ def _epochs(
     first, last = all_spans(rays, state.grid, pool)
     wanted = first >= 0 if used is None else (first >= 0) & used
     ray = np.flatnonzero(wanted)
-    pixels = _pixels(rays, first, last, settings)
+    final = state.level + 1 == len(settings.levels)
+    pixels = _pixels(rays, (first, last), settings.places if final else CENTRAL)
     epochs = settings.levels[state.level].epochs
     count = len(ray) // min(settings.batch, len(ray) // FEWEST_STEPS + 1) + 1
     parts = np.zeros((PARTS, *state.values.shape), dtype=np.float32)
@@ -210,11 +212,10 @@ def all_spans(rays: CapturedRays, grid: Grid, pool: ThreadPoolExecutor) -> tuple
     return first, last
 
 
-def _pixels(rays: CapturedRays, first: Singles, last: Singles, settings: Settings) -> Pixels:
+def _pixels(rays: CapturedRays, span: tuple[Singles, Singles], places: Singles) -> Pixels:
     return Pixels(
-        rays.entry, rays.direction, first, last, rays.colour, rays.weight, rays.footprint,
-        settings.places,
-    )  # fmt: skip
+        rays.entry, rays.direction, *span, rays.colour, rays.weight, rays.footprint, places
+    )
 
 
 def _gradient(
@@ -300,7 +301,7 @@ def squared_error(rays: CapturedRays, which: Bools, made: Field, settings: Setti
     ray = np.flatnonzero(which)
     with workers() as pool:
         first, last = all_spans(rays, made.grid, pool)
-        pixels = _pixels(rays, first, last, settings)
+        pixels = _pixels(rays, (first, last), settings.places)
         parts = np.zeros((PARTS, *made.values.shape), dtype=np.float32)
         medium = medium_of(made, settings.stride)
         add_gradient(ray[:0], pixels, 0, medium, parts[0])  # compile

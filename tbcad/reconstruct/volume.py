@@ -1,6 +1,6 @@
 """A field as a volume for other programs: VTK's image data (.vti), for ParaView and PyVista.
 
-It is dense, so every reader understands it. NumPy has the same from the field's own file:
+It is dense, so every reader understands it. NumPy has the same from the field's file:
 
     field = np.load("field.npz")
     at = tuple(field["node"].T)
@@ -8,8 +8,7 @@ It is dense, so every reader understands it. NumPy has the same from the field's
     density[at] = (x + np.sqrt(x * x + 0.01)) / 2
     colour = np.zeros((*density.shape, 3), np.float32); colour[at] = field["colour"]
 
-OpenVDB files are not written: no wheel of the library is to be had for Python 3.11 to 3.13, and
-packages that write the format on their own write only grids that they have read.
+Their values between nodes are those of a linear density, a little softer than the field's own.
 """
 
 import numpy as np
