@@ -124,7 +124,7 @@ def diagnose(folder: Path = Path()) -> list[Finding]:
         versions(needs, _installed()),
         machine_libraries(_installed()),
         *findings,
-        memory(_available_memory_gb()),
+        memory(available_memory_gb()),
         disk(folder),
     ]
 
@@ -269,7 +269,8 @@ def disk(folder: Path) -> Finding:
     return Finding("disk", ok, f"{free:.1f} GB free at {existing}", remedy)
 
 
-def _available_memory_gb() -> float | None:
+def available_memory_gb() -> float | None:
+    """Memory that new work may take; None where the system does not say."""
     try:
         text = Path("/proc/meminfo").read_text(encoding="ascii")
     except OSError:

@@ -17,6 +17,7 @@ from tbcad.api.captures import (
 from tbcad.api.datasets import export
 from tbcad.api.designs import design
 from tbcad.api.machines import as_built, calibrate, merge, run, simulate_run, solve_intrinsics
+from tbcad.api.reconstructions import reconstruct
 from tbcad.api.tolerances import analyse, inspect
 from tbcad.api.verification import verify, verify_as_built
 from tbcad.api.views import Views, view
@@ -38,6 +39,7 @@ __all__ = [
     "inspect",
     "merge",
     "photograph",
+    "reconstruct",
     "relight",
     "report_page",
     "run",

@@ -23,6 +23,7 @@ from tbcad.cli import drawings as _drawings  # noqa: F401 - adds its command
 from tbcad.cli import merge as _merge  # noqa: F401 - adds its command
 from tbcad.cli import optimize as _optimize  # noqa: F401 - adds its command
 from tbcad.cli import parts as _parts  # noqa: F401 - adds its command
+from tbcad.cli import reconstruct as _reconstruct  # noqa: F401 - adds its command
 from tbcad.cli import refocus as _refocus  # noqa: F401 - adds its command
 from tbcad.cli import report as _report  # noqa: F401 - adds its command
 from tbcad.cli import run_command as _run_command  # noqa: F401 - adds its command
@@ -35,15 +36,13 @@ from tbcad.cli import view as _view  # noqa: F401 - adds its command
 from tbcad.cli.app import app
 from tbcad.cli.examples import add_examples
 from tbcad.cli.help_order import order_help
-from tbcad.cli.stopping import signals_as_interrupt
+from tbcad.cli.stopping import INTERRUPTED, Stopped, signals_as_interrupt
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.own_process import own_process
 
 order_help(app)
 add_examples(app)
-
-INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
 
 
 def run(arguments: list[str]) -> int:
@@ -73,6 +72,9 @@ def _run(arguments: list[str]) -> int:
         text = str(error) if isinstance(error, InputError) else usage_error_text(error)
         sys.stderr.write(f"tbcad: {text}\n")
         return 2
+    except Stopped as stop:
+        sys.stderr.write(f"tbcad: stopped; {stop}\n")
+        return INTERRUPTED
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:  # as typer returns it, too

@@ -107,6 +107,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "study prototype": (("exports/ --azimuths 2", "fewer viewpoints, sooner done"),),
     "study low-pass": (("exports/ --filter-px 1 --filter-px 2", "two filters"),),
     "study calibration": (("exports/ --out studies/", "tables, notes and a plot"),),
+    "reconstruct": (
+        ("captures/knot", "field.npz beside it, which view and show then show"),
+        ("captures/knot --mesh knot.glb --preview knot.png", "also its surface, for Blender"),
+        ("captures/knot --resume", "go on after any stop"),
+    ),
     "show": (
         ("exports/", "the report, in the browser"),
         ("captures/knot", "drag the viewpoint, set focus and aperture; Ctrl-C ends it"),

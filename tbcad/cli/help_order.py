@@ -11,7 +11,7 @@ HEADINGS = {
     "Order and assemble": ("inspection", "parts", "drawings", "assembly"),
     "Run the machine": ("run", "intrinsics", "calibrate", "merge", "as-built"),
     "Simulate and analyse": ("capture", "simulate-run", "tolerance", "study"),
-    "Look at light fields": ("show", "view", "refocus", "export"),
+    "Look at light fields": ("reconstruct", "show", "view", "refocus", "export"),
 }
 
 

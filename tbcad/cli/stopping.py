@@ -5,7 +5,12 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
 STOPPING = ("SIGTERM", "SIGHUP")
+
+
+class Stopped(Exception):
+    """A command was stopped and has kept something; its text says what, and how to go on."""
 
 
 @contextmanager

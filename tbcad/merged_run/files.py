@@ -6,6 +6,7 @@ from typing import Any
 from tbcad.merged_run.merge import HalfMerge, Merge
 from tbcad.runs.exposure import LIT, exposure_name
 from tbcad.simulate.capture.files import capture_record, write_cameras, write_record
+from tbcad.simulate.capture.light_field import RAY_SIGMAS
 from tbcad.types import Progress
 
 
@@ -18,7 +19,8 @@ def write_merge(folder: Path, merge: Merge, progress: Progress) -> dict[str, Any
         progress: called with each step.
     """
     record = capture_record(merge.facts)
-    write_cameras(folder, merge.cameras(progress), merge.capture_mm, record)
+    stored = {**record, RAY_SIGMAS: merge.ray_sigma_mm}  # which would fill capture.json
+    write_cameras(folder, merge.cameras(progress), merge.capture_mm, stored)
     record["based_on"] = {half.camera_id: based_on(half) for half in merge.halves}
     write_record(folder, record)
     return record

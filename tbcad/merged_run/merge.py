@@ -14,6 +14,7 @@ from tbcad.machine.photographed import TURNS, machine_run, stops_known
 from tbcad.machine.record import RECORD, read_machine
 from tbcad.machine.shells import NOT_SERVED, plan_of, tied
 from tbcad.merged_run.corrections import Corrections, Options, corrections
+from tbcad.merged_run.ray_sigmas import ray_sigmas
 from tbcad.merged_run.stop_photographs import CorrectedPhotographs, common_exposure
 from tbcad.runs.exposure import LIT, Frame
 from tbcad.runs.photographs import Run, read_run
@@ -78,11 +79,14 @@ class Merge:
         halves: for each camera of the shell that photographs were taken for.
         capture_mm: diameter of the capture sphere.
         facts: what the merge is based on.
+        ray_sigma_mm: root mean square error of the rays of each mirror at the object, by camera;
+            None where the calibration does not say.
     """
 
     halves: tuple[HalfMerge, ...]
     capture_mm: float
     facts: dict[str, Any]
+    ray_sigma_mm: dict[str, list[float | None]]
 
     def cameras(self, progress: Progress) -> CameraPhotographs:
         """Each camera with what gives the bands of its picture."""
@@ -118,7 +122,9 @@ def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Opti
             f"{folder} has no photograph of the lit object at a stop that {calibration} knows: "
             "photograph the object with tbcad run"
         )
-    return Merge(halves, export.capture_mm, _facts(export, run, calibration, options))
+    mirrors = {half.camera_id: len(half.pixels) for half in halves}
+    sigmas = ray_sigmas((calibration / name for name in parts), mirrors, export.capture_mm)
+    return Merge(halves, export.capture_mm, _facts(export, run, calibration, options), sigmas)
 
 
 def _halves(

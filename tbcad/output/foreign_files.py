@@ -1,7 +1,10 @@
 """Files of the user in an output folder, and how they are kept when the folder is replaced."""
 
 import os
+import re
 import shutil
+import zipfile
+import zlib
 from itertools import chain, count
 from pathlib import Path
 
@@ -18,14 +21,19 @@ from tbcad.output.manifest import (
 
 # Files that a checkout has in its folder of exports: no build writes them, and each keeps them.
 ALWAYS_KEPT = (".gitignore", "README.md")
+# What tbcad reconstruct writes beside a light field: of that alone, so it goes with it.
+LIGHT_FIELD, FIELD_SCHEMA = "lightfield.h5", "tbcad-field"
+_MAX_RECORD_BYTES = 100_000
+FIELD = re.compile(r"field(-\d+)?\.npz|\.field(-\d+)?\.npz\.part")
 
 
 def foreign_files(folder: Path) -> list[Path]:
     """Return the files and folders that tbcad did not write, sorted.
 
     tbcad wrote what manifest.json lists with the same size and sha256, manifest.json itself,
-    verify.json, and report.html if it begins as tbcad's does. A folder all of whose files are
-    listed in the same way is tbcad's; any other is the user's, as a whole.
+    verify.json, and report.html if it begins as tbcad's does; beside a light field also the field
+    of it, under the name that it has by default, and its checkpoint. A folder all of whose files
+    are listed in the same way is tbcad's; any other is the user's, as a whole.
 
     Raises:
         OSError: the folder cannot be read.
@@ -41,9 +49,24 @@ def foreign_files(folder: Path) -> list[Path]:
             inner = list(path.iterdir())
             return bool(inner) and all(map(is_of_tbcad, inner))
         name = path.relative_to(folder).as_posix()
+        if LIGHT_FIELD in listed and is_file(path) and _is_field(path):
+            return True
         return is_file(path) and (name in of_tbcad or is_listed(path, listed.get(name)))
 
     return [path for path in sorted(folder.iterdir()) if not is_of_tbcad(path)]
+
+
+def _is_field(path: Path) -> bool:
+    """Tell a field, or the checkpoint of one, from any other file."""
+    if not FIELD.fullmatch(path.name):
+        return False
+    member = "record.npy" if path.suffix == ".part" else "schema.npy"
+    try:
+        with zipfile.ZipFile(path) as packed, packed.open(member) as array:
+            text = array.read(_MAX_RECORD_BYTES)
+    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, RuntimeError, zlib.error):
+        return False
+    return FIELD_SCHEMA.encode("utf-32-le") in text
 
 
 def is_always_kept(path: Path) -> bool:

@@ -25,6 +25,7 @@ SEVERAL_KINDS = {
     "--n",  # build leaves its check to the design
     "--cameras",  # camera: a file of them; export: names of virtual ones
     "--method",  # view also finds the depth first, which takes too long for moving and for studies
+    "--mesh",  # capture: trace the exported meshes; reconstruct: files of the surface
     "--from",  # init: a design's name; studies: the smallest n
     "--size",  # run, export: a picture's pixels; intrinsics: width of a square, mm
     "--to",  # studies: the largest n; export: the program that reads it

@@ -347,10 +347,14 @@ class TestIncomplete:
     ) -> None:
         first = frames[: len(plan.angle)]
         run = write_run(tmp_path / "half", export, first, perfect)
+        rays = "mirror,sigma_mm,sigma_mrad\na0001,0.04,2\nb0001,0.04,2\n"  # 2 mrad at 15 mm
+        (calibration / "rays.csv").write_text(rays, encoding="utf-8")
         record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
         assert list(record["based_on"]) == ["a"]
         field = LightField.read(tmp_path / "merged")
         assert list(field.frames) == ["a"]
+        told = field.facts["ray_sigma_mm"]
+        assert told == {"a": [0.05, *[None] * (len(field.frames["a"].u) - 1)]}
         at = camera_around_object(0.0, 0.6, 640.0, CAPTURE_MM, (64, 64), None)
         assert synthesise(MirrorTiles(field), at, "nearest", None).image.any()
 

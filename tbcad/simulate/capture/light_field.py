@@ -34,6 +34,8 @@ from tbcad.types import Floats
 
 NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"
+# Fact of a merged run: by camera, root mean square error of each mirror's rays at the object, mm.
+RAY_SIGMAS = "ray_sigma_mm"
 SHOWN_PX = 1200  # width of what notebooks show
 PIXEL_ARRAYS: dict[str, tuple[tuple[int, ...], str]] = {
     "colour": ((3,), "u1"),

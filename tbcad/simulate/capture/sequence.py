@@ -7,12 +7,12 @@ One HDF5 file beside the light field's (docs/light-field.md), whose rays it is a
 """
 
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -30,6 +30,7 @@ NAME = "sequence.h5"
 SCHEMA = "tbcad-sequence/1"
 RAYS_PER_CHUNK = 1 << 16
 AGAIN = "capture again with --frames"
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -116,12 +117,31 @@ def sequence_frame(source: LightField, folder: Path, number: int) -> LightField:
     Raises:
         InputError: there is no sequence or no such frame, or the file is damaged.
     """
+    read = partial(_frames, source=source, number=number)
+    with _opened(folder, read) as frames:
+        return replace(source, frames=frames)
+
+
+def frame_count(folder: Path) -> int:
+    """Number of frames of the sequence of a capture.
+
+    Raises:
+        InputError: there is no sequence, or the file is damaged.
+    """
+
+    def count(store: StoredGroup) -> int:
+        groups = [store.group(name) for name in ("a", "b") if name in store]
+        return min(len(group.array("colour")) for group in groups)
+
+    with _opened(folder, count) as found:
+        return found
+
+
+def _opened(folder: Path, read: Callable[[StoredGroup], Found]) -> AbstractContextManager[Found]:
     file = folder / NAME
     if not file.is_file():
         raise InputError(f"{file}: no such file, so there is one frame only: {AGAIN}")
-    read = partial(_frames, source=source, number=number)
-    with open_hdf5(file, SCHEMA, "sequence", AGAIN, read) as frames:
-        return replace(source, frames=frames)
+    return open_hdf5(file, SCHEMA, "sequence", AGAIN, read)
 
 
 def _frames(store: StoredGroup, source: LightField, number: int) -> dict[str, Frame]:

@@ -1,0 +1,140 @@
+"""tbcad reconstruct: its files, its refusals, and that Python gives the same."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from tbcad.api import reconstruct
+from tbcad.cli import run
+from tbcad.reconstruct import fitted
+from tbcad.reconstruct.options import Options
+from tests.ball_captures import ball, four, quick_choice  # noqa: F401 - fixtures
+
+SMALL = ("--nodes", "24", "--epochs", "3", "--order", "0")
+
+
+@pytest.fixture
+def capture(ball: Path, tmp_path: Path) -> Path:  # noqa: F811
+    """A copy, to write into."""
+    return Path(shutil.copytree(ball, tmp_path / "it"))
+
+
+def test_field_picture_and_verdict(
+    capture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    preview = tmp_path / "p.png"
+    assert run(["reconstruct", str(capture), *SMALL, "--preview", str(preview), "--json"]) == 0
+    (record,) = json.loads(capsys.readouterr().out)["fields"]
+    assert Path(record["file"]) == capture / "field.npz"
+    assert record["psnr_left_out_db"] > 20
+    assert np.asarray(Image.open(preview)).max() > 60
+    assert {file.name for file in tmp_path.iterdir()} == {"it", "p.png"}
+    reconstruct(capture, out=tmp_path / "f.npz", options=Options(24, 3, "0"))
+    assert (tmp_path / "f.npz").read_bytes() == (capture / "field.npz").read_bytes()
+    mesh = tmp_path / "ball.ply"
+    assert run(["reconstruct", str(capture), *SMALL, "--mesh", str(mesh), "--resume"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[0].startswith("PSNR ")
+    assert f"{capture / 'field.npz'}: was there already" in shown[3]
+    triangles = len(trimesh.load_mesh(mesh).faces)
+    assert shown[4] == f"{mesh}: {triangles} triangles"
+    assert 0 < float(shown[5].removeprefix("  from the true object: mean ").split()[0]) < 2
+
+
+def test_a_light_field_alone(ball: Path, tmp_path: Path) -> None:  # noqa: F811
+    shutil.copy(ball / "lightfield.h5", tmp_path / "mine.h5")
+    assert run(["reconstruct", str(tmp_path / "mine.h5"), *SMALL]) == 0
+    assert (tmp_path / "field.npz").is_file()
+
+
+def test_one_frame(capture: Path) -> None:
+    assert run(["reconstruct", str(capture), *SMALL, "--frame", "1"]) == 0
+    assert (capture / "field-1.npz").is_file()
+
+
+def test_a_field_goes_with_its_capture(capture: Path, four: Path) -> None:  # noqa: F811
+    assert run(["reconstruct", str(capture), *SMALL]) == 0
+    shutil.copy(capture / "field.npz", capture / "mine.npz")
+    (capture / "field-1.npz").write_text("no field", encoding="utf-8")
+    assert run(["capture", str(four), "--out", str(capture), "--force"]) == 0
+    assert {file.name for file in capture.glob("*.npz")} == {
+        "object.npz", "mine.npz", "field-1.npz",
+    }  # fmt: skip
+
+
+def test_a_stop_says_how_to_go_on(
+    capture: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fitted, "_tell", stopped)
+    assert run(["reconstruct", str(capture), *SMALL]) == 130
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.startswith("tbcad: stopped; ")
+    assert line.endswith("go on with the same options and --resume")
+    assert (capture / ".field.npz.part").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--out", "{}/field.txt"), "field.txt: name a file that ends in .npz"),
+        (("--out", "{}/none/field.npz"), "field.npz: its folder does not exist"),
+        (("--out", "{}/lightfield.npz"), "lightfield.npz is read by this command"),
+        (("--out", "{}/object.npz", "--force"), "object.npz belongs to "),
+        (("--mesh", "{}/a.obj"), "a.obj: name a file that ends in .glb or .ply or .stl"),
+        (("--mesh", "{}/a.ply", "--mesh", "{}/b/../a.ply"), "is named twice"),
+        (("--preview", "{}/a.jpg"), "a.jpg: name a file that ends in .png"),
+        (("--nodes", "8"), "--nodes is 8, allowed is 16 to 512: change it"),
+        (("--nodes", "1000"), "--nodes is 1000, allowed is 16 to 512: change it"),
+        (("--epochs", "0"), "--epochs is 0, allowed is 1 to 100: change it"),
+        (("--blur", "nan"), "--blur is nan, allowed is 0 to 5: change it"),
+        (("--seed", "-1"), "--seed is -1, allowed is 0 to"),
+        (("--frame", "2"), "--frame 2 is not in the sequence: allowed is 0 to 1"),
+        (("--frame", "0", "--all-frames"), "--frame and --all-frames exclude each other"),
+        (("--resume", "--force"), "--force and --resume exclude each other"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_refused(
+    words: tuple[str, ...],
+    message: str,
+    capture: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (capture / "b").mkdir()
+    (capture / "lightfield.npz").hardlink_to(capture / "lightfield.h5")
+    before = {file: file.read_bytes() for file in capture.rglob("*") if file.is_file()}
+    assert run(["reconstruct", str(capture), *(word.format(capture) for word in words)]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert {file: file.read_bytes() for file in capture.rglob("*") if file.is_file()} == before
+
+
+def test_what_exists_is_kept(capture: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (capture / "field.npz").write_text("mine", encoding="utf-8")
+    assert run(["reconstruct", str(capture)]) == 2
+    assert "field.npz exists: choose another name, or replace it with --force" in (
+        capsys.readouterr().err
+    )
+    assert run(["reconstruct", str(capture), *SMALL, "--resume"]) == 2
+    assert "field.npz is no field that tbcad wrote" in capsys.readouterr().err
+    assert (capture / "field.npz").read_text(encoding="utf-8") == "mine"
+
+
+def test_memory_that_is_not_there(
+    ball: Path,  # noqa: F811
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("tbcad.doctor.available_memory_gb", lambda: 1.0)
+    words = ["reconstruct", str(ball), "--nodes", "500", "--out", str(tmp_path / "f.npz")]
+    assert run(words) == 2
+    assert "memory is short: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
