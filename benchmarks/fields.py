@@ -21,11 +21,11 @@ from scipy import ndimage
 
 from tbcad.depth.view import depth_views
 from tbcad.optics.camera import Camera
-from tbcad.reconstruct.choice import chosen
-from tbcad.reconstruct.field import Field
-from tbcad.reconstruct.fit import Settings, fit
-from tbcad.reconstruct.picture import field_picture
-from tbcad.reconstruct.rays import captured_rays
+from tbcad.reconstruction.choice import chosen
+from tbcad.reconstruction.field import Field
+from tbcad.reconstruction.fit import Settings, fit
+from tbcad.reconstruction.picture import field_picture
+from tbcad.reconstruction.rays import captured_rays
 from tbcad.simulate.capture.geometry import camera_photographs
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import to_bytes

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.geometry.vectors import perpendicular_axes, unit
-from tbcad.reconstruct.fit import Level, Settings, fit
-from tbcad.reconstruct.picture import field_picture
-from tbcad.reconstruct.rays import CapturedRays, captured_rays, entries
+from tbcad.reconstruction.fit import Level, Settings, fit
+from tbcad.reconstruction.picture import field_picture
+from tbcad.reconstruction.rays import CapturedRays, captured_rays, entries
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.image_quality import image_quality

@@ -8,10 +8,10 @@ import trimesh
 
 from tbcad.cli import run
 from tbcad.mirrors.record import write_record
-from tbcad.reconstruct import fitted
-from tbcad.reconstruct.choice import Trial
-from tbcad.reconstruct.fit import Settings
-from tbcad.reconstruct.rays import CapturedRays
+from tbcad.reconstruction import fitted
+from tbcad.reconstruction.choice import Trial
+from tbcad.reconstruction.fit import Settings
+from tbcad.reconstruction.rays import CapturedRays
 from tbcad.types import Progress
 from tests.mirror_arrays import mirror_design
 

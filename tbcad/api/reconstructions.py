@@ -14,8 +14,8 @@ from tbcad.errors import InputError
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-    from tbcad.reconstruct.field import Field
-    from tbcad.reconstruct.options import Options
+    from tbcad.reconstruction.field import Field
+    from tbcad.reconstruction.options import Options
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.types import Progress
 
@@ -60,7 +60,7 @@ class Wanted:
 
     def field_file(self, number: int | None) -> Path:
         """Where the field of a frame is written, or that of the capture itself."""
-        from tbcad.reconstruct.beside import field_file
+        from tbcad.reconstruction.beside import field_file
 
         if self.out is None:
             return field_file(self.folder, number)
@@ -72,7 +72,7 @@ class Wanted:
 
     def part_file(self, number: int | None) -> Path:
         """The checkpoint of that field."""
-        from tbcad.reconstruct.checkpoint import part_file
+        from tbcad.reconstruction.checkpoint import part_file
 
         return part_file(self.field_file(number))
 
@@ -140,7 +140,7 @@ def reconstruct(
     Raises:
         InputError: the light field cannot be read or shows nothing, or a file cannot be written.
     """
-    from tbcad.reconstruct.options import Options
+    from tbcad.reconstruction.options import Options
 
     wanted = Wanted(
         Path(capture),
@@ -184,9 +184,9 @@ def _reconstructed(
     last: Field | None,
     how: tuple[Options, Progress, Progress],
 ) -> Reconstructed:
-    from tbcad.reconstruct.checkpoint import check_same
-    from tbcad.reconstruct.field import read_field, write_field
-    from tbcad.reconstruct.fitted import Told, asked_for, reconstruction
+    from tbcad.reconstruction.checkpoint import check_same
+    from tbcad.reconstruction.field import read_field, write_field
+    from tbcad.reconstruction.fitted import Told, asked_for, reconstruction
 
     options, stage, detail = how
     file, part = wanted.field_file(number), wanted.part_file(number)
@@ -210,7 +210,7 @@ def _show(preview: Path | None, made: Field) -> None:
         return
     from math import radians
 
-    from tbcad.reconstruct.picture import field_picture
+    from tbcad.reconstruction.picture import field_picture
     from tbcad.simulate.image_files import write_images
     from tbcad.simulate.scene.viewpoint import camera_around_object
 
@@ -267,7 +267,7 @@ def expected_seconds(
     wanted: Wanted, options: Options, numbers: list[int | None]
 ) -> dict[str, float]:
     """About how long each stage takes, by its title, on two cores."""
-    from tbcad.reconstruct.fitted import CHOICE, READING, level_name, levels
+    from tbcad.reconstruction.fitted import CHOICE, READING, level_name, levels
     from tbcad.simulate.capture.light_field import LightField
 
     with LightField.open(wanted.capture) as source:
@@ -324,8 +324,8 @@ def _meshes(
     if not files:
         return {}
     from tbcad.atomic_files import replace_files
-    from tbcad.reconstruct.mesh_files import mesh_file
-    from tbcad.reconstruct.surface import field_mesh
+    from tbcad.reconstruction.mesh_files import mesh_file
+    from tbcad.reconstruction.surface import field_mesh
 
     stage(SURFACE)
     if (level := made.facts["surface_level"]) is None:
@@ -343,8 +343,8 @@ def _distances(
     surface: Trimesh, source: LightField, wanted: Wanted, number: int | None
 ) -> dict[str, float]:
     """How far a surface is from the true one, if the capture has it as it stood."""
-    from tbcad.reconstruct.mesh_distance import mesh_distance
-    from tbcad.reconstruct.rays import captured_rays
+    from tbcad.reconstruction.mesh_distance import mesh_distance
+    from tbcad.reconstruction.rays import captured_rays
     from tbcad.simulate.capture.files import OBJECT, read_object
 
     if number is not None or not (wanted.folder / OBJECT).is_file():

@@ -11,7 +11,7 @@ from tbcad.errors import InputError
 if TYPE_CHECKING:
     from tbcad.depth.view import DepthViews
     from tbcad.optics.camera import Camera
-    from tbcad.reconstruct.field import Field
+    from tbcad.reconstruction.field import Field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.synthesis import Method, SynthesisedView
@@ -40,7 +40,7 @@ class Views:
 
     @cached_property
     def _tiles(self) -> MirrorTiles:
-        from tbcad.reconstruct.field import Field
+        from tbcad.reconstruction.field import Field
         from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
         assert not isinstance(self._source, Field)
@@ -70,7 +70,7 @@ class Views:
         """
         from math import radians
 
-        from tbcad.reconstruct.field import Field
+        from tbcad.reconstruction.field import Field
         from tbcad.simulate.scene.viewpoint import camera_around_object
 
         source, angles = self._source, (radians(azimuth_deg), radians(elevation_deg))
@@ -93,7 +93,7 @@ class Views:
 def _of_field(made: Field, camera: Camera) -> SynthesisedView:
     import numpy as np
 
-    from tbcad.reconstruct.picture import field_picture
+    from tbcad.reconstruction.picture import field_picture
     from tbcad.simulate.views.synthesis import SynthesisedView
 
     image = field_picture(made, camera).image

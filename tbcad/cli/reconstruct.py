@@ -107,7 +107,7 @@ def reconstruct(
     check_is_capture(capture)
     if frame is not None and all_frames:
         raise InputError("--frame and --all-frames exclude each other: leave one out")
-    from tbcad.reconstruct.options import Options
+    from tbcad.reconstruction.options import Options
 
     options = Options(nodes, epochs, order, blur, seed)
     from tbcad.api.reconstructions import Wanted, checked_frames, expected_seconds

@@ -25,7 +25,7 @@ from tbcad.screen import stages
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tbcad.reconstruct.field import Field
+    from tbcad.reconstruction.field import Field
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.viewer.query import Query
     from tbcad.viewer.render import MethodAtRest, ViewRenderer
@@ -134,8 +134,8 @@ class _Shown(NamedTuple):
 @contextmanager
 def _shown(file: Path, method: "MethodAtRest | Literal['field'] | None") -> "Iterator[_Shown]":
     """A light field, with the field that is asked for or beside it; or a field."""
-    from tbcad.reconstruct.beside import wanted_field
-    from tbcad.reconstruct.field import SUFFIX, read_field
+    from tbcad.reconstruction.beside import wanted_field
+    from tbcad.reconstruction.field import SUFFIX, read_field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
@@ -189,7 +189,7 @@ def _show_views(shown: _Shown, start: "Query", port: int, open_page: bool, json:
 
 
 def _renderer(shown: _Shown) -> "ViewRenderer":
-    from tbcad.reconstruct.field import Field
+    from tbcad.reconstruction.field import Field
     from tbcad.viewer.render import FieldRenderer, Renderer
 
     if isinstance(shown.pictured, Field):

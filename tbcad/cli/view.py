@@ -133,7 +133,7 @@ def view(
     files = ViewFiles(tuple(depth_files or ()), normals_file, opacity_file)
     by_default = method is None and surface is None and light is None
     choice = _choice("field" if by_default and files.of_field else method, surface)
-    from tbcad.reconstruct.beside import wanted_field
+    from tbcad.reconstruction.beside import wanted_field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 

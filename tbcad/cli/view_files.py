@@ -11,7 +11,7 @@ from tbcad.errors import InputError
 
 if TYPE_CHECKING:
     from tbcad.optics.camera import Camera
-    from tbcad.reconstruct.field import Field
+    from tbcad.reconstruction.field import Field
     from tbcad.types import Bytes
 
 
@@ -84,7 +84,7 @@ def write_depth(
 def field_view(made: "Field", at: "Camera", files: ViewFiles) -> "Bytes":
     """The picture of a field (h, w, 3), and what else is asked for of it."""
     from tbcad.atomic_files import replace_files
-    from tbcad.reconstruct.picture import field_normals, field_picture, normals_png, opacity_png
+    from tbcad.reconstruction.picture import field_normals, field_picture, normals_png, opacity_png
     from tbcad.simulate.scene.depth_files import depth_ply, depth_png
 
     picture = field_picture(made, at)

@@ -15,8 +15,8 @@ from tbcad.datasets.pinhole_pictures import pinhole_pictures
 from tbcad.depth.view import DepthViews
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.reconstruct.field import Field
-from tbcad.reconstruct.picture import field_picture
+from tbcad.reconstruction.field import Field
+from tbcad.reconstruction.picture import field_picture
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus

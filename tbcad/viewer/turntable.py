@@ -15,8 +15,8 @@ from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.output.single_files import check_file
-from tbcad.reconstruct.field import Field
-from tbcad.reconstruct.picture import field_picture
+from tbcad.reconstruction.field import Field
+from tbcad.reconstruction.picture import field_picture
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise

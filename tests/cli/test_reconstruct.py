@@ -11,8 +11,8 @@ from PIL import Image
 
 from tbcad.api import reconstruct
 from tbcad.cli import run
-from tbcad.reconstruct import fitted
-from tbcad.reconstruct.options import Options
+from tbcad.reconstruction import fitted
+from tbcad.reconstruction.options import Options
 from tests.ball_captures import ball, four, quick_choice  # noqa: F401 - fixtures
 
 SMALL = ("--nodes", "24", "--epochs", "3", "--order", "0")

@@ -1,16 +1,16 @@
 """The opacity of a field, rendered by Mitsuba as an absorbing medium before white light.
 
 Its media do not emit, so it says nothing about colours: those are compared with sums in double
-precision (tests/reconstruct/test_marching.py).
+precision (tests/reconstruction/test_marching.py).
 """
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from tbcad.reconstruct.field import Field, density_of
-from tbcad.reconstruct.grid import Grid
-from tbcad.reconstruct.picture import field_picture
+from tbcad.reconstruction.field import Field, density_of
+from tbcad.reconstruction.grid import Grid
+from tbcad.reconstruction.picture import field_picture
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tests.ray_fields import RADIUS
 

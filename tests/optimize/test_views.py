@@ -7,9 +7,9 @@ from tbcad.mirrors.array import design
 from tbcad.optimize import views
 from tbcad.optimize.candidate import Limits, evaluate, place_of
 from tbcad.optimize.views import mean_ssim
-from tbcad.reconstruct import quick
-from tbcad.reconstruct.fit import Level, Settings
-from tbcad.reconstruct.quick import BY_FIELD
+from tbcad.reconstruction import quick
+from tbcad.reconstruction.fit import Level, Settings
+from tbcad.reconstruction.quick import BY_FIELD
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.study.pixels import Sensor
 from tbcad.simulate.study.ssim import ssim

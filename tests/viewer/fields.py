@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.reconstruct.beside import FACT, field_file, light_field_fingerprint
-from tbcad.reconstruct.field import Field, write_field
-from tbcad.reconstruct.grid import Grid
+from tbcad.reconstruction.beside import FACT, field_file, light_field_fingerprint
+from tbcad.reconstruction.field import Field, write_field
+from tbcad.reconstruction.grid import Grid
 from tbcad.simulate.capture.light_field import LightField
 
 NODES, CAPTURE_MM = 25, 60.0

@@ -12,7 +12,7 @@ from PIL import Image
 
 import tbcad
 from tbcad.errors import InputError
-from tbcad.reconstruct.picture import field_picture
+from tbcad.reconstruction.picture import field_picture
 from tbcad.simulate.views.refocus import ThinLens, refocus
 from tbcad.viewer.query import Query
 from tbcad.viewer.render import FieldRenderer, Renderer

@@ -1,0 +1,255 @@
+"""A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from math import log10
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.reconstruction.beside import FACT, light_field_fingerprint
+from tbcad.reconstruction.checkpoint import (
+    Checkpoint,
+    read_checkpoint,
+    settings_of,
+    settings_record,
+    write_checkpoint,
+)
+from tbcad.reconstruction.choice import chosen
+from tbcad.reconstruction.field import Field
+from tbcad.reconstruction.fit import (
+    CENTRAL,
+    Level,
+    Settings,
+    State,
+    all_spans,
+    fit,
+    squared_error,
+    workers,
+)
+from tbcad.reconstruction.hull import hull
+from tbcad.reconstruction.options import Options
+from tbcad.reconstruction.places import pixel_places
+from tbcad.reconstruction.rays import CapturedRays, captured_rays
+from tbcad.reconstruction.start import start
+from tbcad.reconstruction.surface import best_level, resolved_mm
+from tbcad.reconstruction.uncertainty import with_weights
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.types import Bools, Progress
+from tbcad.version import __version__
+
+READING, CHOICE = "rays and hull", "choice by mirrors left out"
+LEFT_OUT = 0.02  # share of the mirrors that the fit does not see
+LEAST_MIRRORS = 10  # with fewer none is left out
+COLOURS = 3
+LARGEST_DB = 99.0  # of colours that are equal
+
+
+@dataclass(frozen=True)
+class Told:
+    """Who is told of a reconstruction under way.
+
+    Attributes:
+        stage: of each stage, by its name.
+        detail: of each epoch.
+        field: likewise, with the field as it is.
+    """
+
+    stage: Progress
+    detail: Progress
+    field: Callable[[Field], None] = lambda _: None
+
+
+def asked_for(source: LightField, options: Options, last: Field | None = None) -> dict[str, Any]:
+    """All that a field follows from.
+
+    Args:
+        source: the light field.
+        options: how it is reconstructed.
+        last: the field that the fit starts from.
+    """
+    return {
+        "tbcad": __version__,
+        "options": asdict(options),
+        FACT: light_field_fingerprint(source),
+        "started_from": None if last is None else last.facts[FACT],
+    }
+
+
+def reconstruction(
+    source: LightField,
+    options: Options,
+    told: Told,
+    part: Path | None = None,
+    last: Field | None = None,
+) -> Field:
+    """Fit a field to the rays of a light field; its facts say how it was made.
+
+    Args:
+        source: the light field.
+        options: how.
+        told: of progress.
+        part: where the checkpoint is written after each epoch, and from which an interrupted fit
+            goes on; None: there is none.
+        last: field of the frame before, to start from.
+
+    Raises:
+        InputError: no ray shows anything, or the checkpoint is of another fit.
+    """
+    told.stage(READING)
+    asked = asked_for(source, options, last)
+    settings = _settings(source, options)
+    saved = None
+    if part is not None and part.exists():
+        saved = read_checkpoint(part, asked, settings.places)
+    rays = with_weights(captured_rays(source, settings.places is not CENTRAL), source)
+    used = used_rays(rays, options.seed)
+    with workers() as pool:
+        inside = hull(rays, pool)
+    if saved is None:
+        settings, trials = _chosen(rays, settings, options, told, last)
+        state = start(inside, last, rays.capture_mm, settings)
+    else:
+        settings, trials, state = saved.settings, saved.trials, saved.state
+    told.stage(level_name(settings.levels[state.level]))
+    for reached in _epochs(rays, settings, used, state):
+        state = reached
+        if part is not None:
+            write_checkpoint(part, Checkpoint(asked, settings, trials, state))
+        _tell(state, settings, told)
+    made = state.field()
+    if not len(made.grid):
+        raise InputError(
+            f"nothing is left of the object after --epochs {options.epochs}: take more of them"
+        )
+    facts = _facts(rays, used, made, inside, settings)
+    about = {"object": source.facts.get("object"), "trials": trials}
+    return replace(made, facts=asked | about | facts)
+
+
+def level_name(level: Level) -> str:
+    """A grid as a stage."""
+    return f"grid of {level.nodes} nodes"
+
+
+def levels(options: Options) -> tuple[Level, ...]:
+    """The usual grids, in proportion to the finest that is asked for."""
+    usual = Settings().levels
+    finest = usual[-1]
+    return tuple(
+        Level(
+            round(one.nodes * options.nodes / finest.nodes),
+            max(round(one.epochs * options.epochs / finest.epochs), 1),
+        )
+        for one in usual
+    )
+
+
+def _settings(source: LightField, options: Options) -> Settings:
+    """As asked, before anything is chosen: exact rays are single ones, pixels have an area."""
+    blur = source.facts.get("blur_px", 0) if options.blur_px is None else options.blur_px
+    exact = source.facts.get("samples") == 1 and not blur
+    places = CENTRAL if exact else pixel_places(float(blur))
+    return Settings(
+        levels(options), order=int(options.order == "1"), places=places, seed=options.seed
+    )
+
+
+def used_rays(rays: CapturedRays, seed: int) -> Bools:
+    """Which rays (n,) the fit sees: those of some mirrors are left out, to judge it by."""
+    mirrors = np.unique(rays.mirror)
+    if len(mirrors) < LEAST_MIRRORS:
+        return np.ones(len(rays), dtype=bool)
+    count = max(round(LEFT_OUT * len(mirrors)), 1)
+    out = np.random.default_rng([seed, len(mirrors)]).choice(mirrors, count, replace=False)
+    return ~np.isin(rays.mirror, out)
+
+
+def _chosen(
+    rays: CapturedRays, settings: Settings, options: Options, told: Told, last: Field | None
+) -> tuple[Settings, list[dict[str, Any]]]:
+    """Weights and order by mirrors left out, and the trials; the first frame's hold for all."""
+    if last is not None:
+        before = settings_of(last.facts["chosen"], settings.places)
+        return replace(before, levels=settings.levels, seed=settings.seed), last.facts["trials"]
+    told.stage(CHOICE)
+    orders = (0, 1) if options.order == "auto" else (settings.order,)
+    # Trials are coarse: they show no pixel's area.
+    single = replace(settings, places=CENTRAL)
+    best, trials = chosen(rays, single, orders, told.detail)
+    tried = [
+        {"order": one.settings.order, "smooth_density": one.settings.smooth_density,
+         "loss": one.loss} for one in trials
+    ]  # fmt: skip
+    return replace(best, places=settings.places), tried
+
+
+def _epochs(rays: CapturedRays, settings: Settings, used: Bools, state: State) -> Iterator[State]:
+    """The epochs that are left; coarse grids, which show no pixel's area, by single rays."""
+    coarse = len(settings.levels) - 2
+    single = replace(settings, places=CENTRAL)
+    if not _passed(state, coarse, settings):
+        for reached in fit(rays, single, used, state):
+            state = reached
+            yield state
+            if _passed(state, coarse, settings):
+                break
+    yield from fit(rays, settings, used, state)
+
+
+def _passed(state: State, level: int, settings: Settings) -> bool:
+    """Whether all epochs of a level are done."""
+    here = state.level == level and state.epoch == settings.levels[level].epochs
+    return here or state.level > level
+
+
+def _tell(state: State, settings: Settings, told: Told) -> None:
+    """Tell of an epoch that is done, and of the next grid if it was the last of this one."""
+    epochs = settings.levels[state.level].epochs
+    told.detail(f"epoch {state.epoch} of {epochs}, {decibels(state.loss / COLOURS):.1f} dB")
+    told.field(state.field())
+    if state.epoch == epochs and state.level + 1 < len(settings.levels):
+        told.stage(level_name(settings.levels[state.level + 1]))
+
+
+def _facts(
+    rays: CapturedRays, used: Bools, made: Field, inside: Bools, settings: Settings
+) -> dict[str, Any]:
+    with workers() as pool:
+        missed = _unexplained(rays, start(inside, None, rays.capture_mm, settings), pool)
+    error = squared_error(rays, ~used, made, settings)
+    return {
+        "chosen": settings_record(settings),
+        "rays": len(rays),
+        "rays_a_pixel": settings.places.shape[1],
+        "node_count": len(made.grid),
+        "unexplained_light": missed,
+        "mirrors_left_out": len(np.unique(rays.mirror[~used])),
+        "psnr_left_out_db": None if used.all() else decibels(error / COLOURS),
+        "surface_level": _surface_level(made, rays, used),
+        "resolved_mm": resolved_mm(rays),
+    }
+
+
+def _surface_level(made: Field, rays: CapturedRays, used: Bools) -> float | None:
+    """Density of the surface, 1/mm, by rays left out, or by all; None: there is no surface."""
+    try:
+        return best_level(made, rays, np.ones_like(used) if used.all() else ~used)
+    except InputError:
+        return None
+
+
+def decibels(error: float) -> float:
+    """Peak signal-to-noise ratio of a mean squared error of colours from 0 to 1."""
+    return -10 * log10(error) if error > 0 else LARGEST_DB
+
+
+def _unexplained(rays: CapturedRays, first: State, pool: ThreadPoolExecutor) -> float:
+    """Share of the light brighter than the background on rays past the first grid."""
+    light = rays.colour.max(axis=1)
+    light[light < rays.dark_level()] = 0
+    past = all_spans(rays, first.grid, pool)[0] < 0
+    return float(light[past].sum(dtype=np.float64) / light.sum(dtype=np.float64))

@@ -1,0 +1,191 @@
+"""A reconstruction is the same on any number of threads, and however often it is stopped."""
+
+import json
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.api import reconstruct
+from tbcad.errors import InputError
+from tbcad.reconstruction.checkpoint import part_file
+from tbcad.reconstruction.field import read_field
+from tbcad.reconstruction.fitted import Told, levels, reconstruction, used_rays
+from tbcad.reconstruction.options import EPOCHS, NODES, Options
+from tbcad.reconstruction.rays import captured_rays
+from tbcad.simulate.capture.light_field import LightField
+from tests.ball_captures import RADIUS_MM, ball, four, quick_choice, without_trials  # noqa: F401 - fixtures
+
+SMALL = Options(nodes=24, epochs=3, order="0")
+
+
+@pytest.fixture(scope="module")
+def made(ball: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:  # noqa: F811
+    out = tmp_path_factory.mktemp("made") / "field.npz"
+    with pytest.MonkeyPatch.context() as patch:
+        without_trials(patch)
+        reconstruct(ball, out=out, options=SMALL)
+    return out
+
+
+def stopped_after(epochs: int) -> Callable[[str], None]:
+    """What ends a reconstruction as Ctrl-C does, when so many epochs are done."""
+    left = [epochs]
+
+    def detail(text: str) -> None:
+        left[0] -= text.startswith("epoch")
+        if left[0] == 0:
+            raise KeyboardInterrupt
+
+    return detail
+
+
+def test_a_ball_is_where_it_is(made: Path) -> None:
+    field = read_field(made)
+    radius = np.linalg.norm(field.grid.points, axis=1)
+    dense = field.density() > 0.5 * field.density().max()
+    assert radius[dense].max() < RADIUS_MM + 2 * field.grid.pitch_mm
+    facts = field.facts
+    assert facts["psnr_left_out_db"] > 20
+    assert facts["mirrors_left_out"] == 2
+    assert facts["unexplained_light"] < 0.01
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_same_bytes_on_any_number_of_threads(
+    threads: int,
+    ball: Path,  # noqa: F811
+    made: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("fit", "fitted"):
+        pool = f"tbcad.reconstruction.{name}.workers"
+        monkeypatch.setattr(pool, lambda: ThreadPoolExecutor(threads))
+    reconstruct(ball, out=tmp_path / "again.npz", options=SMALL)
+    assert (tmp_path / "again.npz").read_bytes() == made.read_bytes()
+
+
+@pytest.mark.parametrize("epochs", [1, 2, 6])
+def test_same_bytes_after_a_stop(
+    epochs: int,
+    ball: Path,  # noqa: F811
+    made: Path,
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "field.npz"
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(ball, out=out, options=SMALL, detail=stopped_after(epochs))
+    assert [file.name for file in tmp_path.iterdir()] == [".field.npz.part"]
+    with pytest.raises(InputError, match="go on with --resume, or begin anew with --force"):
+        reconstruct(ball, out=out, options=SMALL)
+    told: list[str] = []
+    reconstruct(ball, out=out, options=SMALL, resume=True, detail=told.append)
+    assert out.read_bytes() == made.read_bytes()
+    assert [file.name for file in tmp_path.iterdir()] == ["field.npz"]
+    assert len(told) == sum(level.epochs for level in levels(SMALL)) - epochs
+
+
+@pytest.mark.parametrize("epochs", [2, 3, 4])
+def test_same_bytes_after_a_stop_where_pixels_have_an_area(
+    epochs: int,
+    ball: Path,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    """The grids before the last have single rays: also where the stop is between them."""
+    options = Options(nodes=16, epochs=2, order="1", blur_px=0.4)
+    whole, out = tmp_path / "whole.npz", tmp_path / "field.npz"
+    reconstruct(ball, out=whole, options=options)
+    assert read_field(whole).facts["rays_a_pixel"] == 4
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(ball, out=out, options=options, detail=stopped_after(epochs))
+    reconstruct(ball, out=out, options=options, resume=True)
+    assert out.read_bytes() == whole.read_bytes()
+
+
+def test_a_checkpoint_of_other_options_is_refused(ball: Path, tmp_path: Path) -> None:  # noqa: F811
+    out = tmp_path / "field.npz"
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(ball, out=out, options=SMALL, detail=stopped_after(1))
+    kept = part_file(out).read_bytes()
+    others = [(Options(nodes=24, epochs=3, order="0", seed=1), None, "is of seed 0, not 1")]
+    others += [(Options(nodes=30, epochs=3, order="0"), None, "is of nodes 24, not 30")]
+    for options, frame, message in [*others, (SMALL, 1, "is of another capture")]:
+        with pytest.raises(InputError, match=message):
+            reconstruct(ball, out=out, options=options, frame=frame, resume=True)
+    assert part_file(out).read_bytes() == kept
+    part_file(out).write_bytes(kept[:-2000])
+    with pytest.raises(InputError, match=r"is damaged .*: begin anew with --force"):
+        reconstruct(ball, out=out, options=SMALL, resume=True)
+
+
+def test_another_seed_is_another_field(ball: Path, made: Path, tmp_path: Path) -> None:  # noqa: F811
+    out = tmp_path / "field.npz"
+    reconstruct(ball, out=out, options=Options(nodes=24, epochs=3, order="0", seed=1))
+    assert not np.array_equal(read_field(out).values, read_field(made).values)
+
+
+def test_frames_start_from_the_one_before(ball: Path, tmp_path: Path) -> None:  # noqa: F811
+    stages: list[str] = []
+    out = tmp_path / "turn.npz"
+    reconstruct(ball, out=out, options=SMALL, frame="all", progress=stages.append)
+    first, second = (read_field(tmp_path / f"turn-{k}.npz").facts for k in (0, 1))
+    assert first["started_from"] is None
+    assert second["started_from"] == first["light_field"] != second["light_field"]
+    assert "frame 0: grid of 10 nodes" in stages
+    assert "frame 1: grid of 10 nodes" not in stages
+    assert second["psnr_left_out_db"] > first["psnr_left_out_db"] - 1
+    whole = (tmp_path / "turn-1.npz").read_bytes()
+    (tmp_path / "turn-1.npz").unlink()
+    reconstruct(ball, out=out, options=SMALL, frame="all", resume=True)
+    assert (tmp_path / "turn-1.npz").read_bytes() == whole
+
+
+def test_grids_are_in_proportion() -> None:
+    assert levels(Options())[-1].nodes == NODES
+    assert levels(Options())[-1].epochs == EPOCHS
+    assert [level.nodes for level in levels(Options(nodes=72))] == [30, 50, 72]
+
+
+def test_mirrors_left_out_are_whole_and_few(ball: Path) -> None:  # noqa: F811
+    rays = captured_rays(LightField.read(ball))
+    used = used_rays(rays, 0)
+    assert not set(rays.mirror[used]) & set(rays.mirror[~used])
+    assert 1 <= len(set(rays.mirror[~used])) <= 4
+    assert not np.array_equal(used, used_rays(rays, 1))
+
+
+def test_facts_tell_how_it_was_made(made: Path) -> None:
+    facts = read_field(made).facts
+    assert facts["trials"] == [{"order": 0, "smooth_density": 5e-5, "loss": 0.5}]
+    assert facts["chosen"]["order"] == 0
+    assert facts["options"] == {
+        "nodes": 24, "epochs": 3, "order": "0", "blur_px": None, "seed": 0,
+    }  # fmt: skip
+    assert [level["nodes"] for level in facts["chosen"]["levels"]] == [10, 17, 24]
+    assert json.dumps(facts)
+
+
+@pytest.mark.parametrize("case", ["dark", "away"])
+def test_what_shows_nothing_is_refused(case: str, ball: Path) -> None:  # noqa: F811
+    source = LightField.read(ball)
+    for frame in source.frames.values():
+        frame.planes["colour" if case == "dark" else "mirror"][:] = 0
+    message = {
+        "dark": "show nothing brighter than",
+        "away": "no ray of the light field meets its capture sphere",
+    }[case]
+    with pytest.raises(InputError, match=message):
+        reconstruction(source, SMALL, Told(print, print))
+
+
+def test_light_that_no_hull_explains(ball: Path) -> None:  # noqa: F811
+    """A bright mirror that no other confirms is outside of the hull."""
+    source = LightField.read(ball)
+    frame = source.frames["a"]
+    alone = frame.planes["mirror"] == 20
+    frame.planes["colour"][alone] = 200
+    facts = reconstruction(source, Options(nodes=72, epochs=1), Told(print, print)).facts
+    assert 0.0003 < facts["unexplained_light"] < 0.1
