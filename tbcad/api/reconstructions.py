@@ -28,7 +28,6 @@ EVERY: Literal["all"] = "all"
 SURFACE = "surface"
 # For the time left: of a pixel that is read, of a pixel and node by each epoch, and of the surface.
 READ_S, EPOCH_S, SURFACE_S, CHOICE_EPOCHS = 2e-6, 2e-8, 10.0, 6
-RAYS_OF_WIDE = 4
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ def reconstruct(
     Args:
         capture: folder that `capture` or `merge` wrote, or its light field.
         out: file to write, .npz; None: field.npz beside the light field, field-K.npz for a frame.
-        options: grid, epochs, view dependence, blur of the lens, seed.
+        options: grid, epochs, view dependence, rays of a pixel, blur of the lens, seed.
         frame: of the capture's sequence, from 0; "all": each, started from the one before, and each
             file has the frame's number at the end of its name; None: the capture itself.
         meshes: files to write the surface to, .glb, .ply or .stl.
@@ -272,10 +271,9 @@ def expected_seconds(
 
     with LightField.open(wanted.capture) as source:
         count = pixels(source)
-    ray = 1 if source.facts.get("samples") == 1 else RAYS_OF_WIDE
-    of_fit = {
-        level_name(one): EPOCH_S * ray * count * one.nodes * one.epochs for one in levels(options)
-    }
+    of_fit = {level_name(one): EPOCH_S * count * one.nodes * one.epochs for one in levels(options)}
+    *_, finest = of_fit
+    of_fit[finest] *= options.rays
     of_frame = {
         READING: READ_S * count,
         CHOICE: CHOICE_EPOCHS * next(iter(of_fit.values())),

@@ -54,12 +54,20 @@ def reconstruct(
             "gloss; auto: by which of both mirrors that are left out are shown better."
         ),
     ] = "auto",
+    rays: Annotated[
+        int,
+        typer.Option(
+            metavar="K",
+            help="Rays of a pixel on the finest grid: 1, its central ray, or 12 and more, which "
+            "take its area and the lens' spread into account, in K times the time.",
+        ),
+    ] = 1,
     blur: Annotated[
         float | None,
         typer.Option(
             metavar="PX",
-            help="Standard deviation of the lens' spread, pixels of the photograph, besides the "
-            "pixel's own area; by default what the light field says, else 0.",
+            help="With --rays: standard deviation of the lens' spread, pixels of the photograph, "
+            "besides the pixel's own area; by default what the light field says, else 0.",
         ),
     ] = None,
     frame: Annotated[
@@ -109,7 +117,7 @@ def reconstruct(
         raise InputError("--frame and --all-frames exclude each other: leave one out")
     from tbcad.reconstruction.options import Options
 
-    options = Options(nodes, epochs, order, blur, seed)
+    options = Options(nodes, epochs, order, rays, blur, seed)
     from tbcad.api.reconstructions import Wanted, checked_frames, expected_seconds
     from tbcad.api.reconstructions import reconstruct_files as reconstructed
 

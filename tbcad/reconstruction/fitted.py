@@ -1,6 +1,6 @@
 """A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from math import log10
@@ -31,6 +31,7 @@ from tbcad.reconstruction.fit import (
     workers,
 )
 from tbcad.reconstruction.hull import hull
+from tbcad.reconstruction.marching import Singles
 from tbcad.reconstruction.options import Options
 from tbcad.reconstruction.places import pixel_places
 from tbcad.reconstruction.rays import CapturedRays, captured_rays
@@ -115,7 +116,7 @@ def reconstruction(
     else:
         settings, trials, state = saved.settings, saved.trials, saved.state
     told.stage(level_name(settings.levels[state.level]))
-    for reached in _epochs(rays, settings, used, state):
+    for reached in fit(rays, settings, used, state):
         state = reached
         if part is not None:
             write_checkpoint(part, Checkpoint(asked, settings, trials, state))
@@ -149,13 +150,26 @@ def levels(options: Options) -> tuple[Level, ...]:
 
 
 def _settings(source: LightField, options: Options) -> Settings:
-    """As asked, before anything is chosen: exact rays are single ones, pixels have an area."""
+    """As asked, before anything is chosen."""
+    order, single = int(options.order == "1"), Settings().places
+    places = single if options.rays == 1 else _places(source, options)
+    return Settings(levels(options), order=order, places=places, seed=options.seed)
+
+
+def _places(source: LightField, options: Options) -> Singles:
+    """Of the rays of a pixel.
+
+    Raises:
+        InputError: its pixels are single rays.
+    """
     blur = source.facts.get("blur_px", 0) if options.blur_px is None else options.blur_px
-    exact = source.facts.get("samples") == 1 and not blur
-    places = CENTRAL if exact else pixel_places(float(blur))
-    return Settings(
-        levels(options), order=int(options.order == "1"), places=places, seed=options.seed
-    )
+    area = source.facts.get("samples") != 1
+    if not area and not blur:
+        raise InputError(
+            f"--rays {options.rays}: a pixel of this light field is a single ray: leave it out, or "
+            "say with --blur how far the lens spread it"
+        )
+    return pixel_places(options.rays, float(blur), area=area)
 
 
 def used_rays(rays: CapturedRays, seed: int) -> Bools:
@@ -177,7 +191,7 @@ def _chosen(
         return replace(before, levels=settings.levels, seed=settings.seed), last.facts["trials"]
     told.stage(CHOICE)
     orders = (0, 1) if options.order == "auto" else (settings.order,)
-    # Trials are coarse: they show no pixel's area.
+    # Trials are coarse: they do not resolve a pixel.
     single = replace(settings, places=CENTRAL)
     best, trials = chosen(rays, single, orders, told.detail)
     tried = [
@@ -185,25 +199,6 @@ def _chosen(
          "loss": one.loss} for one in trials
     ]  # fmt: skip
     return replace(best, places=settings.places), tried
-
-
-def _epochs(rays: CapturedRays, settings: Settings, used: Bools, state: State) -> Iterator[State]:
-    """The epochs that are left; coarse grids, which show no pixel's area, by single rays."""
-    coarse = len(settings.levels) - 2
-    single = replace(settings, places=CENTRAL)
-    if not _passed(state, coarse, settings):
-        for reached in fit(rays, single, used, state):
-            state = reached
-            yield state
-            if _passed(state, coarse, settings):
-                break
-    yield from fit(rays, settings, used, state)
-
-
-def _passed(state: State, level: int, settings: Settings) -> bool:
-    """Whether all epochs of a level are done."""
-    here = state.level == level and state.epoch == settings.levels[level].epochs
-    return here or state.level > level
 
 
 def _tell(state: State, settings: Settings, told: Told) -> None:

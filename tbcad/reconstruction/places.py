@@ -1,30 +1,31 @@
 """Places of the rays of a pixel that is more than its central ray."""
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 from tbcad.reconstruction.marching import Singles
-from tbcad.types import Floats
 
-PATTERNS = 64  # a power of two, for Sobol's sequence
-SQUARE_VARIANCE = 1 / 12  # of a square of one pixel, along each side
+PATTERNS = 8  # turned against each other
+SQUARE_VARIANCE = 1 / 12  # of a pixel's square, along each side
+GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
-def pixel_places(blur_px: float = 0.0) -> Singles:
-    """Places of four rays from a pixel's centre in each of p patterns, pixels, (p, 4, 2).
+def pixel_places(count: int, blur_px: float = 0.0, *, area: bool = True) -> Singles:
+    """Places of a pixel's rays from its centre in each of p patterns, pixels, (p, count, 2).
 
-    They are drawn from the pixel's square convolved with a Gaussian; evenly, by Sobol's sequence,
-    and the same each time. Rays 0 and 2 lie opposite each other, rays 1 and 3 too, so that each
-    half of a pattern has the mean zero: the gradient (tbcad.reconstruction.marching.add_gradient)
-    is that of the mean light only if both halves are independent, so one is no complement of the
-    other. Their variance over all patterns is exactly that of the distribution.
+    On Vogel's spiral, with the density of a Gaussian of the variance that the pixel's square and
+    the lens' spread have together; their mean is zero and their variance exact in each pattern's
+    sum of both ways. Few rays are worse than one: a step of light inside of a pixel is then a
+    stair (docs/reconstruct.md).
 
     Args:
-        blur_px: standard deviation of the Gaussian.
+        count: of rays.
+        blur_px: standard deviation of the lens' spread.
+        area: whether a pixel is the mean of its square, and not a single ray.
     """
-    uniform = qmc.Sobol(8, scramble=True, rng=np.random.default_rng(0)).random(PATTERNS)
-    drawn = np.clip(uniform, 2.0**-30, 1 - 2.0**-30).reshape(PATTERNS, 2, 2, 2)
-    half: Floats = drawn[:, :, 0] - 0.5 + blur_px * ndtri(drawn[:, :, 1])
-    half *= np.sqrt((SQUARE_VARIANCE + blur_px**2) / (half**2).mean(axis=(0, 1)))
-    return np.concatenate([half, -half], axis=1).astype(np.float32)
+    k = np.arange(count)
+    radius = np.sqrt(-2 * np.log(1 - (k + 0.5) / count))
+    angle = k * GOLDEN_ANGLE + 2 * np.pi * np.arange(PATTERNS)[:, None] / PATTERNS
+    places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    places -= places.mean(axis=1, keepdims=True)
+    sigma = np.sqrt(blur_px**2 + area * SQUARE_VARIANCE)
+    return np.asarray(places * sigma / np.sqrt(np.mean(places**2)), dtype=np.float32)

@@ -129,8 +129,3 @@ def test_a_state_keeps_its_values_while_the_fit_goes_on() -> None:
     before = field_bytes(first)
     next(states)
     assert field_bytes(first) == before
-
-
-def test_an_odd_number_of_rays_in_a_pixel_is_refused() -> None:
-    with pytest.raises(ValueError, match="even"):
-        Settings(places=np.zeros((4, 3, 2), np.float32))

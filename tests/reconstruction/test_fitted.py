@@ -95,7 +95,7 @@ def test_same_bytes_after_a_stop_where_pixels_have_an_area(
     tmp_path: Path,
 ) -> None:
     """The grids before the last have single rays: also where the stop is between them."""
-    options = Options(nodes=16, epochs=2, order="1", blur_px=0.4)
+    options = Options(nodes=16, epochs=2, order="1", rays=4, blur_px=0.4)
     whole, out = tmp_path / "whole.npz", tmp_path / "field.npz"
     reconstruct(ball, out=whole, options=options)
     assert read_field(whole).facts["rays_a_pixel"] == 4
@@ -162,7 +162,7 @@ def test_facts_tell_how_it_was_made(made: Path) -> None:
     assert facts["trials"] == [{"order": 0, "smooth_density": 5e-5, "loss": 0.5}]
     assert facts["chosen"]["order"] == 0
     assert facts["options"] == {
-        "nodes": 24, "epochs": 3, "order": "0", "blur_px": None, "seed": 0,
+        "nodes": 24, "epochs": 3, "order": "0", "rays": 1, "blur_px": None, "seed": 0,
     }  # fmt: skip
     assert [level["nodes"] for level in facts["chosen"]["levels"]] == [10, 17, 24]
     assert json.dumps(facts)

@@ -1,7 +1,6 @@
 """Light along rays against closed forms and sums in double precision; gradients by differences."""
 
 from collections.abc import Callable
-from itertools import product
 
 import numpy as np
 import pytest
@@ -139,7 +138,7 @@ def test_spans_hold_all_that_a_ray_meets(n: int, seed: int) -> None:
     grid = sparse(n, seed, MATT).grid
     entry, direction = lines(12, seed)
     length = -2 * (entry * direction).sum(axis=1)
-    first, last = spans(*single(entry, direction, length), grid.leap, WIDTH)
+    first, last = spans(*single(entry, direction, length), grid.leap, WIDTH, 1)
     for k in range(len(entry)):
         at = np.arange(0, length[k], 0.01)
         met = at[in_whole_cells(grid, entry[k] + at[:, None] * direction[k])]
@@ -176,7 +175,7 @@ def pixels_of(entry: Floats, direction: Floats, colour: Floats, **changes: Singl
 def jitters(pixel: int, seed: int, kinds: int, count: int) -> tuple[int, list[float]]:
     """Pattern of the rays in a pixel, and where the first sample of each is, in steps."""
     state = _mixed(pixel, seed)
-    kind, found = int(state) % kinds, []
+    kind, found = int(_mixed(pixel, 0)) % kinds, []
     for k in range(count):
         state = _mixed(state, k)
         found.append((int(state) >> 8) / (1 << 24))
@@ -197,13 +196,13 @@ def doubled_loss(made: Field, values: Floats, pixels: Pixels, seed: int, step: f
             direction = pixels.direction[i].astype(float) + x * print_of[2] + y * print_of[3]
             at = np.arange(pixels.first[i] + start * step, pixels.last[i], step)
             lights.append(light(made.grid, values, entry, direction, at, step)[:3])
-        halves = [np.mean(lights[g::2] or lights, axis=0) - pixels.colour[i] for g in (0, 1)]
-        total += float(pixels.weight[i] * halves[0] @ halves[1])
+        off = np.mean(lights, axis=0) - pixels.colour[i]
+        total += float(pixels.weight[i] * off @ off)
     return total
 
 
 @pytest.mark.parametrize("columns", [MATT, GLOSSY])
-@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("count", [1, 3, 4])
 def test_the_gradient_is_that_of_differences(columns: int, count: int) -> None:
     made, step, seed = sparse(7, 3, columns, 0.9), 0.9, 11
     rng = np.random.default_rng(5)
@@ -230,29 +229,3 @@ def test_the_gradient_is_that_of_differences(columns: int, count: int) -> None:
         expected = (ahead - behind) / 2e-4 / 2
         size = float(np.linalg.norm(gradient[:, column]))
         assert (gradient * way).sum() == pytest.approx(expected, abs=3e-3 * size), column
-
-
-def test_few_rays_in_a_pixel_have_the_gradient_of_its_mean_light() -> None:
-    """Half of a pixel sees an opaque wall, half nothing; what was photographed is that mean.
-
-    So the mean light is right and its gradient zero, whereas the error of the same rays, of which
-    chance has all or none at the wall, would pull the wall's colour.
-    """
-    grid = cube(5)
-    values = filled(grid, lambda at: np.where(at[:, 0] < 0, 60.0, -3.0))
-    count, step = 20_000, 0.5
-    entry = np.tile([0.1, 0.2, -9.0], (count, 1))
-    direction = np.tile([0.0, 0.0, 1.0], (count, 1))
-    prints = np.zeros((count, 4, 3))
-    prints[:, 0, 0] = 1.0
-    sides = np.array(list(product([-8.0, 8.0], repeat=4)))
-    places = np.stack([sides, np.zeros_like(sides)], axis=2)
-    colour = np.tile(0.5 * values[0, 1:4], (count, 1))
-    last = np.full(count, 18.0)
-    changes = zip(["last", "footprint", "places"], single(last, prints, places), strict=True)
-    pixels = pixels_of(entry, direction, colour, **dict(changes))
-    medium = Medium(WIDTH, step, grid.row, grid.leap, values)
-    gradient = np.zeros_like(values)
-    add_gradient(np.arange(count), pixels, 1, medium, gradient)
-    naive = 0.8 / 4 / 4  # red: mean of off (L - c) L' over chance, L' = 1 at the wall
-    assert abs(gradient[:, 1].sum()) / count < 0.05 * naive
