@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tbcad.types import Progress
 
 LIGHT_FIELD, FIELD_SUFFIX, MESH_SUFFIXES = "lightfield.h5", ".npz", (".glb", ".ply", ".stl")
+VOLUME_SUFFIXES = (".vti",)
 PREVIEW_DEG, PREVIEW_MM, PREVIEW_PX = (30.0, 30.0), 640.0, (480, 360)
 # Bytes at the most, as measured (docs/reconstruct.md): of each pixel of all photographs, and of
 # each node of the finest cube.
@@ -42,6 +43,7 @@ class Wanted:
         preview: picture that is written after each epoch.
         resume: go on with what was interrupted, and keep what is done.
         force: replace files that exist.
+        volume: file to write density and colours on the whole lattice to.
     """
 
     capture: Path
@@ -51,6 +53,7 @@ class Wanted:
     preview: Path | None = None
     resume: bool = False
     force: bool = False
+    volume: Path | None = None
 
     @property
     def folder(self) -> Path:
@@ -68,6 +71,10 @@ class Wanted:
     def mesh_files(self, number: int | None) -> list[Path]:
         """Where the surface of a frame is written, or that of the capture itself."""
         return [self._numbered(file, number) for file in self.meshes]
+
+    def volume_file(self, number: int | None) -> Path | None:
+        """Where the volume of a frame is written, or that of the capture itself."""
+        return None if self.volume is None else self._numbered(self.volume, number)
 
     def part_file(self, number: int | None) -> Path:
         """The checkpoint of that field."""
@@ -112,6 +119,7 @@ def reconstruct(
     options: Options | None = None,
     frame: int | Literal["all"] | None = None,
     meshes: Sequence[Path | str] = (),
+    volume: Path | str | None = None,
     preview: Path | str | None = None,
     resume: bool = False,
     force: bool = False,
@@ -127,6 +135,7 @@ def reconstruct(
         frame: of the capture's sequence, from 0; "all": each, started from the one before, and each
             file has the frame's number at the end of its name; None: the capture itself.
         meshes: files to write the surface to, .glb, .ply or .stl.
+        volume: file to write density and colours on the whole lattice to, .vti.
         preview: PNG file that shows the field after each epoch.
         resume: go on with a fit that was interrupted, and keep what is done.
         force: replace files that exist.
@@ -149,6 +158,7 @@ def reconstruct(
         None if preview is None else Path(preview),
         resume,
         force,
+        None if volume is None else Path(volume),
     )
     return reconstruct_files(wanted, options or Options(), progress, detail)[-1].field
 
@@ -200,7 +210,18 @@ def _reconstructed(
         made = reconstruction(source, options, told, part, last)
         write_field(file, made)
     part.unlink(missing_ok=True)
+    _write_volume(made, wanted.volume_file(number), wanted.force)
     return Reconstructed(file, made, kept, _meshes(made, source, wanted, number, stage))
+
+
+def _write_volume(made: Field, file: Path | None, force: bool) -> None:
+    """Write the volume, unless it is there already."""
+    if file is None or (file.exists() and not force):
+        return
+    from tbcad.atomic_files import replace_files
+    from tbcad.reconstruction.volume import volume_file
+
+    replace_files(file.parent, {file.name: volume_file(made)})
 
 
 def _show(preview: Path | None, made: Field) -> None:
@@ -259,6 +280,8 @@ def _files(wanted: Wanted, numbers: list[int | None]) -> list[tuple[Path, tuple[
         files.append((made, (FIELD_SUFFIX,), may_be))
         done = wanted.force or (wanted.resume and made.exists())
         files += [(mesh, MESH_SUFFIXES, done) for mesh in wanted.mesh_files(number)]
+        if (volume := wanted.volume_file(number)) is not None:
+            files.append((volume, VOLUME_SUFFIXES, done))
     return files
 
 

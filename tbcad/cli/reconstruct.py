@@ -93,6 +93,14 @@ def reconstruct(
             "repeatable.",
         ),
     ] = None,
+    volume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Also write density and colours on the whole lattice, for ParaView and PyVista "
+            "(.vti).",
+        ),
+    ] = None,
     preview: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="A picture (.png) that is written after each epoch."),
@@ -122,7 +130,7 @@ def reconstruct(
     from tbcad.api.reconstructions import reconstruct_files as reconstructed
 
     which: int | Literal["all"] | None = "all" if all_frames else frame
-    wanted = Wanted(capture, out, which, tuple(mesh or ()), preview, resume, force)
+    wanted = Wanted(capture, out, which, tuple(mesh or ()), preview, resume, force, volume)
     numbers = checked_frames(wanted)
     try:
         with stages(expected_seconds(wanted, options, numbers)) as screen:

@@ -36,8 +36,10 @@ def test_field_picture_and_verdict(
     assert {file.name for file in tmp_path.iterdir()} == {"it", "p.png"}
     reconstruct(capture, out=tmp_path / "f.npz", options=Options(24, 3, "0"))
     assert (tmp_path / "f.npz").read_bytes() == (capture / "field.npz").read_bytes()
-    mesh = tmp_path / "ball.ply"
-    assert run(["reconstruct", str(capture), *SMALL, "--mesh", str(mesh), "--resume"]) == 0
+    mesh, volume = tmp_path / "ball.ply", tmp_path / "ball.vti"
+    files = ("--mesh", str(mesh), "--volume", str(volume))
+    assert run(["reconstruct", str(capture), *SMALL, *files, "--resume"]) == 0
+    assert volume.read_bytes().startswith(b"<?xml")
     shown = capsys.readouterr().out.splitlines()
     assert shown[0].startswith("PSNR ")
     assert f"{capture / 'field.npz'}: was there already" in shown[3]
@@ -90,6 +92,7 @@ def test_a_stop_says_how_to_go_on(
         (("--out", "{}/object.npz", "--force"), "object.npz belongs to "),
         (("--mesh", "{}/a.obj"), "a.obj: name a file that ends in .glb or .ply or .stl"),
         (("--mesh", "{}/a.ply", "--mesh", "{}/b/../a.ply"), "is named twice"),
+        (("--volume", "{}/a.vdb"), "a.vdb: name a file that ends in .vti"),
         (("--preview", "{}/a.jpg"), "a.jpg: name a file that ends in .png"),
         (("--nodes", "8"), "--nodes is 8, allowed is 16 to 512: change it"),
         (("--nodes", "1000"), "--nodes is 1000, allowed is 16 to 512: change it"),
