@@ -26,6 +26,7 @@ from tbcad.reconstruction.fit import (
     Settings,
     State,
     all_spans,
+    first_state,
     fit,
     squared_error,
     workers,
@@ -34,11 +35,11 @@ from tbcad.reconstruction.hull import hull
 from tbcad.reconstruction.marching import Singles
 from tbcad.reconstruction.options import Options
 from tbcad.reconstruction.places import pixel_places
-from tbcad.reconstruction.rays import CapturedRays, captured_rays
+from tbcad.reconstruction.rays import NO_FOOTPRINT, CapturedRays, captured_rays
 from tbcad.reconstruction.start import start
 from tbcad.reconstruction.surface import best_level, resolved_mm
 from tbcad.reconstruction.uncertainty import with_weights
-from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tbcad.types import Bools, Progress
 from tbcad.version import __version__
 
@@ -106,7 +107,7 @@ def reconstruction(
     saved = None
     if part is not None and part.exists():
         saved = read_checkpoint(part, asked, settings.places)
-    rays = with_weights(captured_rays(source, settings.places is not CENTRAL), source)
+    rays = _weighted_rays(source, settings)
     used = used_rays(rays, options.seed)
     with workers() as pool:
         inside = hull(rays, pool)
@@ -151,8 +152,8 @@ def levels(options: Options) -> tuple[Level, ...]:
 
 def _settings(source: LightField, options: Options) -> Settings:
     """As asked, before anything is chosen."""
-    order, single = int(options.order == "1"), Settings().places
-    places = single if options.rays == 1 else _places(source, options)
+    places = CENTRAL if options.rays == 1 else _places(source, options)
+    order = int(options.order == "1")
     return Settings(levels(options), order=order, places=places, seed=options.seed)
 
 
@@ -170,6 +171,15 @@ def _places(source: LightField, options: Options) -> Singles:
             "say with --blur how far the lens spread it"
         )
     return pixel_places(options.rays, float(blur), area=area)
+
+
+def _weighted_rays(source: LightField, settings: Settings) -> CapturedRays:
+    """The rays with what a calibration says of them; footprints only where a fit needs them."""
+    wide = settings.places is not CENTRAL
+    if wide or RAY_SIGMAS not in source.facts:
+        return with_weights(captured_rays(source, wide), source)
+    weighted = with_weights(captured_rays(source, True), source)
+    return replace(weighted, footprint=NO_FOOTPRINT)
 
 
 def used_rays(rays: CapturedRays, seed: int) -> Bools:
@@ -214,7 +224,7 @@ def _facts(
     rays: CapturedRays, used: Bools, made: Field, inside: Bools, settings: Settings
 ) -> dict[str, Any]:
     with workers() as pool:
-        missed = _unexplained(rays, start(inside, None, rays.capture_mm, settings), pool)
+        missed = _unexplained(rays, first_state(inside, rays.capture_mm, settings), pool)
     error = squared_error(rays, ~used, made, settings)
     return {
         "chosen": settings_record(settings),

@@ -15,6 +15,7 @@ Singles = NDArray[np.float32]
 LEAST_CHORD_MM = 0.03
 GRAZING = 0.01  # share of the rays, with the shortest way through the capture sphere
 LOWEST, SIGMAS_BETWEEN = 0.05, 0.97  # a quantile, and from there to the quartile if normal
+NO_FOOTPRINT: Singles = np.zeros((1, 4, 3), dtype=np.float32)
 DARKEST = 0.02  # of white: less is called dark whatever the noise
 NOISE = 4.0  # times the standard deviation is brighter than the background's noise
 
@@ -88,7 +89,7 @@ def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
     )
     if not len(length):
         raise InputError("no ray of the light field meets its capture sphere: capture again")
-    wide = prints[0] if prints else np.zeros((1, 4, 3), dtype=np.float32)
+    wide = prints[0] if prints else NO_FOOTPRINT
     weight = np.ones(len(length), dtype=np.float32)
     return CapturedRays(entry, direction, length, colour, mirror, weight, wide, source.capture_mm)
 

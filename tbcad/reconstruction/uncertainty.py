@@ -33,12 +33,12 @@ def with_weights(rays: CapturedRays, source: LightField) -> CapturedRays:
         InputError: its fact does not fit its mirrors.
     """
     sigmas = _sigmas(source)
-    if np.isnan(sigmas).all() or len(rays.footprint) != len(rays):
+    if np.isnan(sigmas).all() or not rays.footprint.any():
         return rays
     sigma = np.where(np.isnan(sigmas), np.nanmax(sigmas), sigmas)[rays.mirror]
-    width_squared = pixel_areas(rays)
-    weight = width_squared / (width_squared + 6 * sigma**2)
-    return replace(rays, weight=np.where(sigma == 0, 1, weight).astype(np.float32))
+    area = pixel_areas(rays)
+    area[area == 0] = np.median(area[area > 0])  # of pixels without neighbours in their mirror
+    return replace(rays, weight=(area / (area + 6 * sigma**2)).astype(np.float32))
 
 
 def pixel_areas(rays: CapturedRays) -> Singles:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from tbcad.reconstruction.field import read_field
 from tbcad.reconstruction.fitted import Told, levels, reconstruction, used_rays
 from tbcad.reconstruction.options import EPOCHS, NODES, Options
 from tbcad.reconstruction.rays import captured_rays
-from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tests.ball_captures import RADIUS_MM, ball, four, quick_choice, without_trials  # noqa: F401 - fixtures
 
 SMALL = Options(nodes=24, epochs=3, order="0")
@@ -189,3 +190,15 @@ def test_light_that_no_hull_explains(ball: Path) -> None:  # noqa: F811
     frame.planes["colour"][alone] = 200
     facts = reconstruction(source, Options(nodes=72, epochs=1), Told(print, print)).facts
     assert 0.0003 < facts["unexplained_light"] < 0.1
+
+
+def test_mirrors_that_are_known_badly_count_less(ball: Path) -> None:  # noqa: F811
+    """Also where each pixel is its central ray, as it is by default."""
+    source = LightField.read(ball)
+    told = {
+        name: [0.0 if k % 2 else 5.0 for k in range(len(frame.u))]
+        for name, frame in source.frames.items()
+    }
+    known = replace(source, facts={**source.facts, RAY_SIGMAS: told})
+    even, weighted = (reconstruction(one, SMALL, Told(print, print)) for one in (source, known))
+    assert not np.array_equal(even.values, weighted.values)

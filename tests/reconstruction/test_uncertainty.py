@@ -50,6 +50,13 @@ def test_the_formula(parallel: LightField) -> None:
     assert found == pytest.approx([1, 1 / (1 + 6 / 144), 0.4], rel=1e-3)
 
 
+def test_a_pixel_without_neighbours_counts_as_the_others(parallel: LightField) -> None:
+    parallel.frames["a"].planes["mirror"][1:, 4:8] = 0  # leaves a row of the second mirror
+    parallel.frames["a"].planes["mirror"][0, 5:8] = 0
+    found = weights(parallel, PIXEL_MM / 2, PIXEL_MM / 2, PIXEL_MM / 2)
+    assert found == pytest.approx([0.4, 0.4, 0.4], rel=1e-3)
+
+
 def test_an_unknown_mirror_counts_as_the_worst(parallel: LightField) -> None:
     found = weights(parallel, 0.1, None, 0.3)
     assert found[1] == pytest.approx(found[2], rel=1e-4)
