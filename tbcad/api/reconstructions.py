@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.types import Progress
 
-LIGHT_FIELD, FIELD_SUFFIX, MESH_SUFFIXES = "lightfield.h5", ".npz", (".glb", ".ply", ".stl")
-VOLUME_SUFFIXES = (".vti",)
+LIGHT_FIELD = "lightfield.h5"
 PREVIEW_DEG, PREVIEW_MM, PREVIEW_PX = (30.0, 30.0), 640.0, (480, 360)
 # Bytes at the most, as measured (docs/reconstruct.md): of each pixel of all photographs, and of
 # each node of the finest cube.
@@ -271,17 +270,19 @@ def checked_frames(wanted: Wanted) -> list[int | None]:
 
 def _files(wanted: Wanted, numbers: list[int | None]) -> list[tuple[Path, tuple[str, ...], bool]]:
     """Each file to write, its suffixes, and whether it may exist."""
+    from tbcad.reconstruction import field, mesh_files, volume
+
     files: list[tuple[Path, tuple[str, ...], bool]] = []
     may_be = wanted.force or wanted.resume
     if wanted.preview is not None:
         files.append((wanted.preview, (".png",), may_be))
     for number in numbers:
         made = wanted.field_file(number)
-        files.append((made, (FIELD_SUFFIX,), may_be))
+        files.append((made, (field.SUFFIX,), may_be))
         done = wanted.force or (wanted.resume and made.exists())
-        files += [(mesh, MESH_SUFFIXES, done) for mesh in wanted.mesh_files(number)]
-        if (volume := wanted.volume_file(number)) is not None:
-            files.append((volume, VOLUME_SUFFIXES, done))
+        files += [(mesh, mesh_files.SUFFIXES, done) for mesh in wanted.mesh_files(number)]
+        if (dense := wanted.volume_file(number)) is not None:
+            files.append((dense, (volume.SUFFIX,), done))
     return files
 
 

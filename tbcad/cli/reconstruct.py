@@ -155,10 +155,11 @@ def _lines(one: "Reconstructed") -> Iterator[str]:
     if out:
         verdict = f"PSNR {facts['psnr_left_out_db']:.2f} dB on {out} mirrors that were left out"
     yield f"{verdict}, of {facts['rays']} rays"
+    several = "1 ray" if facts["rays_a_pixel"] == 1 else f"{facts['rays_a_pixel']} rays"
     yield (
         f"view dependence of order {chosen['order']}, total variation "
         f"{chosen['smooth_density']:g}, smoothness of colours {chosen['smooth_colour']:g}, "
-        f"sparsity {chosen['sparse']:g}; {facts['rays_a_pixel']} rays a pixel"
+        f"sparsity {chosen['sparse']:g}; {several} a pixel"
     )
     yield f"{100 * facts['unexplained_light']:.2g} % of the light is outside of the hull"
     grids = ", ".join(str(level["nodes"]) for level in chosen["levels"])

@@ -132,13 +132,13 @@ def fit(
             state = finer(state, settings)
 
 
-def first_state(inside: Bools, capture_mm: float, settings: Settings) -> State:
-    """An even fog in a hull (k, k, k)."""
-    n = settings.levels[0].nodes
+def first_state(inside: Bools, capture_mm: float, settings: Settings, level: int = 0) -> State:
+    """An even fog in a hull (k, k, k), on the grid of a level."""
+    n = settings.levels[level].nodes
     grid = Grid.about(resampled(inside.astype(np.float32), n) > BORDER, capture_mm)
     values = np.zeros((len(grid), GLOSSY if settings.order else MATT), dtype=np.float32)
     values[:, 0], values[:, 1:MATT] = FIRST_NUMBER, FIRST_COLOUR
-    return _begun(0, grid, values)
+    return _begun(level, grid, values)
 
 
 def finer(state: State, settings: Settings) -> State:

@@ -6,7 +6,8 @@ Visualization and Computer Graphics 1(2), 1995). Density is (x + sqrt(x^2 + q)) 
 that is interpolated linearly between nodes and may be negative, so surfaces lie between nodes
 (A. Karnewar and others, ReLU Fields, SIGGRAPH 2022; J. T. Barron, Squareplus, 2021). Colours are
 interpolated too; of a field of first order, each has a part that is linear in the ray's direction.
-The gradient is what differentiation of these sums gives, sample by sample from the far end.
+The gradient is what differentiation of these sums gives, sample by sample from the near end: what
+lies behind a sample is the light of the ray without what was added up to there.
 
 Nothing here depends on threads: each call has its own samples and its own sums.
 """

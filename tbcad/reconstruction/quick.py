@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from threading import Lock
 
-from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.reconstruction.field import Field
 from tbcad.reconstruction.fit import Level, Settings, fit
@@ -25,10 +24,7 @@ def quick_field(source: LightField) -> Field:
         InputError: none of them meets the capture sphere.
     """
     with _one_at_a_time:
-        rays = captured_rays(source)
-        if len(rays) == 0:
-            raise InputError("no ray of the light field meets the capture sphere")
-        *_, last = fit(rays, QUICK)
+        *_, last = fit(captured_rays(source), QUICK)
     return last.field()
 
 

@@ -2,18 +2,8 @@
 
 import numpy as np
 
-from tbcad.reconstruction.adam import Moments
 from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fit import (
-    BORDER,
-    FIRST_COLOUR,
-    FIRST_NUMBER,
-    Settings,
-    State,
-    first_state,
-)
-from tbcad.reconstruction.grid import Grid, resampled
-from tbcad.reconstruction.marching import GLOSSY, MATT
+from tbcad.reconstruction.fit import Settings, State, first_state
 from tbcad.types import Bools
 
 SKIPPED = 1  # coarse grids that are left out
@@ -31,14 +21,11 @@ def start(inside: Bools, last: Field | None, capture_mm: float, settings: Settin
     """
     if last is None or len(settings.levels) <= SKIPPED:
         return first_state(inside, capture_mm, settings)
-    nodes = settings.levels[SKIPPED].nodes
-    grid = Grid.about(resampled(inside.astype(np.float32), nodes) > BORDER, capture_mm)
-    columns = GLOSSY if settings.order else MATT
-    values = np.zeros((len(grid), columns), dtype=np.float32)
-    values[:, 0], values[:, 1:MATT] = FIRST_NUMBER, FIRST_COLOUR
+    state = first_state(inside, capture_mm, settings, SKIPPED)
+    grid, values = state.grid, state.values
     known = grid.sampled(last.grid.dense(np.ones(len(last.grid), dtype=np.float32)))
     there = known > KNOWN
-    for k in range(min(columns, last.values.shape[1])):
+    for k in range(min(values.shape[1], last.values.shape[1])):
         sampled = grid.sampled(last.grid.dense(last.values[:, k]))
         values[there, k] = sampled[there] / known[there]
-    return State(SKIPPED, 0, grid, values, Moments(np.zeros_like(values), np.zeros_like(values)))
+    return state
