@@ -154,7 +154,7 @@ def _started(controller: Any, export: Path, folder: Path) -> Rig:
     return Rig(controller, export, folder)
 
 
-def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+def until(condition: Callable[[], bool], seconds: float = 600.0) -> None:
     """Wait for something that a thread does."""
     from time import monotonic, sleep
 
