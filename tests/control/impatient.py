@@ -3,6 +3,7 @@
 python -m tests.control.impatient WORDS... is the command in a process of its own.
 """
 
+import signal
 from importlib import import_module
 
 WAITS_S = {
@@ -27,6 +28,8 @@ def main() -> None:
     for name, seconds in WAITS_S.items():
         module, _, constant = name.rpartition(".")
         setattr(import_module(f"tbcad.control.{module}"), constant, seconds)
+    # A shell lets what it starts in the background ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     tbcad()
 
 
