@@ -180,6 +180,7 @@ SMALLER = {
     ("build",): ["--n", "3", "--parts", "shell", *SMALL_SENSOR],
     ("optimize",): ["--set", "n=3", "--candidates", "80", *SMALL_SENSOR],
     ("refocus",): ["--truth-samples", "2", "--frames", "2"],
+    ("drawings",): ["--only", "optical_layout"],
     ("reconstruct",): ["--nodes", "32", "--epochs", "1", "--order", "0"],
     ("study", "balance"): ["--views", "1", *SMALL_SENSOR],
     ("study", "ssim"): ["--sensor", "416x310", "--azimuths", "1"],
