@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from tbcad_verify.run.child import Limits, Outcome, run
 
-LATE = "no answer within 3 s"
+LATE = "no answer within 2 s"
 
 
 def python(folder: Path, body: str, limits: Limits | None = None) -> Outcome:
@@ -52,7 +52,7 @@ def test_late_words_are_not_lost(tmp_path: Path) -> None:
 
 def test_hanging_is_cut_short(tmp_path: Path) -> None:
     start = time.monotonic()
-    done = python(tmp_path, "import time; print('soon', flush=True); time.sleep(900)", Limits(3))
+    done = python(tmp_path, "import time; print('soon', flush=True); time.sleep(900)", Limits(2))
     assert time.monotonic() - start < 600
     assert (done.code, done.reason) == (None, LATE)
     assert done.text == "soon\n"
@@ -69,7 +69,7 @@ print(child.pid, flush=True)
 def test_grandchildren_do_not_outlive_a_child(tmp_path: Path, rest: str, reason: str) -> None:
     """Nor do they keep us waiting: this one holds the pipe open."""
     start = time.monotonic()
-    done = python(tmp_path, SPAWN + rest, Limits(3))
+    done = python(tmp_path, SPAWN + rest, Limits(2))
     assert done.reason == reason
     assert time.monotonic() - start < 600
     assert gone_soon(int(done.text))
@@ -77,7 +77,7 @@ def test_grandchildren_do_not_outlive_a_child(tmp_path: Path, rest: str, reason:
 
 def test_ignoring_polite_signals_does_not_help(tmp_path: Path) -> None:
     body = "import os, signal, time; signal.signal(15, signal.SIG_IGN); print(os.getpid(), "
-    done = python(tmp_path, body + "flush=True); time.sleep(900)", Limits(3))
+    done = python(tmp_path, body + "flush=True); time.sleep(900)", Limits(2))
     assert gone_soon(int(done.text))
 
 
