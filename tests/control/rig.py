@@ -15,11 +15,11 @@ import numpy as np
 from PIL import Image
 
 from tbcad.control.plan import read_settings
+from tests.control.exposing_camera import SIZE
 from tests.control.grbl_double import GrblDouble, Machine
 from tests.control.klipper_double import KlipperDouble, printer_settings
 
 ROOT = Path(__file__).parents[2]
-SIZE = (416, 310)  # of the export's camera
 PICTURE = "scene.jpg"
 PICTURE_BYTES = 16_384  # the virtual camera asks for a file's size once
 LIT = 255

@@ -52,9 +52,9 @@ def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
     assert code is None, output
 
 
-def test_five_kills(either_rig: Rig) -> None:
+def test_three_kills(either_rig: Rig) -> None:
     """Forty of them, with the virtual camera, are in test_whole_loop."""
-    rig, kills = either_rig, 5
+    rig, kills = either_rig, 3
     killed_run(rig, rig.copying, stops=1, kills=kills, seed=1)
     check_every_photograph(rig.out, PER_STOP)
     begun = [one["event"] for one in journal(rig.out) if one["event"] in ("started", "resumed")]
