@@ -2,9 +2,11 @@
 
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 # As tbcad's commands do, before numpy is loaded: each core has a process of tests already, in which
 # threads of the linear algebra would only wait for each other.
@@ -20,6 +22,20 @@ from tbcad.simulate.prototype.plan import Plan, read_plan
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tests.mirror_arrays import mirror_design
 from tests.prototype_exports import write_export, write_wind_up
+
+# No clock, which a busy machine would fail, and the same examples in every run.
+settings.register_profile(
+    "tbcad", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("tbcad")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def without_fsync() -> Iterator[None]:
+    """Nothing waits for the disk, which only a power cut could tell from the real one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _: None)
+        yield
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.priors import Fitted, prototype_prior
-from tbcad.machine.built import BuiltPrototype, designed_build, is_cap, random_build
+from tbcad.machine.built import is_cap, random_build
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Machine
-from tbcad.simulate.prototype.plan import Plan, read_plan
+from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
@@ -100,13 +100,6 @@ def small_run(
     series = np.array([frame.object_turn_deg // 180 for frame in frames])
     known = Fitted(plan.body_centre, is_cap(plan), series)
     return Small(run, prototype_prior(designed.of_frames(kept), kinds, known))
-
-
-def perfect_build(folder: Path) -> tuple[BuiltPrototype, Plan]:
-    """The designed prototype of an export."""
-    export = read_export(folder)
-    plan = read_plan(export)
-    return designed_build(designed_prototype(export, plan), plan), plan
 
 
 def photograph_centroid(image: Floats, place: Floats, radius: int) -> Floats:

@@ -15,7 +15,6 @@ from tbcad.version import __version__
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = (ROOT / "tbcad", ROOT / "verify" / "tbcad_verify")
-NOT_DATA = (".pyc", ".py")
 
 pytestmark = [
     pytest.mark.slow,

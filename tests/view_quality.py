@@ -1,7 +1,5 @@
 """How good views of a light field are, by the object itself."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from tbcad.simulate.image_quality import image_quality
@@ -9,23 +7,18 @@ from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import Method, synthesise
+from tbcad.simulate.views.synthesis import synthesise
 
 THREE_SIDES_DEG = ((10.0, 25.0), (130.0, 40.0), (250.0, 55.0))
 DISTANCE_MM, CAPTURE_MM = 640.0, 60.0
+SIZE_PX = (160, 120)
 
 
-def mean_ssim(
-    tiles: MirrorTiles,
-    scene: Scene,
-    method: Method = "nearest",
-    places_deg: Sequence[tuple[float, float]] = THREE_SIDES_DEG,
-    size_px: tuple[int, int] = (160, 120),
-) -> float:
-    """Of views from places around the object, each by azimuth and elevation."""
+def mean_ssim(tiles: MirrorTiles, scene: Scene) -> float:
+    """Of views from three sides."""
     found = []
-    for azimuth, elevation in np.radians(places_deg):
-        at = camera_around_object(azimuth, elevation, DISTANCE_MM, CAPTURE_MM, size_px, None)
+    for azimuth, elevation in np.radians(THREE_SIDES_DEG):
+        at = camera_around_object(azimuth, elevation, DISTANCE_MM, CAPTURE_MM, SIZE_PX, None)
         truth = np.rint(pinhole_picture(scene, at)).astype(np.uint8)
-        found.append(image_quality(truth, synthesise(tiles, at, method, None).image).ssim)
+        found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
     return float(np.mean(found))

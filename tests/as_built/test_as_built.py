@@ -101,7 +101,7 @@ class TestFiles:
             encoding="utf-8",
         )
         shown = subprocess.run(
-            [command, str(script)], capture_output=True, encoding="utf-8", check=False, timeout=120
+            [command, str(script)], capture_output=True, encoding="utf-8", check=False, timeout=600
         ).stdout
         assert f"SOLIDS {len(built.radius)} True" in shown
 

@@ -1,18 +1,23 @@
 """A camera of the user's own: what is before it, exposed for some seconds, as a PNG file.
 
 python exposing_camera.py RADIANCE SECONDS OUTPUT: a NumPy file of what fills a pixel in a second.
+It is started for each photograph, so it loads little.
 """
+
+from __future__ import annotations
 
 import io
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
-from tests.control.grbl_double import Machine
-from tests.control.rig import SIZE
+if TYPE_CHECKING:
+    from tests.control.grbl_double import Machine
 
+SIZE = (416, 310)  # of the export's camera
 LED, OBJECT = 80.0, 0.4  # of a full pixel in a second: an LED is far brighter than what is lit
 ROWS = range(40, 240, 40)
 

@@ -3,6 +3,8 @@
 python -m tests.control.impatient WORDS... is the command in a process of its own.
 """
 
+import os
+import signal
 from importlib import import_module
 
 WAITS_S = {
@@ -27,6 +29,9 @@ def main() -> None:
     for name, seconds in WAITS_S.items():
         module, _, constant = name.rpartition(".")
         setattr(import_module(f"tbcad.control.{module}"), constant, seconds)
+    os.fsync = lambda _: None  # which only a power cut could tell from the real one
+    # A shell lets what it starts in the background ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     tbcad()
 
 

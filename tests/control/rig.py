@@ -15,11 +15,11 @@ import numpy as np
 from PIL import Image
 
 from tbcad.control.plan import read_settings
+from tests.control.exposing_camera import SIZE
 from tests.control.grbl_double import GrblDouble, Machine
 from tests.control.klipper_double import KlipperDouble, printer_settings
 
 ROOT = Path(__file__).parents[2]
-SIZE = (416, 310)  # of the export's camera
 PICTURE = "scene.jpg"
 PICTURE_BYTES = 16_384  # the virtual camera asks for a file's size once
 LIT = 255
@@ -154,7 +154,7 @@ def _started(controller: Any, export: Path, folder: Path) -> Rig:
     return Rig(controller, export, folder)
 
 
-def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+def until(condition: Callable[[], bool], seconds: float = 600.0) -> None:
     """Wait for something that a thread does."""
     from time import monotonic, sleep
 

@@ -133,7 +133,7 @@ def test_interrupt_holds_base_and_switches_lights_off(rig: Rig, kind: signal.Sig
     process = rig.start(rig.words("--phases", "lit", "--runs", "a", stops="1,30"))
     until(lambda: controller.moving and controller.speed < FAST)
     process.send_signal(kind)
-    out, _ = process.communicate(timeout=30)
+    out, _ = process.communicate(timeout=600)
     assert process.returncode == 1
     assert "stopped by the operator" in out
     assert "LOOK AT THE MACHINE" not in out
@@ -161,7 +161,7 @@ def test_interrupted_homing_stops_with_the_motor_on(rig: Rig, reports: bool) -> 
     asked = len(controller.asked)
     until(lambda: len(controller.asked) > asked)
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=30)
+    out, _ = process.communicate(timeout=600)
     assert "stopped by the operator" in out
     assert "LOOK AT THE MACHINE" not in out
     assert not controller.homed
@@ -210,7 +210,7 @@ def test_interrupted_dwell(rig: Rig) -> None:
     process = rig.start(rig.words("--phases", "lit", "--runs", "a", stops="1"))
     until(resting.is_set)
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=30)
+    out, _ = process.communicate(timeout=600)
     assert process.returncode == 1
     assert "LOOK AT THE MACHINE" not in out
     assert controller.machine.let_go == 0
@@ -350,11 +350,11 @@ def test_file_that_the_system_refuses(rig: Rig) -> None:
     limited = ["sh", "-c", 'ulimit -f 24; exec "$@"', "-"]
     words = rig.words(camera="gphoto2")
     done = rig.start(words, before=limited)
-    out, _ = done.communicate(timeout=60)
+    out, _ = done.communicate(timeout=600)
     assert done.returncode == 1
     assert "cannot be written: File too large" in out
     assert not list((rig.out / "photographs").iterdir())
     again = rig.start(rig.words("--resume", camera="gphoto2", stops=None))
-    again.communicate(timeout=60)
+    again.communicate(timeout=600)
     assert again.returncode == 0
     check_every_photograph(rig.out, ALL)

@@ -23,8 +23,8 @@ from tbcad.errors import InputError
 from tbcad.runs.exposure import PhaseTimes
 from tbcad.runs.photographs import read_run
 from tests.control import exposing_camera
-from tests.control.exposing_camera import radiance
-from tests.control.rig import ROOT, SIZE, Rig, connected_rig, put, scene_of
+from tests.control.exposing_camera import SIZE, radiance
+from tests.control.rig import Rig, connected_rig, put, scene_of
 from tests.control.run_checks import events
 
 GOOD = ("--exposure-leds", "1/100", "--exposure-lit", "2")
@@ -40,8 +40,7 @@ def lit_rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator
 
 def words(rig: Rig, *more: str, stops: str | None = "1") -> list[str]:
     script = Path(exposing_camera.__file__)
-    program = f"env PYTHONPATH={ROOT} {sys.executable} {script}"
-    camera = f"command:{program} {rig.picture} {{exposure_s}} {{output}}"
+    camera = f"command:{sys.executable} {script} {rig.picture} {{exposure_s}} {{output}}"
     every = rig.words("--phases", "dark,led_2,lit", *more, camera=camera, stops=stops)
     return [word for word in every if word != "--no-preflight"]
 

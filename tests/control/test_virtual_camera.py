@@ -15,7 +15,7 @@ SETTINGS = {"shutterspeed": "0.0100s", "f-number": "f/2.8", "imagesize": "640x48
 def test_camera_on_usb(rig: Rig) -> None:
     """More photographs than its store has room for: a session that fails is opened again."""
     process = rig.start(rig.words(camera="gphoto2", stops="1-3"), module="tbcad")
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 0, err
     assert out.startswith("COMPLETE: 36 of 36 photographs")
     check_every_photograph(rig.out, 36)
@@ -27,7 +27,7 @@ def test_camera_on_usb(rig: Rig) -> None:
 
 def test_another_size_is_refused_at_the_first(rig: Rig) -> None:
     process = rig.start(rig.words("--size", "4160x3104", camera="gphoto2"))
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=600)
     assert process.returncode == 2
     assert "gives 416 x 310 pixels, 4160 x 3104 are wanted" in err.splitlines()[-1]
     assert not rig.out.exists()
@@ -39,7 +39,7 @@ def test_another_camera_is_refused_when_a_run_goes_on(rig: Rig) -> None:
     assert tbcad(rig.words(stops="1")) == 0
     (rig.out / "photographs" / "a_0001_dark.json").unlink()
     process = rig.start(rig.words("--resume", camera="gphoto2", stops=None))
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=600)
     assert process.returncode == 2
     assert "the camera is Nikon DSC D750, and the run's is unnamed camera" in err
 
@@ -49,7 +49,7 @@ def test_exposure_of_each_phase(rig: Rig) -> None:
     phases = ("--phases", "dark,led_1,lit", "--runs", "a")
     exposures = ("--exposure-leds", "0.0012", "--exposure-lit", "0.11")
     process = rig.start(rig.words(*phases, *exposures, camera="gphoto2", stops="1"), module="tbcad")
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=600)
     assert process.returncode == 0, err
     run = read_run(rig.out)
     assert not run.faults
@@ -67,7 +67,7 @@ def test_exposure_of_each_phase(rig: Rig) -> None:
 
 def test_exposure_that_the_camera_does_not_have(rig: Rig) -> None:
     process = rig.start(rig.words("--exposure-lit", "30", camera="gphoto2"))
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=600)
     assert process.returncode == 2
     assert "no exposure near 30 s: the nearest is 1.0000s, all are from" in err.splitlines()[-1]
     assert not rig.out.exists()

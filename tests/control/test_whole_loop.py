@@ -56,7 +56,7 @@ class Loop:
         self.rig, self.stops = rig, stops
         self.simulated = rig.scene.folder
         process = rig.start(rig.words(camera="gphoto2"))
-        assert "COMPLETE" in process.communicate(timeout=120)[0]
+        assert "COMPLETE" in process.communicate(timeout=600)[0]
         self.calibrate_merge_view("whole")
         killed_run(rig, "gphoto2", stops, KILLS, seed=4)
         self.calibrate_merge_view("killed")

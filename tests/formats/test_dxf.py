@@ -16,7 +16,6 @@ ENTITIES: tuple[Entity, ...] = (
     Polyline(Layer.FOLD, ((0.0, 0.0), (100.0, 0.0), (100.0, 50.0))),
     Text(Layer.ENGRAVE, (5.0, 6.0), 3.5, "Ø 4,2 mm", "centre", 90.0),
 )
-Pairs = list[tuple[int, str]]
 
 
 def entities(path: Path) -> list[dict[int, list[str]]]:

@@ -47,7 +47,7 @@ RADII = st.floats(0.1, 40)
 BALLS = st.tuples(LENGTHS, OUT, RADII)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(BALLS, BALLS, st.tuples(LENGTHS, st.floats(1, 100), RADII))
 def test_against_many_spheres(
     start: tuple[float, ...], end: tuple[float, ...], ball: tuple[float, ...]

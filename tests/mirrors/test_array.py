@@ -145,7 +145,7 @@ SIZES = st.tuples(
 )
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(n=st.integers(2, 4), sizes=SIZES)
 def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
     n: int, sizes: tuple[float, ...]
@@ -154,7 +154,7 @@ def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(n=st.integers(2, 10), sizes=SIZES)
 def test_so_does_one_of_more_mirrors(n: int, sizes: tuple[float, ...]) -> None:
     check_any_geometry(n, *sizes)

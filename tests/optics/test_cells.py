@@ -140,7 +140,7 @@ def test_four_cells_that_meet_in_one_point(diagonal: int, curvature: float) -> N
     assert np.ptp(cell_areas(cells)) < 1e-9 * cell_areas(cells).max()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     n=st.integers(2, 9),
     x=st.floats(60, 200),

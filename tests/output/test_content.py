@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import get_args
 
@@ -47,39 +48,30 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("told", [True, False], ids=["kind told", "older manifest"])
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_kind_is_known(tmp_path: Path, kind: Kind, told: bool) -> None:
-    assert kind_of(fake(tmp_path / "it", kind, told=told)) == kind
+def test_kinds_are_known(tmp_path: Path, told: bool) -> None:
+    for kind in KINDS:
+        assert kind_of(fake(tmp_path / kind, kind, told=told)) == kind
 
 
-@pytest.mark.parametrize("force", [False, True])
 @pytest.mark.parametrize("present", KINDS)
-@pytest.mark.parametrize("kind", KINDS)
-def test_only_the_same_kind_is_replaced(
-    tmp_path: Path, kind: Kind, present: Kind, force: bool
-) -> None:
-    """And what cost hours only with force; photographs never."""
+def test_only_the_same_kind_is_replaced(tmp_path: Path, present: Kind) -> None:
+    """And what cost hours only with force; photographs never; and nothing is written into it."""
     folder = fake(tmp_path / "it", present)
     before = tree(tmp_path)
-    if kind == present and kind != "run" and (force or kind not in ASKED):
-        check_replaceable(folder, kind, force)
-    else:
-        words = "--force" if kind == present != "run" else "name another folder"
-        with pytest.raises(InputError, match=words) as error:
+    for kind, force in product(KINDS, (False, True)):
+        if kind == present and kind != "run" and (force or kind not in ASKED):
             check_replaceable(folder, kind, force)
-        assert "\n" not in str(error.value)
-        with pytest.raises(InputError), replacing(folder, kind, force):
-            pytest.fail("work began")
-    assert tree(tmp_path) == before
+        else:
+            words = "--force" if kind == present != "run" else "name another folder"
+            with pytest.raises(InputError, match=words) as error:
+                check_replaceable(folder, kind, force)
+            assert "\n" not in str(error.value)
+            with pytest.raises(InputError), replacing(folder, kind, force):
+                pytest.fail("work began")
+        with pytest.raises(InputError, match="is inside"):
+            check_replaceable(folder / "deep" / "new", kind, True)
+        assert tree(tmp_path) == before, kind
     assert COSTLY == ASKED
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("outer", KINDS)
-def test_nothing_is_written_into_what_tbcad_wrote(tmp_path: Path, outer: Kind, kind: Kind) -> None:
-    inner = fake(tmp_path / "it", outer) / "deep" / "new"
-    with pytest.raises(InputError, match="is inside"):
-        check_replaceable(inner, kind, True)
 
 
 @pytest.mark.parametrize("inner", KINDS)

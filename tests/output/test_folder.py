@@ -508,7 +508,7 @@ def test_a_kill_at_any_call_leaves_one_whole_export(
         [sys.executable, "-c", script],
         capture_output=True,
         encoding="utf-8",
-        timeout=60,
+        timeout=600,
         check=False,
     )
     assert run.returncode == 0, run.stderr

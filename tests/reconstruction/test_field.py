@@ -150,8 +150,6 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 
 @settings(
     max_examples=300,
-    deadline=None,
-    derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.integers(0, len(WHOLE) - 1), st.integers(1, 255))

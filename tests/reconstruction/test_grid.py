@@ -18,7 +18,7 @@ masks = st.builds(
     st.integers(0, 10**6),
     st.floats(0, 0.3),
 )
-quickly = settings(max_examples=40, deadline=None, derandomize=True)
+quickly = settings(max_examples=40)
 
 
 @quickly

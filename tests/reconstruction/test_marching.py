@@ -115,7 +115,7 @@ def sparse(n: int, seed: int, columns: int, share: float = 0.4) -> Field:
     return Field(grid, values.astype(np.float32))
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(st.integers(3, 12), st.integers(0, 10**6), st.sampled_from([MATT, GLOSSY]))
 def test_leaps_pass_no_cell_that_has_all_corners(n: int, seed: int, columns: int) -> None:
     made = sparse(n, seed, columns)
@@ -132,7 +132,7 @@ def test_leaps_pass_no_cell_that_has_all_corners(n: int, seed: int, columns: int
         assert 1 - found[1] == pytest.approx(expected[3], **close)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(st.integers(3, 12), st.integers(0, 10**6))
 def test_spans_hold_all_that_a_ray_meets(n: int, seed: int) -> None:
     grid = sparse(n, seed, MATT).grid

@@ -2,9 +2,7 @@
 
 import tomllib
 
-import pytest
-
-from tbcad.reference.keys import Key, key_sections, unit_of
+from tbcad.reference.keys import key_sections, unit_of
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import dotted_fields, section_of
 
@@ -20,22 +18,19 @@ def test_every_section_is_described() -> None:
     assert all(section.description for section in key_sections())
 
 
-@pytest.mark.parametrize("key", KEYS, ids=lambda key: key.name)
-class TestEveryKey:
-    def test_is_described(self, key: Key) -> None:
-        assert key.description.endswith(".")
-        assert key.allowed
-        assert "a table" not in key.allowed
+def test_every_key_is_described_and_its_default_is_toml() -> None:
+    for key in KEYS:
+        assert key.description.endswith("."), key
+        assert key.allowed, key
+        assert "a table" not in key.allowed, key
+        assert tomllib.loads(f"x = {key.default}"), key
 
-    def test_default_is_toml(self, key: Key) -> None:
-        assert tomllib.loads(f"x = {key.default}")
 
-    def test_has_the_unit_of_its_name(self, key: Key) -> None:
+def test_every_key_has_the_unit_of_its_name() -> None:
+    for key in KEYS:
         last = key.name.rpartition(".")[2].rpartition("_")[2]
-        assert bool(key.unit) == (
-            last in {"mm", "deg", "um", "px", "percent", "s", "ma", "v"}
-            or key.name.endswith(("widths", "g_cm3", "_min", "_s2"))
-        )
+        named = last in {"mm", "deg", "um", "px", "percent", "s", "ma", "v"}
+        assert bool(key.unit) == (named or key.name.endswith(("widths", "g_cm3", "_min", "_s2")))
 
 
 def test_units() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.reference.keys import key_sections
-from tbcad.reference.terms import Term, glossary
+from tbcad.reference.terms import glossary
 
 ROOT = Path(__file__).parents[2]
 TERMS = glossary().terms
@@ -20,19 +20,13 @@ def test_there_are_terms_of_every_subject() -> None:
     assert len({term.name for term in TERMS}) == len(TERMS) > 50
 
 
-@pytest.mark.parametrize("term", TERMS, ids=lambda term: term.name)
-class TestEveryTerm:
-    def test_names_keys_that_exist(self, term: Term) -> None:
-        assert set(term.keys) <= KEYS
-
-    def test_names_code_that_exists(self, term: Term) -> None:
-        for name in term.code:
-            assert pkgutil.resolve_name(name)
-
-    def test_is_a_sentence(self, term: Term) -> None:
-        assert term.meaning[0].isupper() or term.meaning[0].isdigit()
-        assert term.meaning.endswith(".")
-        assert "|" not in term.meaning + term.equation + term.symbol + term.name
+def test_every_term_names_keys_and_code_that_exist_and_is_a_sentence() -> None:
+    for term in TERMS:
+        assert set(term.keys) <= KEYS, term
+        assert all(pkgutil.resolve_name(name) for name in term.code), term
+        assert term.meaning[0].isupper() or term.meaning[0].isdigit(), term
+        assert term.meaning.endswith("."), term
+        assert "|" not in term.meaning + term.equation + term.symbol + term.name, term
 
 
 def test_columns_are_those_of_an_export(prototype_columns: dict[str, set[str]]) -> None:

@@ -13,7 +13,7 @@ from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
 from tbcad.spec.load import load_spec, spec_dict
-from tests.exported_files import contents, read_csv
+from tests.exported_files import read_csv
 from tests.helpers import check_step, read_mesh, read_step
 
 
@@ -125,11 +125,6 @@ def test_manifest_holds_every_file(exported: Path) -> None:
         data = (exported / name).read_bytes()
         assert entry == {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
     assert {"tbcad", "cadquery-ocp", "numpy"} <= set(manifest["versions"])
-
-
-def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
-    write_export(design(load_spec(None, ["n=6"])), tmp_path, [SHELL])
-    assert contents(tmp_path) == contents(exported)
 
 
 def test_pcurves_on_request(tmp_path: Path) -> None:

@@ -58,6 +58,7 @@ def test_without_them_an_export_is_as_it_was(exported: Path, tmp_path: Path) -> 
 
 
 def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
+    """Of shells, too."""
     write_export(with_mandrels(), tmp_path, [SHELL])
     assert contents(tmp_path) == contents(exported)
 

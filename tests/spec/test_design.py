@@ -196,10 +196,14 @@ class TestUnknownKey:
 
 
 class TestValue:
-    @pytest.mark.parametrize("key", NUMBERS)
-    def test_range_ends_where_it_says(self, key: str) -> None:
-        field = NUMBERS[key]
-        for limit in (one for one in field.metadata if isinstance(one, (Ge, Gt, Le, Lt))):
+    def test_range_ends_where_it_says(self) -> None:
+        limits = [
+            (key, field, limit)
+            for key, field in NUMBERS.items()
+            for limit in field.metadata
+            if isinstance(limit, (Ge, Gt, Le, Lt))
+        ]
+        for key, field, limit in limits:
             ends = {name: getattr(limit, name, None) for name in ("ge", "gt", "le", "lt")}
             value = next(end for end in ends.values() if end is not None)
             outward = 1 if ends["le"] is not None or ends["lt"] is not None else -1
@@ -209,10 +213,10 @@ class TestValue:
             assert allowed_text(field.annotation, field.metadata) in message
             assert f"{value:g}" in message
 
-    @pytest.mark.parametrize("key", NUMBERS)
     @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "true", "'1'", "[1]", "{a = 1}", "x"])
-    def test_only_finite_numbers_are_numbers(self, key: str, value: str) -> None:
-        assert f"{key} is " in refusal(None, f"{key}={value}")
+    def test_only_finite_numbers_are_numbers(self, value: str) -> None:
+        for key in NUMBERS:
+            assert f"{key} is " in refusal(None, f"{key}={value}")
 
     def test_whole_numbers_are_numbers_but_not_the_reverse(self) -> None:
         assert load_spec(None, ["wall_mm=4"]).shell.wall_mm == 4
@@ -372,10 +376,10 @@ class TestOptions:
         message = refusal(None, "bolts=3")
         assert "shell.foot_flange.bolts or shell.seam_flange.bolts" in message
 
-    @pytest.mark.parametrize("key", KEYS)
-    def test_every_whole_key_is_known(self, key: str) -> None:
+    def test_every_whole_key_is_known(self) -> None:
         """Also when it is the end of another one."""
-        assert key in refusal(None, f"{key}=[[]]")
+        for key in KEYS:
+            assert key in refusal(None, f"{key}=[[]]")
 
     @pytest.mark.parametrize("text", ["", "n", "=4", " =4"])
     def test_without_key_or_value(self, text: str) -> None:

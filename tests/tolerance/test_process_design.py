@@ -148,20 +148,23 @@ def test_a_process_for_which_there_is_no_margin() -> None:
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The design in the record gives the same mirrors again, without the process."""
+    """The edges are chosen; the design in the record gives the same mirrors without the process."""
     out = tmp_path / "exports"
     arguments = ["build", "--n", "4", "--parts", "shell", "--no-verify"]
     arguments += ["--set", "width_px=416", "--set", "height_px=310", "--out", str(out)]
     arguments += ["--set", "margin_mm=0.2"]
     assert run([*arguments, "--for-process", "cnc", "--yield", "0.9"]) == 0
-    mirrors = json.loads((out / "design.json").read_text())["spec"]["mirrors"]
+    spec = json.loads((out / "design.json").read_text())["spec"]
+    mirrors, edges = spec["mirrors"], spec["shell"]["edges"]
     made = ProcessDesign(load_spec(None, ["n=4", *options_of(mirrors)]), 0.0)
     said = capsys.readouterr().err
     assert margins_text(made).partition(" (")[0] in said
     assert ", for 90.0% by cnc" in said
+    assert f"edges: {edges}, with a median of " in said
     assert "pixels of a virtual camera that see the object" in said
     again = tmp_path / "again"
-    words = [word for option in options_of(mirrors) for word in ("--set", option)]
+    options = [*options_of(mirrors), f"shell.edges={edges}"]
+    words = [word for option in options for word in ("--set", option)]
     assert run([*arguments[:-4], "--out", str(again), *words]) == 0
     for name in ("mirrors.csv", "shell_a.stl"):
         assert (again / name).read_bytes() == (out / name).read_bytes()

@@ -1,12 +1,10 @@
 """tbcad build --for-process: the edges that leave most pixels with the margins of a process."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.spec.load import load_spec, spec_dict
 from tbcad.tolerance import process_design as process_module
@@ -145,23 +143,3 @@ def test_both_figures_in_words() -> None:
     tried = TriedEdges("pedestal", made, fewer)
     assert edges_text(EdgeChoice(made, pixels, tried)) == f"{begin}pedestal: 949 (minimum 322)"
     assert pixel_costs(made, pixels)["with these margins"] is pixels
-
-
-def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The edges are in the record of what is built."""
-    process = Path(process_module.__file__).parent / "process" / "cnc.toml"
-    text = process.read_text(encoding="utf-8").replace('name = "cnc"', 'name = "inserts"')
-    for option in INSERTS:
-        key, _, value = option.partition("=")
-        head, _, rest = text.partition(f"[{key}]\nmagnitude = ")
-        text = f"{head}[{key}]\nmagnitude = {value}\n{rest.partition(chr(10))[2]}"
-    (tmp_path / "inserts.toml").write_text(text, encoding="utf-8")
-    out = tmp_path / "exports"
-    command = ["build", "--n", "4", "--parts", "shell", "--no-verify", "--out", str(out)]
-    command += ["--set", "margin_mm=0", "--yield", "0.9"]
-    assert run([*command, "--for-process", str(tmp_path / "inserts.toml")]) == 0
-    said = capsys.readouterr().err
-    assert "edges: pedestal, with a median of" in said
-    assert "; valley: " in said
-    record = json.loads((out / "design.json").read_text(encoding="utf-8"))
-    assert record["spec"]["shell"]["edges"] == "pedestal"

@@ -37,7 +37,7 @@ def server(renderer: Renderer) -> Iterator[ViewServer]:
 def get(
     server: ViewServer, path: str, host: str | None = None, method: str = "GET"
 ) -> tuple[HTTPResponse, bytes]:
-    connection = HTTPConnection(HOST, server.server_port, timeout=60)
+    connection = HTTPConnection(HOST, server.server_port, timeout=600)
     connection.putrequest(method, path, skip_host=True)
     if host != "":
         connection.putheader("Host", host or f"{HOST}:{server.server_port}")
@@ -91,7 +91,7 @@ def test_this_computers_own_name_is_not_refused(server: ViewServer) -> None:
 )  # fmt: skip
 def test_other_paths_are_refused(server: ViewServer, path: str) -> None:
     named = path.format(token=server.token).encode().decode("latin-1")
-    connection = HTTPConnection(HOST, server.server_port, timeout=60)
+    connection = HTTPConnection(HOST, server.server_port, timeout=600)
     connection._validate_path = lambda _: None  # type: ignore[attr-defined]
     connection._encode_request = lambda request: request.encode("latin-1")  # type: ignore[attr-defined]
     connection.request("GET", named)
@@ -157,7 +157,7 @@ def test_a_lens_gives_up_when_another_view_is_asked_for(renderer: Renderer) -> N
 
 
 def raw(server: ViewServer, sent: bytes) -> socket.socket:
-    connection = socket.create_connection((HOST, server.server_port), timeout=60)
+    connection = socket.create_connection((HOST, server.server_port), timeout=600)
     connection.sendall(sent)
     return connection
 
@@ -181,7 +181,7 @@ def everything(connection: socket.socket) -> bytes:
 def all_are_served(server: ViewServer) -> None:
     """Wait until no connection is served any more: then all that could be printed is."""
     for _ in range(MAX_CONNECTIONS):
-        assert server._free.acquire(timeout=60)
+        assert server._free.acquire(timeout=600)
     server._free.release(MAX_CONNECTIONS)
 
 

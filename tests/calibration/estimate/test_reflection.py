@@ -28,14 +28,14 @@ def _case(seed: int, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray,
 
 @given(st.integers(0, 2**32 - 1), st.floats(1, 2000))
 @example(3008991829, 246.0)  # Newton's steps from the bisector at the centre go astray
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_point_is_that_of_the_law_of_reflection(seed: int, radius: float) -> None:
     case = _case(seed, radius)
     assert reflections(*case).point == pytest.approx(reflection_points(*case), abs=1e-8)
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(2, 200))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_derivatives_are_those_of_finite_differences(seed: int, radius: float) -> None:
     case = _case(seed, radius)
     found = reflections(*case)
@@ -55,7 +55,7 @@ def _slope(case: tuple[np.ndarray, ...], place: int, direction: np.ndarray) -> n
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_slopes_of_the_lens_are_those_of_finite_differences(seed: int) -> None:
     rng = np.random.default_rng(seed)
     image = np.column_stack([rng.uniform(-80, 80, size=(6, 2)), rng.uniform(100, 300, size=6)])

@@ -1,7 +1,5 @@
 """One shell: many mirrors, one photograph."""
 
-import time
-
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -16,7 +14,6 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.tolerance.process.process import load_process, process_errors
 from tests.calibration.machines import LEDS, drawn, every_highlight
 
-SECONDS = 10  # of one processor, for 847 mirrors
 HIGHLIGHTS = 4
 
 
@@ -42,12 +39,10 @@ def test_errors_are_as_large_as_the_covariance_says(small_design: MirrorDesign) 
 
 
 @pytest.mark.slow
-def test_the_whole_shell_in_seconds(paper_design: MirrorDesign) -> None:
+def test_the_whole_shell(paper_design: MirrorDesign) -> None:
     prior = _prior(paper_design)
     count = len(prior.mean.radius)
-    begun = time.process_time()
     _, square = found = _estimated(prior, 1)
     known = ray_uncertainty(found[0], np.zeros(count, dtype=np.int64), np.arange(count))
-    assert time.process_time() - begun < SECONDS
     assert square < chi2.ppf(0.999, len(prior.free))
     assert len(known.place_mm) == count == 847

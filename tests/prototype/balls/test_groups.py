@@ -43,7 +43,7 @@ def test_more_groups_than_mirrors(paper_array: MirrorArray, k: int) -> None:
         group_mirrors(paper_array.polar, paper_array.mirrors.radius, k, 0.25)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_no_group_is_empty_or_it_is_said(data: st.DataObject) -> None:
     count = data.draw(st.integers(1, 30))

@@ -51,7 +51,7 @@ def problems(draw: st.DrawFn) -> PlacementProblem:
     return PlacementProblem(separation, low, high, -limit, limit, np.zeros(k), 2 * np.pi)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(problems())
 def test_swing_is_the_minimum_of_all_orders(case: PlacementProblem) -> None:
     found = min_swing_placement(case)
@@ -121,7 +121,7 @@ def test_margin_is_more_than_the_solvers_slack() -> None:
     assert 5 * SLACK < SOLVER_MARGIN
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(problems(), st.integers(0, 2**32 - 1))
 def test_last_digits_of_the_limits_choose_nothing(case: PlacementProblem, seed: int) -> None:
     # They differ between computers, and most azimuths of such balls are free within an interval.

@@ -38,7 +38,7 @@ intervals = st.lists(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(intervals)
 def test_fewest_points_against_exhaustive_search(intervals: list[tuple[float, float]]) -> None:
     low = np.array([float(start) for start, _ in intervals])
@@ -50,7 +50,7 @@ def test_fewest_points_against_exhaustive_search(intervals: list[tuple[float, fl
     assert (points[which] <= high).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.integers(0, 1), st.floats(-1, 1)), min_size=1, max_size=8))
 def test_a_plan_has_the_fewest_stops_within_the_error(mirrors: list[tuple[int, float]]) -> None:
     """Limits of each mirror by spherical trigonometry: its ball moves on a circle of latitude."""

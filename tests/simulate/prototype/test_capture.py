@@ -193,20 +193,18 @@ class TestPhotographs:
 
 
 class TestMerged:
-    @pytest.mark.parametrize("size_mm", [CAPTURE_MM, 1.7 * CAPTURE_MM])
     @pytest.mark.parametrize("resample", ["exact", "photograph"])
     def test_balls_like_the_mirrors_give_the_shells_picture(
         self,
         layout: PrototypeLayout,
         cameras: tuple[Reflector, Reflector],
         resample: Resample,
-        size_mm: float,
     ) -> None:
-        """Also where the object, if it is too large, hides mirrors.
+        """Also where the object, which is too large, hides mirrors.
 
         Halves of a mirror on the seam are aimed beyond it, and balls are not: they differ.
         """
-        scene = prepared_scene(built_in_object(size_mm))
+        scene = prepared_scene(built_in_object(1.7 * CAPTURE_MM))
         ideal_runs = prototype_runs(cameras, ideal(layout, 0.7))
         found = merged_light_field(ideal_runs, scene, resample)
         for at in cameras:
@@ -219,7 +217,7 @@ class TestMerged:
             assert whole.mean() > 0.9
             # At the very edge between two cells rounding decides.
             same = planes["mirror"] == mirror
-            assert ((mirror > 0).sum() < (free > 0).sum()) == (size_mm > CAPTURE_MM)
+            assert (mirror > 0).sum() < (free > 0).sum()
             assert same[whole].mean() > 1 - 1e-4
             same &= whole
             for name in ("origin", "direction"):
@@ -294,7 +292,7 @@ class TestMerged:
         for resample in ("exact", "photograph"):
             one, many = (
                 np.concatenate([b.colour for b in merge_run(runs[0], knot, resample, n)])
-                for n in (1, 3)
+                for n in (1, 2)
             )
             rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
             assert rough[1] < 0.95 * rough[0]

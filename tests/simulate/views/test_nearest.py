@@ -41,7 +41,7 @@ def targets_of(view: Camera) -> tuple[TwoPlane, Rays]:
     elevation=st.floats(0, 90),
     distance=st.floats(60, 2000),
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 def test_equals_a_k_d_tree_over_all_rays(
     light_field: LightField, tiles: MirrorTiles, azimuth: float, elevation: float, distance: float
 ) -> None:

@@ -35,7 +35,7 @@ def test_covariance_is_recovered_from_draws(halves: EdgeModels, length: float) -
     assert (np.abs(found - wanted) < bound).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(20, 500), st.integers(0, 2**32 - 1))
 def test_variance_misses_no_more_than_the_limit(length: float, seed: int) -> None:
     """At points that it does not follow from, too: of a half ellipsoid like a shell's."""

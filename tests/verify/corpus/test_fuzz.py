@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from tbcad_verify import BadExport, verify
 
@@ -25,12 +25,7 @@ NAMES = (
     "shell_a.3mf",
     "shell_a.step",
 )
-QUICK = settings(
-    max_examples=10,
-    derandomize=True,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-)
+QUICK = settings(max_examples=10)
 
 
 @given(

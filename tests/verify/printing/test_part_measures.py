@@ -214,7 +214,7 @@ moves = st.floats(-300, 300)
 
 
 @given(angles, angles, angles, st.tuples(moves, moves, moves))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_rigid_motion_changes_no_figure(
     a: float, b: float, c: float, move: tuple[float, float, float]
 ) -> None:
@@ -232,7 +232,7 @@ def test_a_rigid_motion_changes_no_figure(
 
 
 @given(st.floats(0.02, 50))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_scaling_scales(scale: float) -> None:
     found = shape(flange().apply_scale(scale))
     assert found.walls.minimum == pytest.approx(scale * BASE.walls.minimum, rel=1e-5)

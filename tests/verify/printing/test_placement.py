@@ -117,7 +117,7 @@ points = st.lists(
 
 
 @given(points, st.floats(5, 100), st.floats(5, 100))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_turn_beats_the_one_found(
     corners: list[tuple[float, float]], width: float, depth: float
 ) -> None:

@@ -61,7 +61,7 @@ def test_blanks_and_names_mean_nothing(texts: tuple[str, str]) -> None:
     assert is_mirror_image(one, other.replace(",", ",\n ").replace("'b0001'", "'c0001'"))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_any_other_word_is_seen(texts: tuple[str, str], data: st.DataObject) -> None:
     one, other = texts
@@ -72,7 +72,7 @@ def test_any_other_word_is_seen(texts: tuple[str, str], data: st.DataObject) -> 
     assert not is_mirror_image(changed, one)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(data=st.data())
 def test_the_last_digit_is_seen(texts: tuple[str, str], data: st.DataObject) -> None:
     one, other = texts

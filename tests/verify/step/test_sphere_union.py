@@ -226,7 +226,7 @@ def turn(rng: np.random.Generator) -> Floats:
     return np.asarray(q * np.sign(np.linalg.det(q)))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10**6), count=st.integers(1, 14), scale=st.floats(1e-3, 1e4))
 def test_motions_scale_and_order(seed: int, count: int, scale: float) -> None:
     table = random_balls(seed, count)
