@@ -9,7 +9,7 @@ from tbcad.reconstruction.fit import Level, Settings, fit
 from tbcad.reconstruction.picture import field_picture
 from tbcad.reconstruction.rays import captured_rays
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.study.viewpoints import OwnMethod
+from tbcad.simulate.views.viewpoints import OwnMethod
 from tbcad.types import Bytes
 
 QUICK = Settings(levels=(Level(36, 1), Level(64, 1)), batch=10_000)

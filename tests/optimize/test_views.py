@@ -10,11 +10,11 @@ from tbcad.optimize.views import mean_ssim
 from tbcad.reconstruction import quick
 from tbcad.reconstruction.fit import Level, Settings
 from tbcad.reconstruction.quick import BY_FIELD
+from tbcad.simulate.capture.pixel_counts import Sensor
 from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.ssim import ssim
-from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
+from tbcad.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
 from tbcad.spec.load import load_spec
+from tbcad.studies.ssim import ssim
 
 SPEC = load_spec(None, ["n=4", "width_px=208", "height_px=155"])
 

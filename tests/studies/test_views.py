@@ -11,17 +11,17 @@ from tbcad.errors import InputError
 from tbcad.mirrors import radii
 from tbcad.mirrors.array import design
 from tbcad.optics.camera import Camera
+from tbcad.results.study import Study, study_files
+from tbcad.simulate.capture.pixel_counts import Sensor
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.study.low_pass import BlurOptions, low_pass
-from tbcad.simulate.study.paper import balanced_sensors
-from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
-from tbcad.simulate.study.ssim import proportionate_n, sensor_n, ssim
-from tbcad.simulate.study.study import Study, study_files
-from tbcad.simulate.study.viewpoints import Viewpoints, viewpoints_around
+from tbcad.simulate.views.viewpoints import Viewpoints, viewpoints_around
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
+from tbcad.studies.low_pass import BlurOptions, low_pass
+from tbcad.studies.paper import balanced_sensors
+from tbcad.studies.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
+from tbcad.studies.ssim import proportionate_n, sensor_n, ssim
 
 SMALL = ["n=6", "camera.width_px=208", "camera.height_px=155"]
 SENSORS = (Sensor(208, 155), Sensor(312, 232), Sensor(416, 310))

@@ -7,12 +7,12 @@ import pytest
 
 from tbcad.cli import run
 from tbcad.errors import InputError
+from tbcad.results.study import Study
 from tbcad.simulate.scene.object import patterned_ball
 from tbcad.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
-from tbcad.simulate.study.balance import SUBDIVISIONS, balance, parse_subdivisions
-from tbcad.simulate.study.study import Study
-from tbcad.simulate.study.viewpoints import viewpoints_over_hemisphere
+from tbcad.simulate.views.viewpoints import viewpoints_over_hemisphere
 from tbcad.spec.load import load_spec
+from tbcad.studies.balance import SUBDIVISIONS, balance, parse_subdivisions
 
 SMALL = load_spec(None, ["camera.width_px=416", "camera.height_px=310"])
 

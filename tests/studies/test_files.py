@@ -13,30 +13,30 @@ from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.figure_files import PlotFormat
 from tbcad.mirrors import radii
-from tbcad.simulate import parallel
-from tbcad.simulate.study.capture_area import capture_area
-from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
-from tbcad.simulate.study.elevation import correlation, elevation
-from tbcad.simulate.study.paper import (
-    balanced_sensors,
-    claims,
-    is_table_i,
-    with_lens_of_table_i,
-)
-from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.plots import Panel, Series, plot_file
-from tbcad.simulate.study.resolution import COUNTED, Ratio, resolution
-from tbcad.simulate.study.study import (
+from tbcad.results.plots import Panel, Series, plot_file
+from tbcad.results.study import (
     SUMMARY_COLUMNS,
     Study,
     check_study_folder,
     study_files,
     write_study,
 )
-from tbcad.simulate.study.sweep import n_range
-from tbcad.simulate.study.tables import Table, csv_text
+from tbcad.results.tables import Table, csv_text
+from tbcad.simulate import parallel
+from tbcad.simulate.capture.pixel_counts import Sensor
 from tbcad.spec.design import FIT
 from tbcad.spec.load import load_spec
+from tbcad.studies.capture_area import capture_area
+from tbcad.studies.depth_of_field import LensOptions, depth_of_field
+from tbcad.studies.elevation import correlation, elevation
+from tbcad.studies.paper import (
+    balanced_sensors,
+    claims,
+    is_table_i,
+    with_lens_of_table_i,
+)
+from tbcad.studies.resolution import COUNTED, Ratio, resolution
+from tbcad.studies.sweep import n_range
 from tests.mirror_arrays import mirror_array
 
 SMALL = ("n=4", "width_px=208", "height_px=155")

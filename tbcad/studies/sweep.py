@@ -6,10 +6,11 @@ from typing import TypeVar
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.results.tables import Table
 from tbcad.schedule import run_units
-from tbcad.spec.design import Spec
+from tbcad.spec.design import Spec, spec_with
 from tbcad.spec.errors import SpecError
-from tbcad.types import Progress
+from tbcad.types import Floats, Progress
 
 Result = TypeVar("Result")
 
@@ -42,18 +43,6 @@ def try_design(spec: Spec, **sections: dict[str, object]) -> DesignAttempt:
         return DesignAttempt(None, str(error))
 
 
-def spec_with(spec: Spec, **sections: dict[str, object]) -> Spec:
-    """The spec with other values of some keys, by section; they are not checked.
-
-    Margins of single mirrors belong to the mirrors of the spec: another n, size or margin has none.
-    """
-    mirrors = sections.get("mirrors", {})
-    if "optics" in sections or "margin_mm" in mirrors:
-        sections["mirrors"] = {"own_margins_mm": ()} | mirrors
-    changed = {name: getattr(spec, name).model_copy(update=keys) for name, keys in sections.items()}
-    return spec.model_copy(update=changed)
-
-
 def n_range(first: int, last: int) -> range:
     """The subdivisions of a sweep, both ends included.
 
@@ -84,3 +73,8 @@ def for_each_n(
     """
     # The largest take longest, so they are begun first.
     return run_units(work, list(reversed(ns)), scheduler, lambda n: progress(f"n = {n}"))[::-1]
+
+
+def megapixels(table: Table) -> Floats:
+    """Millions of pixels of the sensors in a table's columns width_px and height_px, (k,)."""
+    return table.numbers("width_px") * table.numbers("height_px") / 1e6

@@ -3,19 +3,19 @@
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray, numbered_directions
+from tbcad.results.tables import Record, Table
 from tbcad.schedule import run_units
-from tbcad.simulate.study.frame_pitch import apices_in_frame, axes_at_pitch, best_pitch
-from tbcad.simulate.study.paper import (
+from tbcad.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels, virtual_cameras
+from tbcad.spec.design import Spec
+from tbcad.studies.frame_pitch import apices_in_frame, axes_at_pitch, best_pitch
+from tbcad.studies.paper import (
     NUMBER,
     RESOLUTION,
     BalancedSensor,
     is_table_i,
     with_lens_of_table_i,
 )
-from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels, virtual_cameras
-from tbcad.simulate.study.sweep import try_design
-from tbcad.simulate.study.tables import Record, Table
-from tbcad.spec.design import Spec
+from tbcad.studies.sweep import try_design
 from tbcad.types import Floats, Progress
 
 NOTES = (

@@ -11,28 +11,28 @@ import numpy as np
 from scipy.stats import linregress
 
 from tbcad.mirrors.array import MirrorDesign
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Cell, Record, Table
 from tbcad.simulate.capture.light_field import NAME, LightField
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.capture.pixel_counts import Sensor
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.study.paper import balanced_sensors, claims, with_lens_of_table_i
-from tbcad.simulate.study.pixels import Sensor, megapixels
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.sweep import try_design
-from tbcad.simulate.study.tables import Cell, Record, Table
-from tbcad.simulate.study.viewpoints import (
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import (
     QUALITY,
     StudyMethod,
     Viewpoints,
     ground_truths,
     view_quality,
 )
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.spec.design import Spec
+from tbcad.studies.paper import balanced_sensors, claims, with_lens_of_table_i
+from tbcad.studies.sweep import megapixels, try_design
 from tbcad.types import Bytes, Progress
 
 MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim_sd")

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import ttest_rel
 
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Table
 from tbcad.simulate.capture.geometry import Geometry, camera_photographs
 from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.tables import Table
-from tbcad.simulate.study.viewpoints import StudyMethod, Viewpoints, ground_truths, view_quality
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import StudyMethod, Viewpoints, ground_truths, view_quality
 from tbcad.types import Floats, Progress
 
 LEVEL = 0.95

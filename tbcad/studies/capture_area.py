@@ -4,13 +4,13 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.simulate.study.paper import claims
-from tbcad.simulate.study.pixels import virtual_cameras
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.sweep import DesignAttempt, for_each_n, try_design
-from tbcad.simulate.study.tables import Cell, Record, Table
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Cell, Record, Table
+from tbcad.simulate.capture.pixel_counts import virtual_cameras
 from tbcad.spec.design import Spec
+from tbcad.studies.paper import claims
+from tbcad.studies.sweep import DesignAttempt, for_each_n, try_design
 from tbcad.types import Progress
 
 RULES = ("flat", "paper", "traced")

@@ -14,12 +14,12 @@ from tbcad.camera.lens import (
 )
 from tbcad.camera.virtual_images import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.errors import InputError
-from tbcad.simulate.study.paper import claimed, claims, with_lens_of_table_i
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.sweep import try_design
-from tbcad.simulate.study.tables import Record, Table
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
 from tbcad.spec.design import Spec
+from tbcad.studies.paper import claimed, claims, with_lens_of_table_i
+from tbcad.studies.sweep import try_design
 from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")

@@ -7,16 +7,16 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.simulate.study.pixels import (
+from tbcad.simulate.capture.pixel_counts import (
     Sensor,
     count_pixels,
     parse_sensor,
     traced_pixels,
     virtual_cameras,
 )
-from tbcad.simulate.study.resolution import Ratio, balance, parse_ratio
+from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.spec.load import load_spec
+from tbcad.studies.resolution import Ratio, balance, parse_ratio
 from tests.mirror_arrays import mirror_array
 
 # The paper's lens does not hold the few large mirrors of a small n.

@@ -12,7 +12,6 @@ from tbcad.optics.camera import Camera, fitted_camera
 from tbcad.simulate.capture.photograph import CENTRE, row_bands
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.study.tables import Table
 from tbcad.types import Floats
 
 # Beyond this, one ray represents a block of pixels: the largest sensor of Table II, 8320 x 6208,
@@ -150,11 +149,6 @@ def traced_pixels(
         for k, numbers in enumerate((rays.mirror[rays.mirror > 0] - 1, mirror, mirror[in_cone])):
             counts[k] += np.bincount(numbers, minlength=m)
     return counts[0], counts[1], counts[2]
-
-
-def megapixels(table: Table) -> Floats:
-    """Millions of pixels of the sensors in a table's columns width_px and height_px, (k,)."""
-    return table.numbers("width_px") * table.numbers("height_px") / 1e6
 
 
 def virtual_cameras(array: MirrorArray) -> int:

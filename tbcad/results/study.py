@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.figure_files import PlotFormat
-from tbcad.simulate.study.plots import Panel, plot_file
-from tbcad.simulate.study.tables import Cell, Table, csv_text
+from tbcad.results.plots import Panel, plot_file
+from tbcad.results.tables import Cell, Table, csv_text
 
 SUMMARY_COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
 

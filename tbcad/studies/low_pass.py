@@ -6,6 +6,9 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
 from tbcad.simulate.capture.geometry import Geometry, camera_photographs
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import Samples, to_bytes
@@ -14,19 +17,16 @@ from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ground_truth import lens_picture
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.study.paper import claimed
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.tables import Record, Table
-from tbcad.simulate.study.viewpoints import (
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.refocus import ThinLens, refocus
+from tbcad.simulate.views.viewpoints import (
     Viewpoints,
     ground_truths,
     object_masks,
     picture_quality,
     view_quality,
 )
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.refocus import ThinLens, refocus
+from tbcad.studies.paper import claimed
 from tbcad.types import Bytes, Floats, Progress
 
 WHERE = "section 5.3, Fig. 11"

@@ -6,8 +6,8 @@ import numpy as np
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.mirrors.array import numbered_directions
-from tbcad.simulate.study.paper import balanced_sensors, with_lens_of_table_i
 from tbcad.spec.design import Spec
+from tbcad.studies.paper import balanced_sensors, with_lens_of_table_i
 from tbcad.types import Floats
 
 # Pitches that are tried, degrees from the vertical; the object is toward positive ones.

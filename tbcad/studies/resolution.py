@@ -6,8 +6,19 @@ from functools import partial
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.study.definitions import DISC, IN_FRAME, definitions
-from tbcad.simulate.study.paper import (
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
+from tbcad.simulate.capture.pixel_counts import (
+    PixelCounts,
+    Sensor,
+    allowed,
+    count_pixels,
+    virtual_cameras,
+)
+from tbcad.spec.design import Spec
+from tbcad.studies.definitions import DISC, IN_FRAME, definitions
+from tbcad.studies.paper import (
     HEADINGS,
     NUMBER,
     RESOLUTION,
@@ -15,19 +26,7 @@ from tbcad.simulate.study.paper import (
     balanced_sensors,
     with_lens_of_table_i,
 )
-from tbcad.simulate.study.pixels import (
-    PixelCounts,
-    Sensor,
-    allowed,
-    count_pixels,
-    megapixels,
-    virtual_cameras,
-)
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.sweep import for_each_n, try_design
-from tbcad.simulate.study.tables import Record, Table
-from tbcad.spec.design import Spec
+from tbcad.studies.sweep import for_each_n, megapixels, try_design
 from tbcad.types import Floats, Progress
 
 MULTIPLES = (0.5, 1, 2, 4)  # of the sides of the design's sensor: those of Table II

@@ -11,25 +11,25 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
 from tbcad.simulate.capture.traced_frame import traced_light_field
 from tbcad.simulate.image_quality import image_quality_map
 from tbcad.simulate.scene.object import patterned_ball
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.study.paper import with_lens_of_table_i
-from tbcad.simulate.study.pixels import Sensor, count_pixels, virtual_cameras
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.sweep import MAX_N, try_design
-from tbcad.simulate.study.tables import Record, Table
-from tbcad.simulate.study.viewpoints import (
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import (
     StudyMethod,
     ground_truths,
     object_masks,
     viewpoints_over_hemisphere,
     views_by,
 )
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.spec.design import Spec
+from tbcad.studies.paper import with_lens_of_table_i
+from tbcad.studies.sweep import MAX_N, try_design
 from tbcad.types import Bools, Bytes, Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)

@@ -5,13 +5,12 @@ from numpy.typing import ArrayLike
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.simulate.study.paper import with_lens_of_table_i
-from tbcad.simulate.study.pixels import PixelCounts, Sensor, count_pixels
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.sweep import spec_with
-from tbcad.simulate.study.tables import Record, Table
-from tbcad.spec.design import Spec
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
+from tbcad.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels
+from tbcad.spec.design import Spec, spec_with
+from tbcad.studies.paper import with_lens_of_table_i
 from tbcad.types import Floats, Progress
 
 CURVES = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}

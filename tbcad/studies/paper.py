@@ -111,5 +111,5 @@ def has_optics_of_table_i(spec: Spec) -> bool:
 
 
 def _rows(name: str) -> list[dict[str, str]]:
-    text = (files("tbcad.simulate.study") / name).read_text(encoding="utf-8")
+    text = (files("tbcad.studies") / name).read_text(encoding="utf-8")
     return list(csv.DictReader(text.splitlines()))
