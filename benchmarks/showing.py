@@ -22,7 +22,7 @@ from timing import Figure, Row, at_least, measured
 
 from tbcad import Views
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.render import Renderer
 from tbcad.viewer.server import HOST, ViewServer
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import Method, synthesise
 

@@ -244,7 +244,7 @@ def calibration_command(folder: Path) -> Work:
 def _by(method: MethodOfStudy) -> "StudyMethod":
     if method != "field":
         return method
-    from tbcad.reconstruction.quick import BY_FIELD
+    from tbcad.reconstruction.picture import BY_FIELD
 
     return BY_FIELD
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter
 
 from tbcad.compiled import compiled_loop
-from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
+from tbcad.datasets.pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, first_then_threads
 from tbcad.simulate.scene.viewpoint import view_directions

@@ -13,7 +13,7 @@ import numpy as np
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
-from tbcad.reconstruction.quick import BY_FIELD
+from tbcad.reconstruction.picture import BY_FIELD
 from tbcad.simulate.capture.traced_frame import traced_light_field
 from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.object import built_in_object

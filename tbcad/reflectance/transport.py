@@ -13,8 +13,7 @@ import numpy as np
 from tbcad.datasets.crops import MirrorId
 from tbcad.errors import InputError
 from tbcad.reflectance.field_file import NAME, RAYS_PER_CHUNK, SCHEMA
-from tbcad.reflectance.lamp_places import LampPlaces
-from tbcad.reflectance.projectors import projectors
+from tbcad.reflectance.lamp_places import LampPlaces, projectors
 from tbcad.simulate.capture.light_field import Frame, LightField
 from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands

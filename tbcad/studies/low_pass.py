@@ -9,14 +9,13 @@ from tbcad.optics.camera import Camera
 from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
-from tbcad.simulate.capture.geometry import Geometry, camera_photographs
+from tbcad.simulate.camera_photographs import Geometry, camera_photographs
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import Samples, to_bytes
-from tbcad.simulate.capture.pixel_response import defocus_shifts, low_pass_shifts
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.ground_truth import lens_picture
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.views.ground_truth import lens_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, refocus
 from tbcad.simulate.views.viewpoints import (
@@ -27,6 +26,7 @@ from tbcad.simulate.views.viewpoints import (
     view_quality,
 )
 from tbcad.studies.paper import claimed
+from tbcad.studies.pixel_response import defocus_shifts, low_pass_shifts
 from tbcad.types import Bytes, Floats, Progress
 
 WHERE = "section 5.3, Fig. 11"

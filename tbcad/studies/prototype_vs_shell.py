@@ -8,7 +8,7 @@ from scipy.stats import ttest_rel
 from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Table
-from tbcad.simulate.capture.geometry import Geometry, camera_photographs
+from tbcad.simulate.camera_photographs import Geometry, camera_photographs
 from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject

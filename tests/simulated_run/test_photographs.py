@@ -12,9 +12,8 @@ from tbcad.simulate.prototype.ball_rays import camera_colours
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run.led_light import DOME_MM, balls_of_frame
-from tbcad.simulated_run.object_light import object_light, pixel_directions
-from tbcad.simulated_run.photographs import Chain, phases_of
-from tbcad.simulated_run.sensor import Sensor
+from tbcad.simulated_run.photographs import Chain, object_light, phases_of
+from tbcad.simulated_run.sensor import Sensor, pixel_directions
 from tests.simulated_runs import BRIGHT, Small, photograph_centroid, small_run
 
 STOPS = (20, 40)

@@ -14,10 +14,9 @@ from tbcad.mirrors.array import MirrorArray, numbered_directions
 from tbcad.results.study import Study
 from tbcad.simulate.views.refocus import lens_pinholes
 from tbcad.spec.load import load_spec
-from tbcad.studies.definitions import DISC, IN_FRAME, definitions
+from tbcad.studies.definitions import DISC, IN_FRAME, apices_in_frame, best_pitch, definitions
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import elevation
-from tbcad.studies.frame_pitch import apices_in_frame, best_pitch
 from tbcad.studies.paper import (
     NUMBER,
     RESOLUTION,

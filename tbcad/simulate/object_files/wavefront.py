@@ -15,9 +15,9 @@ from tbcad.simulate.object_files.contents import (
     even,
     shown_shares,
     text_of,
+    triangles,
     without_facets,
 )
-from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Floats, Ints
 
 OPTIONS = re.compile(r"((?:-[a-z]+(?:\s+(?:on|off|[-+.\de]+|[rgbmlz]))+\s+)*)(.*)", re.IGNORECASE)

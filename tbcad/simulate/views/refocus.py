@@ -14,6 +14,7 @@ from tbcad.simulate.parallel import in_batches
 from tbcad.simulate.plausibility import warn_of_wide_lens
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.ray_bundle import two_plane_along
 from tbcad.simulate.views.synthesis import (
     DepthFunction,
     Rays,
@@ -23,7 +24,6 @@ from tbcad.simulate.views.synthesis import (
     rays_to_capture_sphere,
     search_radius,
 )
-from tbcad.simulate.views.two_plane import two_plane_along
 from tbcad.types import Bools, Colours, Floats, Ints, Progress
 
 # 69 points of a square lattice, the paper's number of pinholes, are within this squared radius

@@ -17,11 +17,12 @@ from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.nearest import nearest_rays
 from tbcad.simulate.views.ray_bundle import (
     RayBundle,
+    TwoPlane,
     boxes_around,
     mirrors_near_boxes,
     ray_bundle,
+    two_plane_along,
 )
-from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
 # The pixels of a block are a run of target rays.

@@ -11,9 +11,9 @@ from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.image_quality import equivalent_blur_px, image_quality_map
-from tbcad.simulate.scene.ground_truth import GOLDEN_ANGLE, pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.simulate.views.ground_truth import GOLDEN_ANGLE, pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import DepthFunction, Method, synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress

@@ -13,12 +13,12 @@ from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph, to_bytes
 from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
 from tbcad.spec.load import load_spec

@@ -4,8 +4,8 @@ Each is a point spread function: a pixel is the mean of rays spread over its are
 """
 
 from tbcad.simulate.capture.photograph import subpixel_shifts
-from tbcad.simulate.scene.ground_truth import disc_points, pixel_points
 from tbcad.simulate.scene.rays import Shift
+from tbcad.simulate.views.ground_truth import disc_points, pixel_points
 
 
 def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:

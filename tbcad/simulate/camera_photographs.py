@@ -5,9 +5,9 @@ from functools import partial
 from typing import Literal
 
 from tbcad.simulate.capture.photograph import RowBand, Samples, photograph
+from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
-from tbcad.simulate.prototype.simulated_merge import merge_run
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
@@ -38,8 +38,7 @@ def camera_photographs(
     if geometry == "prototype":
         both = prototype_runs(export.reflectors, read_plan(export))
         return [
-            (ball_reflector(run), partial(merge_run, run, scene, "photograph", samples, progress))
-            for run in both
+            (ball_reflector(run), partial(merge_run, run, scene, samples, progress)) for run in both
         ]
     shells = read_shell_meshes(export) if geometry == "mesh" else None
 
