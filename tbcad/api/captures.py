@@ -12,8 +12,9 @@ from tbcad.errors import InputError
 
 if TYPE_CHECKING:
     from tbcad.reflectance.environment import LightFormat
-    from tbcad.simulate.camera_photographs import CameraPhotographs, Geometry
+    from tbcad.simulate.camera_photographs import Geometry
     from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.photograph import CameraPhotographs
     from tbcad.simulate.object_files.contents import Up
     from tbcad.simulate.scene.object import SceneObject
     from tbcad.simulate.scene.object_from_file import ObjectOptions, Paint, Unit

@@ -86,7 +86,7 @@ def write_compared(
 ) -> None:
     """Write the picture, and a comparison with the ground truth where it is known."""
     from tbcad.simulate.image_files import difference, side_by_side, write_images
-    from tbcad.simulate.image_quality import image_quality
+    from tbcad.simulate.views.viewpoints import image_quality
 
     if truth is None:
         write_images({out: picture})

@@ -225,7 +225,7 @@ def _lit_truths(
 
 
 def _ssim(truth: "Bytes", picture: "Bytes") -> float:
-    from tbcad.simulate.image_quality import image_quality
+    from tbcad.simulate.views.viewpoints import image_quality
 
     return image_quality(truth, picture).ssim
 

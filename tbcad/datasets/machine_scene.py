@@ -17,6 +17,7 @@ import numpy as np
 from tbcad.formats.ply import mesh_ply
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
+from tbcad.optics.geodesic import triangle_grid
 from tbcad.simulate.object_files.normals import is_closed
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
@@ -223,20 +224,12 @@ def _side(scene: Scene, facet: Ints, weight: Floats, faces: Ints, side: float) -
 def _divided(subject: SceneObject) -> tuple[Ints, Floats, Ints]:
     """Points on facets: facet (v,), barycentric weights (v, 3), and the triangles of them."""
     count, parts = len(subject.faces), _parts(subject)
-    i, j = np.array([(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]).T
+    grid, small = triangle_grid(parts)
+    i, j = np.array(grid).T
     weight = np.column_stack([parts - i - j, i, j]) / parts
-    number = {place: k for k, place in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
-    upward = [
-        (number[a, b], number[a + 1, b], number[a, b + 1])
-        for a in range(parts)
-        for b in range(parts - a)
-    ]
-    downward = [
-        (number[a + 1, b], number[a + 1, b + 1], number[a, b + 1])
-        for a in range(parts)
-        for b in range(parts - a - 1)
-    ]
-    local = np.array(upward + downward)
+    number = np.zeros((parts + 1, parts + 1), dtype=np.int64)
+    number[i, j] = np.arange(len(grid))
+    local = number[small[..., 0], small[..., 1]]
     faces = (local[None] + len(weight) * np.arange(count)[:, None, None]).reshape(-1, 3)
     return np.repeat(np.arange(count), len(weight)), np.tile(weight, (count, 1)), faces
 

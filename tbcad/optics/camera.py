@@ -1,6 +1,6 @@
 """Cameras: a pinhole whose orientation brings all its mirrors into the frame, and a real lens."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -72,14 +72,10 @@ class Camera:
 
     def mirrored(self) -> "Camera":
         """Camera b for camera a: the mirror image in the plane x = 0, with its rows reversed."""
-        return Camera(
-            self.pinhole * FLIP_X,
-            self.forward * FLIP_X,
-            -self.right * FLIP_X,
-            self.width_px,
-            self.height_px,
-            self.hfov,
+        pinhole, forward, right = (
+            one * FLIP_X for one in (self.pinhole, self.forward, -self.right)
         )
+        return replace(self, pinhole=pinhole, forward=forward, right=right)
 
 
 def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> float:

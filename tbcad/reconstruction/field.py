@@ -15,7 +15,6 @@ number x between the nodes, 0 where a cell lacks a node.
 import json
 import warnings
 import zipfile
-import zlib
 from dataclasses import dataclass, field
 from hashlib import sha256
 from io import BytesIO
@@ -41,20 +40,6 @@ NAME = "field.npz"  # beside a light field, which it then shows
 MOST_NODES = 1024  # along an edge
 MOST_BYTES = 4 << 30
 MOST_NUMBER = 1e6
-UNREADABLE = (
-    ArithmeticError,
-    AttributeError,
-    EOFError,
-    KeyError,
-    MemoryError,
-    NotImplementedError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 FACT = "light_field"  # of a field: the fingerprint of what it was fitted to
 ROWS_APART = 64  # of those whose rays are part of a fingerprint
 
@@ -127,7 +112,9 @@ def read_field(path: Path) -> Field:
                 raise ValueError("it unpacks to more than 4 GB")
         with np.load(path, allow_pickle=False) as store:
             return _checked({name: store[name] for name in store.files})
-    except UNREADABLE as fault:
+    except InputError:
+        raise
+    except Exception as fault:  # zip and numpy raise many kinds
         raise InputError(
             f"{path} is no field that tbcad wrote ({fault}): write it again with "
             "`tbcad reconstruct`"

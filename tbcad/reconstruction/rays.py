@@ -48,7 +48,6 @@ class CapturedRays:
     capture_mm: float
 
     def __len__(self) -> int:
-        """Number of rays."""
         return len(self.length)
 
     def spread_mm(self, places: Singles) -> float:

@@ -1,10 +1,11 @@
 """What the cameras see the object in: the recorded spheres, the meshes, or the prototype."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from typing import Literal
 
-from tbcad.simulate.capture.photograph import RowBand, Samples, photograph
+from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.capture.photograph import CameraPhotographs, RowBand, Samples, photograph
 from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
@@ -16,7 +17,6 @@ from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.types import Progress
 
 Geometry = Literal["spheres", "mesh", "prototype"]
-CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[RowBand]]]]
 
 
 def camera_photographs(
@@ -47,3 +47,11 @@ def camera_photographs(
         return photograph(reflector.camera, trace, scene, samples, progress)
 
     return [(reflector, partial(photograph_of, reflector)) for reflector in export.reflectors]
+
+
+def photographed(
+    export: ExportedDesign, scene: Scene, geometry: Geometry, samples: Samples, progress: Progress
+) -> LightField:
+    """The light field in memory; arguments and errors as of `camera_photographs`."""
+    cameras = camera_photographs(export, scene, geometry, samples, progress)
+    return light_field_in_memory(((at, bands()) for at, bands in cameras), export.capture_mm)

@@ -13,9 +13,9 @@ from tbcad.machine.built import BuiltPrototype
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.simulate.capture.photograph import row_bands
-from tbcad.simulate.prototype.ball_rays import ball_hits, reflected_colours
+from tbcad.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.simulate.prototype.plan import HALF_TURN
-from tbcad.simulate.scene.ray_casting import Scene, object_in_front
+from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulated_run.led_light import DOME_MM, FAINT_PX2, Occluders, balls_of_frame, led_light
 from tbcad.simulated_run.sensor import (
     Image16,
@@ -209,9 +209,7 @@ def _band(
     direction = directions.reshape(-1, 3)
     stop = np.zeros(len(direction), dtype=np.int64)
     hits = ball_hits(pinhole, balls[None], direction, stop, walls)
-    front, direct = object_in_front(scene, pinhole, direction, hits.distance)
-    colours = np.where(front[:, None], direct, reflected_colours(scene, hits))
-    return np.asarray(colours.reshape(directions.shape))
+    return camera_colours(scene, pinhole, direction, hits).reshape(directions.shape)
 
 
 def add_points(image: NDArray[np.float32], pixel: Floats, light: Floats, psf: PointSpread) -> None:

@@ -16,13 +16,13 @@ from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
 from tbcad.simulate.capture.traced_frame import traced_light_field
-from tbcad.simulate.image_quality import image_quality_map
 from tbcad.simulate.scene.object import patterned_ball
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.viewpoints import (
     StudyMethod,
     ground_truths,
+    image_quality_map,
     object_masks,
     viewpoints_over_hemisphere,
     views_by,

@@ -9,8 +9,8 @@ from tbcad.optics.camera import Camera
 from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
-from tbcad.simulate.camera_photographs import Geometry, camera_photographs
-from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.camera_photographs import Geometry, photographed
+from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import Samples, to_bytes
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
@@ -142,7 +142,8 @@ def low_pass(
     records: list[Record] = []
     sharpest: dict[str, float] = {}
     for case in options.checked().cases():
-        light_field = _light_field(export, targets.scene, case, progress)
+        geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
+        light_field = photographed(export, targets.scene, geometry, case.samples, progress)
         contrast = _contrast(light_field)
         relative = contrast / sharpest.setdefault(case.geometry, contrast)
         head: Record = {"geometry": case.geometry, "blur": case.name, "px": case.px}
@@ -168,14 +169,6 @@ def _targets(
         lens_truths.append(to_bytes(lens_picture(scene, view, focus, TRUTH_RAYS)))
     truths = ground_truths(scene, pinholes, progress)
     return _Targets(scene, pinholes, truths, lenses, lens_truths, focus)
-
-
-def _light_field(
-    export: ExportedDesign, scene: Scene, case: Blur, progress: Progress
-) -> LightField:
-    geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
-    cameras = camera_photographs(export, scene, geometry, case.samples, progress)
-    return light_field_in_memory(((at, bands()) for at, bands in cameras), export.capture_mm)
 
 
 def _rows(viewpoints: Viewpoints, quality: dict[str, Floats]) -> list[Record]:

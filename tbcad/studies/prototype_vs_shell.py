@@ -8,11 +8,10 @@ from scipy.stats import ttest_rel
 from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Table
-from tbcad.simulate.camera_photographs import Geometry, camera_photographs
-from tbcad.simulate.capture.light_field import light_field_in_memory
+from tbcad.simulate.camera_photographs import Geometry, photographed
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.viewpoints import StudyMethod, Viewpoints, ground_truths, view_quality
 from tbcad.types import Floats, Progress
@@ -62,9 +61,10 @@ def prototype_vs_shell(
     scene, views = prepared_scene(subject), viewpoints.cameras(export.capture_mm)
     truths = ground_truths(scene, views, progress)
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
-    light_fields = (_tiles(export, scene, kind, samples, progress) for kind in kinds)
+    light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
     shell, prototype = (
-        view_quality(tiles, scene, views, truths, method, progress) for tiles in light_fields
+        view_quality(MirrorTiles(one), scene, views, truths, method, progress)
+        for one in light_fields
     )
     facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
     columns = {
@@ -80,14 +80,6 @@ def prototype_vs_shell(
     }
     table = Table.of_columns("prototype", columns, (facts, *NOTES))
     return Study("prototype", _figures(table), (table,), _panels(table))
-
-
-def _tiles(
-    export: ExportedDesign, scene: Scene, kind: Geometry, samples: int, progress: Progress
-) -> MirrorTiles:
-    cameras = camera_photographs(export, scene, kind, samples, progress)
-    photographs = ((reflector, bands()) for reflector, bands in cameras)
-    return MirrorTiles(light_field_in_memory(photographs, export.capture_mm))
 
 
 def _figures(table: Table) -> tuple[Figure, ...]:

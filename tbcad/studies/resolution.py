@@ -61,7 +61,6 @@ class Ratio:
     pixels: float
 
     def __str__(self) -> str:
-        """As the command takes it."""
         return f"{self.cameras:g}:{self.pixels:g}"
 
 

@@ -15,12 +15,12 @@ from tbcad.reflectance.field_file import TRUE_LIGHTS, lit_scene, open_reflectanc
 from tbcad.reflectance.lamp_places import lamps_of_mirrors
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.viewpoints import image_quality
 
 SMALL = ["--width", "96", "--height", "72"]
 

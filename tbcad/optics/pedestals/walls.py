@@ -38,7 +38,6 @@ class GrooveWalls:
         return cls.of_planes(np.arange(0), np.empty((0, 3)), np.empty((0, 3)))
 
     def __len__(self) -> int:
-        """Number of walls."""
         return len(self.mirror)
 
     @property

@@ -28,7 +28,6 @@ class Sensor:
     height_px: int
 
     def __str__(self) -> str:
-        """As the command takes it."""
         return f"{self.width_px}x{self.height_px}"
 
 

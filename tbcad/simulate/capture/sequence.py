@@ -22,10 +22,10 @@ from tbcad.errors import InputError
 from tbcad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import Frame, LightField
-from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
+from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, cast_rays
+from tbcad.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, colours_along
 from tbcad.simulate.scene.rays import meets_sphere
 from tbcad.types import Bytes, Floats, Ints, Progress
 
@@ -83,15 +83,8 @@ def create_sequence(
                 "pixel", data=pixel[name].astype(np.uint32), compression=COMPRESSION_LEVEL
             )
             rays = len(pixel[name])
-            colour[name] = group.create_dataset(
-                "colour",
-                (0, rays, 3),
-                "u1",
-                maxshape=(None, rays, 3),
-                chunks=(1, min(RAYS_PER_CHUNK, max(rays, 1)), 3),
-                shuffle=True,
-                compression=COMPRESSION_LEVEL,
-            )
+            chunk = (1, min(RAYS_PER_CHUNK, max(rays, 1)), 3)
+            colour[name] = chunked(group, "colour", "u1", (0, rays, 3), chunk, (None, rays, 3))
         yield SequenceWriter(pixel, colour)
 
 
@@ -191,7 +184,7 @@ def write_turning(
             progress(f"frame {k + 1} of {len(angles)}")
             turned, back = lit_when_turned(scene, angle), _about_z(-angle)
             writer.append(
-                {name: _colours(turned, origin @ back.T, direction @ back.T)
+                {name: to_bytes(colours_along(turned, origin @ back.T, direction @ back.T))
                  for name, (origin, direction) in rays.items()}
             )  # fmt: skip
     return facts
@@ -204,15 +197,6 @@ def _rays(source: LightField, writer: SequenceWriter, name: str) -> tuple[Floats
         for key in ("origin", "direction")
     )
     return origin, direction
-
-
-def _colours(scene: Scene, origin: Floats, direction: Floats) -> Bytes:
-    """Colours (r, 3) along rays (r, 3)."""
-    parts = chunks(len(origin), RAYS_PER_CHUNK)
-    colours = in_threads(
-        lambda part: to_bytes(cast_rays(scene, origin[part], direction[part]).colour), parts
-    )
-    return np.concatenate([np.zeros((0, 3), dtype=np.uint8), *colours])
 
 
 def turn_of_frame(folder: Path, number: int) -> float:

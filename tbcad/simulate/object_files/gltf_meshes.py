@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.beside import texture, uri_bytes
-from tbcad.simulate.object_files.contents import Part, even
+from tbcad.simulate.object_files.contents import Part, even, texture, uri_bytes
 from tbcad.srgb import srgb, srgb_light
 from tbcad.types import Bytes, Floats, Ints
 

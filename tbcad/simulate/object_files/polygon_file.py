@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.beside import texture_beside
 from tbcad.simulate.object_files.contents import (
     ObjectFile,
     Part,
     shown_shares,
+    texture_beside,
     triangles,
     without_facets,
 )

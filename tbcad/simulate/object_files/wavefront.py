@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.beside import file_beside, texture_beside
 from tbcad.simulate.object_files.contents import (
     ROUNDING,
     ObjectFile,
     Part,
     even,
+    file_beside,
     shown_shares,
     text_of,
+    texture_beside,
     triangles,
     without_facets,
 )

@@ -104,10 +104,9 @@ def reflected_colours(scene: Scene, hits: BallHits) -> Colours:
     return colour
 
 
-def camera_colours(run: PrototypeRun, scene: Scene, direction: Floats, stop: Ints) -> Colours:
-    """What the camera records along unit directions (n, 3) at stops (n,), 0 to 255."""
-    hits = trace_balls(run, direction, stop)
-    front, direct = object_in_front(scene, run.camera.pinhole, direction, hits.distance)
+def camera_colours(scene: Scene, pinhole: Floats, direction: Floats, hits: BallHits) -> Colours:
+    """What a camera records along unit directions (n, 3) that meet balls, 0 to 255."""
+    front, direct = object_in_front(scene, pinhole, direction, hits.distance)
     return np.where(front[:, None], direct, reflected_colours(scene, hits))
 
 
@@ -157,7 +156,9 @@ def photographed_pixels(
     total = np.zeros((len(pixels), 3), dtype=np.float32)
     shifts = sample_shifts(samples)
     for shift in shifts:
-        total += camera_colours(run, scene, run.camera.directions(centres + shift), stops)
+        direction = run.camera.directions(centres + shift)
+        hits = trace_balls(run, direction, stops)
+        total += camera_colours(scene, run.camera.pinhole, direction, hits)
     return to_bytes(total / np.float32(len(shifts)))
 
 

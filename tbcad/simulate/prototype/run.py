@@ -50,7 +50,6 @@ class PrototypeRun:
     parted: bool = False
 
     def __len__(self) -> int:
-        """Number of stops."""
         return len(self.balls)
 
 

@@ -4,13 +4,11 @@ import numpy as np
 
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.photograph import subpixel_shifts
-from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.simulate.scene.ray_casting import Scene, colours_along
 from tbcad.simulate.scene.viewpoint import view_directions
 from tbcad.simulate.views.refocus import ThinLens, lens_rays
 from tbcad.types import Colours, Floats, Progress
 
-RAYS_PER_CHUNK = 1 << 15
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
@@ -19,7 +17,9 @@ def pinhole_picture(scene: Scene, view: Camera, samples: int = 4) -> Colours:
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
     for shift in subpixel_shifts(samples):
         direction = view_directions(view, shift)
-        total += _colours(scene, np.broadcast_to(view.pinhole, direction.shape), direction)
+        flat = direction.reshape(-1, 3)
+        origin = np.broadcast_to(view.pinhole, flat.shape)
+        total += colours_along(scene, origin, flat).reshape(total.shape)
     return total / np.float32(samples**2)
 
 
@@ -44,7 +44,9 @@ def lens_picture(
         zip(disc_points(samples), pixel_points(samples), strict=True)
     ):
         progress(f"ray {k + 1} of {samples}")
-        total += _colours(scene, *lens_rays(view, focus, point * focus.aperture_mm / 2, shift))
+        rays = lens_rays(view, focus, point * focus.aperture_mm / 2, shift)
+        colours = colours_along(scene, *(part.reshape(-1, 3) for part in rays))
+        total += colours.reshape(total.shape)
     return total / np.float32(samples)
 
 
@@ -61,11 +63,3 @@ def pixel_points(count: int) -> list[tuple[float, float]]:
     steps = np.arange(count)[:, None] / np.array([plastic, plastic**2])
     places = (0.5 + steps) % 1 - 0.5
     return [(float(x), float(y)) for x, y in places]
-
-
-def _colours(scene: Scene, origin: Floats, direction: Floats) -> Colours:
-    """Colours (h, w, 3) along rays (h, w, 3)."""
-    flat, start = direction.reshape(-1, 3), origin.reshape(-1, 3)
-    parts = chunks(len(flat), RAYS_PER_CHUNK)
-    colours = in_threads(lambda part: cast_rays(scene, start[part], flat[part]).colour, parts)
-    return np.concatenate(colours).reshape(direction.shape)
