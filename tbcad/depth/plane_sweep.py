@@ -57,11 +57,6 @@ class _Cameras(NamedTuple):
     matrix: Floats
 
 
-def _seen_from(pictures: PinholePictures, view: Camera) -> _Cameras:
-    number, place = facing(pictures, view)
-    return _Cameras(number, place, projections(pictures, view, number))
-
-
 def swept_depth(
     pictures: PinholePictures, view: Camera, sweep: Sweep = FINE
 ) -> tuple[Floats, Floats]:
@@ -81,7 +76,8 @@ def swept_depth(
     planes = np.linspace(-radius, radius, sweep.planes)
     inside = _inside(view, planes, radius)
     difference = np.full(inside.shape, np.float32(np.nan))
-    cameras = _seen_from(pictures, view)
+    number, place = facing(pictures, view)
+    cameras = _Cameras(number, place, projections(pictures, view, number))
     known = pictures.picture, pictures.mask
     distance = planes - float(view.pinhole @ view.forward)
 
