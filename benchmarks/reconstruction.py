@@ -9,12 +9,13 @@ import numpy as np
 from simulation import BOTH, PLACE, photographed
 from timing import Row, at_least, at_most, measured, spent_in_turns
 
-from tbcad.depth.view import depth_views
+from tbcad.depth.depth_map import depth_views
 from tbcad.optics.camera import Camera
 from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fit import Settings, fit
+from tbcad.reconstruction.fit import fit
 from tbcad.reconstruction.picture import field_picture
 from tbcad.reconstruction.rays import captured_rays
+from tbcad.reconstruction.start import Settings
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object

@@ -13,8 +13,7 @@ from circumstances import RESULTS, circumstances, show_and_write
 from timing import Figure, Row, at_least, at_most, measured
 
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.sequence import create_sequence
-from tbcad.simulate.capture.turning import turns, write_turning
+from tbcad.simulate.capture.sequence import create_sequence, turns, write_turning
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.types import Bytes

@@ -23,7 +23,7 @@ from timing import Figure, Row, at_least, measured
 from tbcad import Views
 from tbcad.reconstruction.field import NAME, read_field
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.render import FieldRenderer, Renderer, ViewRenderer
 from tbcad.viewer.server import HOST, ViewServer
 

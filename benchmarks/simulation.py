@@ -26,9 +26,9 @@ from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.ray_bundle import TwoPlane, two_plane_along
 from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus
 from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 from tbcad.types import Floats
 
 Cameras = Sequence[Reflector]

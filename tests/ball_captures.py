@@ -10,9 +10,9 @@ from tbcad.cli import run
 from tbcad.mirrors.record import write_record
 from tbcad.reconstruction import fitted
 from tbcad.reconstruction.choice import Trial
-from tbcad.reconstruction.fit import Settings
 from tbcad.reconstruction.rays import CapturedRays
-from tbcad.types import Progress
+from tbcad.reconstruction.start import Settings
+from tbcad.types import Bools, Progress
 from tests.mirror_arrays import mirror_design
 
 RADIUS_MM = 15.0
@@ -22,7 +22,7 @@ def without_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     """No trials, which take long: one is told of, and the settings stay as they are."""
 
     def unchanged(
-        _: CapturedRays, settings: Settings, orders: tuple[int, ...], told: Progress
+        _: CapturedRays, __: Bools, settings: Settings, orders: tuple[int, ...], told: Progress
     ) -> tuple[Settings, list[Trial]]:
         told("trial 1")
         kept = replace(settings, order=orders[-1])

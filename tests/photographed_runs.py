@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -13,15 +14,34 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import machine_runs
 from tbcad.runs.exposure import EXPOSURE_SCHEMA, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.runs.record import RECORD, RUN_SCHEMA
-from tbcad.simulate.prototype.ball_rays import stop_photograph
+from tbcad.simulate.capture.photograph import Samples, row_bands
+from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.prototype.ball_rays import photographed_pixels
 from tbcad.simulate.prototype.plan import Plan
+from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.types import Bytes
 
 Change = Callable[[np.ndarray, Frame, str], np.ndarray]
 TAKEN = datetime(2026, 1, 1, tzinfo=UTC)
 EXPOSURE_S = 0.5
 DEPENDS_ON = ("design.json", "mirrors.csv", "balls.csv", "prototype.json", "rotation_plan.csv")
+
+
+def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: Samples = 1) -> Bytes:
+    """The whole photograph of a stop, (h, w, 3).
+
+    Args:
+        run: of camera a's mirrors, or of camera b's with the object turned.
+        scene: the object.
+        stop: number of the stop, from 0.
+        samples: a pixel is the mean of these rays.
+    """
+    height, width = run.camera.height_px, run.camera.width_px
+    bands = [np.arange(rows.start * width, rows.stop * width) for rows in row_bands(height)]
+    colours = in_threads(partial(photographed_pixels, run, scene, stop, samples), bands)
+    return np.concatenate(colours).reshape(height, width, 3)
 
 
 def photographs_of(

@@ -15,7 +15,7 @@ from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulated_run.led_light import Occluders
 from tbcad.simulated_run.photographs import Chain, SimulatedRun, frames_of
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.process.process import load_process, process_errors

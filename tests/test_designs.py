@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from tbcad.optimize.candidate import figures_of, size_of
 from tbcad.optimize.views import mean_ssim
-from tbcad.simulate.study.pixels import virtual_cameras
+from tbcad.simulate.capture.pixel_counts import virtual_cameras
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import dotted_fields, section_of
 from tbcad.spec.load import load_spec

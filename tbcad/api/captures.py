@@ -11,9 +11,10 @@ from tbcad.api.arguments import silent
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
-    from tbcad.reflectance.light_directions import LightFormat
-    from tbcad.simulate.capture.geometry import CameraPhotographs, Geometry
+    from tbcad.reflectance.environment import LightFormat
+    from tbcad.simulate.camera_photographs import Geometry
     from tbcad.simulate.capture.light_field import LightField
+    from tbcad.simulate.capture.photograph import CameraPhotographs
     from tbcad.simulate.object_files.contents import Up
     from tbcad.simulate.scene.object import SceneObject
     from tbcad.simulate.scene.object_from_file import ObjectOptions, Paint, Unit
@@ -119,9 +120,9 @@ def photograph(
     answer: Progress = silent,
 ) -> Photographs:
     """Prepare both photographs; arguments as for `capture`."""
-    from tbcad.simulate.capture.geometry import camera_photographs
+    from tbcad.simulate.camera_photographs import camera_photographs
+    from tbcad.simulate.prototype.lamps import lit_by, read_lamps
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.lamps import lit_by, read_lamps
     from tbcad.simulate.scene.object_from_file import load_or_built_in
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
@@ -211,7 +212,7 @@ def _write_frames(
     from math import radians
 
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.simulate.capture.turning import turns, write_turning
+    from tbcad.simulate.capture.sequence import turns, write_turning
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
     angles = turns(wanted.count, radians(wanted.turn_deg))
@@ -223,8 +224,12 @@ def _field_writer(
     photographs: Photographs, wanted: WantedLamps
 ) -> Callable[[Path, Progress], dict[str, Any]]:
     """What writes the reflectance field; a table of lamps is read at once, before long work."""
-    from tbcad.reflectance.lamp_places import MIRRORS, lamps_of_mirrors, read_lamp_places
-    from tbcad.reflectance.projectors import PROJECTORS
+    from tbcad.reflectance.lamp_places import (
+        MIRRORS,
+        PROJECTORS,
+        lamps_of_mirrors,
+        read_lamp_places,
+    )
     from tbcad.reflectance.transport import write_reflectance
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.ray_casting import prepared_scene
@@ -273,8 +278,7 @@ def relight(
     from math import radians
 
     from tbcad.reflectance.environment import read_environment
-    from tbcad.reflectance.field_file import open_reflectance
-    from tbcad.reflectance.relit import relit
+    from tbcad.reflectance.field_file import open_reflectance, relit
     from tbcad.simulate.capture.light_field import LightField
 
     folder, environment = (

@@ -61,7 +61,7 @@ class Wanted:
 
     def field_file(self, number: int | None) -> Path:
         """Where the field of a frame is written, or that of the capture itself."""
-        from tbcad.reconstruction.beside import field_file
+        from tbcad.reconstruction.field import field_file
 
         if self.out is None:
             return field_file(self.folder, number)
@@ -218,7 +218,7 @@ def _write_volume(made: Field, file: Path | None, force: bool) -> None:
     if file is None or (file.exists() and not force):
         return
     from tbcad.atomic_files import replace_files
-    from tbcad.reconstruction.volume import volume_file
+    from tbcad.reconstruction.files import volume_file
 
     replace_files(file.parent, {file.name: volume_file(made)})
 
@@ -270,7 +270,8 @@ def checked_frames(wanted: Wanted) -> list[int | None]:
 
 def _files(wanted: Wanted, numbers: list[int | None]) -> list[tuple[Path, tuple[str, ...], bool]]:
     """Each file to write, its suffixes, and whether it may exist."""
-    from tbcad.reconstruction import field, mesh_files, volume
+    from tbcad.reconstruction.field import SUFFIX
+    from tbcad.reconstruction.files import MESH_SUFFIXES, VOLUME_SUFFIX
 
     files: list[tuple[Path, tuple[str, ...], bool]] = []
     may_be = wanted.force or wanted.resume
@@ -278,11 +279,11 @@ def _files(wanted: Wanted, numbers: list[int | None]) -> list[tuple[Path, tuple[
         files.append((wanted.preview, (".png",), may_be))
     for number in numbers:
         made = wanted.field_file(number)
-        files.append((made, (field.SUFFIX,), may_be))
+        files.append((made, (SUFFIX,), may_be))
         done = wanted.force or (wanted.resume and made.exists())
-        files += [(mesh, mesh_files.SUFFIXES, done) for mesh in wanted.mesh_files(number)]
+        files += [(mesh, MESH_SUFFIXES, done) for mesh in wanted.mesh_files(number)]
         if (dense := wanted.volume_file(number)) is not None:
-            files.append((dense, (volume.SUFFIX,), done))
+            files.append((dense, (VOLUME_SUFFIX,), done))
     return files
 
 
@@ -346,7 +347,7 @@ def _meshes(
     if not files:
         return {}
     from tbcad.atomic_files import replace_files
-    from tbcad.reconstruction.mesh_files import mesh_file
+    from tbcad.reconstruction.files import mesh_file
     from tbcad.reconstruction.surface import field_mesh
 
     stage(SURFACE)

@@ -9,7 +9,7 @@ from tbcad.api.arguments import silent
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
-    from tbcad.depth.view import DepthViews
+    from tbcad.depth.depth_map import DepthViews
     from tbcad.optics.camera import Camera
     from tbcad.reconstruction.field import Field
     from tbcad.simulate.capture.light_field import LightField
@@ -48,8 +48,8 @@ class Views:
 
     @cached_property
     def _depths(self) -> DepthViews:
+        from tbcad.depth.depth_map import depth_views
         from tbcad.depth.plane_sweep import FINE, QUICK
-        from tbcad.depth.view import depth_views
 
         return depth_views(self._tiles, QUICK if self._quick else FINE, self._progress)
 

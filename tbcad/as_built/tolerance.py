@@ -15,10 +15,10 @@ from tbcad.geometry.vectors import norm
 from tbcad.machine.photographed import machine_runs, stops_known
 from tbcad.machine.record import RECORD, read_machine
 from tbcad.optics.windows import cell_windows
+from tbcad.results.tables import Table
 from tbcad.simulate.prototype.plan import Plan, read_plan
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.study.tables import Table
 from tbcad.types import Bools, Floats
 
 RAYS = "rays.csv"

@@ -12,7 +12,7 @@ import numpy as np
 from tbcad.calibration.estimate.lens import projection
 from tbcad.calibration.estimate.reflection import reflections
 from tbcad.geometry.vectors import perpendicular_axes, unit
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
 from tbcad.optics.reflection import reflected_rays
 from tbcad.types import Bools, Floats
 

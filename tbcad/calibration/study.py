@@ -23,11 +23,11 @@ from tbcad.machine.designed import designed_shell, read_leds
 from tbcad.machine.machine import Machine
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Cell, Record, Table
 from tbcad.runs.exposure import Frame
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.tables import Cell, Record, Table
 from tbcad.tolerance.process.process import load_process, process_errors
 from tbcad.types import Floats, Ints, Progress
 

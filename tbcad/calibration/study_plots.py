@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tbcad.simulate.study.plots import Panel, Series
-from tbcad.simulate.study.tables import Record, Table
+from tbcad.results.plots import Panel, Series
+from tbcad.results.tables import Record, Table
 from tbcad.types import Floats
 
 

@@ -76,7 +76,7 @@ def scene_of(folder: Path) -> "Scene | None":
 def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
     """What a pinhole camera would see, ray-traced with samples x samples rays a pixel."""
     from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import pinhole_picture
+    from tbcad.simulate.views.ground_truth import pinhole_picture
 
     return to_bytes(pinhole_picture(scene, at, samples))
 
@@ -86,7 +86,7 @@ def write_compared(
 ) -> None:
     """Write the picture, and a comparison with the ground truth where it is known."""
     from tbcad.simulate.image_files import difference, side_by_side, write_images
-    from tbcad.simulate.image_quality import image_quality
+    from tbcad.simulate.views.viewpoints import image_quality
 
     if truth is None:
         write_images({out: picture})

@@ -121,7 +121,7 @@ def _picture(
     tiles: "MirrorTiles", at: "Camera", lens: "ThinLens", all_in_focus: bool, progress: "Progress"
 ) -> "Bytes":
     """The picture of the lens, sharp at its focus or everywhere."""
-    from tbcad.datasets.pinhole_pictures import pinhole_pictures
+    from tbcad.datasets.pictures import pinhole_pictures
     from tbcad.depth.depth_map import depth_map
     from tbcad.simulate.views.refocus import refocus as refocused
     from tbcad.simulate.views.refocus import refocus_everywhere
@@ -137,7 +137,7 @@ def _truth(
 ) -> "Bytes":
     """The ray-traced picture of the lens; of a pinhole without samples of one."""
     from tbcad.simulate.capture.photograph import to_bytes
-    from tbcad.simulate.scene.ground_truth import lens_picture
+    from tbcad.simulate.views.ground_truth import lens_picture
 
     if samples == 0:
         return true_picture(scene, at)

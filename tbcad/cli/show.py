@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from tbcad.reconstruction.field import Field
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.viewer.query import Query
+    from tbcad.viewer.page import Query
     from tbcad.viewer.render import MethodAtRest, ViewRenderer
     from tbcad.viewer.server import ViewServer
 
@@ -94,7 +94,7 @@ def show(
         if turntable is not None:
             raise InputError(f"{file}: no such file; --turntable is for a light field")
         return _show_report(folder, open_page, json)
-    from tbcad.viewer.query import Query
+    from tbcad.viewer.page import Query
 
     start = Query(azimuth, elevation, distance, width=width, height=height)
     if turntable is not None:
@@ -134,8 +134,7 @@ class _Shown(NamedTuple):
 @contextmanager
 def _shown(file: Path, method: "MethodAtRest | Literal['field'] | None") -> "Iterator[_Shown]":
     """A light field, with the field that is asked for or beside it; or a field."""
-    from tbcad.reconstruction.beside import wanted_field
-    from tbcad.reconstruction.field import SUFFIX, read_field
+    from tbcad.reconstruction.field import SUFFIX, read_field, wanted_field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 

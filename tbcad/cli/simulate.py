@@ -21,7 +21,7 @@ from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.simulate.capture.geometry import Geometry
+    from tbcad.simulate.camera_photographs import Geometry
 
 MOST_SAMPLES = 8
 CAPTURES, BUILT_IN = Path("captures"), "knot"

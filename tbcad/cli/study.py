@@ -20,9 +20,9 @@ from tbcad.cli.options import (
 from tbcad.cli.study_command import Work, of_design, of_export
 
 if TYPE_CHECKING:
+    from tbcad.simulate.capture.pixel_counts import Sensor
     from tbcad.simulate.scene.object import SceneObject
-    from tbcad.simulate.study.pixels import Sensor
-    from tbcad.simulate.study.viewpoints import StudyMethod
+    from tbcad.simulate.views.viewpoints import StudyMethod
     from tbcad.spec.design import Spec
 
 study = typer.Typer(
@@ -64,8 +64,8 @@ def resolution_command(
     scheduler: Scheduler = None,
 ) -> Work:
     """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
-    from tbcad.simulate.study.resolution import parse_ratio, resolution
-    from tbcad.simulate.study.sweep import n_range
+    from tbcad.studies.resolution import parse_ratio, resolution
+    from tbcad.studies.sweep import n_range
 
     ns, counted = n_range(first, last), _sensors(sensors, spec)
     wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
@@ -81,8 +81,8 @@ def capture_area_command(
     scheduler: Scheduler = None,
 ) -> Work:
     """Measure how large an object flat and convex mirrors can see whole (Fig. 5c)."""
-    from tbcad.simulate.study.capture_area import capture_area
-    from tbcad.simulate.study.sweep import n_range
+    from tbcad.studies.capture_area import capture_area
+    from tbcad.studies.sweep import n_range
 
     ns = n_range(first, last)
     return partial(capture_area, spec, ns, scheduler=scheduler)
@@ -92,7 +92,7 @@ def capture_area_command(
 @of_design
 def elevation_command(spec: "Spec") -> Work:
     """Correlate the mirrors' radii with polar angle, and their pixels with elevation (4.2, 5.1)."""
-    from tbcad.simulate.study.elevation import elevation
+    from tbcad.studies.elevation import elevation
 
     return partial(elevation, spec)
 
@@ -106,7 +106,7 @@ def depth_command(
     wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
 ) -> Work:
     """Find the depth of the virtual images, and the f-number that a lens needs (section 6)."""
-    from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
+    from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 
     optics = LensOptions(blur_px, pixel_um, wide_open).checked()
     return partial(depth_of_field, spec, optics)
@@ -127,8 +127,8 @@ def ssim_command(
 ) -> Work:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
     check_is_object(object_file, up, unit)
-    from tbcad.simulate.study.ssim import ssim
-    from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
+    from tbcad.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
+    from tbcad.studies.ssim import ssim
 
     simulated = _sensors(sensors, spec)
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
@@ -151,7 +151,7 @@ def balance_command(
     distance: Distance = 640.0,
 ) -> Work:
     """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
-    from tbcad.simulate.study.balance import balance, parse_subdivisions
+    from tbcad.studies.balance import balance, parse_subdivisions
 
     wanted = parse_subdivisions(ns)
     return partial(balance, spec, wanted, views, distance, _by(method))
@@ -175,8 +175,8 @@ def prototype_command(
     """Compare views from the prototype's merged photographs with those of the full shell."""
     check_is_object(object_file, up, unit)
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.study.prototype_vs_shell import prototype_vs_shell
-    from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
+    from tbcad.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
+    from tbcad.studies.prototype_vs_shell import prototype_vs_shell
 
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
@@ -217,8 +217,8 @@ def low_pass_command(
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
     check_is_object(object_file, up, unit)
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.study.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass
-    from tbcad.simulate.study.viewpoints import viewpoints_around
+    from tbcad.simulate.views.viewpoints import viewpoints_around
+    from tbcad.studies.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass
 
     usual = BlurOptions()
     options = BlurOptions(
@@ -244,7 +244,7 @@ def calibration_command(folder: Path) -> Work:
 def _by(method: MethodOfStudy) -> "StudyMethod":
     if method != "field":
         return method
-    from tbcad.reconstruction.quick import BY_FIELD
+    from tbcad.reconstruction.picture import BY_FIELD
 
     return BY_FIELD
 
@@ -261,7 +261,7 @@ def _subject(
 
 def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:
     """The sensors that are wanted, each once; by default those of Table II for the design."""
-    from tbcad.simulate.study.pixels import parse_sensor
-    from tbcad.simulate.study.resolution import default_sensors
+    from tbcad.simulate.capture.pixel_counts import parse_sensor
+    from tbcad.studies.resolution import default_sensors
 
     return tuple(map(parse_sensor, dict.fromkeys(given or ()))) or default_sensors(spec)

@@ -10,7 +10,7 @@ from tbcad.cli.options import Design, Exports, JsonResult, Out, PlotFormatOption
 from tbcad.cli.study_output import run_study
 
 if TYPE_CHECKING:
-    from tbcad.simulate.study.study import Study
+    from tbcad.results.study import Study
     from tbcad.spec.design import Spec
     from tbcad.types import Progress
 

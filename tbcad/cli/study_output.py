@@ -12,7 +12,7 @@ from tbcad.screen import paragraph, report_console, stages
 
 if TYPE_CHECKING:
     from tbcad.figure_files import PlotFormat
-    from tbcad.simulate.study.study import Study
+    from tbcad.results.study import Study
     from tbcad.types import Progress
 
 
@@ -21,7 +21,7 @@ def run_study(
 ) -> int:
     """Make a study, write its files, and show its figures next to the paper's."""
     from tbcad.output.single_files import check_tables
-    from tbcad.simulate.study.study import check_study_folder, write_study
+    from tbcad.results.study import check_study_folder, write_study
 
     check_tables(out)
     check_study_folder(out)

@@ -97,7 +97,7 @@ def tolerance(
     check_is_export(folder)
     check_is_object(object_file, up, unit)  # as all before, before heavy libraries are loaded
     from tbcad.api import analyse
-    from tbcad.simulate.study.study import check_study_folder, write_study
+    from tbcad.results.study import check_study_folder, write_study
     from tbcad.tolerance.report import json_text, summary_text, tolerance_study
     from tbcad.tolerance.stages import TABLES
 
@@ -142,8 +142,8 @@ def _as_built(
         tolerance_table,
     )
     from tbcad.atomic_files import replace_files
-    from tbcad.simulate.study.study import check_study_folder
-    from tbcad.simulate.study.tables import csv_text
+    from tbcad.results.study import check_study_folder
+    from tbcad.results.tables import csv_text
 
     check_study_folder(out)
     with stages(1) as screen:

@@ -35,7 +35,7 @@ from tbcad.screen import stages
 if TYPE_CHECKING:
     from tbcad.optics.camera import Camera
     from tbcad.reflectance.environment import Environment
-    from tbcad.reflectance.relit import Relit
+    from tbcad.reflectance.field_file import Relit
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.point_lights import PointLights
     from tbcad.simulate.scene.ray_casting import Scene
@@ -133,7 +133,7 @@ def view(
     files = ViewFiles(tuple(depth_files or ()), normals_file, opacity_file)
     by_default = method is None and surface is None and light is None
     choice = _choice("field" if by_default and files.of_field else method, surface)
-    from tbcad.reconstruction.beside import wanted_field
+    from tbcad.reconstruction.field import wanted_field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
@@ -187,7 +187,7 @@ def _frame(source: "LightField", folder: Path, number: int) -> "LightField":
 
 def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
     """Object and camera as they are to each other in a frame."""
-    from tbcad.simulate.capture.turning import (
+    from tbcad.simulate.capture.sequence import (
         camera_before_turn,
         lit_when_turned,
         turn_of_frame,
@@ -206,8 +206,7 @@ def _environment(light: Path, turn_deg: float, kind: LightFormat | None) -> "Env
 
 
 def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
-    from tbcad.reflectance.field_file import open_reflectance
-    from tbcad.reflectance.relit import relit
+    from tbcad.reflectance.field_file import open_reflectance, relit
 
     with open_reflectance(folder) as reflectance:
         return relit(source, reflectance, wanted)
@@ -217,7 +216,7 @@ def _lit_truths(
     scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
 ) -> tuple["Bytes", "Bytes | None"]:
     """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
-    from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene
+    from tbcad.reflectance.field_file import TRUE_LIGHTS, lit_scene
 
     def truth(lights: "PointLights") -> "Bytes":
         return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
@@ -226,7 +225,7 @@ def _lit_truths(
 
 
 def _ssim(truth: "Bytes", picture: "Bytes") -> float:
-    from tbcad.simulate.image_quality import image_quality
+    from tbcad.simulate.views.viewpoints import image_quality
 
     return image_quality(truth, picture).ssim
 
@@ -282,7 +281,7 @@ def _view(
         files: of the depth.
         progress: called with what the depth needs first.
     """
-    from tbcad.depth.view import depth_views
+    from tbcad.depth.depth_map import depth_views
     from tbcad.simulate.scene.ray_casting import depth_along_rays
     from tbcad.simulate.views.synthesis import synthesise
 

@@ -84,8 +84,8 @@ def write_depth(
 def field_view(made: "Field", at: "Camera", files: ViewFiles) -> "Bytes":
     """The picture of a field (h, w, 3), and what else is asked for of it."""
     from tbcad.atomic_files import replace_files
+    from tbcad.depth.depth_map import depth_ply, depth_png
     from tbcad.reconstruction.picture import field_normals, field_picture, normals_png, opacity_png
-    from tbcad.simulate.scene.depth_files import depth_ply, depth_png
 
     picture = field_picture(made, at)
     depth = picture.depth(at)

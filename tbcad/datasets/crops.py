@@ -8,6 +8,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.rays import meets_sphere
+from tbcad.simulate.views.mirror_tiles import mirror_pixels
 from tbcad.types import Bools, Bytes, Floats, Ints
 
 
@@ -65,16 +66,11 @@ class Crop:
 
 def read_crop(source: LightField, mirror: MirrorId) -> Crop | None:
     """Read the pixels of a mirror; None where it has none."""
-    frame = source.frames[mirror.frame]
-    x0, x1, y0, y1 = frame.boxes[mirror.index].tolist()
-    pixels = frame.read(slice(y0, y1), slice(x0, x1))
-    valid = pixels["mirror"] == mirror.index + 1
-    if not valid.any():
+    found = mirror_pixels(source.frames[mirror.frame], mirror.index)
+    if found is None:
         return None
-    rows, columns = (np.flatnonzero(valid.any(axis=axis)) for axis in (1, 0))
-    cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    valid, colour = valid[cut], pixels["colour"][cut]
-    origin, direction = (pixels[name][cut].astype(np.float64) for name in ("origin", "direction"))
+    valid, (colour, *rays) = found
+    origin, direction = (one.astype(np.float64) for one in rays)
     flat = origin.reshape(-1, 3), direction.reshape(-1, 3)
     meets = meets_sphere(*flat, source.capture_mm / 2).reshape(valid.shape)
     return Crop(colour, origin, direction, valid, valid & meets)

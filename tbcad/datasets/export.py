@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.datasets.colmap import write_colmap
 from tbcad.datasets.crops import chosen_mirrors
 from tbcad.datasets.machine_scene import write_machine_scene
-from tbcad.datasets.nerfstudio import write_nerfstudio
+from tbcad.datasets.nerfstudio import write_nerfstudio, write_pictures
 from tbcad.datasets.ngp_rays import write_ngp_rays
 from tbcad.datasets.options import ExportOptions
 from tbcad.datasets.pictures import Pictures, default_size, taken_pictures
+from tbcad.datasets.pinholes import pinhole_of
 from tbcad.datasets.ray_table import write_ray_table
 from tbcad.datasets.seed_points import SeedPoints, seed_points
 from tbcad.datasets.virtual_cameras import VirtualCameras, virtual_cameras
 from tbcad.errors import InputError
+from tbcad.formats.colmap import SparseModel
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
@@ -28,6 +29,9 @@ SCHEMA = "tbcad-dataset/1"
 RECORD, TABLE = "dataset.json", "cameras.csv"
 DIGITS = 6
 COLUMNS = ("name", "x", "y", "z", "rays", "pitch_mm", "rms_mm", "worst_mm", "central_error_mm")
+MODEL = Path("sparse", "0")
+# COLMAP looks for the mask of a0001.png as a0001.png.png.
+MASK_SUFFIX = ".png.png"
 
 
 def write_dataset(
@@ -188,3 +192,26 @@ def _rows(virtual: VirtualCameras) -> Iterator[Row]:
     ):
         cells = [mirror.name, *centre, int(rays), *np.round(row, DIGITS).tolist()]
         yield dict(zip(COLUMNS, cells, strict=True))
+
+
+def write_colmap(folder: Path, names: list[str], pictures: Pictures, seeds: SeedPoints) -> None:
+    """Write images, masks and the sparse model into a folder that exists."""
+    write_pictures(folder, names, pictures, MASK_SUFFIX)
+    (folder / MODEL).mkdir(parents=True)
+    for name, data in sparse_model(names, pictures, seeds).files().items():
+        (folder / MODEL / name).write_bytes(data)
+
+
+def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> SparseModel:
+    """The cameras and points as COLMAP has them."""
+    pinholes = [pinhole_of(camera) for camera in pictures.cameras]
+    intrinsics = [np.concatenate([one.focal_px, one.principal_px]) for one in pinholes]
+    return SparseModel(
+        tuple(f"{name}.png" for name in names),
+        pinholes[0].size_px,
+        np.array(intrinsics),
+        np.array([one.axes for one in pinholes]),
+        np.array([one.centre for one in pinholes]),
+        seeds.points,
+        seeds.colours,
+    )

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from tbcad.datasets.crops import Crop
-from tbcad.datasets.fitted_pinhole import fitted_pinhole
 from tbcad.datasets.nerfstudio import IMAGES, TRANSFORMS, mask_png
 from tbcad.datasets.pictures import crop_of
-from tbcad.datasets.pinholes import Pinhole
+from tbcad.datasets.pinholes import Pinhole, fitted_pinhole
 from tbcad.datasets.virtual_cameras import VirtualCameras
 from tbcad.geometry.vectors import unit
 from tbcad.simulate.capture.light_field import LightField

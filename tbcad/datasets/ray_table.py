@@ -13,7 +13,7 @@ from tbcad.datasets.crops import reading_order
 from tbcad.datasets.pictures import crop_of
 from tbcad.datasets.virtual_cameras import VirtualCameras
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL
+from tbcad.simulate.capture.light_field_writer import chunked
 from tbcad.types import Progress
 
 RAYS, RAYS_H5 = "rays.npz", "rays.h5"
@@ -57,14 +57,7 @@ def _write_h5(path: Path, source: LightField, virtual: VirtualCameras, total: in
     """The same arrays, of which programs read parts."""
     with h5py.File(path, "w", libver=("v110", "v110")) as store:
         stored = {
-            name: store.create_dataset(
-                name,
-                (total, *last),
-                kind,
-                chunks=(min(RAYS_PER_CHUNK, total), *last),
-                shuffle=True,
-                compression=COMPRESSION_LEVEL,
-            )
+            name: chunked(store, name, kind, (total, *last), (min(RAYS_PER_CHUNK, total), *last))
             for name, (kind, last) in COLUMNS.items()
         }
         for name in COLUMNS:

@@ -54,7 +54,6 @@ class VirtualCameras:
     left_out: dict[str, str]
 
     def __len__(self) -> int:
-        """Number of virtual cameras."""
         return len(self.mirrors)
 
     def pinhole_cameras(self, capture_mm: float, size_px: int) -> list[Camera]:

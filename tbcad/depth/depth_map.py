@@ -1,4 +1,7 @@
-"""The depth of a view as a surface: for a blend, as points, and as files."""
+"""The depth of a view as a surface: for views as a blend on it, as points, and as files.
+
+Depth is in mm behind the plane through the origin that faces the view, NaN where it is unknown.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -6,16 +9,43 @@ import numpy as np
 from PIL import Image
 
 from tbcad.compiled import compiled_loop
-from tbcad.datasets.pinhole_pictures import PinholePictures
+from tbcad.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.depth.plane_sweep import FINE, Sweep, swept_depth
 from tbcad.errors import InputError
+from tbcad.formats.ply import points_ply
 from tbcad.optics.camera import Camera
-from tbcad.simulate.scene.depth_files import depth_ply, depth_png, depth_points
-from tbcad.types import Bytes, Floats
+from tbcad.picture_bytes import png_bytes
+from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import SynthesisedView, synthesise
+from tbcad.types import Bytes, Floats, Progress
 
+FRONT = 65535  # the number of the capture sphere's front; 0 is unknown
 # A plane that is less different than a middling one, by colour, is no surface but empty or even.
 MIN_CONFIDENCE = 3.0
 BLACK = 8  # of 255: no brighter is the background, which is matt black
+
+
+def depth_png(depth: Floats, capture_mm: float) -> bytes:
+    """Depth (h, w) as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
+    share = 0.5 - depth / capture_mm
+    number = np.rint(1 + (FRONT - 1) * np.clip(share, 0, 1))
+    return png_bytes(np.nan_to_num(number).astype(np.uint16))
+
+
+def depth_points(view: Camera, depth: Floats) -> Floats:
+    """Points (h, w, 3) of a view's depth (h, w), mm; NaN where it is unknown."""
+    along = view_directions(view)
+    along /= (along @ view.forward)[..., None]
+    plane = -float(view.pinhole @ view.forward)
+    return np.asarray(view.pinhole + (plane + depth)[..., None] * along)
+
+
+def depth_ply(view: Camera, depth: Floats, image: Bytes) -> bytes:
+    """The points that are known as PLY, with the colours of a picture (h, w, 3)."""
+    points = depth_points(view, depth).reshape(-1, 3)
+    known = np.isfinite(points).all(axis=1)
+    return points_ply(points[known], image.reshape(-1, 3)[known])
 
 
 @dataclass(frozen=True)
@@ -111,3 +141,46 @@ def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> D
     smaller = replace(view, width_px=max(size[0], 1), height_px=max(size[1], 1))
     depth, confidence = swept_depth(pictures, smaller, sweep)
     return DepthMap(smaller, depth, confidence, pictures.capture_mm)
+
+
+@dataclass(frozen=True)
+class DepthViews:
+    """What views of a light field are made from, one after the other.
+
+    Attributes:
+        tiles: the light field.
+        pictures: of its virtual cameras.
+        sweep: how fine the depth is looked for.
+    """
+
+    tiles: MirrorTiles
+    pictures: PinholePictures
+    sweep: Sweep = FINE
+
+    def of(
+        self, view: Camera, shown: MirrorTiles | None = None
+    ) -> tuple[SynthesisedView, DepthMap]:
+        """The picture that a pinhole camera would see, and its depth.
+
+        Args:
+            view: the camera, which looks at the origin.
+            shown: another light field of the same rays, whose colours the picture has.
+
+        Raises:
+            InputError: the camera looks elsewhere.
+        """
+        found = depth_map(self.pictures, view, self.sweep)
+        return synthesise(shown or self.tiles, view, "blend", found.along_rays), found
+
+
+def depth_views(
+    tiles: MirrorTiles, sweep: Sweep = FINE, progress: Progress = lambda _: None
+) -> DepthViews:
+    """Make the pictures of all virtual cameras, from which views are then made quickly.
+
+    Args:
+        tiles: the light field.
+        sweep: how fine the depth is looked for.
+        progress: called with each virtual camera whose picture is made.
+    """
+    return DepthViews(tiles, pinhole_pictures(tiles.source, progress), sweep)

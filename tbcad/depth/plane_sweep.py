@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter
 
 from tbcad.compiled import compiled_loop
-from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
+from tbcad.datasets.pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, first_then_threads
 from tbcad.simulate.scene.viewpoint import view_directions
@@ -57,11 +57,6 @@ class _Cameras(NamedTuple):
     matrix: Floats
 
 
-def _seen_from(pictures: PinholePictures, view: Camera) -> _Cameras:
-    number, place = facing(pictures, view)
-    return _Cameras(number, place, projections(pictures, view, number))
-
-
 def swept_depth(
     pictures: PinholePictures, view: Camera, sweep: Sweep = FINE
 ) -> tuple[Floats, Floats]:
@@ -81,7 +76,8 @@ def swept_depth(
     planes = np.linspace(-radius, radius, sweep.planes)
     inside = _inside(view, planes, radius)
     difference = np.full(inside.shape, np.float32(np.nan))
-    cameras = _seen_from(pictures, view)
+    number, place = facing(pictures, view)
+    cameras = _Cameras(number, place, projections(pictures, view, number))
     known = pictures.picture, pictures.mask
     distance = planes - float(view.pinhole @ view.forward)
 
@@ -200,15 +196,8 @@ def _compare(
 ) -> None:
     """Fill in the differences of a block, (d, b, b), from cameras (c,) by their matrices (c, 3, 4).
 
-    Args:
-        matrix: into the cameras' pictures.
-        cameras: their numbers, the nearest first.
-        distance: of the planes along the view from its pinhole, mm, (d,).
-        lens: column and row of the block's first pixel from the middle, and the pixels' pitch.
-        inside: where to compare, (d, b, b).
-        difference: is filled.
-        picture: of all cameras, (m, s, s, 3).
-        mask: where they are known, (m, s, s).
+    The nearest camera is first; `lens` is column and row of the block's first pixel from the
+    middle, and the pixels' pitch. All else is as of `_compare_rows`.
     """
     planes, rows, columns = inside.shape
     colours, apart = np.empty((planes, len(cameras), 3)), np.empty(len(cameras))
@@ -243,15 +232,8 @@ def _look_along(
     Numbers instead of parts of arrays, also below: numba counts who uses an array, which takes
     longer than the colours.
 
-    Args:
-        matrix: into the cameras' pictures, (c, 3, 4).
-        c: which camera.
-        ray: across, across, at unit distance.
-        distance: of the planes, (d,).
-        inside: on which planes to look, (d,).
-        picture: of the camera, (s, s, 3).
-        mask: where it is known, (s, s).
-        found: colours (d, c, 3) and their numbers (d,), are added to.
+    Of the camera: matrices and its place among them, picture (s, s, 3) and where it is known;
+    `ray` is across, across, at unit distance. Colours (d, c, 3) and their numbers (d,) are added.
     """
     colours, count = found
     last = mask.shape[0] - 1

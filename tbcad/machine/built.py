@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.machine.machine import Machine
 from tbcad.machine.other_errors import DISTORTION, LED_MM, PRINCIPAL_PX
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.tolerance.montecarlo.draws import ShellDraws

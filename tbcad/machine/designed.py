@@ -7,7 +7,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import Record, Vector, read_json
 from tbcad.machine.machine import Machine
-from tbcad.optics.lens_camera import without_distortion
+from tbcad.optics.camera import without_distortion
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.simulate.prototype.plan import MISSING, RECORD, SCHEMA, Plan
 from tbcad.simulate.scene.exported import ExportedDesign

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.geometry.rotations import rotated
-from tbcad.optics.highlights import reflection_points
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
+from tbcad.optics.reflection import reflection_points
 from tbcad.types import Floats, Ints
 
 

@@ -11,7 +11,7 @@ from tbcad.errors import InputError
 from tbcad.formats.checked_files import Finite, Record, Vector, read_json
 from tbcad.geometry.vectors import norm
 from tbcad.machine.machine import Machine
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
 from tbcad.runs.exposure import Frame
 
 MACHINE_SCHEMA = "tbcad-machine/1"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.optics.lens_camera import LensCamera, vignetting
+from tbcad.optics.camera import LensCamera, vignetting
 from tbcad.runs.images import Image16, read_image
 from tbcad.srgb import srgb, srgb_light
 from tbcad.types import Bytes, Floats, Ints

@@ -19,8 +19,7 @@ from tbcad.merged_run.stop_photographs import CorrectedPhotographs, common_expos
 from tbcad.runs.exposure import LIT, Frame
 from tbcad.runs.photographs import Run, read_run
 from tbcad.runs.same_export import check_same_export
-from tbcad.simulate.capture.geometry import CameraPhotographs
-from tbcad.simulate.capture.photograph import RowBand
+from tbcad.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.simulate.prototype.merge import merge_photographs, merge_plan
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector

@@ -49,7 +49,7 @@ class MirrorArray:
         cells: of the reflecting surfaces, with the coat.
         modelled_cells: of the modelled surfaces, under the coat.
         area: of the cells, mm^2, (m,).
-        coverage: coverage diameter by exact rays, mm, (m,) (optics.trace).
+        coverage: coverage diameter by exact rays, mm, (m,) (optics.windows).
     """
 
     camera_id: str

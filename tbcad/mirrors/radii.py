@@ -12,7 +12,7 @@ from tbcad.optics.pedestals.cells import pedestal_cells
 from tbcad.optics.pedestals.plan import PedestalPlan, pedestal_plan
 from tbcad.optics.power_diagram import NotRegularError
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.trace import coverage_diameters
+from tbcad.optics.windows import coverage_diameters
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints, Progress
 

@@ -11,7 +11,7 @@ from tbcad.geometry.vectors import dot, unit
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import reflected_rays
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.trace import cell_sides
+from tbcad.optics.windows import cell_sides
 from tbcad.types import Floats, Ints
 
 X = np.array([1.0, 0.0, 0.0])

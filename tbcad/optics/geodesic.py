@@ -36,6 +36,14 @@ def prime_factors(n: int) -> list[int]:
     return factors
 
 
+def triangle_grid(m: int) -> tuple[list[tuple[int, int]], Ints]:
+    """Places (i, j) in a triangle whose sides have m parts, and its m^2 triangles, (m^2, 3, 2)."""
+    grid = [(i, j) for i in range(m + 1) for j in range(m + 1 - i)]
+    up = [((i, j), (i + 1, j), (i, j + 1)) for i, j in grid if i + j < m]
+    down = [((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i, j in grid if i + j < m - 1]
+    return grid, np.array(up + down)
+
+
 def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
     """Split each face (f, 3) into m x m faces and move the new vertices onto the unit sphere.
 
@@ -47,7 +55,7 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
     on_edges = (
         vertices[edges[:, :1]] * (1 - steps)[:, None] + vertices[edges[:, 1:]] * steps[:, None]
     )
-    grid = [(i, j) for i in range(m + 1) for j in range(m + 1 - i)]
+    grid, small = triangle_grid(m)
     inner = np.array([(i, j) for i, j in grid if i and j and i + j < m], dtype=np.int64)
     inner = inner.reshape(-1, 2)
     weights = np.column_stack([m - inner.sum(axis=1), inner]) / m
@@ -65,9 +73,6 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
     ids[:, k, 0], ids[:, m - k, k], ids[:, 0, m - k] = along.transpose(1, 0, 2)
     ids[:, inner[:, 0], inner[:, 1]] = inner_ids.reshape(len(faces), -1)
 
-    up = [((i, j), (i + 1, j), (i, j + 1)) for i, j in grid if i + j < m]
-    down = [((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i, j in grid if i + j < m - 1]
-    small = np.array(up + down)
     triangles = ids[:, small[..., 0], small[..., 1]].reshape(-1, 3)
     return unit(points), triangles
 

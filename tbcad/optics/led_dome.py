@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.highlights import reflection_points
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
+from tbcad.optics.reflection import reflection_points
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])

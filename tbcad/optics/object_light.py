@@ -7,7 +7,7 @@ import numpy as np
 from tbcad.geometry.vectors import dot, norm
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import miss_distances
-from tbcad.optics.trace import (
+from tbcad.optics.windows import (
     cell_sides,
     minima_by_mirror,
     parabola_minima,

@@ -1,12 +1,15 @@
-"""The law of reflection: rays from a pinhole after a mirror, and how far they miss the origin.
+"""The law of reflection: rays from a pinhole after a mirror, and where a sphere shows a light.
 
-The origin is the centre of the capture sphere, so twice the smallest miss is what a mirror covers.
+The origin is the centre of the capture sphere, so twice the smallest distance by which rays miss it
+is what a mirror covers.
 """
 
 import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.types import Floats
+
+ITERATIONS = 40  # of the search for the point of reflection; each gains a digit or so
 
 
 def reflect(ray: Floats, normal: Floats) -> Floats:
@@ -39,22 +42,24 @@ def miss_distances(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
     return norm(np.cross(point, reflected_rays(pinhole, point, normal)))
 
 
-def sphere_miss_distances(pinhole: Floats, ray: Floats, centre: Floats, radius: Floats) -> Floats:
-    """Distances (...) from the origin of rays after convex spherical mirrors, mm.
+def reflection_points(
+    centre: Floats,
+    radius: Floats,
+    place: Floats,
+    pinhole: Floats,
+    iterations: int = ITERATIONS,
+) -> Floats:
+    """Where spheres (m,) show places (3,) or (m, 3) to a pinhole (3,), mm, (m, 3).
 
-    Args:
-        pinhole: mm, (3,).
-        ray: unit directions from the pinhole, (..., 3).
-        centre: of the spheres, mm, (..., 3).
-        radius: of the spheres, mm, (...).
-
-    Returns:
-        Infinite where the ray misses the sphere, or leaves it away from the origin.
+    There the normal bisects both directions. A normal that turns by one angle turns the bisector
+    back by about r (1/a + 1/b) / 2 of it, at distances a and b, so the new normal is their mean
+    with that weight.
     """
-    to_centre = centre - pinhole
-    along = dot(ray, to_centre)
-    inside = radius**2 - dot(to_centre, to_centre) + along**2
-    point = pinhole + (along - np.sqrt(np.maximum(inside, 0)))[..., None] * ray
-    direction = reflected_rays(pinhole, point, (point - centre) / radius[..., None])
-    missed = (inside < 0) | (dot(direction, point) > 0)
-    return np.asarray(np.where(missed, np.inf, norm(np.cross(point, direction))))
+    normal = unit(pinhole - centre)
+    for _ in range(iterations):
+        point = centre + radius[:, None] * normal
+        ways = place - point, pinhole - point
+        weight = radius / 2 * (1 / norm(ways[0]) + 1 / norm(ways[1]))
+        bisector = unit(unit(ways[0]) + unit(ways[1]))
+        normal = unit(bisector + weight[:, None] * normal)
+    return np.asarray(centre + radius[:, None] * normal)

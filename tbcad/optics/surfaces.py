@@ -31,7 +31,6 @@ class Surfaces:
     curvature: Floats
 
     def __len__(self) -> int:
-        """Number of surfaces."""
         return len(self.curvature)
 
     @property

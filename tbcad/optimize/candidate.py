@@ -8,9 +8,8 @@ from pydantic import ValidationError
 
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.optimize.views import ViewsBy, mean_ssim
-from tbcad.simulate.study.pixels import Sensor, count_pixels
-from tbcad.simulate.study.sweep import spec_with
-from tbcad.spec.design import FIT, Spec
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels
+from tbcad.spec.design import FIT, Spec, spec_with
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 

@@ -11,8 +11,8 @@ from tbcad.figure_files import PlotFormat
 from tbcad.formats.toml import toml_text
 from tbcad.optimize.candidate import Candidate, Figures, placed
 from tbcad.optimize.search import SearchResult
-from tbcad.simulate.study.plots import Panel, Series, plot_file
-from tbcad.simulate.study.tables import Table, csv_text
+from tbcad.results.plots import Panel, Series, plot_file
+from tbcad.results.tables import Table, csv_text
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
 from tbcad.types import Floats

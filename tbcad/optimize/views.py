@@ -13,18 +13,18 @@ import numpy as np
 
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
-from tbcad.reconstruction.quick import BY_FIELD
+from tbcad.reconstruction.picture import BY_FIELD
 from tbcad.simulate.capture.traced_frame import traced_light_field
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.study.viewpoints import (
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import (
     ELEVATIONS_DEG,
     ground_truths,
+    image_quality,
     viewpoints_around,
     views_by,
 )
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.types import Bytes
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0

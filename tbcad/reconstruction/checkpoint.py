@@ -10,10 +10,10 @@ import numpy as np
 
 from tbcad.atomic_files import replace_files
 from tbcad.errors import InputError
-from tbcad.reconstruction.adam import Moments
-from tbcad.reconstruction.fit import Level, Settings, State
+from tbcad.reconstruction.gradient import Moments
 from tbcad.reconstruction.grid import Grid
 from tbcad.reconstruction.marching import Singles
+from tbcad.reconstruction.start import Level, Settings, State
 
 SCHEMA = "tbcad-field-part/1"
 ANEW = "begin anew with --force"

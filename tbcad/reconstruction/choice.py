@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.reconstruction.fit import Level, Settings, fit, squared_error
+from tbcad.reconstruction.fit import fit, squared_error
 from tbcad.reconstruction.rays import CapturedRays
+from tbcad.reconstruction.start import Level, Settings, first_state
 from tbcad.types import Bools, Progress
 
 EVERY = 20  # one mirror of so many is held out
@@ -36,7 +37,11 @@ def held_out(rays: CapturedRays) -> Bools:
 
 
 def chosen(
-    rays: CapturedRays, settings: Settings, orders: tuple[int, ...], progress: Progress
+    rays: CapturedRays,
+    inside: Bools,
+    settings: Settings,
+    orders: tuple[int, ...],
+    progress: Progress,
 ) -> tuple[Settings, list[Trial]]:
     """Choose the weights of smoothness and sparsity, and the order of view dependence.
 
@@ -45,6 +50,7 @@ def chosen(
 
     Args:
         rays: what was captured.
+        inside: their hull.
         settings: to begin with.
         orders: that may be chosen, the first is begun with.
         progress: called with each trial.
@@ -56,7 +62,7 @@ def chosen(
 
     def tried(wanted: Settings) -> Trial:
         progress(f"trial {len(trials) + 1}: weights and view dependence by held-out mirrors")
-        trials.append(Trial(wanted, held_out_loss(rays, replace(wanted, levels=LEVELS))))
+        trials.append(Trial(wanted, held_out_loss(rays, inside, replace(wanted, levels=LEVELS))))
         return trials[-1]
 
     best = _best_weight(tried, replace(settings, order=orders[0]))
@@ -92,8 +98,8 @@ def weighted(settings: Settings, factor: float) -> Settings:
     )
 
 
-def held_out_loss(rays: CapturedRays, settings: Settings) -> float:
+def held_out_loss(rays: CapturedRays, inside: Bools, settings: Settings) -> float:
     """Mean squared error, summed over the colours, of held-out rays by a fit to all others."""
     held = held_out(rays)
-    *_, last = fit(rays, settings, ~held)
+    *_, last = fit(rays, settings, ~held, first_state(inside, rays.capture_mm, settings))
     return squared_error(rays, held, last.field(), settings)

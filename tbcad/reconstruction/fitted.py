@@ -1,7 +1,6 @@
 """A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from math import log10
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.reconstruction.beside import FACT, light_field_fingerprint
 from tbcad.reconstruction.checkpoint import (
     Checkpoint,
     read_checkpoint,
@@ -19,26 +17,19 @@ from tbcad.reconstruction.checkpoint import (
     write_checkpoint,
 )
 from tbcad.reconstruction.choice import chosen
-from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fit import (
-    CENTRAL,
-    Level,
-    Settings,
-    State,
-    all_spans,
-    first_state,
-    fit,
-    squared_error,
-    workers,
-)
-from tbcad.reconstruction.hull import hull
+from tbcad.reconstruction.field import FACT, Field, light_field_fingerprint
+from tbcad.reconstruction.fit import all_spans, fit, squared_error
 from tbcad.reconstruction.marching import Singles
 from tbcad.reconstruction.options import Options
-from tbcad.reconstruction.places import pixel_places
-from tbcad.reconstruction.rays import NO_FOOTPRINT, CapturedRays, captured_rays
-from tbcad.reconstruction.start import start
+from tbcad.reconstruction.rays import (
+    NO_FOOTPRINT,
+    CapturedRays,
+    captured_rays,
+    pixel_places,
+    with_weights,
+)
+from tbcad.reconstruction.start import CENTRAL, Level, Settings, State, first_state, hull, start
 from tbcad.reconstruction.surface import best_level, resolved_mm
-from tbcad.reconstruction.uncertainty import with_weights
 from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tbcad.types import Bools, Progress
 from tbcad.version import __version__
@@ -109,10 +100,9 @@ def reconstruction(
         saved = read_checkpoint(part, asked, settings.places)
     rays = _weighted_rays(source, settings)
     used = used_rays(rays, options.seed)
-    with workers() as pool:
-        inside = hull(rays, pool)
+    inside = hull(rays)
     if saved is None:
-        settings, trials = _chosen(rays, settings, options, told, last)
+        settings, trials = _chosen(rays, inside, settings, options, told, last)
         state = start(inside, last, rays.capture_mm, settings)
     else:
         settings, trials, state = saved.settings, saved.trials, saved.state
@@ -193,7 +183,12 @@ def used_rays(rays: CapturedRays, seed: int) -> Bools:
 
 
 def _chosen(
-    rays: CapturedRays, settings: Settings, options: Options, told: Told, last: Field | None
+    rays: CapturedRays,
+    inside: Bools,
+    settings: Settings,
+    options: Options,
+    told: Told,
+    last: Field | None,
 ) -> tuple[Settings, list[dict[str, Any]]]:
     """Weights and order by mirrors left out, and the trials; the first frame's hold for all."""
     if last is not None:
@@ -203,7 +198,7 @@ def _chosen(
     orders = (0, 1) if options.order == "auto" else (settings.order,)
     # Trials are coarse: they do not resolve a pixel.
     single = replace(settings, places=CENTRAL)
-    best, trials = chosen(rays, single, orders, told.detail)
+    best, trials = chosen(rays, inside, single, orders, told.detail)
     tried = [
         {"order": one.settings.order, "smooth_density": one.settings.smooth_density,
          "loss": one.loss} for one in trials
@@ -223,8 +218,7 @@ def _tell(state: State, settings: Settings, told: Told) -> None:
 def _facts(
     rays: CapturedRays, used: Bools, made: Field, inside: Bools, settings: Settings
 ) -> dict[str, Any]:
-    with workers() as pool:
-        missed = _unexplained(rays, first_state(inside, rays.capture_mm, settings), pool)
+    missed = _unexplained(rays, first_state(inside, rays.capture_mm, settings))
     error = squared_error(rays, ~used, made, settings)
     return {
         "chosen": settings_record(settings),
@@ -252,9 +246,9 @@ def decibels(error: float) -> float:
     return -10 * log10(error) if error > 0 else LARGEST_DB
 
 
-def _unexplained(rays: CapturedRays, first: State, pool: ThreadPoolExecutor) -> float:
+def _unexplained(rays: CapturedRays, first: State) -> float:
     """Share of the light brighter than the background on rays past the first grid."""
     light = rays.colour.max(axis=1)
     light[light < rays.dark_level()] = 0
-    past = all_spans(rays, first.grid, pool)[0] < 0
+    past = all_spans(rays, first.grid)[0] < 0
     return float(light[past].sum(dtype=np.float64) / light.sum(dtype=np.float64))

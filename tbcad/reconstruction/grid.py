@@ -40,7 +40,6 @@ class Grid:
         return Grid(len(wanted), width_mm, np.argwhere(nodes).astype(np.uint16))
 
     def __len__(self) -> int:
-        """Number of nodes that are there."""
         return len(self.place)
 
     @property

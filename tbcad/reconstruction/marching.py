@@ -1,4 +1,4 @@
-"""Light along rays through a field: compositing, and its gradient, in compiled loops.
+"""Light along rays through a field: compositing, in compiled loops.
 
 The light of a ray is the sum over its samples k of T_k a_k c_k, with a_k = 1 - exp(-s_k d) of the
 density s_k and the step d, and T_k the product of all 1 - a before k (N. Max, IEEE Trans.
@@ -6,9 +6,6 @@ Visualization and Computer Graphics 1(2), 1995). Density is (x + sqrt(x^2 + q)) 
 that is interpolated linearly between nodes and may be negative, so surfaces lie between nodes
 (A. Karnewar and others, ReLU Fields, SIGGRAPH 2022; J. T. Barron, Squareplus, 2021). Colours are
 interpolated too; of a field of first order, each has a part that is linear in the ray's direction.
-The gradient is what differentiation of these sums gives, sample by sample from the near end: what
-lies behind a sample is the light of the ray without what was added up to there.
-
 Nothing here depends on threads: each call has its own samples and its own sums.
 """
 
@@ -44,31 +41,6 @@ class Medium(NamedTuple):
     rows: NDArray[np.int32]
     leap: NDArray[np.uint8]
     values: Singles
-
-
-class Pixels(NamedTuple):
-    """Photographed rays as the loops take them.
-
-    Attributes:
-        entry: where they enter the capture sphere, mm, (n, 3).
-        direction: unit vectors, (n, 3).
-        first: where they may meet something, mm from the entry, (n,).
-        last: up to where, (n,).
-        colour: that was photographed, 0 to 1, (n, 3).
-        weight: of their squared errors, (n,).
-        footprint: change of entry and direction for a pixel's step right and down, (n, 4, 3), or
-            (1, 4, 3) of zeros.
-        places: of k rays in a pixel, from its centre, pixels, (p, k, 2); one of p for each pixel.
-    """
-
-    entry: Singles
-    direction: Singles
-    first: Singles
-    last: Singles
-    colour: Singles
-    weight: Singles
-    footprint: Singles
-    places: Singles
 
 
 @compiled_sum
@@ -198,7 +170,7 @@ def march(
 
 
 @compiled_sum
-def _most_samples(medium: Medium) -> int:
+def most_samples(medium: Medium) -> int:
     """Samples on the longest way through the cube."""
     return int(2 * medium.width / medium.step) + 2
 
@@ -218,7 +190,7 @@ def composited(
         These five, (n, 5); NaN for the place on rays that are less than half opaque.
     """
     result = np.zeros((len(entry), 5), dtype=np.float32)
-    most = _most_samples(medium)
+    most = most_samples(medium)
     at = np.empty((most, 4), dtype=np.float32)
     slot = np.empty((most, 6), dtype=np.float32)
     for i in range(len(entry)):
@@ -236,143 +208,3 @@ def composited(
                 break
             seen += slot[k, 1]
     return result
-
-
-@compiled_sum
-def _spread(
-    at: Singles,
-    rows: NDArray[np.int32],
-    direction: Singles,
-    by: tuple[float, float, float, float],
-    gradient: Singles,
-) -> None:
-    """Add a sample's gradient, by number, red, green and blue, to the eight nodes about it."""
-    density, red, green, blue = by
-    one = np.float32(1)
-    i, j, k = int(at[0]), int(at[1]), int(at[2])
-    u = at[0] - np.float32(i)
-    v = at[1] - np.float32(j)
-    w = at[2] - np.float32(k)
-    glossy = gradient.shape[1] == GLOSSY
-    for di in range(2):
-        wx = u if di else one - u
-        for dj in range(2):
-            wxy = wx * (v if dj else one - v)
-            for dk in range(2):
-                share = wxy * (w if dk else one - w)
-                row = rows[i + di, j + dj, k + dk]
-                gradient[row, 0] += share * density
-                gradient[row, 1] += share * red
-                gradient[row, 2] += share * green
-                gradient[row, 3] += share * blue
-                if glossy:
-                    for axis in range(3):
-                        part = share * direction[axis]
-                        gradient[row, 4 + axis] += part * red
-                        gradient[row, 7 + axis] += part * green
-                        gradient[row, 10 + axis] += part * blue
-
-
-@compiled_sum
-def _back(
-    at: Singles,
-    slot: Singles,
-    count: int,
-    light: tuple[float, float, float],
-    off: tuple[float, float, float],
-    direction: Singles,
-    medium: Medium,
-    gradient: Singles,
-) -> None:
-    """Add the gradient of one followed ray.
-
-    Args:
-        at: as `march` leaves it.
-        slot: likewise.
-        count: of samples.
-        light: of the ray.
-        off: derivative of the loss by that light.
-        direction: of the ray.
-        medium: the field.
-        gradient: by nodes, as their values, (v, 4 or 13).
-    """
-    one = np.float32(1)
-    through, (behind_r, behind_g, behind_b) = one, light
-    for k in range(count):
-        opacity, weight, slope = slot[k, 0], slot[k, 1], slot[k, 2]
-        behind_r -= weight * slot[k, 3]
-        behind_g -= weight * slot[k, 4]
-        behind_b -= weight * slot[k, 5]
-        through *= one - opacity
-        gain = off[0] * (through * slot[k, 3] - behind_r)
-        gain += off[1] * (through * slot[k, 4] - behind_g)
-        gain += off[2] * (through * slot[k, 5] - behind_b)
-        number = np.float32(medium.step) * slope * gain
-        by = (number, off[0] * weight, off[1] * weight, off[2] * weight)
-        _spread(at[k], medium.rows, direction, by, gradient)
-
-
-@compiled_sum
-def add_gradient(
-    ray: NDArray[np.int64], pixels: Pixels, seed: int, medium: Medium, gradient: Singles
-) -> tuple[float, int]:
-    """Add half the gradient of the weighted squared errors of pixels.
-
-    A pixel's light is the mean of the rays at its places, always the same ones: by other places
-    in each step the variance inside of pixels would be noise in the gradient, which does not
-    fade, or, with the error of the same rays, an error that smooths.
-
-    Args:
-        ray: numbers of the pixels, (b,).
-        pixels: all of them.
-        seed: of each ray's first sample.
-        medium: the field.
-        gradient: what is added to, (v, 4 or 13).
-
-    Returns:
-        Sum of the weighted squared errors, and number of samples.
-    """
-    entry, direction, first, last, colour, weight, footprint, places = pixels
-    kinds, k = places.shape[0], places.shape[1]
-    most = _most_samples(medium)
-    at = np.empty((k, most, 4), dtype=np.float32)
-    slot = np.empty((k, most, 6), dtype=np.float32)
-    toward, begin = np.empty((k, 3), dtype=np.float32), np.empty(3, dtype=np.float32)
-    count, light = np.empty(k, dtype=np.int64), np.empty((k, 3), dtype=np.float32)
-    off = np.empty(3, dtype=np.float32)
-    loss, followed = 0.0, 0
-    wide = footprint.shape[0] > 1
-    for q in range(len(ray)):
-        i = ray[q]
-        kind = _mixed(i, 0) % np.uint32(kinds)
-        state = _mixed(i, seed)
-        off[:] = -colour[i]
-        for j in range(k):
-            state = _mixed(state, j)
-            jitter = np.float32(state >> np.uint32(8)) / np.float32(1 << 24)
-            for axis in range(3):
-                begin[axis], toward[j, axis] = entry[i, axis], direction[i, axis]
-                if wide:
-                    x, y = places[kind, j, 0], places[kind, j, 1]
-                    begin[axis] += x * footprint[i, 0, axis] + y * footprint[i, 1, axis]
-                    toward[j, axis] += x * footprint[i, 2, axis] + y * footprint[i, 3, axis]
-            count[j], _, light[j, 0], light[j, 1], light[j, 2] = march(
-                begin, toward[j], (first[i], last[i]), jitter, medium, at[j], slot[j]
-            )
-            followed += count[j]
-            off += light[j] / np.float32(k)
-        loss += weight[i] * (off * off).sum()
-        off *= weight[i] / np.float32(k)
-        for j in range(k):
-            by, seen = (off[0], off[1], off[2]), (light[j, 0], light[j, 1], light[j, 2])
-            _back(at[j], slot[j], count[j], seen, by, toward[j], medium, gradient)
-    return loss, followed
-
-
-@compiled_sum
-def _mixed(number: Any, seed: int) -> np.uint32:
-    """A number of 32 bits that looks random (C. Wellons, lowbias32, 2018; with a seed)."""
-    x = np.uint32(np.uint32(number) ^ np.uint32(np.uint32(seed) * np.uint32(0x9E3779B9)))
-    x = np.uint32((x ^ (x >> np.uint32(16))) * np.uint32(0x7FEB352D))
-    x = np.uint32((x ^ (x >> np.uint32(15))) * np.uint32(0x846CA68B))
-    return np.uint32(x ^ (x >> np.uint32(16)))

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from tbcad.reconstruction.rays import CapturedRays, Singles
+from tbcad.reconstruction.marching import Singles
+from tbcad.reconstruction.rays import CapturedRays
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Floats

@@ -1,7 +1,8 @@
 """What a camera would see of a field: colours, opacity, depth and normals."""
 
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 from scipy import ndimage
@@ -10,17 +11,23 @@ from tbcad.geometry.vectors import dot, unit
 from tbcad.optics.camera import Camera
 from tbcad.picture_bytes import png_bytes
 from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fit import medium_of
+from tbcad.reconstruction.fit import fit, medium_of
 from tbcad.reconstruction.marching import Medium, Singles, composited
-from tbcad.reconstruction.rays import LEAST_CHORD_MM, entries
-from tbcad.simulate.parallel import THREADS, chunks
+from tbcad.reconstruction.rays import LEAST_CHORD_MM, captured_rays, entries
+from tbcad.reconstruction.start import Level, Settings
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.views.viewpoints import OwnMethod
 from tbcad.types import Bytes, Floats
 
 STRIDE = 0.45  # distances of nodes between samples
 RAYS_PER_CHUNK = 1 << 13
 SMOOTHED = 1.2  # nodes, standard deviation: the opacity whose gradient gives normals
 BEFORE = 1.0  # nodes: where it is taken, in front of where the ray is half opaque
+QUICK = Settings(levels=(Level(36, 1), Level(64, 1)), batch=10_000)
+
+_one_at_a_time = Lock()  # a fit takes all cores, and much memory
 
 
 @dataclass(frozen=True)
@@ -77,9 +84,8 @@ def field_picture(made: Field, view: Camera, stride: float = STRIDE) -> FieldPic
 def _in_threads(entry: Singles, direction: Singles, length: Singles, medium: Medium) -> Singles:
     parts = chunks(len(length), RAYS_PER_CHUNK)
     composited(entry[:0], direction[:0], length[:0], medium)  # compiled before any thread
-    with ThreadPoolExecutor(THREADS) as pool:
-        found = pool.map(lambda at: composited(entry[at], direction[at], length[at], medium), parts)
-        return np.concatenate([np.zeros((0, 5), dtype=np.float32), *found])
+    found = in_threads(lambda at: composited(entry[at], direction[at], length[at], medium), parts)
+    return np.concatenate([np.zeros((0, 5), dtype=np.float32), *found])
 
 
 def field_normals(made: Field, view: Camera, picture: FieldPicture) -> Floats:
@@ -132,3 +138,23 @@ def normals_png(normals: Floats) -> bytes:
 def opacity_png(picture: FieldPicture) -> bytes:
     """The opacity as a PNG in grey: 0 nothing, 255 opaque."""
     return png_bytes(np.rint(255 * np.clip(picture.opacity, 0, 1)).astype(np.uint8))
+
+
+def quick_field(source: LightField) -> Field:
+    """Fit a coarse field to all rays of a light field.
+
+    Raises:
+        InputError: none of them meets the capture sphere.
+    """
+    with _one_at_a_time:
+        *_, last = fit(captured_rays(source), QUICK)
+    return last.field()
+
+
+def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
+    """What makes the picture (h, w, 3) of a camera from a coarse field."""
+    made = quick_field(source)
+    return lambda camera: field_picture(made, camera).image
+
+
+BY_FIELD = OwnMethod("field", quick_views)

@@ -1,16 +1,15 @@
 """The rays of a light field that meet the capture sphere, as the fit takes them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.capture.light_field import Frame, LightField
-from tbcad.types import Bools, Ints
-
-Singles = NDArray[np.float32]
+from tbcad.reconstruction.marching import Singles
+from tbcad.simulate.capture.light_field import RAY_SIGMAS, Frame, LightField
+from tbcad.types import Bools, Floats, Ints
 
 LEAST_CHORD_MM = 0.03
 GRAZING = 0.01  # share of the rays, with the shortest way through the capture sphere
@@ -18,6 +17,9 @@ LOWEST, SIGMAS_BETWEEN = 0.05, 0.97  # a quantile, and from there to the quartil
 NO_FOOTPRINT: Singles = np.zeros((1, 4, 3), dtype=np.float32)
 DARKEST = 0.02  # of white: less is called dark whatever the noise
 NOISE = 4.0  # times the standard deviation is brighter than the background's noise
+PATTERNS = 8  # turned against each other
+SQUARE_VARIANCE = 1 / 12  # of a pixel's square, along each side
+GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,6 @@ class CapturedRays:
     capture_mm: float
 
     def __len__(self) -> int:
-        """Number of rays."""
         return len(self.length)
 
     def spread_mm(self, places: Singles) -> float:
@@ -149,3 +150,73 @@ def _neighbours(values: NDArray[Any], axis: int) -> tuple[NDArray[Any], NDArray[
     front, back = [slice(None)] * values.ndim, [slice(None)] * values.ndim
     front[axis], back[axis] = slice(None, -1), slice(1, None)
     return values[tuple(front)], values[tuple(back)]
+
+
+def pixel_places(count: int, blur_px: float = 0.0, *, area: bool = True) -> Singles:
+    """Places of a pixel's rays from its centre in each of p patterns, pixels, (p, count, 2).
+
+    On Vogel's spiral, with the density of a Gaussian of the variance that the pixel's square and
+    the lens' spread have together; their mean is zero and their variance exact in each pattern's
+    sum of both ways. Few rays are worse than one: a step of light inside of a pixel is then a
+    stair (docs/reconstruct.md).
+
+    Args:
+        count: of rays.
+        blur_px: standard deviation of the lens' spread.
+        area: whether a pixel is the mean of its square, and not a single ray.
+    """
+    k = np.arange(count)
+    radius = np.sqrt(-2 * np.log(1 - (k + 0.5) / count))
+    angle = k * GOLDEN_ANGLE + 2 * np.pi * np.arange(PATTERNS)[:, None] / PATTERNS
+    places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    places -= places.mean(axis=1, keepdims=True)
+    sigma = np.sqrt(blur_px**2 + area * SQUARE_VARIANCE)
+    return np.asarray(places * sigma / np.sqrt(np.mean(places**2)), dtype=np.float32)
+
+
+def with_weights(rays: CapturedRays, source: LightField) -> CapturedRays:
+    """The rays with the weights that follow from what a calibration knows of their mirrors.
+
+    Args:
+        rays: with footprints.
+        source: their light field; without that fact all rays keep their weights. Mirrors of which
+            it says nothing count as the worst of the others.
+
+    Raises:
+        InputError: its fact does not fit its mirrors.
+    """
+    sigmas = _sigmas(source)
+    if np.isnan(sigmas).all() or not rays.footprint.any():
+        return rays
+    sigma = np.where(np.isnan(sigmas), np.nanmax(sigmas), sigmas)[rays.mirror]
+    area = pixel_areas(rays)
+    area[area == 0] = np.median(area[area > 0])  # of pixels without neighbours in their mirror
+    return replace(rays, weight=(area / (area + 6 * sigma**2)).astype(np.float32))
+
+
+def pixel_areas(rays: CapturedRays) -> Singles:
+    """What each pixel sees square to its ray, in the middle of its way, mm^2, (n,)."""
+    middle = (rays.length / 2)[:, None, None]
+    steps = rays.footprint[:, :2] + middle * rays.footprint[:, 2:]
+    across = np.cross(steps[:, 0], steps[:, 1])
+    return np.asarray(np.abs(np.einsum("nx,nx->n", across, rays.direction)))
+
+
+def _sigmas(source: LightField) -> Floats:
+    """Root mean square error of the rays of all mirrors at the object, mm, (m,); NaN: unknown."""
+    told = source.facts.get(RAY_SIGMAS, {})
+    try:
+        columns = [
+            np.array(told.get(name, [None] * len(frame.u)), dtype=np.float64)
+            for name, frame in source.frames.items()
+        ]
+        if [len(one) for one in columns] != [len(frame.u) for frame in source.frames.values()]:
+            raise ValueError("another number of mirrors")
+        sigma = np.concatenate(columns)
+        if (sigma < 0).any() or np.isinf(sigma).any():
+            raise ValueError("numbers that cannot be")
+    except (AttributeError, TypeError, ValueError) as fault:
+        raise InputError(
+            f"the light field's {RAY_SIGMAS} does not fit its mirrors ({fault}): merge again"
+        ) from None
+    return sigma

@@ -23,9 +23,10 @@ from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.optics.geodesic import geodesic
 from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fit import NUMBERS, medium_of
+from tbcad.reconstruction.fit import medium_of
 from tbcad.reconstruction.marching import MATT, SOFTNESS, Singles, composited
 from tbcad.reconstruction.rays import CapturedRays
+from tbcad.reconstruction.start import NUMBERS
 from tbcad.simulate.parallel import chunks, first_then_threads, in_threads
 from tbcad.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Bytes, Floats, Ints

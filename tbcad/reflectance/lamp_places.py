@@ -8,13 +8,19 @@ Mirrors are convex, so these places are not far behind them: light falls off ove
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tbcad.compiled import compiled_loop
 from tbcad.datasets.crops import MirrorId, chosen_mirrors, spread_evenly
 from tbcad.datasets.virtual_cameras import virtual_cameras
 from tbcad.errors import InputError
+from tbcad.geometry.vectors import dot, norm
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.scene.point_lights import Spots, lit_cosine
 from tbcad.spec.csv_rows import number, read_rows
 from tbcad.types import Floats
 
@@ -23,6 +29,13 @@ COLUMNS = ("x_mm", "y_mm", "z_mm")
 MAX_MM = 1e9
 # Both halves of a mirror on the seam have one virtual camera.
 ON_SEAM = 1e-9
+PROJECTORS = "projectors"
+# A plane is taken as a sphere so large that it differs by 1e-5 mm over a cell.
+LEAST_CURVATURE = 1e-7
+# Both halves of a mirror on the seam have one direction.
+SAME_DIRECTION = 1e-9
+# Newton's steps at most, and the last one's share of the whole angle.
+STEPS, LAST_STEP = 60, 1e-12
 
 
 @dataclass(frozen=True)
@@ -77,3 +90,155 @@ def lamps_of_mirrors(source: LightField, every: int) -> LampPlaces:
 def _second_half(source: LightField, mirror: MirrorId) -> bool:
     on_seam = abs(float(source.frames[mirror.frame].u[mirror.index, 0])) < ON_SEAM
     return mirror.frame == "b" and "a" in source.frames and on_seam
+
+
+@dataclass(frozen=True)
+class MirrorPixels:
+    """The pixels of a projector that one mirror throws onto the object.
+
+    Attributes:
+        camera: the projector's pinhole and pixels.
+        number: of the mirror, from 1.
+        owner: number of the mirror that each pixel is on, (h, w).
+        centre: of the sphere, mm, (3,).
+        radius: mm.
+        at_origin: how far light spreads until it is at the origin, mm2.
+    """
+
+    camera: Camera
+    number: int
+    owner: NDArray[np.uint16]
+    centre: Floats
+    radius: float
+    at_origin: float
+
+    def light(self, embree: Any, spots: Spots) -> Floats:
+        """Light on spots (k,), if a white surface at the origin that faces it gets 1."""
+        light = np.zeros(len(spots.place))
+        height = dot(self.centre - spots.place, spots.normal)
+        faces = np.flatnonzero(height + self.radius > 0)  # the sphere is not all below the horizon
+        some = Spots(spots.place[faces], spots.normal[faces], spots.facet_normal[faces])
+        known, spread = reflected(self.centre, self.radius, self.camera.pinhole, some.place)
+        toward = known - some.place
+        cosine = lit_cosine(embree, some, toward / norm(toward)[:, None])
+        light[faces] = np.where(self._owns(known), cosine * self.at_origin / spread, 0.0)
+        return light
+
+    def _owns(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether a pixel of this mirror is where points (k, 3) of its sphere appear."""
+        column, row = np.rint(self.camera.project(points)).astype(np.int64).T
+        height, width = self.owner.shape
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        owner = self.owner[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+        return np.asarray(inside & (owner == self.number))
+
+
+@dataclass(frozen=True)
+class Projectors:
+    """The mirrors of some lamps.
+
+    Attributes:
+        mirrors: of each lamp: one, or both halves of one on the seam.
+    """
+
+    mirrors: tuple[tuple[MirrorPixels, ...], ...]
+
+    def light(self, embree: Any, lamp: int, spots: Spots) -> Floats:
+        """Light on spots (k,) of a lamp by its number."""
+        return np.asarray(sum(one.light(embree, spots) for one in self.mirrors[lamp]))
+
+
+def projectors(source: LightField, lamps: tuple[MirrorId, ...]) -> Projectors:
+    """The projectors of mirrors, in the places of the cameras of a light field."""
+    owner = {name: np.asarray(frame.planes["mirror"][:]) for name, frame in source.frames.items()}
+    return Projectors(
+        tuple(
+            tuple(_pixels(source, one, owner[one.frame]) for one in _halves(source, lamp))
+            for lamp in lamps
+        )
+    )
+
+
+def _halves(source: LightField, mirror: MirrorId) -> list[MirrorId]:
+    """A mirror, and its other half if it is on the seam."""
+    found, direction = [mirror], source.frames[mirror.frame].u[mirror.index]
+    for name, frame in source.frames.items():
+        same = np.flatnonzero(norm(frame.u - direction) < SAME_DIRECTION)
+        found += [MirrorId(name, int(k)) for k in same if name != mirror.frame]
+    return found
+
+
+def _pixels(source: LightField, mirror: MirrorId, owner: NDArray[np.uint16]) -> MirrorPixels:
+    frame = source.frames[mirror.frame]
+    surface = frame.mirrors
+    radius = 1 / max(float(surface.curvature[mirror.index]), LEAST_CURVATURE)
+    centre = surface.apex[mirror.index] - radius * surface.normal[mirror.index]
+    _, spread = reflected(centre, radius, frame.camera.pinhole, np.zeros((1, 3)))
+    return MirrorPixels(frame.camera, mirror.index + 1, owner, centre, radius, float(spread[0]))
+
+
+@compiled_loop
+def reflected(
+    centre: Floats, radius: float, pinhole: Floats, place: Floats
+) -> tuple[Floats, Floats]:
+    """Points (k, 3) of a sphere that reflect a pinhole into others, and how far light spreads.
+
+    That is the area that a unit of solid angle of the pinhole falls on, across the ray, mm2, (k,).
+    With the curvatures 1/s + 2/(r cos i) in the plane of incidence and 1/s + 2 cos i/r across it,
+    of light that has gone s from the pinhole, it is s^2 (1 + t c1) (1 + t c2) after t more.
+    """
+    points, spread = np.empty_like(place), np.empty(len(place))
+    a = pinhole - centre
+    p = np.sqrt((a**2).sum())
+    for k in range(len(place)):
+        b = place[k] - centre
+        q = np.sqrt((b**2).sum())
+        across = b - (a @ b) / p**2 * a
+        height = np.sqrt((across**2).sum())
+        turn = _turn(p, q, np.arctan2(height, (a @ b) / p), radius)
+        normal = np.cos(turn) * a / p
+        if height > 0:
+            normal += np.sin(turn) * across / height
+        points[k] = centre + radius * normal
+        to_pinhole, to_place = pinhole - points[k], place[k] - points[k]
+        s, t = np.sqrt((to_pinhole**2).sum()), np.sqrt((to_place**2).sum())
+        cosine = (normal @ to_pinhole) / s
+        within, aside = 1 / s + 2 / (radius * cosine), 1 / s + 2 * cosine / radius
+        spread[k] = s**2 * (1 + t * within) * (1 + t * aside)
+    return points, spread
+
+
+@compiled_loop
+def _turn(p: float, q: float, whole: float, radius: float) -> float:
+    """Angle at a circle's centre from the pinhole to the normal that reflects it, radians.
+
+    The angles of incidence and reflection differ by a sum that grows with the turn, from below
+    zero where the normal looks at the pinhole to above zero where it looks at the other point.
+
+    Args:
+        p: distance of the pinhole from the centre, mm.
+        q: of the other point.
+        whole: angle between both, radians.
+        radius: of the circle, less than p and q.
+    """
+    low, high = 0.0, whole
+    turn = whole / 2
+    for _ in range(STEPS):
+        x, y = turn, turn - whole
+        px, py = p * np.cos(x) - radius, q * np.cos(y) - radius
+        value = np.arctan2(p * np.sin(x), px) + np.arctan2(q * np.sin(y), py)
+        if value > 0:
+            high = turn
+        else:
+            low = turn
+        # d atan2(p sin x, p cos x - r) / dx
+        slope = p * (p - radius * np.cos(x)) / (px**2 + (p * np.sin(x)) ** 2)
+        slope += q * (q - radius * np.cos(y)) / (py**2 + (q * np.sin(y)) ** 2)
+        after = turn - value / slope
+        if not low <= after <= high:
+            after = (low + high) / 2
+        done = abs(after - turn) <= LAST_STEP * whole
+        turn = after
+        if done:
+            break
+    return turn

@@ -13,10 +13,9 @@ import numpy as np
 from tbcad.datasets.crops import MirrorId
 from tbcad.errors import InputError
 from tbcad.reflectance.field_file import NAME, RAYS_PER_CHUNK, SCHEMA
-from tbcad.reflectance.lamp_places import LampPlaces
-from tbcad.reflectance.projectors import projectors
+from tbcad.reflectance.lamp_places import LampPlaces, projectors
 from tbcad.simulate.capture.light_field import Frame, LightField
-from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
+from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands
 from tbcad.simulate.parallel import chunks, in_batches, in_threads
 from tbcad.simulate.scene.point_lights import Spots, received_light
@@ -131,14 +130,7 @@ def _write_camera(
     group.create_dataset("pixel", data=seen.pixel.astype(np.uint32), compression=COMPRESSION_LEVEL)
     count, rays = len(lamps.name), len(seen.pixel)
     chunk = (1, min(RAYS_PER_CHUNK, max(rays, 1)), 3)
-    stored = group.create_dataset(
-        "transport",
-        (count, rays, 3),
-        "f2",
-        chunks=chunk,
-        shuffle=True,
-        compression=COMPRESSION_LEVEL,
-    )
+    stored = chunked(group, "transport", "f2", (count, rays, 3), chunk)
     items = [(k, part) for k in range(count) for part in chunks(rays, chunk[1])]
 
     def packed(item: tuple[int, slice]) -> bytes:

@@ -5,7 +5,7 @@ import numpy as np
 from tbcad.mirrors.array import mirror_margins
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import miss_distances
-from tbcad.optics.trace import limiting_sides, minima_by_mirror
+from tbcad.optics.windows import limiting_sides, minima_by_mirror
 from tbcad.shell.cell_outlines import rows_and_columns
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints

@@ -1,28 +1,99 @@
 """The light of the LEDs in the balls, point by point: once reflected, and twice."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import Finite, Record, Vector, read_json
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
-from tbcad.optics.highlights import reflection_points
+from tbcad.optics.camera import LensCamera
 from tbcad.optics.led_dome import disc_images, dome_samples
-from tbcad.optics.lens_camera import LensCamera
 from tbcad.optics.pedestals.walls import GrooveWalls
+from tbcad.optics.reflection import reflection_points
 from tbcad.simulate.prototype.ball_rays import (
     ON_BALL_MM,
     ball_hits,
     balls_between,
     points_within_walls,
 )
-from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulate.prototype.plan import HALF_TURN, MISSING, RECORD, SCHEMA
+from tbcad.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Floats, Ints
 
+STAGE = "stage"
+NEAR_MM = 0.05  # of the LED: its dome stands in its pocket
 DOME_MM = 1.5  # radius of a 3 mm LED
 ROUNDS = 5  # of the search for both points of a light that is reflected twice
 # Less light than this of an LED that fills a pixel is nothing: 0.1 of 255, spread over four pixels.
 FAINT_PX2 = 2e-3
+
+
+class _Part(Record):
+    role: str
+    stl: str
+    axes: tuple[Vector, Vector, Vector]
+    origin_mm: tuple[Finite, Finite, Finite]
+
+
+class _Document(Record):
+    parts: tuple[_Part, ...] = ()
+
+
+@dataclass(frozen=True)
+class Occluders:
+    """Meshes before LEDs.
+
+    Attributes:
+        subject: scene of the object, as it stands in the first run; None without an object.
+        stage: scene of the stage, which does not turn; None where its meshes are not there.
+    """
+
+    subject: Any | None
+    stage: Any | None
+
+    def hide(self, point: Floats, led: Floats, turned: bool) -> Bools:
+        """Which of n points (n, 3) have something between them and places on LEDs (n, 3)."""
+        way = led - point
+        length = norm(way)
+        direction = way / length[:, None]
+        flip = HALF_TURN if turned else np.ones(3)
+        hidden = _nearer(self.subject, point * flip, direction * flip, length)
+        return hidden | _nearer(self.stage, point, direction, length)
+
+
+def _nearer(scene: Any | None, origin: Floats, direction: Floats, length: Floats) -> Bools:
+    if scene is None or len(origin) == 0:
+        return np.zeros(len(origin), dtype=bool)
+    hits = scene.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
+    return np.asarray((hits["primID"] >= 0) & (hits["tfar"] < length - NEAR_MM))
+
+
+def stage_scene(folder: Path) -> Any | None:
+    """The stage's printed parts of an export in their places; None where it has none.
+
+    Raises:
+        InputError: the record or a mesh cannot be read.
+    """
+    parts = read_json(folder / RECORD, _Document, SCHEMA, MISSING).parts
+    facets = [_placed(folder, part) for part in parts if part.role == STAGE]
+    return embree_scene(np.concatenate(facets)) if facets else None
+
+
+def _placed(folder: Path, part: _Part) -> Floats:
+    """Facets of a part by their corners, mm, (f, 3, 3), back from the printer's bed."""
+    import trimesh
+
+    path = folder / Path(part.stl).name
+    try:
+        mesh: Any = trimesh.load(path, file_type="stl", force="mesh", process=False)
+        corners = np.asarray(mesh.triangles, dtype=np.float64)
+    except Exception as error:  # trimesh's readers raise whatever their libraries do
+        raise InputError(f"{path} cannot be read: {error}: build it again") from None
+    return np.asarray((corners - part.origin_mm) @ np.array(part.axes).T)
 
 
 @dataclass(frozen=True)

@@ -2,32 +2,57 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import erf, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
+from tbcad.compiled import compiled
 from tbcad.machine.built import BuiltPrototype
+from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
+from tbcad.simulate.capture.photograph import row_bands
+from tbcad.simulate.prototype.ball_rays import ball_hits, camera_colours
+from tbcad.simulate.prototype.plan import HALF_TURN
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulated_run.led_light import DOME_MM, FAINT_PX2, balls_of_frame, led_light
-from tbcad.simulated_run.object_light import object_light, pixel_directions
-from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulated_run.led_light import DOME_MM, FAINT_PX2, Occluders, balls_of_frame, led_light
 from tbcad.simulated_run.sensor import (
     Image16,
     PixelMaps,
     Sensor,
     Signal,
     generator,
+    pixel_directions,
     pixel_maps,
     recorded,
 )
-from tbcad.simulated_run.spread import PointSpread, add_points, blurred
-from tbcad.types import Floats
+from tbcad.types import Colours, Floats
 
 EXPOSURE_S = 1.0  # in which LEDs and object give the light that follows
 LED_LIGHT = 0.9  # of a full pixel: brightness of an LED's image on the optical axis
 OBJECT_LIGHT = 0.9  # likewise: of white, where the object is lit best
 NOISE_STREAM = 4000
 WHITE = 255.0
+REACH = 4.0  # standard deviations beyond which a point gives no light
+
+
+@dataclass(frozen=True)
+class PointSpread:
+    """Spread of a point's light, the same along rows and columns.
+
+    Attributes:
+        separation_px: of the low-pass filter's images.
+        lens_px: standard deviation of the lens's spread.
+    """
+
+    separation_px: float = 1.0
+    lens_px: float = 0.4
+
+    @property
+    def half_px(self) -> int:
+        """Pixels that a point's light reaches on each side."""
+        return int(np.ceil(REACH * self.lens_px + self.separation_px / 2 + 0.5))
 
 
 @dataclass(frozen=True)
@@ -150,3 +175,90 @@ def frames_of(angles: Floats) -> tuple[Frame, ...]:
         for turn in (0, 180)
         for stop, angle in enumerate(angles.tolist(), 1)
     )
+
+
+def object_light(
+    pinhole: Floats,
+    directions: Floats,
+    balls: Floats,
+    scene: Scene,
+    turned: bool,
+    walls: GrooveWalls = NO_WALLS,
+) -> Colours:
+    """What a camera sees of a lit object, 0 to 255, (h, w, 3).
+
+    Args:
+        pinhole: of the camera, mm, (3,).
+        directions: of its pixels, (h, w, 3).
+        balls: in the frame, (k, 8).
+        scene: the object as it stands in the first run.
+        turned: whether it is turned by 180 degrees.
+        walls: of the balls.
+    """
+    # Seen from the object, which rests, camera and balls are turned instead.
+    flip = HALF_TURN if turned else np.ones(3)
+    pinhole, walls = pinhole * flip, walls.flipped(flip)
+    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    bands = (directions[rows.start : rows.stop] * flip for rows in row_bands(len(directions)))
+    return np.concatenate([_band(pinhole, balls, walls, scene, band) for band in bands])
+
+
+def _band(
+    pinhole: Floats, balls: Floats, walls: GrooveWalls, scene: Scene, directions: Floats
+) -> Colours:
+    direction = directions.reshape(-1, 3)
+    stop = np.zeros(len(direction), dtype=np.int64)
+    hits = ball_hits(pinhole, balls[None], direction, stop, walls)
+    return camera_colours(scene, pinhole, direction, hits).reshape(directions.shape)
+
+
+def add_points(image: NDArray[np.float32], pixel: Floats, light: Floats, psf: PointSpread) -> None:
+    """Add the light (n,) of points at columns and rows (n, 2) to an image (h, w).
+
+    A pixel takes what falls on its area: the integral of the spread over it.
+    """
+    _add_points(image, pixel, light, psf.separation_px, psf.lens_px, psf.half_px)
+
+
+def blurred(picture: NDArray[np.float32], psf: PointSpread) -> NDArray[np.float32]:
+    """A picture (h, w, c), of one ray a pixel, behind filter and lens."""
+    half = psf.half_px
+    line = np.zeros((1, 2 * half + 1), dtype=np.float32)
+    centre = np.array([[half, 0.0]])
+    # The middle row of a point's image is its spread along the row; its sum is made one.
+    _add_points(line, centre, np.ones(1), psf.separation_px, psf.lens_px, half)
+    kernel = (line[0] / line.sum()).astype(np.float32)
+    across = convolve1d(picture, kernel, axis=1, mode="constant")
+    return np.asarray(convolve1d(across, kernel, axis=0, mode="constant"))
+
+
+@compiled
+def _add_points(
+    image: NDArray[np.float32],
+    pixel: Floats,
+    light: Floats,
+    separation: float,
+    lens: float,
+    half: int,
+) -> None:
+    height, width = image.shape
+    size = 2 * half + 2
+    share = np.empty((2, size))
+    for i in range(len(pixel)):
+        first = np.empty(2, dtype=np.int64)
+        for axis in range(2):
+            first[axis] = int(np.floor(pixel[i, axis])) - half
+            for k in range(size):
+                share[axis, k] = 0.0
+                for side in (-0.5, 0.5):
+                    place = pixel[i, axis] + side * separation
+                    near = (first[axis] + k - 0.5 - place) / lens
+                    far = (first[axis] + k + 0.5 - place) / lens
+                    share[axis, k] += 0.25 * (erf(far / sqrt(2.0)) - erf(near / sqrt(2.0)))
+        for b in range(size):
+            y = first[1] + b
+            if 0 <= y < height:
+                for a in range(size):
+                    x = first[0] + a
+                    if 0 <= x < width:
+                        image[y, x] += light[i] * share[0, a] * share[1, b]

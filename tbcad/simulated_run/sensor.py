@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from tbcad.optics.lens_camera import LensCamera, vignetting
-from tbcad.simulated_run.object_light import pixel_places
+from tbcad.optics.camera import LensCamera, vignetting
 from tbcad.types import Floats, Ints
 
 Signal = NDArray[np.float32]
@@ -67,6 +66,17 @@ class PixelMaps:
     transmission: Signal
     hot: Ints
     hot_electrons: Floats
+
+
+def pixel_directions(camera: LensCamera) -> Floats:
+    """Unit directions (h, w, 3) through all pixels."""
+    return camera.directions(pixel_places(camera))
+
+
+def pixel_places(camera: LensCamera) -> Floats:
+    """Column and row of all pixels, (h, w, 2)."""
+    row, column = np.mgrid[: camera.height_px, : camera.width_px]
+    return np.stack([column, row], axis=-1).astype(np.float64)
 
 
 def pixel_maps(camera: LensCamera, directions: Floats, sensor: Sensor, seed: int) -> PixelMaps:

@@ -25,13 +25,13 @@ from tbcad.output.inputs import Source, refuse_inputs
 from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
+from tbcad.simulate.prototype.lamps import lit_by, read_lamps
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.lamps import lit_by, read_lamps
 from tbcad.simulate.scene.object import SceneObject, built_in_object
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulated_run.occluders import Occluders, stage_scene
+from tbcad.simulated_run.led_light import Occluders, stage_scene
 from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import (
     EXPOSURE_S,

@@ -230,6 +230,18 @@ class Spec(Section):
         return self
 
 
+def spec_with(spec: Spec, **sections: dict[str, object]) -> Spec:
+    """The spec with other values of some keys, by section; they are not checked.
+
+    Margins of single mirrors belong to the mirrors of the spec: another n, size or margin has none.
+    """
+    mirrors = sections.get("mirrors", {})
+    if "optics" in sections or "margin_mm" in mirrors:
+        sections["mirrors"] = {"own_margins_mm": ()} | mirrors
+    changed = {name: getattr(spec, name).model_copy(update=keys) for name, keys in sections.items()}
+    return spec.model_copy(update=changed)
+
+
 def _check_capture_sphere(optics: OpticsSpec) -> None:
     radius, to_pinhole = optics.capture_diameter_mm / 2, math.hypot(*optics.camera_mm)
     if radius >= to_pinhole:

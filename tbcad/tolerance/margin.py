@@ -6,8 +6,7 @@ from math import ceil
 
 from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.study.sweep import spec_with
-from tbcad.spec.design import MAX_MARGIN, Spec
+from tbcad.spec.design import MAX_MARGIN, Spec, spec_with
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.simulate.study.pixels import Sensor, count_pixels
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels
 from tbcad.spec.design import Spec
 from tbcad.types import Floats
 

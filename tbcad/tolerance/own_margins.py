@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.mirrors.array import DIRECTION_DIGITS
-from tbcad.simulate.study.sweep import spec_with
-from tbcad.spec.design import MAX_MARGIN, Spec
+from tbcad.spec.design import MAX_MARGIN, Spec, spec_with
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.margin import STEP_MM, SolvedDesigns, with_margin
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.simulate.study.plots import Panel, Series
+from tbcad.results.plots import Panel, Series
 from tbcad.tolerance.analysis import Analysis
 from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.types import Floats

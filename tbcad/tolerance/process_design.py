@@ -6,8 +6,7 @@ import numpy as np
 
 from tbcad import schedule
 from tbcad.errors import InputError
-from tbcad.simulate.study.sweep import spec_with
-from tbcad.spec.design import Spec
+from tbcad.spec.design import Spec, spec_with
 from tbcad.tolerance.margin import STEP_MM, SolvedDesigns, margin, with_margin
 from tbcad.tolerance.margin_pixels import SeeingPixels, seeing_pixels
 from tbcad.tolerance.montecarlo.builds import CoverageCase, WorstCase, simulate

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from tbcad.errors import InputError
-from tbcad.simulate.study.sweep import spec_with
-from tbcad.spec.design import EdgeKind, Spec
+from tbcad.spec.design import EdgeKind, Spec, spec_with
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.margin_pixels import SeeingPixels, seeing_pixels
 from tbcad.tolerance.process.process import Process

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.simulate.study.study import Figure, Study
-from tbcad.simulate.study.tables import Record, Table
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
 from tbcad.tolerance.analysis import Analysis
 from tbcad.tolerance.margin import Margin
 from tbcad.tolerance.montecarlo.builds import CoverageResult, estimate_yield

@@ -4,7 +4,7 @@ from tbcad.mirrors.array import design
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.study.viewpoints import ground_truths, viewpoints_around
+from tbcad.simulate.views.viewpoints import ground_truths, viewpoints_around
 from tbcad.spec.design import Spec
 from tbcad.tolerance.montecarlo.sharpness import ReferenceViews, designed_ssim
 from tbcad.types import Progress

@@ -9,7 +9,7 @@ at a picture, and no search among rays.
 import numpy as np
 
 from tbcad.compiled import compiled
-from tbcad.datasets.pinhole_pictures import PinholePictures, facing, projections
+from tbcad.datasets.pictures import PinholePictures, facing, projections
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import first_then_threads
 from tbcad.types import Bools, Bytes, Floats, Ints

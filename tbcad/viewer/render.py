@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 from PIL import Image
 
-from tbcad.datasets.pinhole_pictures import pinhole_pictures
-from tbcad.depth.view import DepthViews
+from tbcad.datasets.pictures import pinhole_pictures
+from tbcad.depth.depth_map import DepthViews
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.reconstruction.field import Field
@@ -28,7 +28,7 @@ from tbcad.simulate.views.synthesis import (
 )
 from tbcad.types import Bytes, Progress
 from tbcad.viewer.moving import moving_view
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 
 MethodAtRest = Method | Literal["depth"]
 JPEG_QUALITY = 88

@@ -15,8 +15,7 @@ from time import monotonic
 from typing import Any
 
 from tbcad.errors import InputError
-from tbcad.viewer.page import viewer_page
-from tbcad.viewer.query import Query, parse_query
+from tbcad.viewer.page import Query, parse_query, viewer_page
 from tbcad.viewer.render import Superseded, ViewRenderer
 
 HOST = "127.0.0.1"

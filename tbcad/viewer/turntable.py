@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image
 
 from tbcad.atomic_files import replace_files
+from tbcad.depth.depth_map import depth_views
 from tbcad.depth.plane_sweep import QUICK
-from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.output.single_files import check_file

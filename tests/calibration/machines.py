@@ -6,8 +6,7 @@ from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.priors import Fitted, prototype_prior
 from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Highlights, Machine
-from tbcad.optics.camera import Camera
-from tbcad.optics.lens_camera import without_distortion
+from tbcad.optics.camera import Camera, without_distortion
 from tbcad.tolerance.process.process import load_process, process_errors
 
 PINHOLE = np.array([100.0, 0.0, -100.0])

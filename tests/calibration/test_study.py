@@ -11,8 +11,8 @@ from tbcad.calibration.study import (
     SHARES,
     calibration_study,
 )
+from tbcad.results.study import Study, study_files
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.study.study import Study, study_files
 
 
 @pytest.fixture(scope="module")

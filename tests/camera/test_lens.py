@@ -16,7 +16,7 @@ from tbcad.camera.lens import (
     sharpest,
 )
 from tbcad.errors import InputError
-from tbcad.simulate.study.depth_of_field import LensOptions
+from tbcad.studies.depth_of_field import LensOptions
 
 LENS = Lens(pixel=0.00345, image=3.65, wide_open=2.8, wavelength=550e-6)
 RANGE = DepthRange(150.0, 250.0)

@@ -18,8 +18,8 @@ from tbcad.cli.stage_times import build_times, export_times, verify_times
 from tbcad.cli.study_output import _show
 from tbcad.doctor import Finding
 from tbcad.output.parts import PARTS
+from tbcad.results.study import Figure, Study
 from tbcad.screen import WIDTH, TimeLeft, paragraph, stages
-from tbcad.simulate.study.study import Figure, Study
 from tests.exported_files import contents
 from tests.verify.synthetic_export import Design
 from tests.verify.synthetic_export import export as write_export

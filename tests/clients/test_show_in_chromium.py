@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from tbcad.cli import run
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.server import ViewServer
 from tests.clients.browser import Browser
 from tests.clients.viewer_page import (

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.render import Renderer
 from tbcad.viewer.server import ViewServer
 from tests.clients.browser import Browser

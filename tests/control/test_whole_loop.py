@@ -22,9 +22,9 @@ from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import home_angles
 from tbcad.runs.photographs import read_photograph, read_run
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import MotionSpec
 from tests.control.conftest import export

@@ -17,9 +17,9 @@ from tbcad.datasets.crops import MirrorId, read_crop
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.views.ground_truth import pinhole_picture
 
 Document = dict[str, Any]
 

@@ -16,7 +16,7 @@ import trimesh
 from PIL import Image
 
 from tbcad.cli import run
-from tbcad.datasets.machine_meshes import object_mesh
+from tbcad.datasets.machine_scene import object_mesh
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from tbcad.datasets.crops import Crop, MirrorId, chosen_mirrors, read_crop, spread_evenly
-from tbcad.datasets.resampling import places, resampled
+from tbcad.datasets.pictures import places, resampled
 from tbcad.datasets.seed_points import seed_points
 from tbcad.datasets.virtual_cameras import _measured, camera_at, virtual_cameras
 from tbcad.errors import InputError

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from tbcad.datasets.pinhole_pictures import pinhole_pictures
+from tbcad.datasets.pictures import pinhole_pictures
 from tbcad.depth.depth_map import depth_map
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, refocus, refocus_everywhere
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.types import Floats
 from tests.depth.test_depth_map import CAPTURE_MM, tiles  # noqa: F401
 from tests.simulate.conftest import knot  # noqa: F401

@@ -7,22 +7,21 @@ import pytest
 import trimesh
 from PIL import Image
 
-from tbcad.datasets.pinhole_pictures import pinhole_pictures
-from tbcad.depth.depth_map import DepthMap, depth_map
-from tbcad.depth.view import depth_views
+from tbcad.datasets.pictures import pinhole_pictures
+from tbcad.depth.depth_map import DepthMap, depth_map, depth_views
 from tbcad.errors import InputError
 from tbcad.mirrors.array import design
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph, to_bytes
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.spec.load import load_spec
 from tests.simulate.conftest import knot  # noqa: F401
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.datasets.pinhole_pictures import PinholePictures
+from tbcad.datasets.pictures import PinholePictures
 from tbcad.datasets.virtual_cameras import camera_at
 from tbcad.depth.plane_sweep import swept_depth
 from tbcad.optics.camera import Camera

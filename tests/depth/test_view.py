@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import tbcad
+from tbcad.depth.depth_map import depth_views
 from tbcad.depth.plane_sweep import QUICK
-from tbcad.depth.view import depth_views
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import image_quality
 from tests.depth.test_depth_map import CAPTURE_MM, tiles  # noqa: F401
 from tests.simulate.conftest import knot  # noqa: F401
 

@@ -8,7 +8,7 @@ import pytest
 from tbcad.geometry.vectors import norm
 from tbcad.machine.built import BuiltPrototype, designed_build, draw_other_errors, random_build
 from tbcad.machine.machine import Machine
-from tbcad.optics.lens_camera import without_distortion
+from tbcad.optics.camera import without_distortion
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors

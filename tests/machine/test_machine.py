@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.highlights import reflection_points
+from tbcad.optics.reflection import reflection_points
 from tests.machine.test_record import MACHINE
 
 

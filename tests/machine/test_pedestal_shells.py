@@ -20,9 +20,8 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulated_run.led_light import LightPoints, balls_of_frame, led_light
-from tbcad.simulated_run.object_light import object_light, pixel_directions
-from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulated_run.led_light import LightPoints, Occluders, balls_of_frame, led_light
+from tbcad.simulated_run.photographs import object_light, pixel_directions
 from tbcad.tolerance.montecarlo.draws import draw
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sharpness import built_reflector

@@ -16,9 +16,9 @@ from tbcad.merged_run.corrections import Options
 from tbcad.runs.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
-from tbcad.simulate.prototype.simulated_merge import merge_run
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene

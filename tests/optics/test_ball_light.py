@@ -6,7 +6,8 @@ from tbcad.geometry.round_cones import RoundCones
 from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics import ball_light
-from tbcad.optics.reflection import miss_distances, reflected_rays, sphere_miss_distances
+from tbcad.optics.reflection import miss_distances, reflected_rays
+from tests.sphere_misses import sphere_miss_distances
 
 CAPTURE = 30.0
 

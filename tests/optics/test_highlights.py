@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.highlights import reflection_points
+from tbcad.optics.reflection import reflection_points
 
 
 @pytest.mark.parametrize("radius", [1.0, 20.0, 300.0, 5000.0])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tbcad.geometry.vectors import dot, norm
-from tbcad.optics.highlights import reflection_points
 from tbcad.optics.led_dome import UP, disc_images, dome_images, dome_samples, sight_axes
+from tbcad.optics.reflection import reflection_points
 from tests.machine.test_record import MACHINE
 
 ELEVATIONS = np.radians([-50.0, -10.0, 0.0, 20.0, 60.0, 90.0])

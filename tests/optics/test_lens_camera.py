@@ -6,8 +6,8 @@ import pytest
 
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import unit
-from tbcad.optics.camera import Camera
-from tbcad.optics.lens_camera import (
+from tbcad.optics.camera import (
+    Camera,
     LensCamera,
     vignetting,
     vignetting_slope,

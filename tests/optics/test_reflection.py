@@ -3,7 +3,8 @@ import pytest
 
 from tbcad.geometry.vectors import unit
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.reflection import miss_distances, reflected_rays, sphere_miss_distances
+from tbcad.optics.reflection import miss_distances, reflected_rays
+from tests.sphere_misses import sphere_miss_distances
 
 
 def test_reflection_at_a_plane() -> None:

@@ -5,9 +5,10 @@ import pytest
 
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import unit
-from tbcad.optics.reflection import miss_distances, sphere_miss_distances
+from tbcad.optics.reflection import miss_distances
 from tbcad.optics.side_rays import misses_of_balls, misses_of_mirrors
 from tbcad.types import Floats
+from tests.sphere_misses import sphere_miss_distances
 
 SIDES, SAMPLES, MIRRORS = 40, 9, 7
 PINHOLE, CAMERA = np.array([100.0, 0.0, -100.0]), np.array([99.0, 1.0, -101.0])

@@ -5,7 +5,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import miss_distances
-from tbcad.optics.trace import coverage_diameters, parabola_minima, samples_about_minima
+from tbcad.optics.windows import coverage_diameters, parabola_minima, samples_about_minima
 from tests.mirror_arrays import mirror_array
 
 PINHOLE = np.array([100.0, 0.0, -100.0])

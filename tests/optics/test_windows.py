@@ -4,9 +4,8 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import unit
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.reflection import sphere_miss_distances
-from tbcad.optics.trace import coverage_diameters
-from tbcad.optics.windows import Windows, cell_windows
+from tbcad.optics.windows import Windows, cell_windows, coverage_diameters
+from tests.sphere_misses import sphere_miss_distances
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from tbcad.optimize.candidate import (
     size_of,
     virtual_camera_pixels,
 )
-from tbcad.simulate.study.pixels import Sensor, count_pixels, virtual_cameras
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
 from tbcad.spec.load import load_spec
 
 FEW_PIXELS = ("n=4", "width_px=416", "height_px=310")

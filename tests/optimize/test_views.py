@@ -7,14 +7,14 @@ from tbcad.mirrors.array import design
 from tbcad.optimize import views
 from tbcad.optimize.candidate import Limits, evaluate, place_of
 from tbcad.optimize.views import mean_ssim
-from tbcad.reconstruction import quick
-from tbcad.reconstruction.fit import Level, Settings
-from tbcad.reconstruction.quick import BY_FIELD
+from tbcad.reconstruction import picture
+from tbcad.reconstruction.picture import BY_FIELD
+from tbcad.reconstruction.start import Level, Settings
+from tbcad.simulate.capture.pixel_counts import Sensor
 from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.study.pixels import Sensor
-from tbcad.simulate.study.ssim import ssim
-from tbcad.simulate.study.viewpoints import ELEVATIONS_DEG, viewpoints_around
+from tbcad.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
 from tbcad.spec.load import load_spec
+from tbcad.studies.ssim import ssim
 
 SPEC = load_spec(None, ["n=4", "width_px=208", "height_px=155"])
 
@@ -52,7 +52,7 @@ def test_views_are_compared_within_the_limits_only(size_mm: float, measured: boo
 
 
 def test_by_a_coarse_field_it_is_the_figure_of_that_study(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(quick, "QUICK", Settings(levels=(Level(24, 1),), batch=3000))
+    monkeypatch.setattr(picture, "QUICK", Settings(levels=(Level(24, 1),), batch=3000))
     monkeypatch.setattr(views, "AZIMUTHS", 1)
     viewpoints = viewpoints_around((15.0,), 1, 640.0)
     fixed = SPEC.model_copy(update={"camera": SPEC.camera.model_copy(update={"hfov_deg": 89.0})})

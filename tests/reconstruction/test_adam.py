@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tbcad.reconstruction.adam import CORNER, MEMORY, Columns, Moments, adam, unbiased_size
+from tbcad.reconstruction.gradient import CORNER, MEMORY, Columns, Moments, adam, unbiased_size
 from tbcad.reconstruction.grid import Grid
 
 GRID = Grid(3, 2.0, np.argwhere(np.ones((3, 3, 3), bool)).astype(np.uint16))

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError, PlausibilityWarning
-from tbcad.reconstruction.beside import (
+from tbcad.reconstruction.field import (
     field_file,
     field_of,
     light_field_fingerprint,
     wanted_field,
+    write_field,
 )
-from tbcad.reconstruction.field import write_field
 from tbcad.simulate.capture.light_field import LightField
 from tests.simulate.conftest import cameras, knot, light_field  # noqa: F401
 from tests.viewer.fields import ball, write_ball

@@ -7,11 +7,11 @@ import pytest
 
 from tbcad.reconstruction import choice
 from tbcad.reconstruction.choice import FACTOR, LEVELS, chosen, held_out, held_out_loss, weighted
-from tbcad.reconstruction.fit import Level, Settings
+from tbcad.reconstruction.start import Level, Settings, hull
 from tests.ray_fields import Ball, rays_of
 
 RAYS = rays_of([Ball((1, 0, 0), 5, (0.8, 0.4, 0.2))], 2_000)
-BEGUN = Settings()
+BEGUN, HULL = Settings(), hull(RAYS)
 
 
 def choose(
@@ -19,14 +19,14 @@ def choose(
 ) -> tuple[Settings, int]:
     """What is chosen where the loss is least at that power of the factor, and number of trials."""
 
-    def loss(_: object, settings: Settings) -> float:
+    def loss(_: object, __: object, settings: Settings) -> float:
         assert settings.levels == LEVELS
         power = log(settings.sparse / BEGUN.sparse) / log(FACTOR)
         return (1 + (power - best) ** 2) * (gloss if settings.order else 1.0)
 
     monkeypatch.setattr(choice, "held_out_loss", loss)
     told: list[str] = []
-    found, trials = chosen(RAYS, BEGUN, orders, told.append)
+    found, trials = chosen(RAYS, HULL, BEGUN, orders, told.append)
     assert len(told) == len(trials)
     assert found.levels == BEGUN.levels
     return found, len(trials)
@@ -56,16 +56,16 @@ def test_held_out_rays_have_no_part_in_the_trial(monkeypatch: pytest.MonkeyPatch
     small = Settings(levels=(Level(10, 1),), batch=500)
     held = held_out(RAYS)
     assert 0 < held.mean() < 0.1
-    before = held_out_loss(RAYS, small)
+    before = held_out_loss(RAYS, HULL, small)
     mirrors = {*RAYS.mirror[held].tolist()}
     assert mirrors.isdisjoint(RAYS.mirror[~held].tolist())
     seen: list[np.ndarray] = []
     real = choice.fit
 
-    def watched(rays: object, settings: Settings, used: np.ndarray) -> object:
+    def watched(rays: object, settings: Settings, used: np.ndarray, state: object) -> object:
         seen.append(used)
-        return real(rays, settings, used)
+        return real(rays, settings, used, state)
 
     monkeypatch.setattr(choice, "fit", watched)
-    assert held_out_loss(RAYS, small) == before
+    assert held_out_loss(RAYS, HULL, small) == before
     assert np.array_equal(seen[0], ~held)

@@ -1,7 +1,6 @@
 """Fits to rays of balls in closed form; threads and pauses change no bit of them."""
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from copy import deepcopy
 from dataclasses import replace
 
@@ -10,10 +9,13 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.reconstruction import fit as fitting
+from tbcad.reconstruction import start as starting
 from tbcad.reconstruction.field import Field, field_bytes
-from tbcad.reconstruction.fit import Level, Settings, State, fit, medium_of, squared_error
+from tbcad.reconstruction.fit import fit, medium_of, squared_error
 from tbcad.reconstruction.marching import composited
 from tbcad.reconstruction.rays import CapturedRays
+from tbcad.reconstruction.start import Level, Settings, State
+from tbcad.simulate import parallel
 from tests.ray_fields import RADIUS, Ball, rays_of
 
 BALL = Ball((1.0, 0.5, -0.5), 5.0, (0.8, 0.4, 0.2))
@@ -79,33 +81,22 @@ def test_the_loss_falls() -> None:
     assert losses[-1] < 0.5 * losses[0]
 
 
-def whole_fit(monkeypatch: pytest.MonkeyPatch, workers: Callable[[], object], order: int) -> bytes:
-    monkeypatch.setattr(fitting, "workers", workers)
-    return field_bytes(fitted(rays_of(TWO, 6_000), replace(TINY, order=order)))
-
-
-class Backward:
-    """A pool of one thread that does the last item first."""
-
-    def map(self, work: Callable[..., object], *items: Iterable[object]) -> Iterator[object]:
-        todo = list(zip(*items, strict=True))
-        return iter([work(*one) for one in reversed(todo)][::-1])
-
-    def __enter__(self) -> "Backward":
-        return self
-
-    def __exit__(self, *_: object) -> None: ...
+def backward(work: Callable[..., object], items: Iterable[object]) -> list[object]:
+    """As `in_threads`, in one thread that does the last item first."""
+    return [work(item) for item in reversed(list(items))][::-1]
 
 
 @pytest.mark.parametrize("order", [0, 1])
 def test_threads_and_the_order_of_their_work_change_no_bit(
     monkeypatch: pytest.MonkeyPatch, order: int
 ) -> None:
-    found = {
-        whole_fit(monkeypatch, workers, order)
-        for workers in (lambda: ThreadPoolExecutor(1), lambda: ThreadPoolExecutor(3), Backward)
-    }
-    assert len(found) == 1
+    settings, found = replace(TINY, order=order), set()
+    for threads in (1, 3):
+        monkeypatch.setattr(parallel, "THREADS", threads)
+        found.add(field_bytes(fitted(rays_of(TWO, 6_000), settings)))
+    for module in (fitting, starting):
+        monkeypatch.setattr(module, "in_threads", backward)
+    assert found == {field_bytes(fitted(rays_of(TWO, 6_000), settings))}
 
 
 def test_another_seed_is_another_field() -> None:

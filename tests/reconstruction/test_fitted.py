@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -62,9 +61,7 @@ def test_same_bytes_on_any_number_of_threads(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for name in ("fit", "fitted"):
-        pool = f"tbcad.reconstruction.{name}.workers"
-        monkeypatch.setattr(pool, lambda: ThreadPoolExecutor(threads))
+    monkeypatch.setattr("tbcad.simulate.parallel.THREADS", threads)
     reconstruct(ball, out=tmp_path / "again.npz", options=SMALL)
     assert (tmp_path / "again.npz").read_bytes() == made.read_bytes()
 

@@ -1,14 +1,13 @@
 """The hull of balls in closed form."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.reconstruction.hull import MOST_DARK, hull
 from tbcad.reconstruction.rays import CapturedRays
+from tbcad.reconstruction.start import MOST_DARK, hull
 from tests.ray_fields import RADIUS, Ball, rays_of
 
 RED = (0.8, 0.2, 0.1)
@@ -16,8 +15,7 @@ RED = (0.8, 0.2, 0.1)
 
 def hull_of(rays: CapturedRays) -> tuple[np.ndarray, np.ndarray, float]:
     """Nodes in the hull, all nodes' places (..., 3), and their pitch."""
-    with ThreadPoolExecutor(1) as pool:
-        inside = hull(rays, pool)
+    inside = hull(rays)
     axis = np.linspace(-RADIUS, RADIUS, len(inside))
     return inside, np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1), axis[1] - axis[0]
 

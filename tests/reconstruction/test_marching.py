@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tbcad.reconstruction.field import Field
 from tbcad.reconstruction.fit import medium_of
+from tbcad.reconstruction.gradient import Pixels, _mixed, add_gradient
 from tbcad.reconstruction.grid import Grid
 from tbcad.reconstruction.marching import (
     GLOSSY,
@@ -17,9 +18,6 @@ from tbcad.reconstruction.marching import (
     LEAST_OPACITY,
     MATT,
     Medium,
-    Pixels,
-    _mixed,
-    add_gradient,
     composited,
     march,
     spans,

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from tbcad.errors import InputError
-from tbcad.reconstruction.mesh_files import SUFFIXES, mesh_file
+from tbcad.reconstruction.files import MESH_SUFFIXES, mesh_file
 from tbcad.reconstruction.surface import field_mesh
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
 from tests.reconstruction.balls import BELOW, COLOUR, made_of
@@ -22,7 +22,7 @@ def mesh() -> trimesh.Trimesh:
     return field_mesh(made, 1.0)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", MESH_SUFFIXES)
 def test_the_file_is_closed_and_always_the_same(mesh: trimesh.Trimesh, suffix: str) -> None:
     content = mesh_file(mesh, suffix)
     assert content == mesh_file(mesh, suffix)

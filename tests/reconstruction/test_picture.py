@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tbcad.depth.depth_map import depth_png, depth_points
 from tbcad.reconstruction.field import Field
 from tbcad.reconstruction.grid import Grid
 from tbcad.reconstruction.picture import (
@@ -16,7 +17,6 @@ from tbcad.reconstruction.picture import (
     normals_png,
     opacity_png,
 )
-from tbcad.simulate.scene.depth_files import depth_png, depth_points
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tests.reconstruction.balls import COLOUR, NODES, RADIUS, WIDTH_MM, ball, nothing
 

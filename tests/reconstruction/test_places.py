@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.reconstruction.places import pixel_places
+from tbcad.reconstruction.rays import pixel_places
 
 
 @pytest.mark.parametrize("area", [False, True])

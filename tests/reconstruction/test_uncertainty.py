@@ -8,8 +8,7 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
-from tbcad.reconstruction.rays import captured_rays
-from tbcad.reconstruction.uncertainty import pixel_areas, with_weights
+from tbcad.reconstruction.rays import captured_rays, pixel_areas, with_weights
 from tbcad.simulate.capture.light_field import RAY_SIGMAS, Frame, LightField
 
 PIXEL_MM = 0.5

@@ -6,7 +6,7 @@ import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
-from tbcad.reconstruction import volume
+from tbcad.reconstruction import files
 from tbcad.reconstruction.field import Field, write_field
 from tbcad.reconstruction.grid import Grid
 from tests.reconstruction.balls import COLOUR, NODES, RADIUS, WIDTH_MM, ball
@@ -23,8 +23,8 @@ def some_of_it() -> Field:
 
 def test_the_volume_has_density_and_colour_in_place() -> None:
     made = some_of_it()
-    content = volume.volume_file(made)
-    assert content == volume.volume_file(made)
+    content = files.volume_file(made)
+    assert content == files.volume_file(made)
     reader = vtkXMLImageDataReader()
     reader.ReadFromInputStringOn()
     reader.SetInputString(content.decode())
@@ -43,7 +43,7 @@ def test_the_volume_has_density_and_colour_in_place() -> None:
 def test_numpy_has_the_same_from_the_fields_file(tmp_path: Path) -> None:
     made = some_of_it()
     write_field(tmp_path / "field.npz", made)
-    told = [line for line in (volume.__doc__ or "").splitlines() if line.startswith("    ")]
+    told = [line for line in (files.__doc__ or "").splitlines() if line.startswith("    ")]
     lines = "\n".join(line.strip() for line in told)
     names = {"np": np}
     exec(lines.replace("field.npz", str(tmp_path / "field.npz")), names)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.reflectance.environment import environment
-from tbcad.reflectance.light_directions import LightFormat, LightPixels, light_pixels
+from tbcad.reflectance.environment import LightFormat, LightPixels, environment, light_pixels
 
 SHAPES: tuple[tuple[LightFormat, int, int], ...] = (
     ("latlong", 60, 120),

@@ -10,7 +10,7 @@ from tbcad.datasets.crops import MirrorId
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.reflectance.field_file import open_reflectance
-from tbcad.reflectance.projectors import LEAST_CURVATURE, MirrorPixels, projectors, reflected
+from tbcad.reflectance.lamp_places import LEAST_CURVATURE, MirrorPixels, projectors, reflected
 from tbcad.reflectance.transport import seen_spots
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.point_lights import Spots, received_light

@@ -11,17 +11,16 @@ import tbcad
 from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.reflectance.environment import read_environment
-from tbcad.reflectance.field_file import open_reflectance
+from tbcad.reflectance.field_file import TRUE_LIGHTS, lit_scene, open_reflectance, relit
 from tbcad.reflectance.lamp_places import lamps_of_mirrors
-from tbcad.reflectance.relit import TRUE_LIGHTS, lit_scene, relit
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.viewpoints import image_quality
 
 SMALL = ["--width", "96", "--height", "72"]
 

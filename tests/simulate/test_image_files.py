@@ -17,7 +17,7 @@ from tbcad.simulate.image_files import (
     write_animation,
     write_images,
 )
-from tbcad.simulate.image_quality import equivalent_blur_px, image_quality, image_quality_map
+from tbcad.simulate.views.viewpoints import equivalent_blur_px, image_quality, image_quality_map
 
 RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0, 0), (0, 0, 255)))
 

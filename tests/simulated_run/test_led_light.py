@@ -6,16 +6,14 @@ import pytest
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
 from tbcad.machine.machine import Machine
-from tbcad.optics.camera import Camera
+from tbcad.optics.camera import Camera, without_distortion
 from tbcad.optics.led_dome import dome_images
-from tbcad.optics.lens_camera import without_distortion
 from tbcad.optics.pedestals.walls import NO_WALLS
 from tbcad.simulate.prototype.ball_rays import balls_between
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run import led_light as module
-from tbcad.simulated_run.led_light import LightPoints, led_light
-from tbcad.simulated_run.occluders import Occluders
+from tbcad.simulated_run.led_light import LightPoints, Occluders, led_light
 from tbcad.types import Floats
 
 EMPTY = Occluders(None, None)

@@ -8,13 +8,12 @@ import pytest
 
 from tbcad.calibration.detection.expected import expected_highlights
 from tbcad.machine.photographed import machine_runs
-from tbcad.simulate.prototype.ball_rays import camera_colours
+from tbcad.simulate.prototype.ball_rays import camera_colours, trace_balls
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run.led_light import DOME_MM, balls_of_frame
-from tbcad.simulated_run.object_light import object_light, pixel_directions
-from tbcad.simulated_run.photographs import Chain, phases_of
-from tbcad.simulated_run.sensor import Sensor
+from tbcad.simulated_run.photographs import Chain, object_light, phases_of
+from tbcad.simulated_run.sensor import Sensor, pixel_directions
 from tests.simulated_runs import BRIGHT, Small, photograph_centroid, small_run
 
 STOPS = (20, 40)
@@ -70,7 +69,7 @@ def test_the_lit_object_is_what_a_capture_traces(export_folder: Path) -> None:
     turned = np.array([-1.0, -1.0, 1.0])
     flat = directions.reshape(-1, 3) * turned
     stop = np.full(len(flat), run.frames[number].stop - 1)
-    theirs = camera_colours(half, run.scene, flat, stop)
+    theirs = camera_colours(run.scene, half.camera.pinhole, flat, trace_balls(half, flat, stop))
     same = np.abs(mine.reshape(-1, 3) - theirs).max(axis=1) < 1
     assert (theirs.max(axis=1) > 30).sum() > 300
     assert same.mean() > 0.999

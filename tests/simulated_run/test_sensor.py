@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tbcad.optics.lens_camera import LensCamera
-from tbcad.simulated_run.object_light import pixel_directions
-from tbcad.simulated_run.sensor import PixelMaps, Sensor, generator, pixel_maps, recorded
+from tbcad.optics.camera import LensCamera
+from tbcad.simulated_run.sensor import (
+    PixelMaps,
+    Sensor,
+    generator,
+    pixel_directions,
+    pixel_maps,
+    recorded,
+)
 
 SENSOR = Sensor(grains=0, hot_share=0.0)
 CAMERA = LensCamera(

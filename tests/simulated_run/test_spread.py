@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.simulated_run.spread import PointSpread, add_points, blurred
+from tbcad.simulated_run.photographs import PointSpread, add_points, blurred
 
 # So wide that sums over pixels are integrals: what is left of one cycle a pixel is 6e-5.
 SPREAD = PointSpread(separation_px=1.0, lens_px=0.7)

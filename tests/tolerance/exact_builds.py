@@ -20,7 +20,7 @@ from tbcad_verify.shell.recover import recover
 from tbcad.cad.mesh import Mesh
 from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.optics import trace
+from tbcad.optics import windows
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
@@ -57,7 +57,7 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
 
 
 def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
-    """Coverage of each mirror of build k by tbcad.optics.trace, mm; of even scale only."""
+    """Coverage of each mirror of build k by tbcad.optics.windows, mm; of even scale only."""
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
     back = Rotation.from_rotvec(draws.shell_tilt[k]).inv()
@@ -66,13 +66,13 @@ def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray
     cells = made(array, draws, k)
     whole = array.cells.surfaces.apex[:, 0] != 0
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trace, "ROUNDS", FINE)
-        patch.setattr(trace, "limiting_sides", lambda one: _counted(one, whole))
-        return trace.coverage_diameters(placed(cells, scale, middle), pinhole - middle)
+        patch.setattr(windows, "ROUNDS", FINE)
+        patch.setattr(windows, "limiting_sides", lambda one: _counted(one, whole))
+        return windows.coverage_diameters(placed(cells, scale, middle), pinhole - middle)
 
 
 def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What tbcad.optics.trace.limiting_sides does, with the halved mirrors known beforehand."""
+    """What tbcad.optics.windows.limiting_sides does, with the halved mirrors known beforehand."""
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.results.study import SUMMARY_COLUMNS, study_files
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.study.study import SUMMARY_COLUMNS, study_files
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.analysis import Analysis, ProcessOption, PrototypeYield
 from tbcad.tolerance.margin import Margin

@@ -10,7 +10,7 @@ from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorArray, numbered_directions
 from tbcad.optics import flat
-from tbcad.simulate.study.paper import claimed
+from tbcad.studies.paper import claimed
 from tests.mirror_arrays import mirror_array
 
 ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)

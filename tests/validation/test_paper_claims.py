@@ -1,6 +1,6 @@
 """What the paper states in Tables I and II and sections 1 to 6, computed again.
 
-The paper's figures are read from tbcad.simulate.study.paper, each with its place.
+The paper's figures are read from tbcad.studies.paper, each with its place.
 """
 
 from pathlib import Path
@@ -11,11 +11,13 @@ import pytest
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, numbered_directions
-from tbcad.simulate.study.definitions import DISC, IN_FRAME, definitions
-from tbcad.simulate.study.depth_of_field import LensOptions, depth_of_field
-from tbcad.simulate.study.elevation import elevation
-from tbcad.simulate.study.frame_pitch import apices_in_frame, best_pitch
-from tbcad.simulate.study.paper import (
+from tbcad.results.study import Study
+from tbcad.simulate.views.refocus import lens_pinholes
+from tbcad.spec.load import load_spec
+from tbcad.studies.definitions import DISC, IN_FRAME, apices_in_frame, best_pitch, definitions
+from tbcad.studies.depth_of_field import LensOptions, depth_of_field
+from tbcad.studies.elevation import elevation
+from tbcad.studies.paper import (
     NUMBER,
     RESOLUTION,
     BalancedSensor,
@@ -24,9 +26,6 @@ from tbcad.simulate.study.paper import (
     claims,
     is_table_i,
 )
-from tbcad.simulate.study.study import Study
-from tbcad.simulate.views.refocus import lens_pinholes
-from tbcad.spec.load import load_spec
 
 ROWS = balanced_sensors()
 PAGE = Path(__file__).parents[2] / "docs" / "reproduction.md"

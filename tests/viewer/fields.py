@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.reconstruction.beside import FACT, field_file, light_field_fingerprint
-from tbcad.reconstruction.field import Field, write_field
+from tbcad.reconstruction.field import FACT, Field, field_file, light_field_fingerprint, write_field
 from tbcad.reconstruction.grid import Grid
 from tbcad.simulate.capture.light_field import LightField
 

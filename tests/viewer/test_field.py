@@ -14,7 +14,7 @@ import tbcad
 from tbcad.errors import InputError
 from tbcad.reconstruction.picture import field_picture
 from tbcad.simulate.views.refocus import ThinLens, refocus
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.render import FieldRenderer, Renderer
 from tbcad.viewer.server import ViewServer
 from tbcad.viewer.turntable import Turntable, write_turntable

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from tbcad.datasets.pinhole_pictures import PinholePictures, pinhole_pictures
+from tbcad.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.ray_bundle import TwoPlane, two_plane_along
 from tbcad.simulate.views.synthesis import horizon_search_radius, search_radius, synthesise
-from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.types import Floats
 from tbcad.viewer.moving import moving_view
 from tests.simulate.conftest import cameras, knot, light_field  # noqa: F401

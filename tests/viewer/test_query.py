@@ -3,7 +3,7 @@
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.viewer.query import Query, limits, parse_query
+from tbcad.viewer.page import Query, limits, parse_query
 
 CAPTURE_MM = 60.0
 

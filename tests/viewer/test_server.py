@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.depth.view import depth_views
+from tbcad.depth.depth_map import depth_views
 from tbcad.errors import InputError
 from tbcad.simulate.views.refocus import ThinLens, refocus
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.render import Renderer, Superseded
 from tbcad.viewer.server import HOST, MAX_CONNECTIONS, ViewServer
 

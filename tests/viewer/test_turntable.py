@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tbcad.depth.depth_map import depth_views
 from tbcad.depth.plane_sweep import QUICK
-from tbcad.depth.view import depth_views
 from tbcad.errors import InputError
 from tbcad.simulate.views.synthesis import synthesise
-from tbcad.viewer.query import Query
+from tbcad.viewer.page import Query
 from tbcad.viewer.render import Renderer
 from tbcad.viewer.turntable import (
     BEGIN,

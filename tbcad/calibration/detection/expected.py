@@ -6,8 +6,8 @@ import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.machine import Machine
+from tbcad.optics.camera import vignetting, vignetting_slope
 from tbcad.optics.led_dome import dome_images
-from tbcad.optics.lens_camera import vignetting, vignetting_slope
 from tbcad.types import Bools, Floats, Ints
 
 MARGIN_PX = 6.0  # of the picture: highlights nearer to its edge are not whole

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.optics.lens_camera import LensCamera, distorted
+from tbcad.optics.camera import LensCamera, distorted
 from tbcad.types import Floats
 
 LENS = 9  # focal lengths 2, principal point 2, distortion 5
@@ -34,7 +34,7 @@ def projection(camera: LensCamera, image: Floats) -> tuple[Floats, Floats, Float
 
 
 def _distortion_slopes(place: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
-    """Of tbcad.optics.lens_camera.distorted by the place (n, 2, 2), by k1 k2 p1 p2 k3 (n, 2, 5)."""
+    """Of tbcad.optics.camera.distorted by the place (n, 2, 2), by k1 k2 p1 p2 k3 (n, 2, 5)."""
     k1, k2, p1, p2, k3 = coefficients
     x, y = place.T
     s = x * x + y * y

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.optics.highlights import reflection_points
+from tbcad.optics.reflection import reflection_points
 from tbcad.types import Floats
 
 ITERATIONS = 60

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.optics.lens_camera import LensCamera, distorted
+from tbcad.optics.camera import LensCamera, distorted
 from tbcad.spec.errors import short_text
 from tbcad.types import Floats
 

@@ -33,8 +33,8 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.record import RECORD as MACHINE
 from tbcad.machine.record import write_machine
 from tbcad.output.manifest import write_manifest
+from tbcad.results.tables import csv_text
 from tbcad.screen import WIDTH
-from tbcad.simulate.study.tables import csv_text
 
 COVARIANCE = "covariance.npz"
 

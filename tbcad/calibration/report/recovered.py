@@ -13,7 +13,7 @@ from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.report.tables import angle_deviations
 from tbcad.geometry.rotations import rotated
 from tbcad.machine.machine import Machine
-from tbcad.simulate.study.tables import Table
+from tbcad.results.tables import Table
 from tbcad.types import Bools, Floats
 
 MICROMETRES, MILLI = 1000.0, 1000.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.geometry.vectors import unit
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.highlights import reflection_points
+from tbcad.optics.reflection import reflection_points
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
 from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats, Ints

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.capture.geometry import CameraPhotographs
 from tbcad.simulate.capture.light_field import NAME
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
+from tbcad.simulate.capture.photograph import CameraPhotographs
 from tbcad.simulate.image_files import write_images
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.types import Bytes, Ints

@@ -119,11 +119,9 @@ class LightField:
             return replace(stored, frames=frames)
 
     def __len__(self) -> int:
-        """Number of mirrors."""
         return sum(len(frame.u) for frame in self.frames.values())
 
     def __repr__(self) -> str:
-        """Return object, cameras and numbers of mirrors and pixels."""
         sizes = ", ".join(
             f"camera {name}: {len(frame.u)} mirrors, {camera.width_px} x {camera.height_px}"
             for name, frame in self.frames.items()

@@ -51,14 +51,7 @@ def write_camera(
     shape = (camera.height_px, camera.width_px)
     chunk = (min(CHUNK[0], shape[0]), min(CHUNK[1], shape[1]))
     planes = {
-        name: group.create_dataset(
-            name,
-            shape + last,
-            kind,
-            chunks=chunk + last,
-            shuffle=True,
-            compression=COMPRESSION_LEVEL,
-        )
+        name: chunked(group, name, kind, shape + last, chunk + last)
         for name, (last, kind) in PIXEL_ARRAYS.items()
     }
     picture = np.zeros((*shape, 3), dtype=np.uint8)
@@ -71,6 +64,19 @@ def write_camera(
         picture[rows] = band.colour
         _write_chunks(planes, band)
     return picture, counts
+
+
+def chunked(
+    group: h5py.Group,
+    name: str,
+    kind: str,
+    shape: tuple[int, ...],
+    chunks: tuple[int, ...],
+    most: tuple[int | None, ...] | None = None,
+) -> h5py.Dataset:
+    """An array in compressed chunks, which `filtered_chunk` makes too; it may grow to `most`."""
+    filters = {"shuffle": True, "compression": COMPRESSION_LEVEL}
+    return group.create_dataset(name, shape, kind, chunks=chunks, maxshape=most, **filters)
 
 
 def _write_chunks(planes: Mapping[str, h5py.Dataset], band: RowBand) -> None:

@@ -1,6 +1,6 @@
 """A camera's photograph through its mirrors, band after band of pixel rows."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,6 +12,7 @@ from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, in_batches
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, unit_directions
+from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Bytes, Colours, Floats, Progress
 
 Tracer = Callable[[range, Shift], ReflectedRays]
@@ -35,6 +36,10 @@ class RowBand:
     rows: range
     rays: ReflectedRays
     colour: Bytes
+
+
+CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[RowBand]]]]
+"""Cameras, each with what takes its photograph."""
 
 
 def photograph(

@@ -16,21 +16,24 @@ from typing import Any, TypeVar
 
 import h5py
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
 from tbcad.formats.hdf5 import StoredGroup, open_hdf5
+from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import Frame, LightField
-from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, filtered_chunk
-from tbcad.simulate.capture.photograph import row_bands
+from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, chunked, filtered_chunk
+from tbcad.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.simulate.parallel import chunks, in_threads
+from tbcad.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, colours_along
 from tbcad.simulate.scene.rays import meets_sphere
-from tbcad.types import Bytes, Ints
+from tbcad.types import Bytes, Floats, Ints, Progress
 
 NAME = "sequence.h5"
 SCHEMA = "tbcad-sequence/1"
-RAYS_PER_CHUNK = 1 << 16
 AGAIN = "capture again with --frames"
 Found = TypeVar("Found")
+RAYS_PER_CHUNK = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -80,15 +83,8 @@ def create_sequence(
                 "pixel", data=pixel[name].astype(np.uint32), compression=COMPRESSION_LEVEL
             )
             rays = len(pixel[name])
-            colour[name] = group.create_dataset(
-                "colour",
-                (0, rays, 3),
-                "u1",
-                maxshape=(None, rays, 3),
-                chunks=(1, min(RAYS_PER_CHUNK, max(rays, 1)), 3),
-                shuffle=True,
-                compression=COMPRESSION_LEVEL,
-            )
+            chunk = (1, min(RAYS_PER_CHUNK, max(rays, 1)), 3)
+            colour[name] = chunked(group, "colour", "u1", (0, rays, 3), chunk, (None, rays, 3))
         yield SequenceWriter(pixel, colour)
 
 
@@ -162,3 +158,77 @@ def _coloured(frame: Frame, pixel: Ints, colour: Bytes) -> Frame:
     picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
     picture[pixel] = colour
     return replace(frame, planes={**frame.planes, "colour": picture.reshape(*shape, 3)})
+
+
+def turns(count: int, whole: float) -> Floats:
+    """Angles (count,) of frames, radians: the first is 0, the last one step before the whole."""
+    return np.asarray(whole * np.arange(count) / count)
+
+
+def write_turning(
+    folder: Path, source: LightField, scene: Scene, angles: Floats, progress: Progress
+) -> dict[str, Any]:
+    """Write a sequence of the object at some angles, and return what is in it.
+
+    Args:
+        folder: of the capture.
+        source: its light field.
+        scene: the object, in the built-in light.
+        angles: about z, radians, (t,).
+        progress: called with each frame.
+    """
+    facts = {"frames": len(angles), "turns_deg": np.degrees(angles).tolist()}
+    with create_sequence(folder, source, facts) as writer:
+        rays = {name: _rays(source, writer, name) for name in source.frames}
+        for k, angle in enumerate(angles.tolist()):
+            progress(f"frame {k + 1} of {len(angles)}")
+            turned, back = lit_when_turned(scene, angle), _about_z(-angle)
+            writer.append(
+                {name: to_bytes(colours_along(turned, origin @ back.T, direction @ back.T))
+                 for name, (origin, direction) in rays.items()}
+            )  # fmt: skip
+    return facts
+
+
+def _rays(source: LightField, writer: SequenceWriter, name: str) -> tuple[Floats, Floats]:
+    planes, pixel = source.frames[name].planes, writer.pixel[name]
+    origin, direction = (
+        np.asarray(planes[key][:]).reshape(-1, 3)[pixel].astype(np.float64)
+        for key in ("origin", "direction")
+    )
+    return origin, direction
+
+
+def turn_of_frame(folder: Path, number: int) -> float:
+    """The angle of a frame, radians.
+
+    Raises:
+        InputError: the sequence does not say how far the object turned.
+    """
+    with open_hdf5(folder / NAME, SCHEMA, "sequence", AGAIN, lambda store: store.facts) as facts:
+        turned: Any = facts.get("turns_deg")
+    try:
+        return float(np.radians(turned[number]))
+    except (TypeError, LookupError) as error:
+        raise InputError(f"{folder / NAME} says nothing of frame {number}: {AGAIN}") from error
+
+
+def _about_z(angle: float) -> Floats:
+    return np.asarray(Rotation.from_euler("z", angle).as_matrix())
+
+
+def lit_when_turned(scene: Scene, angle: float) -> Scene:
+    """The object before its turn, with the light that it has after it."""
+    normals = scene.subject.normals @ _about_z(angle).T
+    return replace(scene, shade=both_sides(built_in_shade, normals))
+
+
+def camera_before_turn(camera: Camera, angle: float) -> Camera:
+    """The camera that sees the object before its turn as this one sees it after it."""
+    back = _about_z(-angle)
+    return replace(
+        camera,
+        pinhole=back @ camera.pinhole,
+        forward=back @ camera.forward,
+        right=back @ camera.right,
+    )

@@ -1,19 +1,29 @@
 """The contents of an object's file, whatever its format."""
 
-from collections.abc import Sequence
+import warnings
+from base64 import b64decode
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path, PureWindowsPath
 from typing import Any, Literal, NamedTuple
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.errors import InputError
+from tbcad.errors import InputError, PlausibilityWarning
+from tbcad.formats.pictures import Picture, picture_of
+from tbcad.srgb import srgb
 from tbcad.types import Bytes, Floats, Ints
 
 Up = Literal["y", "z"]
 # Real colours of at least so much in one file are bytes; those over 1 and below are refused.
 LEAST_OF_BYTES, ROUNDING = 2.0, 1e-3
 UNITS_MM = {"um": 0.001, "mm": 1.0, "cm": 10.0, "in": 25.4, "ft": 304.8, "m": 1000.0}
+MAX_PICTURE_BYTES = 1 << 30
+# An object in inches that fits the capture sphere is 25.4 times smaller than was meant.
+SMALL_SHARE = 1 / 20
+LIKELY_UNITS_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 
 
 @dataclass(frozen=True)
@@ -109,3 +119,162 @@ def without_facets(points: int) -> InputError:
         f"it has {points} points and no facets: name a triangle mesh; MeshLab makes one of a cloud "
         "of points (screened Poisson)"
     )
+
+
+def triangles(counts: Ints, points: Floats) -> tuple[Ints, Ints]:
+    """Cut polygons into triangles; those that are not convex are cut by their outline.
+
+    Args:
+        counts: corners of each polygon, (p,).
+        points: of all corners, one polygon after the other, (sum of counts, 3).
+
+    Returns:
+        Numbers of corners (t, 3) of triangles, and their polygons (t,), ascending. Polygons of one
+        or two corners give none.
+    """
+    begin = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+    number = np.maximum(counts - 2, 0)
+    polygon = np.repeat(np.arange(len(counts)), number)
+    step = np.arange(len(polygon)) - np.repeat(np.cumsum(number) - number, number)
+    first = begin[polygon]
+    corners = np.column_stack([first, first + step + 1, first + step + 2])
+    for bad in _not_convex(counts, polygon, points[corners]):
+        own = points[begin[bad] : begin[bad] + counts[bad]]
+        cut = _cut(own)
+        if len(cut) == number[bad]:
+            corners[polygon == bad] = begin[bad] + cut
+    return corners, polygon
+
+
+def _not_convex(counts: Ints, polygon: Ints, corners: Floats) -> list[int]:
+    """Polygons of which a triangle of the fan is turned against the whole."""
+    if len(polygon) == len(counts):
+        return []
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    whole = np.zeros((len(counts), 3))
+    np.add.at(whole, polygon, across)
+    turned = np.einsum("tx,tx->t", across, whole[polygon]) < 0
+    return [int(bad) for bad in np.unique(polygon[turned])]
+
+
+def _cut(points: Floats) -> NDArray[Any]:
+    """Triangles (t, 3) of one flat polygon (k, 3)."""
+    from manifold3d import triangulate
+
+    middle = points - points.mean(axis=0)
+    axes = np.linalg.svd(middle, full_matrices=False)[2][:2]
+    flat = middle @ axes.T
+    x, y = flat.T
+    order = np.arange(len(flat))
+    if (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() < 0:
+        order = order[::-1]
+    cut = np.asarray(triangulate([flat[order]]), dtype=np.int64).reshape(-1, 3)
+    turned = order[cut]
+    return turned if order[0] == 0 else turned[:, ::-1]
+
+
+def file_beside(mesh: Path, name: str) -> Path:
+    """The file that a mesh names, or the one with its base name beside the mesh.
+
+    Raises:
+        InputError: there is none in the folder of the mesh; links that lead out do not count.
+    """
+    folder = mesh.parent.resolve()
+    parts = PureWindowsPath(name.strip().strip('"')).parts  # takes both kinds of slashes
+    wanted = Path(*parts) if parts else Path()
+    for file in (wanted, Path(wanted.name)):
+        found = _without_case(folder, file)
+        if found is not None and found.resolve().is_relative_to(folder) and found.is_file():
+            if found.stat().st_size > MAX_PICTURE_BYTES:
+                raise InputError(f"{name} is over 1 GiB: reduce it")
+            return found
+    raise InputError(f"{name} is not in the folder of the mesh")
+
+
+def uri_bytes(mesh: Path, uri: str) -> bytes:
+    """The bytes that a URI holds, or those of a file beside the mesh."""
+    if uri.startswith("data:"):
+        return b64decode(uri.partition(",")[2])
+    return file_beside(mesh, unquote(uri)).read_bytes()
+
+
+def _without_case(folder: Path, file: Path) -> Path | None:
+    """The file as it is spelt, or with other capitals where only these differ."""
+    if not file.name or ".." in file.parts or file.is_absolute():
+        return None
+    if (folder / file).is_file():
+        return folder / file
+    parent = (folder / file).parent
+    here = sorted(parent.iterdir()) if parent.is_dir() else []
+    return next((p for p in here if p.name.casefold() == file.name.casefold()), None)
+
+
+def texture_beside(mesh: Path, name: str, notes: list[str]) -> Bytes | None:
+    """A picture that a mesh names, as bytes (h, w, 3); None, and a note, where it is not there."""
+    try:
+        file = file_beside(mesh, name)
+    except InputError as error:
+        notes.append(f"its texture {error}")
+        return None
+    return texture(file.read_bytes(), file.name, notes)
+
+
+def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:
+    """The picture of a texture, as bytes (h, w, 3); None, and a note, where it cannot be read."""
+    try:
+        try:
+            return shown_bytes(picture_of(data, name))
+        except InputError:
+            shown = shown_bytes(picture_of(data, name, ignore_alpha=True))
+            notes.append(f"the transparency of its texture {name} is left out")
+            return shown
+    except InputError as error:
+        notes.append(f"its texture {error}")
+        return None
+
+
+def shown_bytes(picture: Picture) -> Bytes:
+    """A picture (h, w) or (h, w, 3) as bytes (h, w, 3); real numbers are light."""
+    if picture.dtype == np.uint16:
+        picture = np.rint(picture / 257).astype(np.uint8)
+    elif picture.dtype != np.uint8:
+        picture = np.rint(255 * srgb(picture.astype(np.float64).clip(0, 1))).astype(np.uint8)
+    return np.ascontiguousarray(np.dstack([picture] * 3) if picture.ndim == 2 else picture)
+
+
+def warn_of_small_object(
+    name: str, size_mm: float, capture_mm: float, other_units: Iterable[str]
+) -> None:
+    """Warn of an object whose size is likely to be in another unit.
+
+    Args:
+        name: of the object.
+        size_mm: longest side of the box that holds it.
+        capture_mm: diameter of the capture sphere.
+        other_units: in which it would have the size of an object.
+    """
+    if size_mm >= SMALL_SHARE * capture_mm:
+        return
+    units = " or ".join(f"--unit {unit}" for unit in other_units) or "another --unit"
+    _warn(
+        f"{name} is {size_mm:.3g} mm large, the capture sphere {capture_mm:g} mm: give {units}, "
+        "scale it, or use --fit"
+    )
+
+
+def warn_of_left_out(name: str, what: Sequence[str]) -> None:
+    """Warn of what an object's file names that was not found, not understood or left out."""
+    _warn(f"{name}: {'; '.join(what)}")
+
+
+def units_that_fit(size: float, capture_mm: float) -> list[str]:
+    """Units in which a size is that of an object that fills a good part of the capture sphere."""
+    return [
+        name
+        for name, mm in LIKELY_UNITS_MM.items()
+        if SMALL_SHARE * capture_mm <= size * mm <= capture_mm
+    ]
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, PlausibilityWarning, stacklevel=3)

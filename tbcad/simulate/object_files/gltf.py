@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.beside import uri_bytes
-from tbcad.simulate.object_files.contents import ObjectFile, without_facets
-from tbcad.simulate.object_files.gltf_geometry import Accessors, primitive_part
-from tbcad.simulate.object_files.gltf_materials import Materials
+from tbcad.simulate.object_files.contents import ObjectFile, uri_bytes, without_facets
+from tbcad.simulate.object_files.gltf_meshes import Accessors, Materials, primitive_part
 from tbcad.types import Floats
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942

@@ -12,9 +12,9 @@ from tbcad.simulate.object_files.contents import (
     Part,
     shown_shares,
     text_of,
+    triangles,
     without_facets,
 )
-from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Floats, Ints
 
 HEADER = re.compile(r"(ST)?(C)?(N)?OFF\b")

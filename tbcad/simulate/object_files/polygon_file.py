@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.beside import texture_beside
-from tbcad.simulate.object_files.contents import ObjectFile, Part, shown_shares, without_facets
+from tbcad.simulate.object_files.contents import (
+    ObjectFile,
+    Part,
+    shown_shares,
+    texture_beside,
+    triangles,
+    without_facets,
+)
 from tbcad.simulate.object_files.ply_tables import List, Values, read_tables
-from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Bytes, Floats, Ints
 
 COLOURS = (("red", "green", "blue"), ("r", "g", "b"),

@@ -7,17 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.beside import file_beside, texture_beside
 from tbcad.simulate.object_files.contents import (
     ROUNDING,
     ObjectFile,
     Part,
     even,
+    file_beside,
     shown_shares,
     text_of,
+    texture_beside,
+    triangles,
     without_facets,
 )
-from tbcad.simulate.object_files.polygons import triangles
 from tbcad.types import Floats, Ints
 
 OPTIONS = re.compile(r"((?:-[a-z]+(?:\s+(?:on|off|[-+.\de]+|[rgbmlz]))+\s+)*)(.*)", re.IGNORECASE)

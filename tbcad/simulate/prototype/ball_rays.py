@@ -4,18 +4,16 @@ Along given directions, in the whole photograph of a stop, or in the pixels that
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
 from tbcad.compiled import compiled
 from tbcad.geometry.vectors import dot
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.optics.reflection import reflect
-from tbcad.simulate.capture.photograph import Samples, row_bands, sample_shifts, to_bytes
-from tbcad.simulate.parallel import in_threads
+from tbcad.simulate.capture.photograph import Samples, sample_shifts, to_bytes
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.simulate.scene.rays import within_walls
@@ -106,10 +104,9 @@ def reflected_colours(scene: Scene, hits: BallHits) -> Colours:
     return colour
 
 
-def camera_colours(run: PrototypeRun, scene: Scene, direction: Floats, stop: Ints) -> Colours:
-    """What the camera records along unit directions (n, 3) at stops (n,), 0 to 255."""
-    hits = trace_balls(run, direction, stop)
-    front, direct = object_in_front(scene, run.camera.pinhole, direction, hits.distance)
+def camera_colours(scene: Scene, pinhole: Floats, direction: Floats, hits: BallHits) -> Colours:
+    """What a camera records along unit directions (n, 3) that meet balls, 0 to 255."""
+    front, direct = object_in_front(scene, pinhole, direction, hits.distance)
     return np.where(front[:, None], direct, reflected_colours(scene, hits))
 
 
@@ -124,21 +121,6 @@ def image_points(camera: LensCamera, direction: Floats) -> Floats:
     return np.asarray(np.clip(pixels, 0, last))
 
 
-def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: Samples = 1) -> Bytes:
-    """The whole photograph of a stop, (h, w, 3).
-
-    Args:
-        run: of camera a's mirrors, or of camera b's with the object turned.
-        scene: the object.
-        stop: number of the stop, from 0.
-        samples: a pixel is the mean of these rays.
-    """
-    height, width = run.camera.height_px, run.camera.width_px
-    bands = [np.arange(rows.start * width, rows.stop * width) for rows in row_bands(height)]
-    colours = in_threads(partial(_pixels, run, scene, stop, samples), bands)
-    return np.concatenate(colours).reshape(height, width, 3)
-
-
 def resampled_photograph(
     run: PrototypeRun, scene: Scene, stop: int, samples: Samples, places: Floats
 ) -> Bytes:
@@ -149,7 +131,7 @@ def resampled_photograph(
     near, weight = between_pixels(places)
     pixel = near[..., 0] + near[..., 1] * run.camera.width_px
     traced, which = np.unique(pixel, return_inverse=True)
-    corners = _pixels(run, scene, stop, samples, traced)[which.reshape(len(places), 4)]
+    corners = photographed_pixels(run, scene, stop, samples, traced)[which.reshape(len(places), 4)]
     return to_bytes(np.einsum("nk,nkc->nc", weight, corners))
 
 
@@ -164,7 +146,9 @@ def between_pixels(places: Floats) -> tuple[Ints, Floats]:
     return corner[:, None] + CORNERS, weight
 
 
-def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels: Ints) -> Bytes:
+def photographed_pixels(
+    run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels: Ints
+) -> Bytes:
     """Pixels (n,) of a photograph, counted row by row, (n, 3)."""
     row, column = np.divmod(pixels, run.camera.width_px)
     centres = np.column_stack([column, row]).astype(np.float64)
@@ -172,7 +156,9 @@ def _pixels(run: PrototypeRun, scene: Scene, stop: int, samples: Samples, pixels
     total = np.zeros((len(pixels), 3), dtype=np.float32)
     shifts = sample_shifts(samples)
     for shift in shifts:
-        total += camera_colours(run, scene, run.camera.directions(centres + shift), stops)
+        direction = run.camera.directions(centres + shift)
+        hits = trace_balls(run, direction, stops)
+        total += camera_colours(scene, run.camera.pinhole, direction, hits)
     return to_bytes(total / np.float32(len(shifts)))
 
 

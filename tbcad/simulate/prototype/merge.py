@@ -15,16 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import unit
-from tbcad.optics.lens_camera import without_distortion
-from tbcad.simulate.capture.photograph import CENTRE, RowBand, Tracer, row_bands
+from tbcad.optics.camera import without_distortion
+from tbcad.simulate.capture.photograph import (
+    CENTRE,
+    RowBand,
+    Samples,
+    Tracer,
+    row_bands,
+)
 from tbcad.simulate.parallel import in_batches, in_threads
 from tbcad.simulate.prototype.ball_rays import (
     BallHits,
     image_points,
+    resampled_photograph,
     trace_balls,
     trace_own_ball,
 )
 from tbcad.simulate.prototype.run import PrototypeRun
+from tbcad.simulate.scene.ray_casting import Scene, object_in_front
 from tbcad.simulate.scene.rays import ReflectedRays, Shift, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import MARGIN_PX
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
@@ -238,3 +246,46 @@ def _band(plan: MergePlan, colours: Callable[[range, Bools], Bytes], rows: range
 
 def _resampled_colours(picture: Bytes, rows: range, shown: Bools) -> Bytes:
     return np.asarray(picture[rows.start : rows.stop].reshape(-1, 3) * shown[:, None])
+
+
+@dataclass(frozen=True)
+class SimulatedPhotographs:
+    """What the photographs of a run's stops show of a scene.
+
+    Attributes:
+        run: the run.
+        scene: the object.
+        samples: a pixel is the mean of these rays.
+    """
+
+    run: PrototypeRun
+    scene: Scene
+    samples: Samples = 1
+
+    def colours(self, stop: int, places: Floats) -> Bytes:
+        """Colours (n, 3) of a stop's photograph at columns and rows (n, 2)."""
+        return resampled_photograph(self.run, self.scene, stop, self.samples, places)
+
+    def in_front(self, mirror: Ints, direction: Floats, distance: Floats) -> Bools:
+        """Where (n,) the object is before what camera rays meet at distances (n,), mm."""
+        del mirror
+        return object_in_front(self.scene, self.run.camera.pinhole, direction, distance)[0]
+
+
+def merge_run(
+    run: PrototypeRun,
+    scene: Scene,
+    samples: Samples = 1,
+    progress: Progress = lambda _: None,
+) -> Iterator[RowBand]:
+    """Bands of the merged picture from top to bottom.
+
+    Args:
+        run: for camera a's mirrors or camera b's.
+        scene: the object.
+        samples: a pixel of the photographs is the mean of these rays.
+        progress: called with each step.
+    """
+    photographs = SimulatedPhotographs(run, scene, samples)
+    plan = merge_plan(run, scene.radius, photographs.in_front)
+    yield from merge_photographs(plan, photographs, progress)

@@ -104,7 +104,6 @@ class Plan:
     parted: bool = False
 
     def __len__(self) -> int:
-        """Number of balls."""
         return len(self.radius)
 
     @property

@@ -13,8 +13,8 @@ import numpy as np
 
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import dot, unit
-from tbcad.optics.highlights import reflection_points
-from tbcad.optics.lens_camera import LensCamera, without_distortion
+from tbcad.optics.camera import LensCamera, without_distortion
+from tbcad.optics.reflection import reflection_points
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
@@ -50,7 +50,6 @@ class PrototypeRun:
     parted: bool = False
 
     def __len__(self) -> int:
-        """Number of stops."""
         return len(self.balls)
 
 

@@ -10,7 +10,16 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.geometry.smallest_sphere import smallest_sphere
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.object_files.contents import UNITS_MM, ObjectFile, Part, Up, without_facets
+from tbcad.simulate.object_files.contents import (
+    UNITS_MM,
+    ObjectFile,
+    Part,
+    Up,
+    units_that_fit,
+    warn_of_left_out,
+    warn_of_small_object,
+    without_facets,
+)
 from tbcad.simulate.object_files.normals import (
     corner_normals,
     facet_vectors,
@@ -19,7 +28,6 @@ from tbcad.simulate.object_files.normals import (
     usable,
 )
 from tbcad.simulate.object_files.read import read_object_file
-from tbcad.simulate.plausibility import units_that_fit, warn_of_left_out, warn_of_small_object
 from tbcad.simulate.scene.object import GREY, Reading, SceneObject, built_in_object
 from tbcad.types import Bytes, Floats, Ints, Progress
 

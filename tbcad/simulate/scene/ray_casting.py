@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.geometry.vectors import dot, unit
+from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.object import SceneObject, pattern
 from tbcad.simulate.scene.point_lights import PointLights, Spots, lamp_light
 from tbcad.simulate.scene.rays import meets_sphere
@@ -21,6 +22,7 @@ SKY_LIGHT = 0.35
 BACKGROUND = 0
 # Of glossy surfaces: Phong's exponent, half the highlight's light within 11 degrees of its middle.
 GLOSS_EXPONENT = 40
+RAYS_PER_CHUNK = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -196,6 +198,13 @@ def _light(scene: Scene, hits: SurfaceHits) -> Floats:
     if scene.lamps is not None:
         return lamp_light(scene.embree, hits.spots(scene.subject), scene.lamps)
     return hits.light(scene.subject, scene.shade)[:, None]
+
+
+def colours_along(scene: Scene, origin: Floats, direction: Floats) -> Colours:
+    """Colours (n, 3), 0 to 255, along rays (n, 3), in threads."""
+    parts = chunks(len(origin), RAYS_PER_CHUNK)
+    colours = in_threads(lambda part: cast_rays(scene, origin[part], direction[part]).colour, parts)
+    return np.concatenate([np.zeros((0, 3), dtype=np.float32), *colours])
 
 
 def object_in_front(

@@ -34,7 +34,6 @@ class Reflector:
     cells: Cells
 
     def __len__(self) -> int:
-        """Number of mirrors."""
         return len(self.u)
 
     @property

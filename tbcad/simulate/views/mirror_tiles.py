@@ -1,6 +1,7 @@
 """The captured rays of each mirror: a rectangle of pixels, read when first needed."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,12 @@ def _widths(apex: Floats) -> Floats:
     return np.reshape(distance, (len(apex), -1))[:, -1]
 
 
-def _tile(frame: Frame, index: int) -> MirrorTile | None:
+def mirror_pixels(frame: Frame, index: int) -> tuple[Bools, list[NDArray[Any]]] | None:
+    """The smallest rectangle with all pixels of a mirror; None where it has none.
+
+    Returns:
+        Which are of the mirror, (h, w); and colours, origins and directions, (h, w, 3) each.
+    """
     x0, x1, y0, y1 = frame.boxes[index].tolist()
     pixels = frame.read(slice(y0, y1), slice(x0, x1))
     valid = pixels["mirror"] == index + 1
@@ -111,13 +117,17 @@ def _tile(frame: Frame, index: int) -> MirrorTile | None:
         return None
     rows, columns = (np.flatnonzero(valid.any(axis=axis)) for axis in (1, 0))
     cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    valid = np.pad(valid[cut], 1)
+    return valid[cut], [pixels[name][cut] for name in ("colour", "origin", "direction")]
+
+
+def _tile(frame: Frame, index: int) -> MirrorTile | None:
+    found = mirror_pixels(frame, index)
+    if found is None:
+        return None
+    valid = np.pad(found[0], 1)
     height, width = valid.shape
     valid = valid.ravel()
-    colour, origin, direction = (
-        np.pad(pixels[name][cut], BORDER).reshape(-1, 3)
-        for name in ("colour", "origin", "direction")
-    )
+    colour, origin, direction = (np.pad(one, BORDER).reshape(-1, 3) for one in found[1])
     pinhole, spread = convergence_point(origin[valid], direction[valid])
     middle = _middle(valid, height, width)
     return MirrorTile((height, width), valid, colour, origin, direction, pinhole, spread, middle)

@@ -1,5 +1,6 @@
 """A large lens made of many pinholes (section 4.3 of the paper): the mean of their pictures."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -7,13 +8,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.errors import InputError
+from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import in_batches
-from tbcad.simulate.plausibility import warn_of_wide_lens
 from tbcad.simulate.scene.rays import unit_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.ray_bundle import two_plane_along
 from tbcad.simulate.views.synthesis import (
     DepthFunction,
     Rays,
@@ -23,12 +24,13 @@ from tbcad.simulate.views.synthesis import (
     rays_to_capture_sphere,
     search_radius,
 )
-from tbcad.simulate.views.two_plane import two_plane_along
 from tbcad.types import Bools, Colours, Floats, Ints, Progress
 
 # 69 points of a square lattice, the paper's number of pinholes, are within this squared radius
 # in steps of the lattice.
 LATTICE_RADIUS2 = 20
+# A lens as wide as it is far away is seen from the object under 53 degrees: wider than F/1.
+WIDE_LENS = 1.0
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,12 @@ class ThinLens:
                 f"--focus {self.plane_mm:g} is far from the object: allowed is "
                 f"{-limit:g} to {limit:g} mm from its middle, toward the camera"
             )
-        warn_of_wide_lens(self.aperture_mm, distance)
+        if self.aperture_mm > WIDE_LENS * distance:
+            text = (
+                f"--aperture {self.aperture_mm:g} is more than --distance {distance:g}: a lens so "
+                "wide blurs all but one plane and looks past the mirrors; both are in mm"
+            )
+            warnings.warn(PlausibilityWarning(text), stacklevel=2)
 
 
 def lens_pinholes(radius2: int = LATTICE_RADIUS2) -> Floats:

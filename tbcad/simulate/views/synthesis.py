@@ -17,12 +17,13 @@ from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.nearest import nearest_rays
 from tbcad.simulate.views.ray_bundle import (
     RayBundle,
+    TwoPlane,
     boxes_around,
     mirrors_near_boxes,
     ray_bundle,
+    two_plane_along,
 )
-from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
-from tbcad.types import Bools, Bytes, Colours, Floats, Ints
+from tbcad.types import Bools, Colours, Floats, Ints
 
 # The pixels of a block are a run of target rays.
 BLOCK_PX = 8
@@ -54,7 +55,6 @@ class SynthesisedView:
         return np.rint(self.colour).astype(np.uint8)
 
     def __repr__(self) -> str:
-        """Return size and the share that was seen."""
         rows, columns = self.seen.shape
         return f"<SynthesisedView: {columns} x {rows}, {self.seen.mean():.1%} seen>"
 
@@ -86,7 +86,10 @@ def synthesise(
         rest = (rays[0][~seen], rays[1][~seen])
         bundle = nearby_rays(tiles, two_plane, rest, horizon_search_radius(tiles))
         colours[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
-    return SynthesisedView(*_picture(view.height_px, view.width_px, pixels, colours, seen))
+    shape = view.height_px, view.width_px
+    picture, complete = np.zeros((*shape, 3), dtype=np.float32), np.ones(shape, dtype=bool)
+    picture.reshape(-1, 3)[pixels], complete.reshape(-1)[pixels] = colours, seen
+    return SynthesisedView(picture, complete)
 
 
 def _rays_of_view(tiles: MirrorTiles, view: Camera) -> tuple[Ints, Rays]:
@@ -127,21 +130,6 @@ def _through_sphere(
     return pixels[:count], directions[:count]
 
 
-@compiled
-def _picture(
-    height: int, width: int, pixels: Ints, colours: Colours, seen: Bools
-) -> tuple[Colours, Bools]:
-    """Pixels with their colours as a picture, and what is seen: those, and all others."""
-    colour = np.zeros((height, width, 3), dtype=np.float32)
-    complete = np.ones((height, width), dtype=np.bool_)
-    for i in range(len(pixels)):
-        row, column = divmod(pixels[i], width)
-        complete[row, column] = seen[i]
-        for j in range(3):
-            colour[row, column, j] = colours[i, j]
-    return colour, complete
-
-
 def rays_to_capture_sphere(tiles: MirrorTiles, rays: Rays) -> tuple[Ints, Rays]:
     """Which rays (h, w, 3) meet the capture sphere, and those rays, (n, 3).
 
@@ -150,26 +138,9 @@ def rays_to_capture_sphere(tiles: MirrorTiles, rays: Rays) -> tuple[Ints, Rays]:
     """
     flat = [part.reshape(-1, 3) for part in rays]
     meets = meets_sphere(flat[0], flat[1], tiles.source.capture_mm / 2)
-    pixels, *chosen = _chosen(pixels_in_blocks(*rays[0].shape[:2]), meets, *flat)
-    return pixels, (chosen[0], chosen[1])
-
-
-@compiled
-def _chosen(
-    order: Ints, meets: Bools, origin: Floats, direction: Floats
-) -> tuple[Ints, Floats, Floats]:
-    """Those numbers of an order that are chosen, and their rays."""
-    pixels = np.empty(meets.sum(), dtype=np.int64)
-    origins, directions = np.empty((len(pixels), 3)), np.empty((len(pixels), 3))
-    count = 0
-    for pixel in order:
-        if meets[pixel]:
-            pixels[count] = pixel
-            for j in range(3):
-                origins[count, j] = origin[pixel, j]
-                directions[count, j] = direction[pixel, j]
-            count += 1
-    return pixels, origins, directions
+    order = pixels_in_blocks(*rays[0].shape[:2])
+    pixels = order[meets[order]]
+    return pixels, (flat[0][pixels], flat[1][pixels])
 
 
 @lru_cache(maxsize=4)
@@ -202,20 +173,10 @@ def ray_colours(
     targets = bundle.two_plane.coordinates(*rays)
     if method == "nearest":
         pixels = nearest_rays(bundle, targets)
-        return _colours_of(bundle.colour, pixels), pixels >= 0
+        seen = pixels >= 0
+        return np.where(seen[:, None], bundle.colour[pixels], np.float32(0)), seen
     colour, seen = blend_cameras(bundle, targets, _depths(bundle.two_plane, rays, depth))
     return colour.astype(np.float32), seen
-
-
-@compiled
-def _colours_of(colour: Bytes, pixels: Ints) -> Colours:
-    """Colours (n, 3) of pixels; black for -1."""
-    result = np.zeros((len(pixels), 3), dtype=np.float32)
-    for i in range(len(pixels)):
-        if pixels[i] >= 0:
-            for j in range(3):
-                result[i, j] = colour[pixels[i], j]
-    return result
 
 
 def search_radius(tiles: MirrorTiles) -> float:

@@ -15,13 +15,13 @@ from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 

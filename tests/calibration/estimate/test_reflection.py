@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from tbcad.calibration.estimate.lens import projection
 from tbcad.calibration.estimate.reflection import reflections
 from tbcad.geometry.vectors import unit
-from tbcad.optics.highlights import reflection_points
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
+from tbcad.optics.reflection import reflection_points
 from tests.machine.test_record import CAMERA
 
 STEP = 1e-4

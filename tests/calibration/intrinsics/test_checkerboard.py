@@ -21,7 +21,7 @@ from tbcad.calibration.intrinsics.checkerboard import (
 )
 from tbcad.calibration.intrinsics.files import read_lens
 from tbcad.errors import InputError
-from tbcad.optics.lens_camera import LensCamera
+from tbcad.optics.camera import LensCamera
 
 SQUARES, SIZE_MM = (9, 6), 5.0
 WIDTH, HEIGHT, SAMPLES = 640, 480, 2

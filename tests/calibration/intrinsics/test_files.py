@@ -13,8 +13,7 @@ from tbcad.calibration.intrinsics.files import read_lens
 from tbcad.calibration.intrinsics.lens import Lens
 from tbcad.calibration.intrinsics.opencv import opencv_text
 from tbcad.errors import InputError
-from tbcad.optics.camera import Camera
-from tbcad.optics.lens_camera import without_distortion
+from tbcad.optics.camera import Camera, without_distortion
 
 LENS = Lens(
     focal=np.array([1058.3, 1057.9]),

@@ -10,7 +10,7 @@ from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES, NotRegularError
 from tbcad.optics.reflection import reflect
 from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.trace import coverage_diameters
+from tbcad.optics.windows import coverage_diameters
 from tests.mirror_arrays import mirror_array
 from tests.pedestal_designs import GROOVE, pedestals
 

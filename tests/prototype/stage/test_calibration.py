@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.optics.highlights import reflection_points
+from tbcad.optics.reflection import reflection_points
 from tbcad.prototype.stage.calibration import (
     NOISE_PX,
     calibration_estimate,

@@ -1,8 +1,9 @@
 """Capture with the prototype: its plan as read, its photographs, and what is merged of them."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,27 +16,37 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
-from tbcad.simulate.capture.photograph import CENTRE, RowBand
+from tbcad.simulate.capture.photograph import CENTRE, RowBand, sample_shifts, to_bytes
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
 from tbcad.simulate.prototype.ball_rays import (
     image_points,
+    reflected_colours,
     resampled_photograph,
-    stop_photograph,
     trace_balls,
+)
+from tbcad.simulate.prototype.merge import (
+    MergePlan,
+    SimulatedPhotographs,
+    merge_plan,
+    merge_run,
+    merged_bands,
+    merged_pixels,
 )
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.prototype.run import PrototypeRun, ball_reflector, prototype_runs
-from tbcad.simulate.prototype.simulated_merge import Resample, merge_run
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.ray_casting import Scene, object_in_front, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
+from tbcad.types import Bools, Bytes
 from tests.exported_files import Rows, edit_csv, edit_json
+from tests.photographed_runs import stop_photograph
 from tests.prototype_exports import plan_of
 from tests.simulate.conftest import CAPTURE_MM
 
 Runs = tuple[PrototypeRun, PrototypeRun]
+Merge = Callable[..., Iterator[RowBand]]
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +59,28 @@ def merged(runs: Runs, knot: Scene) -> LightField:
     return merged_light_field(runs, knot)
 
 
-def merged_light_field(runs: Runs, scene: Scene, resample: Resample = "photograph") -> LightField:
-    photographs = ((ball_reflector(run), merge_run(run, scene, resample)) for run in runs)
+def merged_light_field(runs: Runs, scene: Scene, merge: Merge = merge_run) -> LightField:
+    photographs = ((ball_reflector(run), merge(run, scene)) for run in runs)
     return light_field_in_memory(photographs, CAPTURE_MM)
+
+
+def traced(plan: MergePlan, photographs: SimulatedPhotographs, rows: range, _: Bools) -> Bytes:
+    """Colours (n, 3) along the rotated directions themselves."""
+    pinhole, scene = plan.run.camera.pinhole, photographs.scene
+    total = np.zeros((len(rows) * plan.run.reflector.camera.width_px, 3), dtype=np.float32)
+    shifts = sample_shifts(photographs.samples)
+    for shift in shifts:
+        _mirror, hits, front, direction = merged_pixels(plan, rows, shift)
+        direct = object_in_front(scene, pinhole, direction, hits.distance)[1]
+        total += np.where(front[:, None], direct, reflected_colours(scene, hits))
+    return to_bytes(total / np.float32(len(shifts)))
+
+
+def traced_merge(run: PrototypeRun, scene: Scene, samples: int = 1) -> Iterator[RowBand]:
+    """The merged picture without photographs between."""
+    photographs = SimulatedPhotographs(run, scene, samples)
+    plan = merge_plan(run, scene.radius, photographs.in_front)
+    yield from merged_bands(plan, partial(traced, plan, photographs), lambda _: None)
 
 
 def ideal(layout: PrototypeLayout, angle: float) -> Plan:
@@ -193,12 +223,12 @@ class TestPhotographs:
 
 
 class TestMerged:
-    @pytest.mark.parametrize("resample", ["exact", "photograph"])
+    @pytest.mark.parametrize("merge", [traced_merge, merge_run])
     def test_balls_like_the_mirrors_give_the_shells_picture(
         self,
         layout: PrototypeLayout,
         cameras: tuple[Reflector, Reflector],
-        resample: Resample,
+        merge: Merge,
     ) -> None:
         """Also where the object, which is too large, hides mirrors.
 
@@ -206,7 +236,7 @@ class TestMerged:
         """
         scene = prepared_scene(built_in_object(1.7 * CAPTURE_MM))
         ideal_runs = prototype_runs(cameras, ideal(layout, 0.7))
-        found = merged_light_field(ideal_runs, scene, resample)
+        found = merged_light_field(ideal_runs, scene, merge)
         for at in cameras:
             shell = list(shell_photograph(at.camera, exact_tracer(at), scene))
             planes = found.frames[at.camera_id].planes
@@ -263,7 +293,7 @@ class TestMerged:
     def test_photographs_are_close_to_exact_rays(
         self, merged: LightField, runs: Runs, knot: Scene
     ) -> None:
-        sharp = merged_light_field(runs, knot, "exact")
+        sharp = merged_light_field(runs, knot, traced_merge)
         for camera, frame in merged.frames.items():
             other = sharp.frames[camera]
             for name in RAYS:
@@ -277,8 +307,8 @@ class TestMerged:
         """A camera of a narrower lens takes no rays beyond its frame, and no colours."""
         wide = runs[0].camera
         narrow = replace(runs[0], camera=replace(wide, focal=1.4 * wide.focal))
-        for resample in ("exact", "photograph"):
-            bands = list(merge_run(narrow, knot, resample))  # type: ignore[arg-type]
+        for merge in (traced_merge, merge_run):
+            bands = list(merge(narrow, knot))
             mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
             place = narrow.camera.project(origin[mirror > 0])
             assert (place >= -1e-6).all()
@@ -289,10 +319,9 @@ class TestMerged:
             assert not np.concatenate([band.colour for band in bands])[lost].any()
 
     def test_more_samples_smooth(self, runs: Runs, knot: Scene) -> None:
-        for resample in ("exact", "photograph"):
+        for merge in (traced_merge, merge_run):
             one, many = (
-                np.concatenate([b.colour for b in merge_run(runs[0], knot, resample, n)])
-                for n in (1, 2)
+                np.concatenate([b.colour for b in merge(runs[0], knot, n)]) for n in (1, 2)
             )
             rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
             assert rough[1] < 0.95 * rough[0]

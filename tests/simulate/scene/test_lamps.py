@@ -9,7 +9,7 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.scene.lamps import Lamps, irradiance, lit_by, read_lamps
+from tbcad.simulate.prototype.lamps import Lamps, irradiance, lit_by, read_lamps
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 

@@ -10,7 +10,7 @@ from PIL import Image
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.geometry.vectors import norm, unit
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.scene.lamps import Lamps, lit_by
+from tbcad.simulate.prototype.lamps import Lamps, lit_by
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.point_lights import PointLights

@@ -11,16 +11,16 @@ from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.simulate.capture.light_field import light_field_in_memory
 from tbcad.simulate.capture.photograph import photograph, to_bytes
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.ground_truth import pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import mirror_coverage
 from tbcad.tolerance.montecarlo.draws import draw

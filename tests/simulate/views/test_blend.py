@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.simulate.image_quality import image_quality
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.blend import CAMERAS, blend_cameras
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.pixels_about import SIGMA_PX
 from tbcad.simulate.views.ray_bundle import RayBundle
 from tbcad.simulate.views.synthesis import nearby_rays, search_radius
+from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.types import Bools, Floats, Ints
 from tests.simulate.views.test_nearest import targets_of
 

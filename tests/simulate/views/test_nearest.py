@@ -11,8 +11,8 @@ from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.mirror_tiles import MirrorTiles, convergence_point
 from tbcad.simulate.views.nearest import nearest_rays
+from tbcad.simulate.views.ray_bundle import TwoPlane, two_plane_along
 from tbcad.simulate.views.synthesis import Rays, nearby_rays, search_radius
-from tbcad.simulate.views.two_plane import TwoPlane, two_plane_along
 
 CAPTURE_MM = 60.0
 EXACT = 0.9995

@@ -9,20 +9,20 @@ import pytest
 from PIL import Image
 
 import tbcad
-from tbcad.depth.view import depth_views
+from tbcad.depth.depth_map import depth_views
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.image_quality import image_quality
-from tbcad.simulate.scene.ground_truth import lens_picture, pinhole_picture
 from tbcad.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.simulate.views.ground_truth import lens_picture, pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.ray_bundle import two_plane_along
 from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, lens_rays, refocus, refocus_sweep
 from tbcad.simulate.views.synthesis import horizon_search_radius, synthesise
-from tbcad.simulate.views.two_plane import two_plane_along
+from tbcad.simulate.views.viewpoints import image_quality
 
 SIZE = (160, 120)
 

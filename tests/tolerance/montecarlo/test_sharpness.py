@@ -15,7 +15,7 @@ from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.study.viewpoints import ground_truths
+from tbcad.simulate.views.viewpoints import ground_truths
 from tbcad.spec.load import load_spec
 from tbcad.tolerance.montecarlo.coverage import mirror_coverage
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw

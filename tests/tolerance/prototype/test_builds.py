@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.reflection import sphere_miss_distances
 from tbcad.optics.windows import cell_windows
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
@@ -35,6 +34,7 @@ from tbcad.tolerance.prototype.windows import (
     run_pose,
 )
 from tests.prototype_exports import plan_of
+from tests.sphere_misses import sphere_miss_distances
 
 SPREAD = {
     "ball_radius": Error(0.05),

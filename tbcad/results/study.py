@@ -1,0 +1,95 @@
+"""What a study found, and its files."""
+
+import errno
+import os
+from dataclasses import astuple, dataclass
+from pathlib import Path
+
+from tbcad.atomic_files import replace_files, write_errors_as_input_errors
+from tbcad.figure_files import PlotFormat
+from tbcad.results.plots import Panel, plot_file
+from tbcad.results.tables import Cell, Table, csv_text
+
+SUMMARY_COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure that a study measured, beside the paper's.
+
+    Attributes:
+        quantity: what it is.
+        unit: "" for numbers without one.
+        value: as measured; None where there is none.
+        paper: as the paper states it; None where it does not.
+        where: place in the paper.
+    """
+
+    quantity: str
+    unit: str
+    value: Cell
+    paper: Cell = None
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study's findings.
+
+    Attributes:
+        name: of its files.
+        figures: the most important ones, beside the paper's.
+        tables: all figures.
+        panels: of the plot.
+        notes: what the figures mean, besides the notes of the tables.
+    """
+
+    name: str
+    figures: tuple[Figure, ...]
+    tables: tuple[Table, ...]
+    panels: tuple[Panel, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> Table:
+        """The figures as a table."""
+        rows = tuple(astuple(figure) for figure in self.figures)
+        return Table(f"{self.name}-summary", SUMMARY_COLUMNS, rows, self.notes)
+
+
+def check_study_folder(out: Path) -> None:
+    """Check, before any work, that files can be written into a folder, which need not exist.
+
+    Raises:
+        InputError: they cannot.
+    """
+    with write_errors_as_input_errors(out):
+        absolute = out.absolute()
+        existing = next(folder for folder in (absolute, *absolute.parents) if folder.exists())
+        if not existing.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{existing} is a file")
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, "no right to write there")
+
+
+def write_study(
+    study: Study, out: Path, more: dict[str, bytes] | None = None, plot: PlotFormat = "png"
+) -> list[Path]:
+    """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    with write_errors_as_input_errors(out):
+        out.mkdir(parents=True, exist_ok=True)
+    return replace_files(out, study_files(study, plot) | (more or {}))
+
+
+def study_files(study: Study, plot: PlotFormat = "png") -> dict[str, bytes]:
+    """The files of a study by name: the same study gives the same bytes."""
+    tables = (study.summary, *study.tables)
+    files = {f"{table.name}.csv": csv_text(table).encode() for table in tables}
+    notes = [note for table in tables for note in table.notes]
+    files[f"{study.name}-notes.txt"] = "".join(f"{note}\n" for note in notes).encode()
+    files[f"{study.name}.{plot}"] = plot_file(study.panels, plot)
+    return files

@@ -1,0 +1,214 @@
+"""Which balance of virtual cameras and pixels is best for which object (section 6).
+
+A ball about the origin is seen at a distance of its radius from the reference plane, which goes
+through the origin; a matt surface sends the same light in all directions, a glossy one does not.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.optics.camera import Camera
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
+from tbcad.simulate.capture.traced_frame import traced_light_field
+from tbcad.simulate.scene.object import patterned_ball
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import (
+    StudyMethod,
+    ground_truths,
+    image_quality_map,
+    object_masks,
+    viewpoints_over_hemisphere,
+    views_by,
+)
+from tbcad.spec.design import Spec
+from tbcad.studies.paper import with_lens_of_table_i
+from tbcad.studies.sweep import MAX_N, try_design
+from tbcad.types import Bools, Bytes, Progress
+
+SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
+NEAR, FAR = 0.3, 0.98  # radius of the ball, in that of the capture sphere
+GLOSS = 1.0  # highlights as bright as the lamps
+COLUMNS = ("n", "virtual_cameras", "pixels", "surface", "radius_mm", "ssim_on_object", "reason")
+NOTES = (
+    "ssim_on_object: mean of the local SSIM where the truth shows the object, over all views of "
+    "640 x 480 pixels, evenly over the hemisphere. pixels: mean number that a virtual camera has "
+    "on the capture sphere.",
+    "The sensor is that of the design, n is varied: more virtual cameras have fewer pixels each. "
+    "Lens of Table I for the paper's design.",
+    "radius_mm: of a ball about the origin with the built-in pattern; its surface is as far from "
+    "the reference plane as its radius. glossy: with highlights of both lamps (Phong, exponent "
+    "40).",
+)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One object with its truth.
+
+    Attributes:
+        surface: "matt" or "glossy".
+        radius_mm: of the ball.
+        scene: the ball.
+        truths: from each viewpoint, (h, w, 3).
+        masks: where they show it, (h, w).
+    """
+
+    surface: str
+    radius_mm: float
+    scene: Scene
+    truths: list[Bytes]
+    masks: list[Bools]
+
+    @property
+    def name(self) -> str:
+        """For legends."""
+        return f"{self.surface}, {self.radius_mm:g} mm from the reference plane"
+
+
+def parse_subdivisions(given: list[int] | None) -> tuple[int, ...]:
+    """Subdivisions n in ascending order, each once; by default SUBDIVISIONS.
+
+    Raises:
+        InputError: no design has one of them.
+    """
+    ns = tuple(sorted(set(given or SUBDIVISIONS)))
+    if ns[0] < 2 or ns[-1] > MAX_N:
+        wrong = ns[0] if ns[0] < 2 else ns[-1]
+        raise InputError(f"--n is {wrong}, allowed is 2 to {MAX_N}: change it")
+    return ns
+
+
+def balance(
+    spec: Spec,
+    ns: tuple[int, ...],
+    views: int,
+    distance_mm: float,
+    method: StudyMethod,
+    progress: Progress = lambda _: None,
+) -> Study:
+    """The study: SSIM of views over n at the design's sensor, for four objects.
+
+    Args:
+        spec: the design.
+        ns: subdivisions.
+        views: number of viewpoints, evenly over the hemisphere.
+        distance_mm: of the viewpoints.
+        method: how views are made.
+        progress: called with each step.
+    """
+    spec = with_lens_of_table_i(spec)
+    viewpoints = viewpoints_over_hemisphere(views, distance_mm)
+    cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
+    seen = subjects(spec.optics.capture_diameter_mm, cameras, progress)
+    records = [one for n in ns for one in _of_n(spec, n, seen, cameras, method, progress)]
+    table = Table.of_records("balance", records, (f"Method: {method}.", *NOTES), COLUMNS)
+    best = [one for subject in seen for one in _best(table, subject)]
+    panels = (_panel(table, seen, method),)
+    return Study("balance", tuple(map(_figure, best)), (table, _best_table(best)), panels)
+
+
+def subjects(capture_mm: float, cameras: list[Camera], progress: Progress) -> list[Subject]:
+    """The four objects with their truth."""
+    result = []
+    for share in (NEAR, FAR):
+        radius = round(share * capture_mm / 2, 2)
+        matt = prepared_scene(patterned_ball(radius))
+        masks = object_masks(matt, cameras)
+        for surface, scene in (("matt", matt), ("glossy", replace(matt, gloss=GLOSS))):
+            truths = ground_truths(scene, cameras, progress)
+            result.append(Subject(surface, radius, scene, truths, masks))
+    return result
+
+
+def _of_n(
+    spec: Spec,
+    n: int,
+    seen: list[Subject],
+    cameras: list[Camera],
+    method: StudyMethod,
+    progress: Progress,
+) -> list[Record]:
+    """A row for each object, or for what a refusal of the design says."""
+    attempt = try_design(spec, optics={"n": n})
+    head: Record = {**dict.fromkeys(COLUMNS), "n": n, "reason": attempt.reason}
+    if attempt.design is None:
+        return [head]
+    head |= _counts(attempt.design)
+    rows = []
+    for subject in seen:
+        progress(f"n = {n}: {subject.name}")
+        value = ssim_on_object(attempt.design, subject, cameras, method)
+        own: Record = {
+            "surface": subject.surface,
+            "radius_mm": subject.radius_mm,
+            "ssim_on_object": value,
+        }
+        rows.append({**head, **own})
+    return rows
+
+
+def _counts(design: MirrorDesign) -> Record:
+    array, camera = design.arrays[0], design.spec.camera
+    sensor = Sensor(camera.width_px, camera.height_px)
+    counts = count_pixels(array, (sensor,), design.spec.optics.capture_diameter_mm / 2)[0]
+    number = virtual_cameras(array)
+    return {"virtual_cameras": number, "pixels": float(2 * counts.seen.sum() / number)}
+
+
+def ssim_on_object(
+    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: StudyMethod
+) -> float:
+    """Mean local SSIM where the object is, over all views."""
+    tiles = MirrorTiles(traced_light_field(design, subject.scene))
+    view = views_by(method, tiles, subject.scene)
+    values = [
+        image_quality_map(truth, view(at))[1][mask].mean()
+        for at, truth, mask in zip(cameras, subject.truths, subject.masks, strict=True)
+    ]
+    return float(np.mean(values))
+
+
+def _rows(table: Table, subject: Subject) -> Table:
+    return table.where(surface=subject.surface, radius_mm=subject.radius_mm)
+
+
+def _best(table: Table, subject: Subject) -> list[Record]:
+    """The row with the highest SSIM, with the ratio of virtual cameras to pixels."""
+    rows = _rows(table, subject).records()
+    if not rows:
+        return []
+    best = max(rows, key=lambda row: float(row["ssim_on_object"] or 0))
+    ratio = float(best["virtual_cameras"] or 0) / float(best["pixels"] or 1)
+    return [{**best, "cameras_per_pixel": ratio, "object": subject.name}]
+
+
+def _best_table(best: list[Record]) -> Table:
+    columns = ("surface", "radius_mm", "n", "virtual_cameras", "pixels", "cameras_per_pixel")
+    return Table.of_records("balance-best", best, columns=(*columns, "ssim_on_object"))
+
+
+def _figure(best: Record) -> Figure:
+    return Figure(f"{best['object']}: best n", "", best["n"], where="section 6")
+
+
+def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> Panel:
+    styles = ("C0o-", "C0s--", "C1o-", "C1s--")
+    series = tuple(
+        Series(
+            subject.name,
+            _rows(table, subject).numbers("virtual_cameras")
+            / _rows(table, subject).numbers("pixels"),
+            _rows(table, subject).numbers("ssim_on_object"),
+            style,
+        )
+        for subject, style in zip(seen, styles, strict=True)
+    )
+    x_label = "virtual cameras per pixel of a virtual camera"
+    return Panel(f"Views by method {method}", x_label, "SSIM on the object", series, "x")

@@ -1,0 +1,261 @@
+"""Depth of the mirrors' virtual images, and the stop that a real lens would need (section 6)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.camera.lens import (
+    DepthRange,
+    Lens,
+    aperture_stop,
+    aperture_stops,
+    focal_length,
+    lens_for,
+)
+from tbcad.camera.virtual_images import FANS, PLACES, VirtualImages, virtual_images
+from tbcad.errors import InputError
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
+from tbcad.spec.design import Spec
+from tbcad.studies.paper import claimed, claims, with_lens_of_table_i
+from tbcad.studies.sweep import try_design
+from tbcad.types import Floats, Progress
+
+RULES = ("traced", "paper", "flat")
+POINTS = tuple(f"{place}_{fan}" for place in PLACES for fan in FANS)
+NUMBERS = (
+    *("polar_deg", "radius_mm", "incidence_deg", "to_mirror_mm"),
+    *(f"{point}_mm" for point in POINTS),
+    *(f"{point}_depth_mm" for point in POINTS),
+)
+NOTES = (
+    "Distances are from the camera's pinhole to the virtual image of a point of the capture "
+    "sphere on the mirror's principal ray: the nearest to the mirror, the centre, the farthest. "
+    "Coddington's equations; tangential and sagittal fans have images of their own.",
+    "_depth_: the same along the camera's optical axis, which is what a lens focuses on. The "
+    "camera is turned as the design turns it.",
+    "Mirrors of camera a; b's mirror them. Section 6 has 'the range of 150-250 mm from the camera' "
+    "in the paper's experiments, with its prototype, whose dimensions it does not state; read as "
+    "distances.",
+)
+LENS_NOTES = (
+    "A thin lens without aberrations or field curvature, stop at the lens, whose angle of view is "
+    "the design's; focused on the harmonic mean of the range's ends, where their blur is equal.",
+    "blur_px: geometric blur circle at both ends. airy_px: Airy disc of 550 nm on the axis; it is "
+    "larger off the axis. total_px: root of the sum of their squares.",
+    "blur limited: the largest pupil within --blur-px. sharpest: minimum total_px. light: relative "
+    "to the lens wide open (--wide-open); stops_lost: in factors of two. No stop is wider than "
+    "wide open.",
+    "The paper states neither aperture nor focal length: only that the aperture must be smaller "
+    "than with planar mirrors, and 100 ms of exposure.",
+)
+CONSTANT = "camera to images of the centre, flat radii: farthest less nearest"
+PAPER_RANGE = "the paper's distances"
+RANGES_SHOWN = ("traced radii, along the axis", PAPER_RANGE)
+# Columns of the stops that are figures of the study: what they are called, and their units.
+STOP_FIGURES = {
+    "pupil_mm": ("pupil", "mm"),
+    "f_number": ("F-number", ""),
+    "blur_px": ("blur circle", "px"),
+    "total_px": ("blur and diffraction", "px"),
+    "light": ("light relative to wide open", ""),
+}
+# Images in the plot: radii, point of the capture sphere, fan, label, mark.
+IMAGES = (
+    ("traced", 0, 0, "traced radii: nearest point, tangential", "C0."),
+    ("traced", 1, 0, "centre, tangential", "C2."),
+    ("traced", 1, 1, "centre, sagittal", "C4."),
+    ("traced", 2, 1, "farthest point, sagittal", "C1."),
+    ("flat", 1, 0, "flat mirrors: centre", "k."),
+)
+SMALLEST_STOP = 8  # of the plot, in F-numbers of the lens wide open
+MAX_OPTION = 1000
+
+
+@dataclass(frozen=True)
+class LensOptions:
+    """The lens and its pixels.
+
+    Attributes:
+        blur_px: largest blur circle allowed.
+        pixel_um: width of a pixel, micrometres.
+        wide_open: F-number of the lens fully open.
+    """
+
+    blur_px: float = 1.0
+    pixel_um: float = 3.45
+    wide_open: float = 2.8
+
+    def checked(self) -> "LensOptions":
+        """These, when all are above 0 to 1000.
+
+        Raises:
+            InputError: one is not.
+        """
+        for option, value in vars(self).items():
+            if not 0 < value <= MAX_OPTION:
+                name = "--" + option.replace("_", "-")
+                raise InputError(f"{name} {value:g}: allowed is above 0 to {MAX_OPTION}: change it")
+        return self
+
+
+def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda _: None) -> Study:
+    """The study: where the images are by all radius rules, and the stops for them."""
+    spec = with_lens_of_table_i(spec)
+    camera, wide_open = spec.camera, options.checked().wide_open
+    lens = lens_for(
+        np.radians(camera.hfov_deg), camera.width_px, options.pixel_um / 1000, wide_open
+    )
+    by_rule, refusals = _by_rule(spec, progress)
+    ranges = _ranges(by_rule)
+    stops = _stop_records(ranges, lens, options.blur_px)
+    tables = (
+        _mirror_table(by_rule, (*NOTES, *refusals)),
+        Table.of_records("depth-of-field-stops", stops, LENS_NOTES),
+    )
+    figures = (*_image_figures(by_rule), *_flat_figures(by_rule, ranges), *_stop_figures(stops))
+    panels = (_image_panel(by_rule), _blur_panel(ranges, lens))
+    return Study("depth-of-field", figures, tables, panels)
+
+
+def _by_rule(spec: Spec, progress: Progress) -> tuple[dict[str, VirtualImages], list[str]]:
+    """Mirrors by each radius rule that makes them, and why the others do not."""
+    by_rule, refusals = {}, []
+    for rule in RULES:
+        progress(f"radii by rule {rule}")
+        attempt = try_design(spec, mirrors={"radius_rule": rule})
+        if attempt.array is None:
+            refusals.append(f"No figures of {rule} radii: {attempt.reason}")
+        else:
+            radius = spec.optics.capture_diameter_mm / 2
+            by_rule[rule] = virtual_images(attempt.array, radius)
+    return by_rule, refusals
+
+
+def _mirror_table(by_rule: dict[str, VirtualImages], notes: tuple[str, ...]) -> Table:
+    numbers = np.vstack([np.empty((0, len(NUMBERS))), *map(_numbers, by_rule.values())])
+    columns = {
+        "id": [name for images in by_rule.values() for name in images.array.ids],
+        "radii": [rule for rule, images in by_rule.items() for _ in images.array.ids],
+        **dict(zip(NUMBERS, numbers.T, strict=True)),
+    }
+    return Table.of_columns("depth-of-field", columns, notes)
+
+
+def _numbers(images: VirtualImages) -> Floats:
+    """The columns NUMBERS of some mirrors, (m, 16)."""
+    array = images.array
+    return np.column_stack(
+        [
+            np.degrees(array.polar),
+            array.mirrors.radius,
+            np.degrees(images.incidence),
+            images.to_mirror,
+            images.distance.reshape(len(array), -1),
+            images.depth.reshape(len(array), -1),
+        ]
+    )
+
+
+def _range(values: Floats) -> DepthRange:
+    return DepthRange(float(values.min()), float(values.max()))
+
+
+def _ranges(by_rule: dict[str, VirtualImages]) -> dict[str, DepthRange]:
+    """Ranges of depth that are to be sharp, by name."""
+    return {
+        **{f"{rule} radii, along the axis": _range(one.depth) for rule, one in by_rule.items()},
+        **{f"{rule} radii, distances": _range(one.distance) for rule, one in by_rule.items()},
+        PAPER_RANGE: DepthRange(claimed("depth_near"), claimed("depth_far")),
+    }
+
+
+def _stop_records(ranges: dict[str, DepthRange], lens: Lens, blur_px: float) -> list[Record]:
+    return [
+        {
+            "range": name,
+            "near_mm": over.near,
+            "far_mm": over.far,
+            "focus_mm": over.focus,
+            "focal_mm": focal_length(lens, over),
+            "stop": kind,
+            **stop,
+        }
+        for name, over in ranges.items()
+        for kind, stop in aperture_stops(lens, over, blur_px).items()
+    ]
+
+
+def _image_figures(by_rule: dict[str, VirtualImages]) -> list[Figure]:
+    ends = (
+        ("nearest", np.min, claims()["depth_near"]),
+        ("farthest", np.max, claims()["depth_far"]),
+    )
+    return [
+        Figure(
+            f"camera to {which} image, {rule} radii",
+            "mm",
+            float(end(images.distance)),
+            claim.value,
+            claim.where,
+        )
+        for rule, images in by_rule.items()
+        for which, end, claim in ends
+    ]
+
+
+def _flat_figures(by_rule: dict[str, VirtualImages], ranges: dict[str, DepthRange]) -> list[Figure]:
+    """Whether flat mirrors keep the images at one distance, and convex ones need more depth."""
+    if "flat" not in by_rule:
+        return []
+    where = claims()["depth_near"].where
+    centre = by_rule["flat"].distance[:, 1]
+    figures = [Figure(CONSTANT, "mm", float(np.ptp(centre)), 0.0, where)]
+    for kind in ("distances", "along the axis"):
+        spread = {rule: ranges[f"{rule} radii, {kind}"].spread for rule in by_rule}
+        figures += [
+            Figure(f"1/near - 1/far of {rule} radii over flat, {kind}", "", ratio, "> 1", where)
+            for rule, ratio in ((rule, spread[rule] / spread["flat"]) for rule in spread)
+            if rule != "flat"
+        ]
+    return figures
+
+
+def _stop_figures(stops: list[Record]) -> list[Figure]:
+    where = claims()["depth_near"].where
+    return [
+        Figure(f"{stop['stop']}, {stop['range']}: {text}", unit, stop[column], where=where)
+        for stop in stops
+        if stop["range"] in RANGES_SHOWN and stop["stop"] != "wide open"
+        for column, (text, unit) in STOP_FIGURES.items()
+    ]
+
+
+def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
+    series = [
+        Series(label, np.degrees(one.array.polar), one.distance[:, place, fan], mark)
+        for rule, place, fan, label, mark in IMAGES
+        if (one := by_rule.get(rule))
+    ]
+    polar = np.concatenate([one.array.polar for one in by_rule.values()] or [np.zeros(1)])
+    ends = np.degrees([polar.min(), polar.max()])
+    for key, style in (("depth_near", "k--"), ("depth_far", "k-.")):
+        paper = claimed(key)
+        series.append(Series(f"the paper: {paper:g} mm", ends, np.full(2, paper), style))
+    title = "Virtual images of the capture sphere"
+    return Panel(title, "polar angle, degrees", "distance from the camera, mm", tuple(series))
+
+
+def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
+    series: list[Series] = []
+    f_numbers = np.linspace(lens.wide_open, SMALLEST_STOP * lens.wide_open, 60)
+    shown = [(name, over) for name, over in ranges.items() if name in RANGES_SHOWN]
+    for k, (name, over) in enumerate(shown):
+        stops = [aperture_stop(lens, over, focal_length(lens, over) / f) for f in f_numbers]
+        blur, total = np.array([(stop["blur_px"], stop["total_px"]) for stop in stops]).T
+        series += [
+            Series(f"blur circle, {name}", f_numbers, blur, f"C{k}--"),
+            Series(f"with diffraction, {name}", f_numbers, total, f"C{k}-"),
+        ]
+    return Panel("Blur at the ends of the range", "F-number", "diameter, pixels", tuple(series))

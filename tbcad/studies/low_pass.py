@@ -1,0 +1,263 @@
+"""Views with the prototype, blurred by an optical low-pass filter (section 5.3, Fig. 11)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.optics.camera import Camera
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Record, Table
+from tbcad.simulate.camera_photographs import Geometry, photographed
+from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.capture.photograph import Samples, to_bytes
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.simulate.scene.object import SceneObject
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.views.ground_truth import lens_picture
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.refocus import ThinLens, refocus
+from tbcad.simulate.views.viewpoints import (
+    Viewpoints,
+    ground_truths,
+    object_masks,
+    picture_quality,
+    view_quality,
+)
+from tbcad.studies.paper import claimed
+from tbcad.studies.pixel_response import defocus_shifts, low_pass_shifts
+from tbcad.types import Bytes, Floats, Progress
+
+WHERE = "section 5.3, Fig. 11"
+NO_FILTER = "none"
+SHELL, PROTOTYPE = "shell", "prototype"
+ELEVATIONS_DEG = (15.0, 45.0)
+LENS_SIZE = (320, 240)  # pixels of the pictures with the large aperture
+TRUTH_RAYS = 64  # a pixel of their ground truth
+LENS_RAYS = 9  # over the blur circle, times samples x samples
+MAX_SPREAD_PX = 16.0
+NOTES = (
+    "filter: a birefringent low-pass filter splits every point of the photograph into four, at "
+    "the corners of a square of this side; 0.75 and 1 pixel are what cameras have. lens: an even "
+    "blur circle of this diameter.",
+    "pinhole: views of 640 x 480 pixels from --distance by the nearest captured ray. aperture: "
+    "the mean of 69 pinholes all over an aperture of 80 mm at 160 mm (Fig. 11), 320 x 240 pixels, "
+    "against a ray-traced thin lens. blur_mm: standard deviation, at the object, of the Gaussian "
+    "with which the truth comes nearest to the view.",
+    "photograph_contrast: root mean square difference of neighbouring pixels of the same mirror, "
+    "relative to the same photograph without a filter.",
+    "Without noise, with exact poses, one colour a pixel without a mosaic of colour filters.",
+)
+
+
+@dataclass(frozen=True)
+class Blur:
+    """What blurs the photographs of one case.
+
+    Attributes:
+        geometry: of the mirrors.
+        name: none, filter or lens.
+        px: separation or diameter, pixels.
+        samples: rays of a pixel.
+    """
+
+    geometry: str
+    name: str
+    px: float
+    samples: Samples
+
+
+@dataclass(frozen=True)
+class BlurOptions:
+    """The blurs that are tried, pixels.
+
+    Attributes:
+        separations_px: of the low-pass filter's images.
+        lens_px: diameters of the lens's blur circle.
+        samples: a pixel, in each of the filter's images, is the mean of samples x samples rays.
+    """
+
+    separations_px: tuple[float, ...] = (0.75, 1.0, 2.0)
+    lens_px: tuple[float, ...] = (2.4,)
+    samples: int = 2
+
+    def checked(self) -> "BlurOptions":
+        """These, when all are above 0 to 16.
+
+        Raises:
+            InputError: one is not.
+        """
+        for option, values in (("--filter-px", self.separations_px), ("--lens-px", self.lens_px)):
+            for value in values:
+                if not 0 < value <= MAX_SPREAD_PX:
+                    raise InputError(
+                        f"{option} {value:g}: allowed is above 0 to {MAX_SPREAD_PX:g}: change it"
+                    )
+        return self
+
+    def cases(self) -> list[Blur]:
+        """Shell and prototype without blur, and the prototype with each."""
+        n, rays = self.samples, LENS_RAYS * self.samples**2
+        return [
+            Blur(SHELL, NO_FILTER, 0.0, n),
+            Blur(PROTOTYPE, NO_FILTER, 0.0, n),
+            *(Blur(PROTOTYPE, "filter", px, low_pass_shifts(px, n)) for px in self.separations_px),
+            *(Blur(PROTOTYPE, "lens", px, defocus_shifts(px, rays)) for px in self.lens_px),
+        ]
+
+
+@dataclass(frozen=True)
+class _Targets:
+    """The viewpoints, and the truth at each."""
+
+    scene: Scene
+    pinholes: list[Camera]
+    truths: list[Bytes]
+    lenses: list[Camera]
+    lens_truths: list[Bytes]
+    focus: ThinLens
+
+
+def low_pass(
+    export: ExportedDesign,
+    subject: SceneObject,
+    viewpoints: Viewpoints,
+    options: BlurOptions,
+    progress: Progress = lambda _: None,
+) -> Study:
+    """The study: captures with each blur, and views of each against the truth.
+
+    Args:
+        export: a design with its prototype.
+        subject: the object.
+        viewpoints: directions of all views; the distance is that of the pinholes.
+        options: the blurs.
+        progress: called with each step.
+
+    Raises:
+        InputError: there is no prototype in the export.
+    """
+    targets = _targets(export, subject, viewpoints, progress)
+    records: list[Record] = []
+    sharpest: dict[str, float] = {}
+    for case in options.checked().cases():
+        geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
+        light_field = photographed(export, targets.scene, geometry, case.samples, progress)
+        contrast = _contrast(light_field)
+        relative = contrast / sharpest.setdefault(case.geometry, contrast)
+        head: Record = {"geometry": case.geometry, "blur": case.name, "px": case.px}
+        for kind, quality in _views(MirrorTiles(light_field), targets, progress).items():
+            for row in _rows(viewpoints, quality):
+                records.append({**head, "view": kind, **row, "photograph_contrast": relative})
+    table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *NOTES))
+    means = Table.of_records("low-pass-means", _means(table))
+    return Study("low-pass", _figures(means), (table, means), _panels(means))
+
+
+def _targets(
+    export: ExportedDesign, subject: SceneObject, viewpoints: Viewpoints, progress: Progress
+) -> _Targets:
+    scene = prepared_scene(subject)
+    pinholes = viewpoints.cameras(export.capture_mm)
+    near = replace(viewpoints, distance_mm=claimed("prototype_distance"))
+    lenses = near.cameras(export.capture_mm, LENS_SIZE)
+    focus = ThinLens(claimed("prototype_aperture"), 0.0)
+    lens_truths = []
+    for k, view in enumerate(lenses):
+        progress(f"truth of the aperture {k + 1} of {len(lenses)}")
+        lens_truths.append(to_bytes(lens_picture(scene, view, focus, TRUTH_RAYS)))
+    truths = ground_truths(scene, pinholes, progress)
+    return _Targets(scene, pinholes, truths, lenses, lens_truths, focus)
+
+
+def _rows(viewpoints: Viewpoints, quality: dict[str, Floats]) -> list[Record]:
+    angles = {"elevation_deg": viewpoints.elevation_deg, "azimuth_deg": viewpoints.azimuth_deg}
+    return Table.of_columns("", {**angles, **quality}).records()
+
+
+def _contrast(light_field: LightField) -> float:
+    """Root mean square difference of neighbouring pixels in a row that belong to one mirror."""
+    squares = []
+    for frame in light_field.frames.values():
+        mirror, colour = frame.planes["mirror"][:], frame.planes["colour"][:].astype(np.float32)
+        same = (mirror[:, 1:] == mirror[:, :-1]) & (mirror[:, 1:] > 0)
+        squares.append(np.mean((colour[:, 1:] - colour[:, :-1])[same] ** 2))
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _views(
+    tiles: MirrorTiles, targets: _Targets, progress: Progress
+) -> dict[str, dict[str, Floats]]:
+    """Quality of the pinholes' views and of those with the aperture, each (v,) by its name."""
+    scene = targets.scene
+    pinhole = view_quality(tiles, scene, targets.pinholes, targets.truths, "nearest", progress)
+    rows: list[dict[str, float]] = []
+    masks = object_masks(scene, targets.lenses)
+    for view, truth, mask in zip(targets.lenses, targets.lens_truths, masks, strict=True):
+        progress(f"aperture {len(rows) + 1} of {len(masks)}")
+        rows.append(picture_quality(view, truth, refocus(tiles, view, targets.focus).image, mask))
+    aperture = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return {"pinhole": pinhole, "aperture": aperture}
+
+
+def _means(table: Table) -> list[Record]:
+    keys = dict.fromkeys(row[:4] for row in table.rows)
+    records: list[Record] = []
+    for key in keys:
+        head: Record = dict(zip(table.columns[:4], key, strict=True))
+        rows = table.where(**head)
+        names = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "photograph_contrast")
+        means = {name: float(rows.numbers(name).mean()) for name in names}
+        records.append({**head, "views": len(rows.rows), **means})
+    return records
+
+
+def _name(record: Record) -> str:
+    blur = "no blur" if record["blur"] == NO_FILTER else f"{record['blur']} {record['px']:g} px"
+    return f"{record['geometry']}, {blur}"
+
+
+def _figures(means: Table) -> tuple[Figure, ...]:
+    units = {"ssim": ("mean SSIM", ""), "blur_mm": ("mean blur", "mm")}
+    figures = [
+        Figure(f"{_name(record)}: {name}, {record['view']}", unit, record[key], where=WHERE)
+        for record in means.records()
+        for key, (name, unit) in units.items()
+    ]
+    contrast = [
+        Figure(
+            f"{_name(record)}: contrast of the photographs",
+            "",
+            record["photograph_contrast"],
+            where=WHERE,
+        )
+        for record in means.where(view="pinhole").records()
+    ]
+    return (*figures, *contrast)
+
+
+def _panels(means: Table) -> tuple[Panel, ...]:
+    labels = {
+        "ssim": ("Similarity of views to the truth", "mean SSIM"),
+        "blur_mm": ("Blur of views", "mean standard deviation at the object, mm"),
+    }
+    return tuple(
+        Panel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
+        for column, (title, unit) in labels.items()
+    )
+
+
+def _names(means: Table) -> list[str]:
+    return [_name(record) for record in means.where(view="pinhole").records()]
+
+
+def _bars(means: Table, column: str) -> tuple[Series, ...]:
+    place = np.arange(len(_names(means)), dtype=np.float64)
+    series = []
+    for view, label, style in (
+        ("pinhole", "pinhole at --distance", "C0o"),
+        ("aperture", "aperture of 80 mm at 160 mm", "C1s"),
+    ):
+        series.append(Series(label, means.where(view=view).numbers(column), place, style))
+    return tuple(series)

@@ -1,0 +1,118 @@
+"""Views from the prototype's merged pictures against those of the full shell."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import ttest_rel
+
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Table
+from tbcad.simulate.camera_photographs import Geometry, photographed
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.simulate.scene.object import SceneObject
+from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import StudyMethod, Viewpoints, ground_truths, view_quality
+from tbcad.types import Floats, Progress
+
+LEVEL = 0.95
+WHERE = "section 5.1"
+NOTES = (
+    "Difference: the prototype's SSIM less the shell's, view by view against the same ray-traced "
+    "truth. Interval: Student's t at 95 % over the views; neighbouring views share captured rays "
+    "and are not wholly independent, so the true interval is somewhat wider.",
+    "blur: standard deviation, at the object, of the Gaussian with which the truth comes nearest "
+    "to the view.",
+    "The prototype's picture is merged from photographs of every stop, as the prototype takes "
+    "them, both runs; the same number of rays a pixel for both.",
+)
+
+
+def mean_difference_interval(one: Floats, other: Floats) -> tuple[float, float]:
+    """Interval of the mean of the other's values (v,) less the one's (Student's t, paired)."""
+    if len(one) < 2:
+        return -np.inf, np.inf
+    interval = ttest_rel(other, one).confidence_interval(LEVEL)
+    return float(interval.low), float(interval.high)
+
+
+def prototype_vs_shell(
+    export: ExportedDesign,
+    subject: SceneObject,
+    viewpoints: Viewpoints,
+    method: StudyMethod,
+    samples: int = 3,
+    progress: Progress = lambda _: None,
+) -> Study:
+    """The study: both light fields of one object, and the same views of both.
+
+    Args:
+        export: a design with its prototype.
+        subject: the object.
+        viewpoints: where the views are from.
+        method: how views are made.
+        samples: a pixel of a photograph is the mean of samples x samples rays.
+        progress: called with each step.
+
+    Raises:
+        InputError: there is no prototype in the export.
+    """
+    scene, views = prepared_scene(subject), viewpoints.cameras(export.capture_mm)
+    truths = ground_truths(scene, views, progress)
+    kinds: tuple[Geometry, ...] = ("spheres", "prototype")
+    light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
+    shell, prototype = (
+        view_quality(MirrorTiles(one), scene, views, truths, method, progress)
+        for one in light_fields
+    )
+    facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
+    columns = {
+        "elevation_deg": viewpoints.elevation_deg,
+        "azimuth_deg": viewpoints.azimuth_deg,
+        "shell_psnr_db": shell["psnr_db"],
+        "prototype_psnr_db": prototype["psnr_db"],
+        "shell_ssim": shell["ssim"],
+        "prototype_ssim": prototype["ssim"],
+        "shell_blur_mm": shell["blur_mm"],
+        "prototype_blur_mm": prototype["blur_mm"],
+        "ssim_difference": prototype["ssim"] - shell["ssim"],
+    }
+    table = Table.of_columns("prototype", columns, (facts, *NOTES))
+    return Study("prototype", _figures(table), (table,), _panels(table))
+
+
+def _figures(table: Table) -> tuple[Figure, ...]:
+    mean = {name: float(table.numbers(name).mean()) for name in table.columns}
+    low, high = mean_difference_interval(
+        table.numbers("shell_ssim"), table.numbers("prototype_ssim")
+    )
+    verdict = "not significant" if low <= 0 <= high else "significant"
+    spread = float(np.std(table.numbers("shell_ssim"), ddof=1)) if len(table.rows) > 1 else None
+    figures = (
+        Figure("mean SSIM of the shell's views", "", mean["shell_ssim"]),
+        Figure("mean SSIM of the prototype's views", "", mean["prototype_ssim"]),
+        Figure("difference", "", mean["ssim_difference"]),
+        Figure("its interval at 95 %, low", "", low),
+        Figure("its interval at 95 %, high", "", high),
+        Figure("at 95 % the difference is", "", verdict, "no significant difference"),
+        Figure("standard deviation of SSIM over the shell's views", "", spread),
+        Figure("mean blur of the shell's views", "mm", mean["shell_blur_mm"]),
+        Figure("mean blur of the prototype's views", "mm", mean["prototype_blur_mm"]),
+        Figure("mean PSNR of the shell's views", "dB", mean["shell_psnr_db"]),
+        Figure("mean PSNR of the prototype's views", "dB", mean["prototype_psnr_db"]),
+    )
+    return tuple(replace(figure, where=WHERE) for figure in figures)
+
+
+def _panels(table: Table) -> tuple[Panel, ...]:
+    elevation = table.numbers("elevation_deg")
+    pairs = (
+        Series("shell", elevation - 0.7, table.numbers("shell_ssim"), "C0."),
+        Series("prototype", elevation + 0.7, table.numbers("prototype_ssim"), "C1."),
+    )
+    difference = Series("", elevation, table.numbers("ssim_difference"), "k.")
+    return (
+        Panel("Views against the truth", "elevation, degrees", "SSIM", pairs),
+        Panel("Prototype less shell", "elevation, degrees", "difference of SSIM", (difference,)),
+    )

@@ -1,0 +1,252 @@
+"""How like the truth views are, sensor by sensor, each with its own n (Fig. 9)."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import linregress
+
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.results.plots import Panel, Series
+from tbcad.results.study import Figure, Study
+from tbcad.results.tables import Cell, Record, Table
+from tbcad.simulate.capture.light_field import NAME, LightField
+from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
+from tbcad.simulate.capture.photograph import photograph
+from tbcad.simulate.capture.pixel_counts import Sensor
+from tbcad.simulate.scene.object import SceneObject
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.viewpoints import (
+    QUALITY,
+    StudyMethod,
+    Viewpoints,
+    ground_truths,
+    view_quality,
+)
+from tbcad.spec.design import Spec
+from tbcad.studies.paper import balanced_sensors, claims, with_lens_of_table_i
+from tbcad.studies.sweep import megapixels, try_design
+from tbcad.types import Bytes, Progress
+
+MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim_sd")
+FITS = ("elevation_deg", "sensors", "slope", "intercept", "r2")
+ALL = "all"  # in the place of an elevation: views at all of them
+WHERE = "section 4.4, Fig. 9"
+NOTES = (
+    "SSIM and PSNR of views of 640 x 480 pixels, over the whole frame, against ray-traced "
+    "pictures of the same object (4 x 4 rays a pixel). ssim_on_object: mean of the local SSIM "
+    "where the truth shows the object; object_share: of the frame.",
+    "blur: standard deviation, at the object's centre, of the Gaussian with which the truth comes "
+    "nearest to the view, by least squares. The paper's 'apparent resolution' is read as its "
+    "inverse.",
+    "Each sensor has the n of Table II where the design's own sensor and n are in it; else n is "
+    "that of the design times the fourth root of how many times the pixels it has, rounded, which "
+    "keeps virtual cameras and pixels of one in proportion.",
+    "Fit: least squares of the mean SSIM over log10 of a sensor's pixels; r2 is the square of the "
+    "correlation. The paper's text states that SSIM is linear, no slope and no R^2.",
+)
+
+
+def sensor_n(spec: Spec, sensor: Sensor) -> int:
+    """A sensor's n: that of Table II where the design is in it, else one in proportion."""
+    paper = {(row.width_px, row.height_px): row.n for row in balanced_sensors()}
+    if paper.get((spec.camera.width_px, spec.camera.height_px)) == spec.optics.n:
+        return paper.get((sensor.width_px, sensor.height_px), proportionate_n(spec, sensor))
+    return proportionate_n(spec, sensor)
+
+
+def proportionate_n(spec: Spec, sensor: Sensor) -> int:
+    """Mirrors grow with n^2, and are to grow with the square root of the pixels."""
+    pixels = spec.camera.width_px * spec.camera.height_px
+    factor = float((sensor.width_px * sensor.height_px / pixels) ** 0.25)
+    return max(1, round(spec.optics.n * factor))
+
+
+def ssim(
+    spec: Spec,
+    subject: SceneObject,
+    sensors: tuple[Sensor, ...],
+    viewpoints: Viewpoints,
+    method: StudyMethod,
+    progress: Progress = lambda _: None,
+) -> Study:
+    """The study: captures with every sensor, and views of each against the truth.
+
+    Args:
+        spec: the design; sensor and n are varied.
+        subject: the object.
+        sensors: in place of the design's.
+        viewpoints: where the views are from.
+        method: how views are made.
+        progress: called with each step.
+    """
+    spec, scene = with_lens_of_table_i(spec), prepared_scene(subject)
+    truths = ground_truths(scene, viewpoints.cameras(spec.optics.capture_diameter_mm), progress)
+    compared = partial(_compared, spec, scene, viewpoints, truths, method, progress)
+    records = [record for sensor in sensors for record in compared(sensor)]
+    table = Table.of_records("ssim", records, (f"Object: {subject.name}; {method}.", *NOTES))
+    means = Table.of_records(
+        "ssim-means", [mean for sensor in sensors for mean in _means(table, sensor)], columns=MEANS
+    )
+    fits = Table.of_records("ssim-fits", _fits(means), columns=FITS)
+    panels = (_ssim_panel(means, fits), *_elevation_panels(means))
+    return Study("ssim", tuple(_figures(means, fits)), (table, means, fits), panels)
+
+
+def _compared(
+    spec: Spec,
+    scene: Scene,
+    viewpoints: Viewpoints,
+    truths: list[Bytes],
+    method: StudyMethod,
+    progress: Progress,
+    sensor: Sensor,
+) -> list[Record]:
+    """PSNR and SSIM of the views with one sensor, or what a refusal of its design says."""
+    n, cameras = sensor_n(spec, sensor), viewpoints.cameras(spec.optics.capture_diameter_mm)
+    attempt = try_design(spec, optics={"n": n}, camera=asdict(sensor))
+    quality = {name: np.full(len(cameras), np.nan) for name in QUALITY}
+    if attempt.design is not None:
+        with _light_field(attempt.design, scene, progress) as light_field:
+            tiles = MirrorTiles(light_field)
+            quality = view_quality(tiles, scene, cameras, truths, method, progress)
+    columns = {
+        "elevation_deg": viewpoints.elevation_deg,
+        "azimuth_deg": viewpoints.azimuth_deg,
+        **quality,
+    }
+    head: Record = {**asdict(sensor), "n": n}
+    views = Table.of_columns("", columns).records()
+    return [{**head, **view, "reason": attempt.reason} for view in views]
+
+
+@contextmanager
+def _light_field(design: MirrorDesign, scene: Scene, progress: Progress) -> Iterator[LightField]:
+    """The light field of a design in a file: of the largest sensor it would fill the memory."""
+    with tempfile.TemporaryDirectory(prefix="tbcad-study-") as folder:
+        file = Path(folder) / NAME
+        with create_light_field(file, design.spec.optics.capture_diameter_mm, {}) as store:
+            for reflector in reflectors(design):
+                trace = exact_tracer(reflector)
+                bands = photograph(reflector.camera, trace, scene, 1, progress)
+                write_camera(store, reflector, bands)
+        with LightField.open(file) as light_field:
+            yield light_field
+
+
+def _means(table: Table, sensor: Sensor) -> list[Record]:
+    """Means over azimuths at each elevation, and over all views of a sensor."""
+    views = table.where(**asdict(sensor), reason="")
+    groups = {e: views.where(elevation_deg=e) for e in sorted(set(views.numbers("elevation_deg")))}
+    return [_mean(name, group) for name, group in {**groups, ALL: views}.items() if group.rows]
+
+
+def _mean(name: Cell, group: Table) -> Record:
+    ssim = group.numbers("ssim")
+    return {
+        **{key: group.column(key)[0] for key in ("width_px", "height_px", "n")},
+        "elevation_deg": name,
+        "views": len(ssim),
+        **{key: float(group.numbers(key).mean()) for key in QUALITY},
+        "ssim_sd": float(np.std(ssim, ddof=1)) if len(ssim) > 1 else None,
+    }
+
+
+def _fits(means: Table) -> list[Record]:
+    """Lines through the means of each elevation over the logarithm of the pixels."""
+    fits: list[Record] = []
+    for elevation in dict.fromkeys(means.column("elevation_deg")):
+        rows = means.where(elevation_deg=elevation)
+        x = np.log10(1e6 * megapixels(rows))
+        if len(np.unique(x)) < 2:
+            continue
+        fit = linregress(x, rows.numbers("ssim"))
+        fits.append(
+            {
+                "elevation_deg": elevation,
+                "sensors": len(x),
+                "slope": float(fit.slope),
+                "intercept": float(fit.intercept),
+                # Through two points there is always a line.
+                "r2": float(fit.rvalue**2) if len(x) > 2 else None,
+            }
+        )
+    return fits
+
+
+def _figures(means: Table, fits: Table) -> Iterator[Figure]:
+    for mean in means.where(elevation_deg=ALL).records():
+        name = "{width_px}x{height_px}, n = {n}: mean".format(**mean)
+        yield Figure(f"{name} SSIM", "", mean["ssim"], where=WHERE)
+        yield Figure(f"{name} PSNR", "dB", mean["psnr_db"], where=WHERE)
+        yield Figure(f"{name} blur", "mm", mean["blur_mm"], where=WHERE)
+    for fit in fits.where(elevation_deg=ALL).records():
+        yield Figure("SSIM for ten times the pixels", "", fit["slope"], where=WHERE)
+        yield Figure("R^2 of SSIM over log pixels", "", fit["r2"], where=WHERE)
+    for size, rows in _by_sensor(means).items():
+        yield from _elevation_figures(size, rows)
+
+
+def _by_sensor(means: Table) -> dict[str, Table]:
+    """Means at each elevation, without those over all, by sensor."""
+    sizes = dict.fromkeys(zip(means.column("width_px"), means.column("height_px"), strict=True))
+    elevations = replace(means, rows=tuple(r for r in means.rows if ALL not in r))
+    return {f"{w}x{h}": elevations.where(width_px=w, height_px=h) for w, h in sizes}
+
+
+def _elevation_figures(size: str, rows: Table) -> Iterator[Figure]:
+    """Where views are sharpest, most similar, and the object largest."""
+    elevation, place = rows.numbers("elevation_deg"), claims()["sharpest_elevation"]
+    best: dict[str, tuple[int, Cell]] = {
+        "least blur": (int(rows.numbers("blur_mm").argmin()), place.value),
+        "highest SSIM": (int(rows.numbers("ssim").argmax()), f"not {place.value:g}"),
+        "highest SSIM on the object": (int(rows.numbers("ssim_on_object").argmax()), None),
+        "largest image of the object": (int(rows.numbers("object_share").argmax()), place.value),
+    }
+    for name, (index, paper) in best.items():
+        where = place.where if paper else ""
+        yield Figure(
+            f"{size}: elevation of the {name}", "deg", float(elevation[index]), paper, where
+        )
+
+
+def _ssim_panel(means: Table, fits: Table) -> Panel:
+    series = []
+    for k, elevation in enumerate(dict.fromkeys(means.column("elevation_deg"))):
+        rows = means.where(elevation_deg=elevation)
+        name = "all elevations" if elevation == ALL else f"elevation {elevation:g} degrees"
+        style = "ko" if elevation == ALL else f"C{k}.:"
+        series.append(Series(name, megapixels(rows), rows.numbers("ssim"), style))
+    x, fit = megapixels(means.where(elevation_deg=ALL)), fits.where(elevation_deg=ALL)
+    for slope, intercept, r2 in np.column_stack([fit.numbers(key) for key in FITS[2:]]):
+        label = "line" if np.isnan(r2) else f"line, R^2 = {r2:.3f}"
+        series.append(Series(label, x, slope * np.log10(1e6 * x) + intercept, "k-"))
+    title = "Similarity of views to the truth"
+    return Panel(title, "sensor, megapixels", "SSIM", tuple(series), logarithmic="x")
+
+
+def _elevation_panels(means: Table) -> tuple[Panel, Panel]:
+    labels = {
+        "blur_mm": ("Blur of views", "standard deviation at the object, mm"),
+        "ssim_on_object": ("Similarity where the object is", "SSIM"),
+    }
+    blur, on_object = (
+        Panel(
+            title,
+            "elevation, degrees",
+            unit,
+            tuple(
+                Series(size, rows.numbers("elevation_deg"), rows.numbers(column), f"C{k}.-")
+                for k, (size, rows) in enumerate(_by_sensor(means).items())
+            ),
+        )
+        for column, (title, unit) in labels.items()
+    )
+    return blur, on_object

@@ -1,0 +1,265 @@
+"""What the studies find and write, and the command."""
+
+import csv
+import math
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+
+from tbcad import schedule
+from tbcad.cli import run
+from tbcad.errors import InputError
+from tbcad.figure_files import PlotFormat
+from tbcad.mirrors import radii
+from tbcad.results.plots import Panel, Series, plot_file
+from tbcad.results.study import (
+    SUMMARY_COLUMNS,
+    Study,
+    check_study_folder,
+    study_files,
+    write_study,
+)
+from tbcad.results.tables import Table, csv_text
+from tbcad.simulate import parallel
+from tbcad.simulate.capture.pixel_counts import Sensor
+from tbcad.spec.design import FIT
+from tbcad.spec.load import load_spec
+from tbcad.studies.capture_area import capture_area
+from tbcad.studies.depth_of_field import LensOptions, depth_of_field
+from tbcad.studies.elevation import correlation, elevation
+from tbcad.studies.paper import (
+    balanced_sensors,
+    claims,
+    is_table_i,
+    with_lens_of_table_i,
+)
+from tbcad.studies.resolution import COUNTED, Ratio, resolution
+from tbcad.studies.sweep import n_range
+from tests.mirror_arrays import mirror_array
+
+SMALL = ("n=4", "width_px=208", "height_px=155")
+# No radius gives some of these mirrors their coverage.
+HOPELESS = ("camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
+
+
+def small_resolution() -> Study:
+    sensors, ratios = (Sensor(208, 155), Sensor(416, 310)), (Ratio(1, 1), Ratio(1, 4))
+    return resolution(load_spec(None, SMALL), range(3, 8), sensors, ratios)
+
+
+def test_resolution_finds_what_its_rows_say() -> None:
+    study = small_resolution()
+    swept, balanced, defined, fits = study.tables
+    assert len(swept.rows) == 10
+    for at in swept.records():
+        assert at["virtual_cameras"] == 5 * at["n"] ** 2 + 2 * at["n"] + 1
+        assert at["seeing_average_px"] == at["seeing_px"] / at["virtual_cameras"]
+        assert at["seeing_px"] < at["on_mirrors_px"] < 2 * at["width_px"] * at["height_px"]
+    for at in balanced.records():
+        if at["balanced_n"] is None:
+            assert "--from" in at["reason"]
+            continue
+        aim = {"1:1": 1, "1:4": 0.25}[at["ratio"]]
+        found = swept.where(width_px=at["width_px"])
+        column = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
+        actual = found.numbers("virtual_cameras") / found.numbers(column[at["pixels_counted"]])
+        above, below = (found.numbers("n")[side] for side in (actual > aim, actual < aim))
+        assert max(below) < at["balanced_n"] < min(above)
+    assert np.isfinite(balanced.numbers("balanced_n")).any()
+    assert defined.rows == fits.rows == ()  # Table II has none of these sensors
+
+
+def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    files = []
+    for threads in (1, 3):
+        monkeypatch.setattr(parallel, "THREADS", threads)
+        monkeypatch.setattr(schedule, "cores", lambda k=threads: k)
+        files.append(study_files(small_resolution()))
+    assert files[0] == files[1]
+    assert len(files[0]) == 7
+
+
+def test_capture_area_has_the_paper_beside_it() -> None:
+    table = (study := capture_area(load_spec(None), range(2, 6))).tables[0]
+    (at,) = table.where(n=4).records()
+    assert at["paper_claim_flat_mm"] == 21.2
+    assert at["flat_closed_form_mm"] == pytest.approx(21.0, abs=0.01)  # measured before: 21.0
+    array = mirror_array("n=4", "radius_rule=paper")
+    assert at["paper_minimum_mm"] == array.coverage.min()
+    assert at["paper_mirrors_short"] == (array.coverage < 59.9994).sum() > 0
+    assert at["traced_minimum_mm"] > 60.59
+    assert at["traced_mirrors_short"] == 0
+    assert table.column("paper_claim_flat_mm") == [None, None, 21.2, None]
+    assert study.summary.columns == SUMMARY_COLUMNS
+    assert (study.figures[0].value, study.figures[0].paper) == (at["flat_closed_form_mm"], 21.2)
+
+
+def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(radii, "MAX_ITERATIONS", 2)  # else the search takes ten seconds
+    spec = load_spec(None, HOPELESS)
+    (at,) = capture_area(spec, range(9, 10)).tables[0].records()
+    assert at["traced_minimum_mm"] is None
+    assert "no radius gives" in str(at["traced_reason"])
+    study = resolution(spec, range(9, 10), (Sensor(208, 155),), (Ratio(1, 1),))
+    (at,) = study.tables[0].records()
+    assert [at[name] for name in COUNTED] == [None] * 7
+    assert "no radius gives" in str(at["reason"])
+    assert len(study_files(study)) == 7
+
+
+def test_elevation_of_the_paper_design() -> None:
+    """Radii by eq. 2 at n = 18: 8.00 ... 65.4 mm (DESIGN.md section 3), tied to the polar angle."""
+    study = elevation(load_spec(None))
+    mirrors, bands, correlated = study.tables
+    assert len(mirrors.rows) == 847
+    radius, polar = mirrors.numbers("paper_radius_mm"), np.array(mirrors.numbers("polar_deg"))
+    assert min(radius) == pytest.approx(8.00, abs=0.005)
+    assert max(radius) == pytest.approx(65.4, abs=0.06)
+    assert (polar.min(), polar.max()) == (pytest.approx(45), pytest.approx(135))
+    for row in correlated.where(of="log radius").records():
+        assert (abs(row["correlation"]) > 0.97) == (row["with"] == "polar angle"), row["radii"]
+    assert bands.numbers("mirrors").sum() == 847
+    assert (np.diff(bands.numbers("elevation_from_deg")) == 15).all()
+    low = (mirrors.numbers("elevation_deg") >= 15) & (mirrors.numbers("elevation_deg") < 30)
+    mean = mirrors.numbers("seeing_px")[low].mean()
+    assert bands.where(elevation_from_deg=15.0).numbers("mean_seeing_px")[0] == pytest.approx(mean)
+
+
+def test_correlation_is_pearsons() -> None:
+    x = np.arange(10.0)
+    assert correlation(x, 3 - 2 * x) == pytest.approx(-1, rel=1e-12)
+    assert correlation(x, (x - 4.5) ** 2) == pytest.approx(0, abs=1e-12)
+
+
+def test_elevation_of_few_mirrors() -> None:
+    study = elevation(load_spec(None, ["n=2"]))
+    assert len(study.tables[0].rows) == 15
+    assert np.isfinite(study.tables[2].numbers("correlation")).all()
+
+
+def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
+    study = depth_of_field(load_spec(None, ["n=4"]), LensOptions())
+    (flat,) = study.summary.where(quantity="camera to farthest image, flat radii").records()
+    assert flat["tbcad"] == pytest.approx(2 * math.sqrt(15000) + 30, rel=1e-12)
+    assert (flat["paper"], flat["where"]) == (250, "section 6")
+    paper = study.tables[1].where(range="the paper's distances")
+    assert [row[1:4] for row in paper.rows] == [(150, 250, pytest.approx(187.5))] * 3
+    # Closed form: with 2080 pixels across 89 degrees a pixel is 2 tan(44.5 deg) / 2080 wide at
+    # unit distance, and pupil = 2 pixel / (1/150 - 1/250).
+    (limited,) = paper.where(stop="blur limited").records()
+    width = 2 * math.tan(math.radians(44.5)) / 2080
+    assert limited["pupil_mm"] == pytest.approx(2 * width / (1 / 150 - 1 / 250), rel=1e-12)
+
+
+def test_csv_keeps_every_digit() -> None:
+    table = Table("t", ("a", "b", "c"), ((1 / 3, None, "x, y"), (1e-17, 3, "")))
+    rows = list(csv.reader(csv_text(table).splitlines()))
+    assert rows[0] == ["a", "b", "c"]
+    assert (float(rows[1][0]), rows[1][1:]) == (1 / 3, ["", "x, y"])
+    assert float(rows[2][0]) == 1e-17
+    assert table.numbers("b") == pytest.approx([math.nan, 3], nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("kind", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+)
+def test_pictures_repeat_whatever_the_user_has_set(kind: PlotFormat, begin: bytes) -> None:
+    line = Series("line", np.arange(1.0, 5), np.array([1, 2, np.nan, 400.0]))
+    panels = (Panel("one", "x", "y", (line,), "y"), Panel("two", "x", "y", (line,)))
+    first = plot_file(panels, kind)
+    with matplotlib.rc_context({"figure.facecolor": "red", "font.size": 20.0}):
+        assert plot_file(panels, kind) == first
+    assert plot_file(panels[:1], kind) != first
+    assert first.startswith(begin)
+
+
+def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "studies"
+    study = elevation(load_spec(None, ["n=4"]))
+    files = write_study(study, out)
+    (out / "mine.txt").write_text("mine")
+    (out / "elevation.csv").write_text("old")
+    assert write_study(study, out) == files
+    assert {path.name for path in out.iterdir()} == {"mine.txt", *(path.name for path in files)}
+    assert (out / "elevation.csv").read_bytes() == study_files(study)["elevation.csv"]
+
+
+def test_nothing_is_left_when_a_file_cannot_be_replaced(tmp_path: Path) -> None:
+    study = elevation(load_spec(None, ["n=4"]))
+    (tmp_path / "elevation.png").mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_study(study, tmp_path)
+    assert not list(tmp_path.glob(".tbcad-*"))
+
+
+def test_study_folders_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="is a file"):
+        check_study_folder(tmp_path / "file" / "studies")
+    check_study_folder(tmp_path / "not" / "yet")
+    assert not (tmp_path / "not").exists()
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 5), (5, 4), (2, 61)])
+def test_sweeps_refused(first: int, last: int) -> None:
+    with pytest.raises(InputError, match="--from or --to"):
+        n_range(first, last)
+    assert list(n_range(2, 4)) == [2, 3, 4]
+
+
+def test_claims_say_where_in_the_paper() -> None:
+    assert all(claim.where and claim.text for claim in claims().values())
+    assert claims()["virtual_cameras"].value == 1657
+    assert [row.n for row in balanced_sensors()] == [12, 18, 26, 36]
+
+
+def test_which_designs_are_the_papers() -> None:
+    assert is_table_i(load_spec(None))
+    assert is_table_i(load_spec(None, ["n=5", "radius_rule=flat", "width_px=100"]))
+    for setting in ("hfov_deg=88", "semi_minor_mm=101", "capture_diameter_mm=59"):
+        assert not is_table_i(load_spec(None, [setting]))
+
+
+def test_lens_of_table_i_is_for_its_geometry_only() -> None:
+    """Elsewhere it would be too wide or too narrow for the mirrors."""
+    assert with_lens_of_table_i(load_spec(None, ["n=5"])).camera.hfov_deg == 89
+    for setting in ("camera_mm=[130, 0, -220]", "semi_minor_mm=110", "capture_diameter_mm=50"):
+        assert with_lens_of_table_i(load_spec(None, [setting])).camera.hfov_deg == FIT
+    assert with_lens_of_table_i(load_spec(None, ["hfov_deg=70"])).camera.hfov_deg == 70
+
+
+def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "studies"
+    arguments = ["study", "capture-area", "--from", "4", "--to", "4", "--out", str(out)]
+    assert run(arguments) == 0
+    shown = capsys.readouterr()
+    assert "21.2 mm" in shown.out
+    assert "capture-area.csv" in shown.out
+    assert (out / "capture-area.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["resolution", "--sensor", "12"],
+        ["resolution", "--ratio", "0:1"],
+        ["resolution", "--from", "9", "--to", "3"],
+        ["capture-area", "--to", "61"],
+        ["elevation", "--set", "optics.m=3"],
+        ["elevation", "missing.toml"],
+        ["depth-of-field", "--blur-px", "0"],
+        ["depth-of-field", "--pixel-um", "nan"],
+        ["low-pass", "missing", "--filter-px", "0"],
+        ["low-pass", "missing", "--lens-px", "17"],
+    ],
+)
+def test_bad_input_is_one_line(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["study", *arguments, "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,216 @@
+"""Studies of views: SSIM by sensor, and the prototype against the shell."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import ttest_rel
+
+from tbcad.cli import run
+from tbcad.errors import InputError
+from tbcad.mirrors import radii
+from tbcad.mirrors.array import design
+from tbcad.optics.camera import Camera
+from tbcad.results.study import Study, study_files
+from tbcad.simulate.capture.pixel_counts import Sensor
+from tbcad.simulate.scene.exported import read_export
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.views.viewpoints import Viewpoints, viewpoints_around
+from tbcad.spec.errors import SpecError
+from tbcad.spec.load import load_spec
+from tbcad.studies.low_pass import BlurOptions, low_pass
+from tbcad.studies.paper import balanced_sensors
+from tbcad.studies.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
+from tbcad.studies.ssim import proportionate_n, sensor_n, ssim
+
+SMALL = ["n=6", "camera.width_px=208", "camera.height_px=155"]
+SENSORS = (Sensor(208, 155), Sensor(312, 232), Sensor(416, 310))
+
+
+def quiet(_: str) -> None:
+    pass
+
+
+def test_sensors_of_table_ii_have_its_n() -> None:
+    """Table II: 12, 18, 26 and 36; in proportion 1040 x 776 would have 13 and 4160 x 3104 25."""
+    paper, other = load_spec(None), load_spec(None, ["n=17"])
+    sensors = [Sensor(row.width_px, row.height_px) for row in balanced_sensors()]
+    assert [sensor_n(paper, sensor) for sensor in sensors] == [12, 18, 26, 36]
+    assert [proportionate_n(paper, sensor) for sensor in sensors] == [13, 18, 25, 36]
+    assert [sensor_n(other, sensor) for sensor in sensors] == [12, 17, 24, 34]
+    assert sensor_n(paper, Sensor(3664, 2748)) == 24
+
+
+def test_n_proportionate_to_the_sensor() -> None:
+    """Four times the sides: sixteen times the pixels, twice the n (design sensor-10mp)."""
+    sensors = (Sensor(2080, 1552), Sensor(8320, 6208), Sensor(3664, 2748))
+    assert [proportionate_n(load_spec(None), sensor) for sensor in sensors] == [18, 36, 24]
+    assert proportionate_n(load_spec(None, SMALL), Sensor(16, 16)) == 2
+
+
+class SmallViews(Viewpoints):
+    """With a quarter of the pixels: how blurred views are is searched for, which takes long."""
+
+    def cameras(self, capture_mm: float, size: tuple[int, int] = (320, 240)) -> list[Camera]:
+        return super().cameras(capture_mm, size)
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 2, 640.0)))
+    return ssim(
+        load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest", quiet
+    )
+
+
+def test_more_pixels_make_better_views(study: Study) -> None:
+    means = study.tables[1]
+    every = means.where(elevation_deg="all").numbers("ssim")
+    assert len(every) == 3
+    assert every[0] < every[1] < every[2] < 1
+
+
+def test_means(study: Study) -> None:
+    views, means = study.tables[:2]
+    assert len(views.rows) == 3 * 4
+    mine = views.where(width_px=416, elevation_deg=60.0).numbers("ssim")
+    (mean,) = means.where(width_px=416, elevation_deg=60.0).records()
+    assert mean["views"] == len(mine) == 2
+    assert mean["ssim"] == pytest.approx(np.mean(mine))
+
+
+def test_more_pixels_make_sharper_views(study: Study) -> None:
+    rows = study.tables[1].where(elevation_deg="all")
+    blur, share = rows.numbers("blur_mm"), rows.numbers("object_share")
+    assert blur[0] > blur[1] > blur[2] > 0
+    assert len(np.unique(share)) == 1  # the same viewpoints
+    assert 0.01 < share[0] < 0.8
+    on_object, all_over = rows.numbers("ssim_on_object"), rows.numbers("ssim")
+    assert (on_object < all_over).all()  # the background is even
+
+
+def test_elevations_of_the_sharpest_and_most_similar_views(study: Study) -> None:
+    means = study.tables[1].where(width_px=208)
+    rows = {figure.quantity: figure for figure in study.figures}
+    found = rows["208x155: elevation of the least blur"]
+    at = {elevation: means.where(elevation_deg=elevation) for elevation in (15.0, 60.0)}
+    blur = {elevation: row.numbers("blur_mm")[0] for elevation, row in at.items()}
+    assert found.value == min(blur, key=lambda elevation: blur[elevation])
+    assert (found.paper, found.where) == (15, "section 4.4")
+
+
+def test_fit(study: Study) -> None:
+    means, fits = study.tables[1:]
+    rows = means.where(elevation_deg="all")
+    x, y = np.log10(rows.numbers("width_px") * rows.numbers("height_px")), rows.numbers("ssim")
+    slope, intercept = np.polyfit(x, y, 1)
+    (fit,) = fits.where(elevation_deg="all").records()
+    assert (fit["slope"], fit["intercept"]) == pytest.approx((slope, intercept))
+    rest = y - slope * x - intercept
+    assert fit["r2"] == pytest.approx(1 - (rest**2).sum() / ((y - y.mean()) ** 2).sum())
+
+
+def test_the_same_study_gives_the_same_files(study: Study) -> None:
+    files = study_files(study)
+    assert {"ssim.csv", "ssim-means.csv", "ssim-fits.csv", "ssim.png"} <= set(files)
+    assert study_files(study) == files
+
+
+def test_a_sensor_whose_mirrors_cannot_be_made_has_a_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(radii, "MAX_ITERATIONS", 2)  # else the search takes ten seconds
+    hopeless = ["camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36"]
+    spec = load_spec(None, [*SMALL, "n=9", *hopeless])
+    viewpoints = viewpoints_around((30.0,), 1, 640.0)
+    with pytest.raises(SpecError) as refusal:
+        design(spec)
+    found = ssim(spec, built_in_object(36.0), SENSORS[:1], viewpoints, "nearest", quiet)
+    assert found.tables[0].column("reason") == [str(refusal.value)]
+    assert found.figures == ()
+
+
+def test_interval_of_the_mean_difference() -> None:
+    rng = np.random.default_rng(3)
+    one = rng.normal(0.9, 0.05, 20)
+    other = one + rng.normal(0.01, 0.01, 20)
+    interval = mean_difference_interval(one, other)
+    difference = other - one
+    half = 2.093024 * difference.std(ddof=1) / np.sqrt(20)  # t at 97.5 %, 19 degrees of freedom
+    assert interval == pytest.approx((difference.mean() - half, difference.mean() + half))
+    low, high = mean_difference_interval(one, one[::-1])
+    assert low < 0 < high
+    assert mean_difference_interval(one[:1], other[:1]) == (-np.inf, np.inf)
+
+
+@pytest.mark.slow
+def test_prototype_against_the_shell(export_folder: Path) -> None:
+    """Fewer pixels and other virtual cameras: views that are slightly worse."""
+    export = read_export(export_folder)
+    viewpoints = viewpoints_around((20.0, 60.0), 2, 640.0)
+    found = prototype_vs_shell(export, built_in_object(60.0), viewpoints, "nearest", 2)
+    rows = {figure.quantity: figure.value for figure in found.figures}
+    shell, balls = (rows[f"mean SSIM of the {name}'s views"] for name in ("shell", "prototype"))
+    assert 0.5 < balls < shell < 1
+    assert rows["difference"] == pytest.approx(balls - shell)
+    (table,) = found.tables
+    assert len(table.rows) == 4
+    ssim_of = {name: table.numbers(f"{name}_ssim") for name in ("shell", "prototype")}
+    assert table.numbers("ssim_difference") == pytest.approx(
+        ssim_of["prototype"] - ssim_of["shell"]
+    )
+    significant = ttest_rel(*ssim_of.values()).pvalue < 0.05
+    verdict = "significant" if significant else "not significant"
+    assert rows["at 95 % the difference is"] == verdict
+
+
+@pytest.mark.slow
+def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
+    """Section 5.3: the wider the filter, the lower the contrast, and the blurrier every view."""
+    viewpoints = viewpoints_around((30.0,), 1, 640.0)
+    options = BlurOptions((1.0, 3.0), (3.0,), 1)
+    found = low_pass(read_export(export_folder), built_in_object(60.0), viewpoints, options)
+    means = found.tables[1]
+    assert len(found.tables[0].rows) == len(means.rows) == 5 * 2
+    for view in ("pinhole", "aperture"):
+        none, narrow, wide = (
+            means.where(geometry="prototype", view=view, px=px, blur=blur).records()[0]
+            for blur, px in (("none", 0.0), ("filter", 1.0), ("filter", 3.0))
+        )
+        assert 1 == none["photograph_contrast"] > narrow["photograph_contrast"]
+        assert narrow["photograph_contrast"] > wide["photograph_contrast"] > 0.2
+        assert none["blur_mm"] < narrow["blur_mm"] < wide["blur_mm"]
+        assert none["ssim"] > wide["ssim"]
+    (shell,) = means.where(geometry="shell", view="aperture").records()
+    assert shell["blur_mm"] < none["blur_mm"]
+    assert len(study_files(found)) == 5
+
+
+def test_blurs_refused() -> None:
+    with pytest.raises(InputError, match="--filter-px 0"):
+        BlurOptions((0.0,)).checked()
+    with pytest.raises(InputError, match="--lens-px nan"):
+        BlurOptions(lens_px=(np.nan,)).checked()
+
+
+def test_viewpoints_around_the_object() -> None:
+    viewpoints = viewpoints_around((0.0, 45.0), 4, 500.0)
+    assert viewpoints.azimuth_deg.tolist() == [0, 90, 180, 270] * 2
+    at = np.array([view.pinhole for view in viewpoints.cameras(60.0)])
+    assert np.linalg.norm(at, axis=1) == pytest.approx(np.full(8, 500.0))
+    assert at[4:, 2] == pytest.approx(np.full(4, 500 * np.sqrt(0.5)))
+    with pytest.raises(InputError, match="--azimuths 0"):
+        viewpoints_around((0.0,), 0, 500.0)
+
+
+def test_bad_input_of_the_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (
+        ["ssim", "--sensor", "abc"],
+        ["ssim", "--azimuths", "0"],
+        ["ssim", "--distance", "5"],
+        ["prototype", str(tmp_path)],
+    ):
+        assert run(["study", *arguments, "--out", str(tmp_path / "out")]) == 2
+        said = capsys.readouterr().err.splitlines()
+        assert said[-1].startswith("tbcad: ")
+    assert not (tmp_path / "out").exists()
