@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.api import build, calibrate, merge, simulate_run
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.corrections import Options
+from tbcad.merged_run.stop_photographs import Options
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import read_export

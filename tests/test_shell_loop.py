@@ -10,7 +10,7 @@ from tbcad.api import calibrate, merge, simulate_run
 from tbcad.calibration.options import CalibrationOptions
 from tbcad.geometry.vectors import norm
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.corrections import Options
+from tbcad.merged_run.stop_photographs import Options
 from tbcad.mirrors.array import design
 from tbcad.mirrors.record import write_record
 from tbcad.simulate.capture.light_field import LightField

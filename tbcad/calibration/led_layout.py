@@ -78,15 +78,7 @@ def best_layout(
     cost: Callable[[list[int]], float],
     progress: Progress = lambda _: None,
 ) -> list[int]:
-    """Numbers of the LEDs among `with_partners(places)`.
-
-    Args:
-        room: for LEDs.
-        places: that are tried, (p, 3).
-        number: of LEDs, even.
-        cost: of LEDs by their numbers.
-        progress: called with the number of pairs found.
-    """
+    """Numbers of so many LEDs among `with_partners(places)` that cost least."""
     p = len(places)
 
     def of_pairs(pairs: list[int]) -> float:

@@ -5,14 +5,20 @@ process says is a judgement, below.
 """
 
 import math
+import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
 from tbcad.calibration.estimate.parameters import Block, Prior
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import Record, read_json
 from tbcad.geometry.vectors import norm
+from tbcad.machine.built import LED_MM
 from tbcad.machine.machine import Machine
-from tbcad.machine.other_errors import LED_MM
+from tbcad.simulate.prototype.plan import MISSING, SCHEMA
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.types import Bools, Floats, Ints
 
@@ -23,9 +29,14 @@ OBLONG = 1e-3
 """By which pixels are not square: mask-made sensors are square to better; judgement."""
 DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
 """k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
-15); judgement, wider than tbcad.machine.other_errors, because highlights tell it well. k3 is fixed:
+15); judgement, wider than tbcad.machine.built, because highlights tell it well. k3 is fixed:
 those of a few balls do not tell it from k2."""
 UNIFORM = math.sqrt(3)  # half width of a uniform distribution over its standard deviation
+MEASURED_MM = 0.01
+"""Standard deviation of a radius that is measured without saying how well: by a micrometer screw
+over the body, or a spherometer."""
+PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
+Measured = tuple[tuple[int, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -50,13 +61,7 @@ class Fitted:
 
 
 def prototype_prior(machine: Machine, errors: Errors, fitted: Fitted) -> Prior:
-    """Prior of a prototype whose balls are on a base that rotates.
-
-    Args:
-        machine: as designed.
-        errors: of its process.
-        fitted: what else is known.
-    """
+    """Prior of a prototype as designed, whose balls are on a base that rotates."""
     radius, radii = _radii(machine, errors, fitted)
     arm = norm(machine.centre - fitted.body_centre)
     tilted = np.where(fitted.is_cap, arm * deviation(errors.cap_tilt), 0.0)
@@ -80,14 +85,9 @@ def prototype_prior(machine: Machine, errors: Errors, fitted: Fitted) -> Prior:
 
 
 def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> Prior:
-    """Prior of one shell with its camera; LEDs are held at the object's place, all at once.
+    """Prior of one designed shell with its camera; LEDs are held at the object's place together.
 
     In the frame of the shell: how its whole place is off is the camera's and the LEDs' error here.
-
-    Args:
-        machine: as designed, with one frame.
-        errors: of its process.
-        lens_known: whether focal lengths, principal point and distortion are given.
     """
     spheres, shift = len(machine.radius), deviation(errors.shell_shift)
     camera = _camera(machine, errors, lens_known)
@@ -144,7 +144,6 @@ def _led(errors: Errors) -> float:
 
 
 def _radii(machine: Machine, errors: Errors, fitted: Fitted) -> tuple[Floats, Floats]:
-    """Means and standard deviations."""
     made, bought = errors.whole_radius, errors.ball_radius
     radius = machine.radius + np.where(fitted.is_cap, made.mean, bought.mean)
     sigma = np.where(fitted.is_cap, deviation(made), deviation(bought))
@@ -155,3 +154,44 @@ def _radii(machine: Machine, errors: Errors, fitted: Fitted) -> tuple[Floats, Fl
 
 def _with_radii(machine: Machine, radius: Floats) -> Machine:
     return replace(machine, radius=radius)
+
+
+class _Home(Record):
+    zero_error_deg: float = Field(ge=0, le=180)
+
+
+class _Document(Record):
+    home: _Home | None = None
+
+
+def read_zero_error(path: Path) -> float:
+    """Half width of the base's angle zero by the record of a prototype, radians; 0 if not said.
+
+    Raises:
+        InputError: the record cannot be read.
+    """
+    home = read_json(path, _Document, SCHEMA, MISSING).home
+    return 0.0 if home is None else math.radians(home.zero_error_deg)
+
+
+def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
+    """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm."""
+    return tuple(_measured(text, balls) for text in texts)
+
+
+def _measured(text: str, balls: int) -> tuple[int, float, float]:
+    found = PATTERN.fullmatch(text.replace(" ", ""))
+    try:
+        ball, radius, sigma = found.groups() if found else ("", "", "")
+        values = int(ball) - 1, float(radius), float(sigma or MEASURED_MM)
+    except ValueError:
+        raise InputError(
+            f"--measured {text!r:.60} is not BALL=RADIUS_MM or BALL=RADIUS_MM:SIGMA_MM: write for "
+            "instance 1=43.21:0.01"
+        ) from None
+    if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
+        raise InputError(
+            f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation above "
+            "0 mm: change it"
+        )
+    return values

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.calibration.estimate.lens import projection
-from tbcad.calibration.estimate.reflection import reflections
+from tbcad.calibration.estimate.reflection import projection, reflections
 from tbcad.geometry.vectors import perpendicular_axes, unit
 from tbcad.optics.lens_camera import LensCamera
 from tbcad.optics.reflection import reflected_rays
@@ -37,15 +36,7 @@ class SphereInformation:
 def sphere_information(
     camera: LensCamera, centre: Floats, radius: Floats, leds: Floats, seen: Bools
 ) -> SphereInformation:
-    """What highlights tell of each sphere.
-
-    Args:
-        camera: known.
-        centre: mm, (m, 3).
-        radius: mm, (m,).
-        leds: mm, (l, 3).
-        seen: which spheres show which LEDs, (m, l).
-    """
+    """What highlights of LEDs (l, 3) tell of spheres (m,), where seen, (m, l); in mm."""
     slopes = [
         _slopes(camera, centre, radius, np.broadcast_to(led, centre.shape))[0] for led in leds
     ]

@@ -206,14 +206,7 @@ def _whole_table(setup: Setup, layouts: list[Layout], progress: Progress) -> Tab
 
 
 def whole_errors(setup: Setup, leds: Floats, process: str, noise_px: float) -> RayUncertainty:
-    """How well the mirrors' rays are known after a whole run.
-
-    Args:
-        setup: of an export, with the frames that are photographed.
-        leds: places of the LEDs, mm, (l, 3).
-        process: that made the prototype.
-        noise_px: of the highlights.
-    """
+    """How well the mirrors' rays are known after a whole run with LEDs (l, 3) at places in mm."""
     lit = replace(setup, designed=replace(setup.designed, leds=leds))
     prior = lit.prior(process_errors(load_process(process)))
     seen = _seen(setup, prior.mean, np.arange(len(setup.frames)))

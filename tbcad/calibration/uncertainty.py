@@ -89,13 +89,7 @@ class RayUncertainty:
 
 
 def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:
-    """Covariance of an estimate's rays.
-
-    Args:
-        found: the machine with its information.
-        frame: in which each ray is photographed, (m,).
-        sphere: that shows it, (m,).
-    """
+    """Covariance of an estimate's rays by spheres (m,) in frames (m,)."""
     known = covariance(found.prior, found.information)
     return known_rays(found.prior, found.values, known, frame, sphere)
 
@@ -103,15 +97,7 @@ def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertaint
 def known_rays(
     prior: Prior, values: Floats, known: Covariance, frame: Ints, sphere: Ints
 ) -> RayUncertainty:
-    """Covariance of the rays of a machine whose parameters have a covariance.
-
-    Args:
-        prior: of the machine.
-        values: its free parameters in prior standard deviations, (q,).
-        known: their covariance.
-        frame: in which each ray is photographed, (m,).
-        sphere: that shows it, (m,).
-    """
+    """Covariance of rays (m,) of a machine whose free parameters (q,) have a covariance."""
     slopes, direction = ray_slopes(prior, values, frame, sphere)
     of_all, of_each = shared_motions(prior, frame, direction)
     every = known.of(slopes, FIGURES)

@@ -74,7 +74,7 @@ def merge(
     if exports is not None:
         check_is_export(exports)
     from tbcad.api import merge as merged
-    from tbcad.merged_run.corrections import Options
+    from tbcad.merged_run.stop_photographs import Options
 
     out = out or CAPTURES / run.resolve().name
     options = Options(vignetting, tuple(flat or ()), encoding, brightness)

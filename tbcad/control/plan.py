@@ -79,11 +79,8 @@ class Plan:
         sha256: of each file that it depends on, by name.
         size_px: columns and rows of the design's camera.
         firmware: of the controller, "grblhal" or "grbl".
-        axis: letter of the base's axis.
         phases: of a stop, in order.
-        motion: times and speeds.
         settings: of the controller, by number.
-        program: the motions.
         frames: of both runs, in order.
     """
 
@@ -104,11 +101,7 @@ class Plan:
 
 
 def read_control_plan(folder: Path) -> Plan:
-    """Read what a run needs of a folder that `tbcad build` wrote with a prototype.
-
-    Raises:
-        InputError: something is missing or does not fit; it says what.
-    """
+    """Read what a run needs of a folder that `tbcad build` wrote with a prototype."""
     design = read_json(
         folder / DESIGN_FILE, _Design, DESIGN_SCHEMA, "name a folder that tbcad build wrote"
     )
@@ -133,11 +126,7 @@ def read_control_plan(folder: Path) -> Plan:
 
 
 def read_settings(path: Path) -> dict[int, float]:
-    """Settings of the controller by number, without the direction, which is found by trying.
-
-    Raises:
-        InputError: there is no such file, or a line is neither comment nor setting.
-    """
+    """Settings of the controller by number, without the direction, which is found by trying."""
     settings: dict[int, float] = {}
     for number, line in enumerate(_text(path).splitlines(), 1):
         if line.startswith("("):

@@ -48,7 +48,6 @@ class Seen:
     """What a photograph shows.
 
     Attributes:
-        state: what to think of it.
         peak: level of its brightest light, of the largest number.
         saturated: share of the highlights, or of the lit pixels, that are.
         highlights: number of them; None where no single LED shines.
@@ -82,14 +81,10 @@ class Seen:
 def preflight(times: dict[str, float | None], shoot: Shoot, where: str, note: Progress) -> None:
     """Photograph one stop under each light, and say what is wrong.
 
-    Args:
-        times: exposure time of each phase, s; None: that which the camera has.
-        shoot: takes a photograph.
-        where: the camera and the stop in words.
-        note: called with a line for each phase.
+    A time of None is that which the camera has; a note is given for each phase.
 
     Raises:
-        InputError: an exposure will not do; it says which would.
+            InputError: an exposure will not do; it says which would.
     """
     dark: dict[str, Image16] = {}
     seen: dict[str, Seen] = {}
@@ -197,7 +192,6 @@ def _right(phase: str, seconds: float | None, seen: Seen, shoot: Shoot) -> float
 
 
 def _step(wrong: Mapping[str, State], right: Mapping[str, float | None]) -> str:
-    """What to do."""
     options = [
         f"--exposure-{'lit' if phase == LIT else 'leds'} {seconds:.3g}"
         for phase, seconds in right.items()

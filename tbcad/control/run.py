@@ -6,25 +6,33 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
+from tbcad.control.base import Base
 from tbcad.control.cameras.choice import (
     check_camera_name,
     check_can_expose,
     connected_camera,
 )
-from tbcad.control.connection import machine_at
-from tbcad.control.estimate import (
+from tbcad.control.grbl import Grbl
+from tbcad.control.klipper.base import KlipperBase
+from tbcad.control.klipper.files import read_klipper_files
+from tbcad.control.klipper.host import Klipper
+from tbcad.control.klipper.moonraker import PREFIX, Moonraker, read_address
+from tbcad.control.machine import Machine, MachineFault
+from tbcad.control.outcome import DryRun, Outcome
+from tbcad.control.plan import Plan, read_control_plan
+from tbcad.control.port import SerialPort
+from tbcad.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
+    Preflight,
+    RunOptions,
     Shots,
+    chosen_frames,
+    chosen_phases,
     count,
     disk_bytes,
     expected_seconds,
 )
-from tbcad.control.faults import MachineFault
-from tbcad.control.machine import Machine
-from tbcad.control.outcome import Outcome
-from tbcad.control.plan import Plan, read_control_plan
-from tbcad.control.selection import Preflight, RunOptions, chosen_frames, chosen_phases
 from tbcad.control.session import Ask, Session, Show
 from tbcad.errors import InputError
 from tbcad.output.content import refuse_inside
@@ -44,8 +52,6 @@ class RunRequest:
     """What is asked for.
 
     Attributes:
-        exports: folder that tbcad build wrote.
-        out: folder of the run.
         phases: names with commas between; None: all, or those of the run that is resumed.
         stops: numbers and ranges with commas between; None likewise.
         runs: "a", "b" or "ab"; None: both, or as in the run that is resumed.
@@ -66,34 +72,8 @@ class RunRequest:
     preflight: Preflight = "first"
 
 
-@dataclass(frozen=True)
-class DryRun:
-    """What a run would do.
-
-    Attributes:
-        plan: of the export.
-        remaining: photographs to be taken.
-        seconds: that it would take, about.
-        disk_bytes: that it would need, about.
-    """
-
-    plan: Plan
-    remaining: list[Shots]
-    seconds: float
-    disk_bytes: int
-
-    @property
-    def photographs(self) -> int:
-        """Number of photographs."""
-        return count(self.remaining)
-
-
 def dry_run(request: RunRequest) -> DryRun:
-    """What a run would do, without port and camera; nothing is written.
-
-    Raises:
-        InputError: export, folder or choice will not do.
-    """
+    """What a run would do, without port and camera; nothing is written."""
     plan, options = _prepared(request, send_settings=False)
     taken = set(read_run(request.out).exposures) if request.resume else set[str]()
     names = [phase.name for phase in options.phases]
@@ -240,3 +220,15 @@ def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> No
             f"{request.out} is a run of another export: {other[0]} of {request.exports} differs; "
             "name the export that it was begun with"
         )
+
+
+def machine_at(port: str, folder: Path, plan: Plan, note: Progress, stack: ExitStack) -> Machine:
+    """Open a port, which the stack closes: of a serial line, or "moonraker:" and a URL."""
+    if port.startswith(PREFIX):
+        server = Moonraker(read_address(port.removeprefix(PREFIX)))
+        return KlipperBase(Klipper(server, note), plan, read_klipper_files(folder))
+    if "://" in port:
+        raise InputError(f"--port is {port!r:.60}: for Klipper say {PREFIX}http://HOST")
+    line = SerialPort(port)
+    stack.callback(line.close)
+    return Base(Grbl(line, note), plan)

@@ -7,7 +7,12 @@ from itertools import groupby
 from pathlib import Path
 
 from tbcad.control.cameras.camera import Camera, Shot
-from tbcad.control.estimate import (
+from tbcad.control.machine import CameraFault, Machine, MachineFault
+from tbcad.control.outcome import Outcome
+from tbcad.control.plan import Plan
+from tbcad.control.selection import (
+    Preflight,
+    RunOptions,
     Shots,
     bytes_each,
     check_disk,
@@ -17,19 +22,14 @@ from tbcad.control.estimate import (
     expected_seconds,
     size_text,
 )
-from tbcad.control.faults import CameraFault, MachineFault
-from tbcad.control.machine import Machine
-from tbcad.control.outcome import Outcome
-from tbcad.control.plan import Plan
-from tbcad.control.selection import Preflight, RunOptions
 from tbcad.control.shooting import (
     Photograph,
     check_like_record,
     exposure_of,
     light_on,
+    run_record,
     taken_twice,
 )
-from tbcad.control.trials import run_record
 from tbcad.errors import InputError
 from tbcad.runs.exposure import Frame, exposure_name
 from tbcad.runs.writing import DiskFault, RunWriter, new_run, resumed_run
@@ -150,7 +150,6 @@ class Session:
             raise InputError(f"the camera: {fault}") from None
 
     def _light(self, phase: str) -> AbstractContextManager[None]:
-        """Have the light of a phase on."""
         lights = {one.name: one for one in self._options.phases}
         return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
@@ -211,7 +210,6 @@ class Session:
         self._homed = True
 
     def _position(self, shots: Shots, note: Progress) -> None:
-        """All photographs at one position."""
         self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
         for name in shots.phases:
             with self._light(name):
@@ -261,7 +259,6 @@ class Session:
 
 
 def _turned(remaining: list[Shots]) -> bool:
-    """Whether the object is turned at the first position."""
     return bool(remaining and remaining[0].frame.object_turn_deg)
 
 

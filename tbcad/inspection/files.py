@@ -14,10 +14,9 @@ from tbcad.errors import InputError
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.formats.step_named import read_named_solid
 from tbcad.formats.step_tolerances import FaceTolerances, write_tolerances
-from tbcad.inspection.deviations import MM_PER_UM
 from tbcad.inspection.limits import Limits
 from tbcad.inspection.read_back import check_read_back
-from tbcad.inspection.sensitivity import Sensitivities
+from tbcad.inspection.sensitivity import MM_PER_UM, Sensitivities
 from tbcad.mirrors.array import mirror_ids
 from tbcad.optics.cells import Cells
 from tbcad.optics.pedestals.cells import PedestalCells
@@ -49,9 +48,7 @@ class Half:
 
     Attributes:
         name: of its solid, "shell_a".
-        ids: of its mirrors.
         surfaces: of the solid, below the coat.
-        limits: of the mirrors.
         dowel_mm: diameter of the holes for dowel pins.
         walls: of each mirror's pedestal: names of the faces, with a point (mm) and the normal of
             their planes, (6,); none where spheres meet.
@@ -178,11 +175,7 @@ def dowel_face(solid: Solid, diameter: float) -> str:
 
 
 def notes(wall_um: Floats | None = None) -> dict[str, str]:
-    """What tolerances of faces cannot say.
-
-    Args:
-        wall_um: by how much the walls of each pedestal may be off, (m,).
-    """
+    """What tolerances of faces cannot say; walls of pedestals may be off by micrometres, (m,)."""
     walls = {}
     if wall_um is not None:
         limit = f"{wall_um.min():.1f} um along their normals, or as the zones allow"

@@ -38,15 +38,11 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limi
 
     Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
     mirror of a virtual camera the same limit; a mirror keeps the smallest limit that its virtual
-    cameras ask for. Sums are linear for `each`, and of squares for `sigma`.
-
-    Args:
-        found: losses of the virtual cameras.
-        target_mm: that every virtual camera must see.
-        wanted: share of the pairs of shells in which all do, between 0 and 1.
+    cameras ask for. Sums are linear for `each`, and of squares for `sigma`, with which the wanted
+    share of the pairs of shells is good.
 
     Raises:
-        InputError: a virtual camera sees less than the target as designed.
+            InputError: a virtual camera sees less than the target as designed.
     """
     margin = found.coverage - target_mm
     if margin.min() <= 0:
@@ -66,13 +62,7 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limi
 
 
 def whole_margin_steps(found: Sensitivities, limits: Limits, radius: Floats) -> Floats:
-    """Deviations (2 m, kinds) that would take a whole margin if losses were linear.
-
-    Args:
-        found: losses.
-        limits: that follow from them.
-        radius: of the mirrors (2 m,), mm: no step is more than half of it.
-    """
+    """Deviations (2 m, kinds) that would linearly take a whole margin; radii (2 m,), mm."""
     steps = kinds_and_seat(found) * np.maximum(limits.each, SMALLEST_LIMIT)
     column = KINDS.index("radius")
     steps[:, column] = np.minimum(steps[:, column], radius / 2)

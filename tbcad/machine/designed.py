@@ -44,12 +44,7 @@ def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
 
 
 def designed_shell(reflector: Reflector, leds: Floats) -> Machine:
-    """One camera of the shell with its mirrors as spheres that do not move.
-
-    Args:
-        reflector: camera and mirrors, all of them curved.
-        leds: that are held at the object's place to calibrate it, mm, (l, 3).
-    """
+    """One camera of the shell with its curved mirrors as spheres at rest; LEDs (l, 3), mm."""
     mirrors = reflector.mirrors
     radius = 1 / mirrors.curvature
     return Machine(

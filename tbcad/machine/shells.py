@@ -38,14 +38,10 @@ def shell_frame(half: int) -> Frame:
 
 
 def designed_half(export: ExportedDesign, half: int) -> Machine:
-    """One camera of an export's shell; LEDs are where the prototype's stage has them.
-
-    Args:
-        export: of the design.
-        half: 0 for camera a, 1 for camera b.
+    """One camera of an export's shell, 0 for a and 1 for b; LEDs as on the prototype's stage.
 
     Raises:
-        InputError: a mirror is planar: it shows no LED that could be told from its place.
+            InputError: a mirror is planar: it shows no LED that could be told from its place.
     """
     reflector, flip = export.reflectors[half], _flip(half)
     if (reflector.mirrors.curvature <= 0).any():
@@ -90,11 +86,7 @@ def half_of(frames: tuple[Frame, ...]) -> int:
 
 
 def plan_of(export: ExportedDesign, geometry: Geometry, frames: tuple[Frame, ...]) -> Plan:
-    """The plan of the one machine that took some frames of a run.
-
-    Raises:
-        InputError: it cannot be read.
-    """
+    """The plan of the one machine that took some frames of a run."""
     if geometry == "prototype":
         return read_plan(export)
     return shell_plan(export, half_of(frames))
@@ -104,9 +96,7 @@ def tied(machines: list[tuple[Machine, tuple[Frame, ...]]]) -> list[Machine]:
     """Machines, each moved as a whole to where its LEDs are those of the first.
 
     Photographs alone do not tell where a machine is; but both cameras of a shell see the same LEDs.
-
-    Args:
-        machines: with their frames; one prototype stays where it is.
+    One prototype stays where it is.
     """
     first, *others = machines
     anchor = _led_middle(*first) if others else 0.0  # a prototype's record may be without LEDs
@@ -131,16 +121,6 @@ def random_half(
 
     The mean of the scales along the axes is used for all three, and form errors are left out: a
     sphere stays a sphere.
-
-    Args:
-        export: of the design.
-        half: 0 for camera a, 1 for camera b.
-        errors: of the process.
-        seed: of all builds.
-        build: number of the build.
-
-    Raises:
-        InputError: the mirrors are planar.
     """
     designed, grooves = designed_half(export, half), export.reflectors[half].walls
     maps = warp_maps_of(edge_models(export.reflectors), errors)

@@ -13,12 +13,16 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS, machine_run, stops_known
 from tbcad.machine.record import RECORD, read_machine
 from tbcad.machine.shells import NOT_SERVED, plan_of, tied
-from tbcad.merged_run.corrections import Corrections, Options, corrections
 from tbcad.merged_run.ray_sigmas import ray_sigmas
-from tbcad.merged_run.stop_photographs import CorrectedPhotographs, common_exposure
+from tbcad.merged_run.stop_photographs import (
+    CorrectedPhotographs,
+    Corrections,
+    Options,
+    common_exposure,
+    corrections,
+)
 from tbcad.runs.exposure import LIT, Frame
-from tbcad.runs.photographs import Run, read_run
-from tbcad.runs.same_export import check_same_export
+from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.capture.geometry import CameraPhotographs
 from tbcad.simulate.capture.photograph import RowBand
 from tbcad.simulate.prototype.merge import merge_photographs, merge_plan
@@ -35,7 +39,6 @@ class HalfMerge:
 
     Attributes:
         run: where camera and balls are.
-        photographs: of its stops.
         pixels: of each mirror with a ray, filled in as the merge goes on, (m,).
     """
 
@@ -78,7 +81,6 @@ class Merge:
     Attributes:
         halves: for each camera of the shell that photographs were taken for.
         capture_mm: diameter of the capture sphere.
-        facts: what the merge is based on.
         ray_sigma_mm: root mean square error of the rays of each mirror at the object, by camera;
             None where the calibration does not say.
     """
@@ -99,14 +101,9 @@ class Merge:
 def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Options) -> Merge:
     """Read what a merge needs, but the photographs themselves.
 
-    Args:
-        folder: of the run.
-        calibration: folder with machine.json.
-        exports: folder that the machine was built from.
-        options: how the photographs are corrected.
-
     Raises:
-        InputError: one cannot be read, they do not belong together, or nothing was photographed.
+            InputError: one cannot be read, they do not belong together, or nothing was
+            photographed.
     """
     run, export = read_run(folder), read_export(exports)
     check_same_export(run, exports)

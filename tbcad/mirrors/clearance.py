@@ -28,13 +28,8 @@ STEPS_PER_MM = 10  # of the sizes tried
 def check_clearance(spec: Spec, array: MirrorArray, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
-    Args:
-        spec: of the design.
-        array: camera a's mirrors.
-        solve: the mirrors of another spec, to try remedies.
-
     Raises:
-        SpecError: with the mirror, and sizes with which the light passes the object.
+            SpecError: with the mirror, and sizes with which the light passes the object.
     """
     radius = spec.optics.capture_diameter_mm / 2
     distance, mirror = _passage(spec.optics, array)

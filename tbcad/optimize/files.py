@@ -38,14 +38,7 @@ Groups = dict[str, tuple[list[Figures], str]]
 def search_files(
     result: SearchResult, spec: Spec, out: Path, plot: PlotFormat = "png"
 ) -> dict[str, bytes]:
-    """The files of a search by name: the same search gives the same bytes.
-
-    Args:
-        result: of the search.
-        spec: the design that it began from.
-        out: the TOML file; the others are named after it.
-        plot: kind of the plot.
-    """
+    """The files of a search, beside out, by name: the same search gives the same bytes."""
     return {
         out.name: design_text(result, spec).encode(),
         f"{out.stem}-candidates.csv": csv_text(candidate_table(result)).encode(),

@@ -21,9 +21,10 @@ from tbcad.optimize.candidate import (
     bounds,
     evaluate,
     place_of,
+    read_store,
     rounded,
+    store_bytes,
 )
-from tbcad.optimize.store import read_store, store_bytes
 from tbcad.optimize.views import ViewsBy
 from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
@@ -56,7 +57,6 @@ class Search:
     """What a search is asked.
 
     Attributes:
-        spec: the design that it begins from.
         objectives: what is made better; all count alike, as ratios to the first design.
         budget: number of places that are judged at most.
         max_size_mm: longest side of the machine; None: of the first design's.
@@ -92,9 +92,6 @@ class SearchResult:
     """What a search found.
 
     Attributes:
-        start: the design that it began from.
-        limits: that candidates had to keep.
-        best: the best candidate.
         candidates: all that were judged, in the order in which they were.
         on_front: which of them no other one that keeps the limits betters in all objectives.
     """
@@ -107,11 +104,7 @@ class SearchResult:
 
 
 def parse_objectives(names: Sequence[str]) -> tuple[Objective, ...]:
-    """Objectives from their names, each once.
-
-    Raises:
-        InputError: a name is none.
-    """
+    """Objectives from their names, each once."""
     for name in names:
         if name not in OBJECTIVES:
             known = ", ".join(OBJECTIVES)
@@ -127,15 +120,11 @@ def search(
 ) -> SearchResult:
     """Search a better place of camera and ellipsoid.
 
-    Args:
-        asked: the design, what to improve, limits.
-        store: file of judgements (JSON lines): it is read when it exists, and written after
-            every generation, so that a search that was stopped goes on.
-        scheduler: address of a Dask scheduler; None for this machine's cores.
-        progress: called after every generation.
+    The store, a file of judgements (JSON lines), is read when it exists, and written after every
+    generation, so that a search that was stopped goes on.
 
     Raises:
-        InputError: the first design cannot be made; the store is of another design.
+            InputError: the first design cannot be made; the store is of another design.
     """
     judged = read_store(store, asked.key()) if store else {}
     judge = partial(_judge, asked, judged, store, scheduler, progress)

@@ -212,7 +212,6 @@ class Spec(Section):
     prototype: PrototypeSpec = PrototypeSpec()
 
     def __repr__(self) -> str:
-        """Return name and subdivision; `spec_dict` gives every key."""
         return f"<Spec {self.name!r}: n = {self.optics.n}>"
 
     __str__ = __repr__

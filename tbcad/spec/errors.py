@@ -136,14 +136,7 @@ def _inside(section: str, known: list[str]) -> list[str]:
 def validation_error(
     error: ValidationError, model: type[BaseModel], file: str, options: Collection[str] = ()
 ) -> SpecError:
-    """Return the first error of a validation as one line, and how many more there are.
-
-    Args:
-        error: what pydantic found.
-        model: the model that was validated.
-        file: where the design came from.
-        options: dotted keys that options have set.
-    """
+    """Return the first error of a validation as one line, and how many more there are."""
     first, *others = error.errors(include_url=False)
     key = ".".join(part for part in first["loc"] if isinstance(part, str))
     more = f" (and {len(others)} more)" if others else ""

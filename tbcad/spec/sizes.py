@@ -113,7 +113,6 @@ def _floor(optics: OpticsSpec, balls: PrototypeSpec) -> float:
 
 
 def _distance(optics: OpticsSpec) -> float:
-    """From the origin to the pinhole, mm."""
     return math.hypot(*optics.camera_mm)
 
 

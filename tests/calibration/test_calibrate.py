@@ -18,9 +18,9 @@ from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
 from tbcad.calibration.options import CalibrationOptions
 from tbcad.calibration.report.files import write_calibration
+from tbcad.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.calibration.report.tables import rays_table, residuals_table
 from tbcad.calibration.report.verdict import Answer, verdict, verdict_text
-from tbcad.calibration.true_rays import at_plane, centre_pixels, traced
 from tbcad.cli import run as command
 from tbcad.errors import InputError
 from tbcad.machine.built import BuiltPrototype, random_build

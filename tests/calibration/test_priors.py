@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from tbcad.calibration.estimate.parameters import Block
-from tbcad.calibration.priors import UNIFORM, Fitted, prototype_prior, shell_prior
-from tbcad.calibration.setup_files import MEASURED_MM, parse_measured, read_zero_error
+from tbcad.calibration.priors import (
+    MEASURED_MM,
+    UNIFORM,
+    Fitted,
+    parse_measured,
+    prototype_prior,
+    read_zero_error,
+    shell_prior,
+)
 from tbcad.errors import InputError
 from tbcad.tolerance.process.process import load_process, process_errors
 from tests.calibration.machines import small_machine

@@ -10,16 +10,18 @@ from scipy.stats import chi2
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance, covariance
 from tbcad.calibration.estimate.solve import estimate
+from tbcad.calibration.report.plots import COLUMNS, draw_recovered
 from tbcad.calibration.report.recovered import (
     BESIDES,
     SIGMAS,
     Kind,
+    place_mm,
+    ray_errors,
     recovered_errors,
     recovered_table,
+    turn_mrad,
 )
-from tbcad.calibration.report.recovered_plot import COLUMNS, draw_recovered
 from tbcad.calibration.report.tables import angles_table, spheres_table
-from tbcad.calibration.true_rays import place_mm, ray_errors, turn_mrad
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import unit
 from tbcad.machine.built import BuiltPrototype

@@ -8,7 +8,7 @@ from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.calibration.true_rays import at_plane, centre_pixels, traced
+from tbcad.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.calibration.uncertainty import (
     SPHERE_MM,
     ray_slopes,

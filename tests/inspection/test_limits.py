@@ -8,10 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tbcad.errors import InputError
-from tbcad.inspection.deviations import Deviation, independent_classes, tilt_axes
 from tbcad.inspection.inspect import minimum_at_limits
 from tbcad.inspection.limits import Limits, mirror_limits
-from tbcad.inspection.sensitivity import Sensitivities, sensitivities, touching
+from tbcad.inspection.sensitivity import (
+    Deviation,
+    Sensitivities,
+    independent_classes,
+    sensitivities,
+    tilt_axes,
+    touching,
+)
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.reflector import reflectors

@@ -6,20 +6,33 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.calibration.detection.detection import Detection, Reason, Rejected
+from tbcad.calibration.detection.detection import (
+    Detection,
+    Reason,
+    Rejected,
+    no_highlights,
+    relative_light,
+    verdicts,
+)
 from tbcad.calibration.detection.expected import Expected, Room, maybe_hidden
-from tbcad.calibration.detection.matching import NoPairs, highlights_of, match, shift_of
-from tbcad.calibration.detection.motion import Move, find_move
-from tbcad.calibration.detection.noise import centroid_sigmas, gain, reading_variance
-from tbcad.calibration.detection.nothing_found import no_highlights
+from tbcad.calibration.detection.matching import (
+    Move,
+    NoPairs,
+    find_move,
+    highlights_of,
+    match,
+    shift_of,
+)
 from tbcad.calibration.detection.spots import (
     ROUNDING,
     Spots,
     Unmeasured,
+    centroid_sigmas,
     find_spots,
+    gain,
     joined_spots,
+    reading_variance,
 )
-from tbcad.calibration.detection.verdicts import relative_light, verdicts
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
@@ -40,8 +53,6 @@ class _Read:
     """What a frame's photographs show.
 
     Attributes:
-        spots: of all LEDs.
-        unmeasured: what is bright besides.
         photographed: which LEDs' photographs could be read, (l,).
         faults: of the others, and of the dark one.
         dark: the dark photograph, if it could be read.
@@ -89,14 +100,14 @@ def detect(
     """Find all highlights of a run, and say of each that is not used why.
 
     Args:
-        run: that was photographed.
-        prior: of the machine; its frames are those of the run's record.
-        room: that an object may fill; None where nothing stands between LEDs and spheres.
-        dome: radius of the LEDs' domes, mm.
-        progress: called with each step.
+            run: that was photographed.
+            prior: of the machine; its frames are those of the run's record.
+            room: that an object may fill; None where nothing stands between LEDs and spheres.
+            dome: radius of the LEDs' domes, mm.
+            progress: called with each step.
 
     Raises:
-        InputError: no highlights are found, or the run has no phases of single LEDs.
+            InputError: no highlights are found, or the run has no phases of single LEDs.
     """
     frames, machine = run.record.frames, prior.mean
     if not any(phase.startswith("led_") for phase in run.record.phases):
@@ -161,7 +172,6 @@ def _spare_dark(run: Run) -> _Dark | None:
 
 
 def _seconds(run: Run, frame: Frame, phase: str) -> float | None:
-    """Exposure time of a photograph, s, if it is known."""
     exposure = run.exposure(frame, phase)
     return None if exposure is None else exposure.exposure_s
 
@@ -247,7 +257,7 @@ def _move_line(frames: tuple[Frame, ...], move: Move, shift: Floats) -> str:
 
 
 def _dead_leds(machine: Machine, expected: Expected, reasons: list[Reason | None]) -> list[str]:
-    """LEDs that do not shine, of those that are photographed."""
+    """Lines on LEDs that do not shine, of those that are photographed."""
     lines = []
     passed_over = (Reason.OUTSIDE, Reason.NO_PHOTOGRAPH, Reason.MOVED)
     counted = np.array([reason not in passed_over for reason in reasons])

@@ -56,12 +56,7 @@ class Expected:
 
 
 def expected_highlights(machine: Machine, dome: float) -> Expected:
-    """All highlights of a machine.
-
-    Args:
-        machine: with its frames.
-        dome: radius of the LEDs' domes, mm.
-    """
+    """All highlights of a machine whose LEDs have domes of a radius in mm."""
     camera = machine.camera
     shape = len(machine.angle), len(machine.radius), len(machine.leds)
     frame, sphere, led = (index.ravel() for index in np.indices(shape))

@@ -6,6 +6,8 @@ expected places agree on is taken. Then the machine is estimated from the neares
 again.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -13,6 +15,7 @@ from tbcad.calibration.detection.expected import Expected, expected_highlights
 from tbcad.calibration.detection.spots import Spots
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
+from tbcad.geometry.vectors import norm
 from tbcad.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints, Progress
 
@@ -24,6 +27,10 @@ FIRST_PX, NEAR_PX, FINAL_PX = 30.0, 10.0, 2.5
 FIRST_SIGMA_PX, SIGMA_PX = 2.0, 0.3
 FEW = 4  # highlights of a frame
 PHOTOGRAPH_PX = 1e5  # apart: spots of different photographs never pair
+MIN_HIGHLIGHTS = 4  # of a frame, to say where it is
+MIN_FRAMES = 3  # on either side of a move
+MIN_MOVE_PX, MOVE_SIGMAS = 0.15, 8.0  # less is no move
+FEW_PAIRS = 0.3  # share of the usual number of pairs: fewer are not where the machine shows them
 
 
 class NoPairs(Exception):
@@ -33,21 +40,15 @@ class NoPairs(Exception):
 def match(
     prior: Prior, spots: Spots, dome: float, progress: Progress
 ) -> tuple[Expected, Ints, Estimate]:
-    """Pair spots with highlights.
-
-    Args:
-        prior: of the machine, whose frames and LEDs those of the spots are.
-        spots: of all photographs.
-        dome: radius of the LEDs' domes, mm.
-        progress: called with each step.
+    """Pair spots with highlights of a prior's machine, whose LEDs have domes of a radius in mm.
 
     Returns:
-        The highlights that the machine should show; the spot of each, or -1, (n,); and the machine
-        that was estimated on the way.
+            The highlights that the machine should show; the spot of each, or -1, (n,); and the
+            machine
+            that was estimated on the way.
 
     Raises:
-        NoPairs: the spots fit no machine near the prior.
-        InputError: no machine explains them.
+            NoPairs: the spots fit no machine near the prior.
     """
     expected = expected_highlights(prior.mean, dome)
     some = np.unique(np.linspace(0, len(prior.mean.angle) - 1, FIRST_FRAMES).astype(np.int64))
@@ -148,3 +149,54 @@ def _estimated(
     if (partner < 0).all():
         raise NoPairs
     return estimate(prior, highlights_of(expected, partner, spots, sigma))
+
+
+@dataclass(frozen=True)
+class Move:
+    """A move of the camera.
+
+    Attributes:
+        first: number of the first frame after it.
+        kept: whether each frame is on the side that is kept, (f,).
+    """
+
+    first: int
+    kept: Bools
+
+
+def find_move(estimate: Estimate, frames: int, spots: Floats) -> Move | None:
+    """The one move of the camera that residuals, and spots in each frame (f,), show; or None."""
+    frame = estimate.highlights.frame
+    count = np.bincount(frame, minlength=frames).astype(np.int64)
+    lost = (count < FEW_PAIRS * np.median(count[count > 0])) & (spots > 0)
+    if lost.sum() >= MIN_FRAMES and _at_one_end(lost):
+        first = int(np.flatnonzero(lost)[0]) if not lost[0] else int(np.flatnonzero(~lost)[0])
+        return Move(first, ~lost)
+    return _step(estimate, count)
+
+
+def _at_one_end(lost: Bools) -> bool:
+    """Whether what is lost is all that comes before or after one frame."""
+    return int(np.count_nonzero(np.diff(lost.astype(int)))) == 1
+
+
+def _step(estimate: Estimate, count: Ints) -> Move | None:
+    known = np.flatnonzero(count >= MIN_HIGHLIGHTS)
+    if len(known) < 2 * MIN_FRAMES:
+        return None
+    frame = estimate.highlights.frame
+    middle = np.array([np.median(estimate.residual[frame == f], axis=0) for f in known])
+    before = np.arange(1, len(known))[:, None]
+    sums = np.cumsum(middle, axis=0)
+    step = (sums[-1] - sums[:-1]) / (len(known) - before) - sums[:-1] / before
+    # A step in the middle is known better than one near an end.
+    weight = np.sqrt(before * (len(known) - before) / len(known))
+    score = norm(step * weight)
+    score[: MIN_FRAMES - 1] = score[len(known) - MIN_FRAMES :] = 0
+    best = int(score.argmax())
+    scatter = float(np.median(np.abs(np.diff(middle, axis=0)))) + np.finfo(float).eps
+    if norm(step[best]) < MIN_MOVE_PX or score[best] < MOVE_SIGMAS * scatter:
+        return None
+    first = int(known[best + 1])
+    after = np.arange(len(count)) >= first
+    return Move(first, after if after.sum() > (~after).sum() else ~after)

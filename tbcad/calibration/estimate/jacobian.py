@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from tbcad.calibration.estimate.lens import LENS, projection
 from tbcad.calibration.estimate.parameters import Block, Prior
-from tbcad.calibration.estimate.reflection import reflections
+from tbcad.calibration.estimate.reflection import LENS, projection, reflections
 from tbcad.geometry.rotations import rotated
 from tbcad.machine.machine import Machine
 from tbcad.types import Floats, Ints
@@ -41,15 +40,7 @@ class Slopes:
 def highlights_with_slopes(
     prior: Prior, values: Floats, frame: Ints, sphere: Ints, led: Ints
 ) -> tuple[Floats, csr_array]:
-    """Columns and rows (n, 2), and their derivatives, (2 n, q).
-
-    Args:
-        prior: of the machine.
-        values: free parameters in prior standard deviations, (q,).
-        frame: of each highlight, (n,).
-        sphere: of each, (n,).
-        led: of each, (n,).
-    """
+    """Columns and rows (n, 2) of highlights (n,), and derivatives by values (q,), (2 n, q)."""
     machine = prior.machine(values)
     image = light_images(prior, values, machine, frame, sphere, machine.leds[led])
     slopes = Slopes(

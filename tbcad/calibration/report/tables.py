@@ -123,7 +123,6 @@ def _runout_deviations(prior: Prior, known: Covariance) -> Floats:
 
 
 def _deviations(prior: Prior, known: Covariance, columns: Ints) -> Floats:
-    """Of sums of parameters, by their numbers, (n, c)."""
     ones = np.ones((len(columns), 1, columns.shape[1]))
     slopes = Slopes((columns,), (ones,)).matrix(prior)
     return np.asarray(np.sqrt(known.of(slopes, 1)[:, 0, 0]))

@@ -38,7 +38,6 @@ class Verdict:
     """What to think of a calibration.
 
     Attributes:
-        answer: in a word.
         place_mm: root mean square error of the rays at the object's centre, median and 95 %, mm,
             besides a motion of all of them.
         turn_mrad: of their directions, mrad.
@@ -49,7 +48,6 @@ class Verdict:
         short: share of the rays that are less well known than half of their pixel.
         doubts: why it may not be trusted, one line each.
         pulled: parameters that the process does not explain, by name and prior deviations.
-        steps: what to do.
     """
 
     answer: Answer

@@ -70,7 +70,6 @@ class PrototypeModel:
     Attributes:
         pinhole: mm, (3,).
         axes: the camera's right, down and forward, (3, 3).
-        plan: balls on the base, and its stops.
         runs: for camera a's mirrors and for camera b's.
         virtual: number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
         wind_up: turn of the base under gravity at each of t stops, radians, (t,).
@@ -154,13 +153,7 @@ class PrototypeResult:
 
 @dataclass(frozen=True)
 class PrototypeCase:
-    """Simulates builds of the prototype; it can be sent to another process.
-
-    Attributes:
-        model: the prototype as designed.
-        errors: of the process.
-        seed: of all builds.
-    """
+    """Simulates builds of the prototype; it can be sent to another process."""
 
     model: PrototypeModel
     errors: Errors
@@ -170,8 +163,7 @@ class PrototypeCase:
         """Result of the builds of these numbers."""
         model = self.model
         draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.wind_up)
-        uncalibrated, calibrated = coverage_and_offsets(model, draws)
-        return PrototypeResult(*uncalibrated, *calibrated)
+        return prototype_result(model, draws)
 
 
 @dataclass(frozen=True)
@@ -212,11 +204,8 @@ def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int
 def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
     """Centres of the reflecting spheres with their bodies tilted in their seats, mm, (k, 3).
 
-    A ball's own is its body's, and stays.
-
-    Args:
-        plan: with the balls.
-        tilt: of each body about two axes across its normal, radians, (k, 2).
+    Tilts are about two axes across the normal, radians, (k, 2). A ball's own is its body's, and
+    stays.
     """
     about = Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
     return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
@@ -246,29 +235,22 @@ def _shortest_rotations(start: Floats, end: Floats) -> Floats:
     return np.asarray(np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None])
 
 
-def coverage_and_offsets(
-    model: PrototypeModel, draws: PrototypeDraws
-) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+def prototype_result(model: PrototypeModel, draws: PrototypeDraws) -> PrototypeResult:
     """Coverage and pointing errors of s prototypes, with designed and with calibrated windows.
 
-    Returns:
-        Coverage diameter of v virtual cameras, mm, (s, v): twice the minimum distance from the
-        object's centre of all rays camera -> edge of the window -> reflected; zero where the
-        window does not contain the centre's image; the smaller of a mirror's halves at the seam.
-        Then the distance at the object between the ray in the middle of each window and the
-        designed ray, square to that, mm; infinite without a ball, (s, 2 m). Then both again, with
-        calibrated windows.
+    Coverage is twice the minimum distance from the object's centre of all rays camera -> edge of
+    the window -> reflected; zero where the window does not contain the centre's image; the smaller
+    of a mirror's halves at the seam. Offsets are the distance at the object between the ray in the
+    middle of each window and the designed ray, square to that; infinite without a ball.
     """
     v, m = int(model.virtual.max()) + 1, len(model.virtual)
-    uncalibrated, calibrated = (
-        (np.empty((len(draws), v)), np.empty((len(draws), m))) for _ in range(2)
-    )
+    result = PrototypeResult(*(np.empty((len(draws), size)) for size in (v, m, v, m)))
     for build in range(len(draws)):
         poses = [run_pose(model, draws, build, half) for half in HALVES]
         known = [calibrated_pose(model, half, poses[half]) for half in HALVES]
-        uncalibrated[0][build], uncalibrated[1][build] = _seen(model, poses)
-        calibrated[0][build], calibrated[1][build] = _seen(model, known)
-    return uncalibrated, calibrated
+        result.coverage[build], result.offset[build] = _seen(model, poses)
+        result.calibrated_coverage[build], result.calibrated_offset[build] = _seen(model, known)
+    return result
 
 
 def _seen(model: PrototypeModel, poses: list[RunPose]) -> tuple[Floats, Floats]:

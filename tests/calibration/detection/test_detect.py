@@ -12,9 +12,8 @@ import pytest
 from PIL import Image
 
 from tbcad.calibration.detection.detect import detect
-from tbcad.calibration.detection.detection import Detection, Reason
+from tbcad.calibration.detection.detection import Detection, Reason, no_highlights
 from tbcad.calibration.detection.expected import Room, expected_highlights
-from tbcad.calibration.detection.nothing_found import no_highlights
 from tbcad.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tbcad.calibration.intrinsics.files import read_lens
-from tbcad.calibration.intrinsics.lens import Lens
-from tbcad.calibration.intrinsics.opencv import opencv_text
+from tbcad.calibration.intrinsics.lens import Lens, opencv_text
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.lens_camera import without_distortion

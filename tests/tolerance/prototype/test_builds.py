@@ -30,8 +30,8 @@ from tbcad.tolerance.prototype.windows import (
     PrototypeModel,
     PrototypeResult,
     calibrated_pose,
-    coverage_and_offsets,
     prototype_model,
+    prototype_result,
     run_pose,
 )
 from tests.prototype_exports import plan_of
@@ -142,14 +142,16 @@ def balls(
 def coverage_of(
     model: PrototypeModel, draws: PrototypeDraws, calibrated: bool = False
 ) -> np.ndarray:
-    return coverage_and_offsets(model, draws)[calibrated][0]
+    result = prototype_result(model, draws)
+    return result.calibrated_coverage if calibrated else result.coverage
 
 
 class TestCoverage:
     def test_without_errors_it_is_the_record(
         self, model: PrototypeModel, layout: PrototypeLayout
     ) -> None:
-        diameter, offset = coverage_and_offsets(model, draws_of(model, 1))[0]
+        result = prototype_result(model, draws_of(model, 1))
+        diameter, offset = result.coverage, result.offset
         m = len(layout.array)
         assert diameter[0, :m] == pytest.approx(layout.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
@@ -223,7 +225,7 @@ class TestMotions:
         ray by 2 cos(i) as much across that plane: 2 rho cos(i) e / r at the distance rho."""
         delta = 1e-6
         draws = draws_of(model, 1, rotation_angle=Error(mean=delta))
-        _, offset = coverage_and_offsets(model, draws)[0]
+        offset = prototype_result(model, draws).offset
         rho, axis = norm(plan.apex), plan.frame[0]
         sideways = delta * norm(np.cross(axis, plan.centre))
         cosine = -(plan.normal * plan.apex).sum(axis=1) / rho
@@ -236,7 +238,8 @@ class TestMotions:
         draws = draws_of(model, 1, camera_tilt=Error(5e-3), camera_focal=Error(5e-3))
         exact = coverage_of(model, draws_of(model, 1))
         fixed = coverage_of(model, draws)
-        known, offset = coverage_and_offsets(model, draws)[1]
+        result = prototype_result(model, draws)
+        known, offset = result.calibrated_coverage, result.calibrated_offset
         assert known == pytest.approx(exact, abs=1e-6)
         assert offset.max() < 1e-6
         assert fixed.min() < exact.min() - 1
