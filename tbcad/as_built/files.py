@@ -111,7 +111,7 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
     """Write the files of a machine as built, and return their record.
 
     Raises:
-            InputError: one cannot be read, or they do not belong together.
+        InputError: one cannot be read, or they do not belong together.
     """
     machine, _ = read_machine(calibration / MACHINE)
     plan = read_plan(read_export(exports))

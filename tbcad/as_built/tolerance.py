@@ -74,7 +74,7 @@ def as_built_tolerance(
     its own standard deviation of rays.csv.
 
     Raises:
-            InputError: one cannot be read, or they do not belong together.
+        InputError: one cannot be read, or they do not belong together.
     """
     export = read_export(exports)
     plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)

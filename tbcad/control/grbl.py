@@ -104,13 +104,13 @@ class Grbl:
         """Send a line and wait until it is taken; return what else came meanwhile.
 
         Args:
-                line: of G-code, or a $ command.
-                expected_s: how long the controller may be busy with it.
-                silent_s: how long it may leave `?` unanswered, as GRBL does while it homes.
+            line: of G-code, or a $ command.
+            expected_s: how long the controller may be busy with it.
+            silent_s: how long it may leave `?` unanswered, as GRBL does while it homes.
 
         Raises:
-                MachineFault: it is refused, answered by an alarm, or not answered.
-                ControllerReset: the controller began anew.
+            MachineFault: it is refused, answered by an alarm, or not answered.
+            ControllerReset: the controller began anew.
         """
         if len(line) > MAX_LINE:
             raise MachineFault(f"{line!r} is longer than {MAX_LINE} characters")

@@ -92,8 +92,8 @@ def take(camera: Camera, base: Machine, seconds: float | None = None) -> Photogr
     """Take one photograph, with an exposure time or that which the camera has.
 
     Raises:
-            CameraFault: there is none, it cannot be read, or it has another exposure time.
-            MachineFault: the controller does not release the camera.
+        CameraFault: there is none, it cannot be read, or it has another exposure time.
+        MachineFault: the controller does not release the camera.
     """
     if seconds is not None:
         camera.expose(seconds)

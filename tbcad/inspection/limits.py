@@ -42,7 +42,7 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limi
     share of the pairs of shells is good.
 
     Raises:
-            InputError: a virtual camera sees less than the target as designed.
+        InputError: a virtual camera sees less than the target as designed.
     """
     margin = found.coverage - target_mm
     if margin.min() <= 0:

@@ -29,7 +29,7 @@ def check_read_back(
     (mm) and normal, (6,).
 
     Raises:
-            StepError: one is missing, doubled, or not as given: a fault of tbcad.
+        StepError: one is missing, doubled, or not as given: a fault of tbcad.
     """
     read = read_tolerances(path)
     flat = sorted(one.value for one in read if one.kind == "flatness")

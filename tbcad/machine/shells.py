@@ -41,7 +41,7 @@ def designed_half(export: ExportedDesign, half: int) -> Machine:
     """One camera of an export's shell, 0 for a and 1 for b; LEDs as on the prototype's stage.
 
     Raises:
-            InputError: a mirror is planar: it shows no LED that could be told from its place.
+        InputError: a mirror is planar: it shows no LED that could be told from its place.
     """
     reflector, flip = export.reflectors[half], _flip(half)
     if (reflector.mirrors.curvature <= 0).any():

@@ -102,8 +102,7 @@ def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Opti
     """Read what a merge needs, but the photographs themselves.
 
     Raises:
-            InputError: one cannot be read, they do not belong together, or nothing was
-            photographed.
+        InputError: one cannot be read, they do not belong together, or nothing was photographed.
     """
     run, export = read_run(folder), read_export(exports)
     check_same_export(run, exports)

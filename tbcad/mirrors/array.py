@@ -143,8 +143,8 @@ def numbered_directions(n: int, stretch: tuple[float, float] = UNSTRETCHED) -> t
     """Directions and faces of a geodesic polyhedron of frequency n, stretched along x and y.
 
     Returns:
-            Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and
-            the outward triangles over them, (20 n^2, 3).
+        Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and the
+        outward triangles over them, (20 n^2, 3).
     """
     vertices, faces = geodesic(n)
     u = stretched(vertices, *stretch)

@@ -29,7 +29,7 @@ def check_clearance(spec: Spec, array: MirrorArray, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
     Raises:
-            SpecError: with the mirror, and sizes with which the light passes the object.
+        SpecError: with the mirror, and sizes with which the light passes the object.
     """
     radius = spec.optics.capture_diameter_mm / 2
     distance, mirror = _passage(spec.optics, array)

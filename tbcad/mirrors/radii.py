@@ -129,7 +129,7 @@ def solve_radii(
     give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.).
 
     Raises:
-            SpecError: when the mirrors do not close to one array, or rule traced finds no radii.
+        SpecError: when the mirrors do not close to one array, or rule traced finds no radii.
     """
     try:
         if rule == "traced":

@@ -124,7 +124,7 @@ def search(
     generation, so that a search that was stopped goes on.
 
     Raises:
-            InputError: the first design cannot be made; the store is of another design.
+        InputError: the first design cannot be made; the store is of another design.
     """
     judged = read_store(store, asked.key()) if store else {}
     judge = partial(_judge, asked, judged, store, scheduler, progress)

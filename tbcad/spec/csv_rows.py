@@ -43,7 +43,7 @@ def read_rows(
     Numbers are yielded with decimal points; columns beside the named ones are refused, or left out.
 
     Raises:
-            SpecError: when the file cannot be read or is not such a table; it names the line.
+        SpecError: when the file cannot be read or is not such a table; it names the line.
     """
     lines = read_text(file, name, "list").split("\n")
     said = SAID.fullmatch(lines[0])

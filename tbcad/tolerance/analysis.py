@@ -121,7 +121,7 @@ def analyse(
     words, as soon as it is known.
 
     Raises:
-            InputError: mirrors are planar, or the scheduler cannot be reached.
+        InputError: mirrors are planar, or the scheduler cannot be reached.
     """
     _refuse_planar(export)
     errors = process_errors(process, export.spec.mirrors.coating_um)

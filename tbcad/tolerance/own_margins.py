@@ -89,7 +89,7 @@ def own_margins(
     One margin for all mirrors, even (mm), is tried first; the spec's radii must follow rule traced.
 
     Returns:
-            None where no try was enough: margins too large, or mirrors that cannot be made.
+        None where no try was enough: margins too large, or mirrors that cannot be made.
     """
     designs = designs or solved_designs()
     target, best = spec.optics.capture_diameter_mm, None

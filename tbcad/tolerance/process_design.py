@@ -61,7 +61,7 @@ def design_for_process(
     are smaller on average than one for all.
 
     Raises:
-            InputError: no margin is enough, or the radii do not follow a target.
+        InputError: no margin is enough, or the radii do not follow a target.
     """
     check_margins_can_be_set(spec, wanted_yield)
     spec = spec_with(spec, mirrors={"own_margins_mm": ()})
@@ -178,7 +178,7 @@ def edges_for_process(
     none are searched for.
 
     Raises:
-            InputError: as `design_for_process`, with neither kind of edges.
+        InputError: as `design_for_process`, with neither kind of edges.
     """
     check_margins_can_be_set(spec, wanted_yield)
     if "edges" in spec.shell.model_fields_set:

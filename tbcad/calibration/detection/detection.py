@@ -89,10 +89,10 @@ def no_highlights(
     """The error of a run without highlights.
 
     Args:
-            spots: of all photographs.
-            unmeasured: what is bright besides.
-            photographs: number of those by LEDs.
-            reasons: of all expected highlights; none where the spots fit no machine.
+        spots: of all photographs.
+        unmeasured: what is bright besides.
+        photographs: number of those by LEDs.
+        reasons: of all expected highlights; none where the spots fit no machine.
     """
     saturated = int(np.count_nonzero(spots.full >= FULL))
     if reasons:

@@ -82,7 +82,7 @@ def estimate(
     """Estimate a machine, from parameters (q,) in prior standard deviations or the prior's mean on.
 
     Raises:
-            InputError: there are no highlights, or nothing explains them.
+        InputError: there are no highlights, or nothing explains them.
     """
     if not len(highlights):
         raise InputError("no highlights to calibrate from: see the faults of the run")

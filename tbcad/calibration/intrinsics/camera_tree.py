@@ -49,8 +49,8 @@ def camera_lens(tree: Node, name: str) -> Lens:
     """The lens of the only camera of a file's tree of mappings, lists and texts.
 
     Raises:
-            InputError: it has no camera or several, another model of the lens, or a part of the
-                    picture's pixels.
+        InputError: it has no camera or several, another model of the lens, or a part of the
+            picture's pixels.
     """
     cameras = list(_cameras(tree, ""))
     if len(cameras) > 1:

@@ -67,7 +67,7 @@ def solve_lens(folder: Path, board: Board, progress: Progress) -> SolvedLens:
     """Solve a lens from a folder of photographs of a board, whole or in part, by one camera.
 
     Raises:
-            InputError: too few boards are found, sizes differ, or the solution makes no sense.
+        InputError: too few boards are found, sizes differ, or the solution makes no sense.
     """
     cv()  # before any photograph is read
     files, seen, size = _photographs(folder), dict[str, BoardCorners](), None

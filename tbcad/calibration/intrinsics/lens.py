@@ -89,7 +89,7 @@ def lens_of(
     """A lens from a file's 4 intrinsics, OpenCV's coefficients of distortion, columns and rows.
 
     Raises:
-            InputError: one is no number, or a coefficient after k3 is not zero.
+        InputError: one is no number, or a coefficient after k3 is not zero.
     """
     values, given = numbers_of(intrinsics, name), numbers_of(coefficients, name)
     if len(values) != 4:
