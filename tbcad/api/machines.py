@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tbcad.control.outcome import Outcome
     from tbcad.control.selection import Preflight
     from tbcad.control.session import Ask, Show
-    from tbcad.merged_run.stop_photographs import Options as MergeOptions
+    from tbcad.merged_run.stop_photographs import MergeOptions
     from tbcad.runs.photographs import Run
     from tbcad.simulate.object_files.contents import Up
     from tbcad.simulate.scene.object_from_file import Unit
@@ -256,7 +256,7 @@ def merge(
     from tbcad.machine.calibrated_export import export_of
     from tbcad.merged_run.files import write_merge
     from tbcad.merged_run.merge import prepared_merge
-    from tbcad.merged_run.stop_photographs import Options as MergeOptions
+    from tbcad.merged_run.stop_photographs import MergeOptions
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 

@@ -8,10 +8,11 @@ import numpy as np
 from tbcad.calibration.detection.detection import Detection
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.calibration.intrinsics.lens import Lens
-from tbcad.calibration.priors import Fitted, prototype_prior, read_zero_error, shell_prior
+from tbcad.calibration.intrinsics.lens import CalibratedLens
+from tbcad.calibration.priors import Measured, prototype_prior, read_zero_error, shell_prior
 from tbcad.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
 from tbcad.errors import InputError
+from tbcad.machine.built import is_cap
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Highlights, Machine
 from tbcad.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
@@ -41,30 +42,30 @@ class Setup:
     plan: Plan
     frames: tuple[Frame, ...]
     designed: Machine
-    lens: Lens | None = None
+    lens: CalibratedLens | None = None
 
-    def prior(self, errors: Errors, measured: tuple[tuple[int, float, float], ...] = ()) -> Prior:
+    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
         """Means and standard deviations by its process and by radii that are measured."""
-        fitted = Fitted(
-            body_centre=self.plan.body_centre,
-            is_cap=np.asarray(self.plan.body_radius < self.plan.radius),
-            series=np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
-            zero_error=read_zero_error(self.export.folder / RECORD),
-            lens_known=self.lens is not None,
-            measured=measured,
-        )
         stop = np.array([frame.stop - 1 for frame in self.frames])
         known = (self.export.folder / STOPS).is_file()  # not of exports by old versions
         wind_up = read_wind_up(self.export, self.plan)[stop] if known else 0.0
-        turned = self.designed.angle + wind_up
-        return prototype_prior(replace(self.designed, angle=turned), errors, fitted)
+        return prototype_prior(
+            replace(self.designed, angle=self.designed.angle + wind_up),
+            errors,
+            self.plan.body_centre,
+            is_cap(self.plan),
+            np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
+            read_zero_error(self.export.folder / RECORD),
+            self.lens is not None,
+            measured,
+        )
 
 
 @dataclass(frozen=True)
 class ShellSetup(Setup):
     """One camera of a shell before it is calibrated: its mirrors are the balls of its plan."""
 
-    def prior(self, errors: Errors, measured: tuple[tuple[int, float, float], ...] = ()) -> Prior:
+    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
         """Means and standard deviations by its process.
 
         Raises:
@@ -79,7 +80,7 @@ def prepared_setup(
     export: ExportedDesign,
     frames: tuple[Frame, ...],
     size: tuple[int, int],
-    lens: Lens | None,
+    lens: CalibratedLens | None,
     geometry: Geometry = "prototype",
 ) -> Setup:
     """The machine of an export as frames of a run, of a shell those of one camera, show it.

@@ -13,7 +13,7 @@ from tbcad.calibration.intrinsics.files import read_lens
 from tbcad.calibration.options import DEFAULT_PROCESS, CalibrationOptions
 from tbcad.calibration.priors import parse_measured
 from tbcad.calibration.report.files import write_calibration, write_recovered
-from tbcad.calibration.report.verdict import Verdict, verdict, verdict_text
+from tbcad.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
 from tbcad.errors import InputError
 from tbcad.figure_files import PlotFormat
 from tbcad.machine.designed import dome_radius
@@ -45,7 +45,7 @@ class WrittenCalibration:
 
     folder: Path
     result: Calibration
-    verdict: Verdict
+    verdict: CalibrationVerdict
     text: str
     record: dict[str, Any]
     others: tuple["WrittenCalibration", ...] = ()

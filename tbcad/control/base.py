@@ -6,7 +6,7 @@ from time import sleep
 from tbcad.control.grbl import HOME, SYNC, Grbl
 from tbcad.control.machine import PIN_FIRST, MachineFault
 from tbcad.control.messages import Status
-from tbcad.control.plan import SETTINGS, Plan
+from tbcad.control.plan import SETTINGS, ControlPlan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
 from tbcad.types import Progress
@@ -27,7 +27,7 @@ class Base:
 
     switch_s = 0.02  # two lines
 
-    def __init__(self, grbl: Grbl, plan: Plan) -> None:
+    def __init__(self, grbl: Grbl, plan: ControlPlan) -> None:
         """Drive a machine as its export says."""
         self._grbl, self._plan = grbl, plan
         self._offset: float | None = None
@@ -184,7 +184,7 @@ def _shown(value: float | None) -> str:
     return "missing" if value is None else f"{value:g}"
 
 
-def travel_s(degrees: float, plan: Plan) -> float:
+def travel_s(degrees: float, plan: ControlPlan) -> float:
     """Duration of a motion from rest to rest, s."""
     speed, rise = plan.motion.feed_deg_min / 60, plan.motion.acceleration_deg_s2
     if degrees * rise < speed**2:

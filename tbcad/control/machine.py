@@ -30,7 +30,7 @@ class CameraFault(_Fault):
     """A photograph that was not taken, or cannot be used: the run goes on with the next."""
 
 
-class Machine(Protocol):
+class DrivenMachine(Protocol):
     """Motions and lights of one machine; all but `secure` raise MachineFault when it fails.
 
     Attributes:

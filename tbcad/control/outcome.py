@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from tbcad.control.plan import Plan
+from tbcad.control.plan import ControlPlan
 from tbcad.control.selection import Shots, count, duration_text, size_text
 
 NAMED = 5  # of the photographs that are missing
@@ -43,7 +43,7 @@ class Outcome:
 class DryRun:
     """What a run would do."""
 
-    plan: Plan
+    plan: ControlPlan
     remaining: list[Shots]
     seconds: float
     disk_bytes: int

@@ -17,15 +17,15 @@ from tbcad.control.klipper.base import KlipperBase
 from tbcad.control.klipper.files import read_klipper_files
 from tbcad.control.klipper.host import Klipper
 from tbcad.control.klipper.moonraker import PREFIX, Moonraker, read_address
-from tbcad.control.machine import Machine, MachineFault
+from tbcad.control.machine import DrivenMachine, MachineFault
 from tbcad.control.outcome import DryRun, Outcome
-from tbcad.control.plan import Plan, read_control_plan
+from tbcad.control.plan import ControlPlan, read_control_plan
 from tbcad.control.port import SerialPort
 from tbcad.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
     Preflight,
-    RunOptions,
+    RunSelection,
     Shots,
     chosen_frames,
     chosen_phases,
@@ -148,7 +148,7 @@ def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
 
 
 @contextmanager
-def _secured(base: Machine, note: Progress) -> Iterator[None]:
+def _secured(base: DrivenMachine, note: Progress) -> Iterator[None]:
     """Hold the base and switch lights off if an error comes through; tell what is not safe."""
     try:
         yield
@@ -169,7 +169,7 @@ def _faults_as_input_errors(port: str) -> Iterator[None]:
         raise InputError(f"{fault}: make room, or name another folder") from None
 
 
-def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOptions]:
+def _prepared(request: RunRequest, send_settings: bool) -> tuple[ControlPlan, RunSelection]:
     """Plan and choice, or those of the run that is resumed."""
     plan = read_control_plan(request.exports)
     phases = chosen_phases(plan, request.phases, request.times)
@@ -179,7 +179,7 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
         refuse_inputs(request.out, (request.exports,))
         refuse_inside(request.out, request.out.resolve())
         check_new(request.out)
-        return plan, RunOptions(frames, phases, size, send_settings, request.times)
+        return plan, RunSelection(frames, phases, size, send_settings, request.times)
     record = read_record(request.out)
     _check_same_export(request, plan, record)
     known = ",".join(name for name in record.phases if name != DARK_LIT)
@@ -192,7 +192,7 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
         (
             "--exposure",
             request.times if request.times != PhaseTimes() else None,
-            _same_times(request.times, record),
+            all(request.times.of(phase) == record.times.of(phase) for phase in record.phases),
         ),
     )
     for name, value, same in given:
@@ -201,15 +201,10 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
                 f"{request.out} was begun with another {name}: leave it out with --resume"
             )
     size = record.width_px, record.height_px
-    return plan, RunOptions(record.frames, recorded, size, send_settings, record.times)
+    return plan, RunSelection(record.frames, recorded, size, send_settings, record.times)
 
 
-def _same_times(times: PhaseTimes, record: RunRecord) -> bool:
-    """Whether all phases of a run were photographed with these exposure times."""
-    return all(times.of(phase) == record.times.of(phase) for phase in record.phases)
-
-
-def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> None:
+def _check_same_export(request: RunRequest, plan: ControlPlan, record: RunRecord) -> None:
     if record.source != "camera":
         raise InputError(f"{request.out} is a simulated run: name another folder")
     other = [
@@ -222,7 +217,9 @@ def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> No
         )
 
 
-def machine_at(port: str, folder: Path, plan: Plan, note: Progress, stack: ExitStack) -> Machine:
+def machine_at(
+    port: str, folder: Path, plan: ControlPlan, note: Progress, stack: ExitStack
+) -> DrivenMachine:
     """Open a port, which the stack closes: of a serial line, or "moonraker:" and a URL."""
     if port.startswith(PREFIX):
         server = Moonraker(read_address(port.removeprefix(PREFIX)))

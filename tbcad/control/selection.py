@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from tbcad.control.base import travel_s
-from tbcad.control.plan import Phase, Plan
+from tbcad.control.plan import ControlPlan, LightPhase
 from tbcad.errors import InputError
 from tbcad.runs.exposure import DARK_LIT, Frame, PhaseTimes
 
@@ -27,7 +27,7 @@ MINUTE, HOUR = 60, 3600
 
 
 @dataclass(frozen=True)
-class RunOptions:
+class RunSelection:
     """What is photographed, and how.
 
     Attributes:
@@ -39,7 +39,7 @@ class RunOptions:
     """
 
     frames: tuple[Frame, ...]
-    phases: tuple[Phase, ...]
+    phases: tuple[LightPhase, ...]
     size_px: tuple[int, int]
     send_settings: bool = False
     times: PhaseTimes = field(default_factory=PhaseTimes)
@@ -51,8 +51,8 @@ class RunOptions:
 
 
 def chosen_phases(
-    plan: Plan, text: str | None, times: PhaseTimes | None = None
-) -> tuple[Phase, ...]:
+    plan: ControlPlan, text: str | None, times: PhaseTimes | None = None
+) -> tuple[LightPhase, ...]:
     """Phases by names with commas between, in the plan's order; `leds` for all LEDs, None for all.
 
     The dark one that exposure times ask for is added.
@@ -68,11 +68,11 @@ def chosen_phases(
             "these, or leds for all LEDs"
         )
     chosen = {phase.name: phase for phase in plan.phases if phase.name in named}
-    dark = Phase(name=DARK_LIT, output=None)
+    dark = LightPhase(name=DARK_LIT, output=None)
     return tuple(chosen.get(name, dark) for name in (times or PhaseTimes()).phases(tuple(chosen)))
 
 
-def chosen_frames(plan: Plan, stops: str | None, runs: str) -> tuple[Frame, ...]:
+def chosen_frames(plan: ControlPlan, stops: str | None, runs: str) -> tuple[Frame, ...]:
     """Frames of runs "a", "b" or "ab", at all stops or some, such as "1-10,40"."""
     if runs not in RUNS:
         raise InputError(f"--runs is {runs!r:.20}, allowed is a, b or ab: change it")
@@ -114,7 +114,9 @@ class Shots:
         return f"run {run}, stop {self.frame.stop} at {self.frame.base_angle_deg:.1f} degrees"
 
 
-def expected_seconds(plan: Plan, remaining: Iterable[Shots], capture_s: float) -> dict[str, float]:
+def expected_seconds(
+    plan: ControlPlan, remaining: Iterable[Shots], capture_s: float
+) -> dict[str, float]:
     """Expected duration of each position, s, by its title."""
     each = plan.motion.light_s + capture_s + WRITE_S
     return {
@@ -123,7 +125,7 @@ def expected_seconds(plan: Plan, remaining: Iterable[Shots], capture_s: float) -
     }
 
 
-def _with_travel(plan: Plan, remaining: Iterable[Shots]) -> Iterator[tuple[Shots, float]]:
+def _with_travel(plan: ControlPlan, remaining: Iterable[Shots]) -> Iterator[tuple[Shots, float]]:
     for _, run in groupby(remaining, lambda shots: shots.frame.object_turn_deg):
         at = plan.program.start.angle_deg
         for shots in run:

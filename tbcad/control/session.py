@@ -6,13 +6,13 @@ from functools import partial
 from itertools import groupby
 from pathlib import Path
 
-from tbcad.control.cameras.camera import Camera, Shot
-from tbcad.control.machine import CameraFault, Machine, MachineFault
+from tbcad.control.cameras.camera import RunCamera, Shot
+from tbcad.control.machine import CameraFault, DrivenMachine, MachineFault
 from tbcad.control.outcome import Outcome
-from tbcad.control.plan import Plan
+from tbcad.control.plan import ControlPlan
 from tbcad.control.selection import (
     Preflight,
-    RunOptions,
+    RunSelection,
     Shots,
     bytes_each,
     check_disk,
@@ -48,7 +48,9 @@ Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
 class Session:
     """One machine and one run."""
 
-    def __init__(self, plan: Plan, options: RunOptions, base: Machine, camera: Camera) -> None:
+    def __init__(
+        self, plan: ControlPlan, options: RunSelection, base: DrivenMachine, camera: RunCamera
+    ) -> None:
         """Run with a machine and a camera that are connected."""
         self._plan, self._options = plan, options
         self._base, self._camera = base, camera

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from time import monotonic
 
-from tbcad.control.cameras.camera import Camera, Shot, are_near, shutter_seconds
+from tbcad.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
-from tbcad.control.machine import CameraFault, Machine
-from tbcad.control.plan import Phase, Plan
-from tbcad.control.selection import RunOptions
+from tbcad.control.machine import CameraFault, DrivenMachine
+from tbcad.control.plan import ControlPlan, LightPhase
+from tbcad.control.selection import RunSelection
 from tbcad.errors import InputError
 from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.runs.record import PhaseExposure, RunRecord
@@ -57,7 +57,7 @@ class Photograph:
 
 
 @contextmanager
-def light_on(base: Machine, phase: Phase, seconds: float) -> Iterator[None]:
+def light_on(base: DrivenMachine, phase: LightPhase, seconds: float) -> Iterator[None]:
     """Have the light of a phase on, and let it settle for some seconds."""
     outputs = () if phase.output is None else (phase.output,)
     for output in outputs:
@@ -75,7 +75,10 @@ def light_on(base: Machine, phase: Phase, seconds: float) -> Iterator[None]:
 
 
 def taken_twice(
-    camera: Camera, base: Machine, seconds: float | None, check: Callable[[Photograph], None]
+    camera: RunCamera,
+    base: DrivenMachine,
+    seconds: float | None,
+    check: Callable[[Photograph], None],
 ) -> Photograph:
     """A photograph that passes a check; a second one, over a new session, if the first fails."""
     try:
@@ -88,7 +91,7 @@ def taken_twice(
     return photograph
 
 
-def take(camera: Camera, base: Machine, seconds: float | None = None) -> Photograph:
+def take(camera: RunCamera, base: DrivenMachine, seconds: float | None = None) -> Photograph:
     """Take one photograph, with an exposure time or that which the camera has.
 
     Raises:
@@ -146,7 +149,7 @@ def exposure_of(photograph: Photograph, frame: Frame, phase: str) -> Exposure:
 
 
 def run_record(
-    plan: Plan, options: RunOptions, trials: Mapping[str, Photograph], seconds: float
+    plan: ControlPlan, options: RunSelection, trials: Mapping[str, Photograph], seconds: float
 ) -> RunRecord:
     """The record of a run, by a photograph for each phase and its expected duration."""
     try:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.inspection.files import halves, write_half, write_record
-from tbcad.inspection.limits import Limits, mirror_limits, whole_margin_steps
+from tbcad.inspection.limits import MirrorLimits, mirror_limits, whole_margin_steps
 from tbcad.inspection.sensitivity import Deviation, Sensitivities, sensitivities
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.tolerance.montecarlo.coverage import coverage
@@ -51,7 +51,7 @@ def inspect(
     return write_record(folder, found, limits, {**facts, "files": files})
 
 
-def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, Limits]:
+def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, MirrorLimits]:
     """Losses of an export's virtual cameras, and the limits that follow; see `mirror_limits`.
 
     Losses are taken for small deviations. They grow faster than those: another edge of a cell
@@ -70,7 +70,7 @@ def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, 
     return found, mirror_limits(found, export.capture_mm, wanted).within(steps, found)
 
 
-def minimum_at_limits(export: ExportedDesign, limits: Limits, builds: int = BUILDS) -> float:
+def minimum_at_limits(export: ExportedDesign, limits: MirrorLimits, builds: int = BUILDS) -> float:
     """Minimum coverage of simulated shells whose mirrors are all at their limits, mm.
 
     Each deviation is at its limit one way or the other, at random; tilts in random directions.

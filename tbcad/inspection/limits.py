@@ -14,7 +14,7 @@ PLACES = np.array([3, 4, 5, 3])  # decimals of limits: a nanometre, or what turn
 
 
 @dataclass(frozen=True)
-class Limits:
+class MirrorLimits:
     """Limits of all mirrors, a's first: offset (um), tilt (mrad), radius (mm), walls (um) if any.
 
     Attributes:
@@ -27,13 +27,13 @@ class Limits:
     sigma: Floats
     seat_um: float
 
-    def within(self, steps: Floats, found: Sensitivities) -> "Limits":
+    def within(self, steps: Floats, found: Sensitivities) -> "MirrorLimits":
         """The same, no limit more than its part of the deviation whose loss is known."""
         largest = _floor(steps / kinds_and_seat(found), PLACES[: steps.shape[1]])
         return replace(self, each=np.minimum(self.each, largest))
 
 
-def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limits:
+def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> MirrorLimits:
     """Share each virtual camera's margin out to the mirrors that it depends on.
 
     Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
@@ -58,10 +58,10 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limi
     seat = margin / parts / _positive(found.seat)
     each, sigma = (_smallest(found.mirror, of[found.camera]) for of in (each, sigma))
     places = PLACES[: found.loss.shape[1]]
-    return Limits(_floor(each, places), _floor(sigma, places), float(_floor(seat.min(), 1)))
+    return MirrorLimits(_floor(each, places), _floor(sigma, places), float(_floor(seat.min(), 1)))
 
 
-def whole_margin_steps(found: Sensitivities, limits: Limits, radius: Floats) -> Floats:
+def whole_margin_steps(found: Sensitivities, limits: MirrorLimits, radius: Floats) -> Floats:
     """Deviations (2 m, kinds) that would linearly take a whole margin; radii (2 m,), mm."""
     steps = kinds_and_seat(found) * np.maximum(limits.each, SMALLEST_LIMIT)
     column = KINDS.index("radius")

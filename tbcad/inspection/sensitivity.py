@@ -12,9 +12,9 @@ import numpy as np
 from tbcad.geometry.vectors import unit
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.coverage import coverage, virtual_camera_numbers
-from tbcad.tolerance.montecarlo.draws import ShellDraws
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import CURVATURE, EdgeModel, EdgeModels, edge_models
-from tbcad.tolerance.montecarlo.form import TERMS
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Floats, Ints
 
 MM_PER_UM = 1e-3
@@ -51,21 +51,12 @@ class Deviation:
 
     def draws(self, model: EdgeModel) -> ShellDraws:
         """The deviations as errors of simulated builds, everything else being as designed."""
-        count = len(self.offset)
-        still, one = np.zeros((count, 3)), np.ones((count, 3))
-        return ShellDraws(
+        builds, m = self.offset.shape
+        return replace(
+            draw(Errors(), 0, range(builds), m, walls=len(model.walls))[0],
             centre=self._centre(model),
             radius=self.radius,
-            scale=one,
-            shell_shift=still,
-            shell_tilt=still,
-            camera_shift=still,
-            camera_tilt=still,
-            focal=one[:, 0],
-            facets=still[:, 0],
-            foot=np.zeros(self.offset.shape),
             wall=-MM_PER_UM * self.wall[..., model.walls.mirror],
-            form=np.zeros((*self.offset.shape, len(TERMS))),
         )
 
     def _centre(self, model: EdgeModel) -> Floats:
@@ -207,13 +198,10 @@ def _seat_losses(models: EdgeModels, half: int, designed: Floats) -> Floats:
     moved = SEAT_STEP_UM * MM_PER_UM * np.eye(3)
     total = np.zeros_like(designed)
     for field, step in (("shell_shift", moved), ("shell_tilt", moved / np.ptp(y))):
-        both = (_seated(models, half, field, sign * step) for sign in (1.0, -1.0))
+        both = []
+        for rows in (step, -step):
+            draws = [Deviation.none(len(rows), len(one)).draws(one) for one in models]
+            draws[half] = replace(draws[half], **{field: rows})
+            both.append(coverage(models, (draws[0], draws[1]))[0])
         total += np.sqrt((_worse(designed, both) ** 2).sum(axis=0)) / SEAT_STEP_UM
     return total
-
-
-def _seated(models: EdgeModels, half: int, field: str, rows: Floats) -> Floats:
-    """Coverage of all virtual cameras when a half is moved or turned, (s, v)."""
-    draws: list[ShellDraws] = [Deviation.none(len(rows), len(one)).draws(one) for one in models]
-    draws[half] = replace(draws[half], **{field: rows})
-    return coverage(models, (draws[0], draws[1]))[0]

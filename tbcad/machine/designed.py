@@ -21,7 +21,7 @@ class _Led(Record):
     position_mm: Vector
 
 
-class _Document(Record):
+class _LedsFile(Record):
     leds: list[_Led]
 
 
@@ -65,7 +65,7 @@ def read_leds(folder: Path) -> Floats:
         InputError: the record cannot be read, or names none.
     """
     path = folder / RECORD
-    leds = read_json(path, _Document, SCHEMA, MISSING).leds
+    leds = read_json(path, _LedsFile, SCHEMA, MISSING).leds
     if not leds:
         raise InputError(
             f"{path} names no LEDs, which calibrate the machine: build it with the default of "

@@ -17,7 +17,7 @@ from tbcad.merged_run.ray_sigmas import ray_sigmas
 from tbcad.merged_run.stop_photographs import (
     CorrectedPhotographs,
     Corrections,
-    Options,
+    MergeOptions,
     common_exposure,
     corrections,
 )
@@ -98,7 +98,7 @@ class Merge:
         ]
 
 
-def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Options) -> Merge:
+def prepared_merge(folder: Path, calibration: Path, exports: Path, options: MergeOptions) -> Merge:
     """Read what a merge needs, but the photographs themselves.
 
     Raises:
@@ -128,7 +128,7 @@ def _halves(
     export: ExportedDesign,
     calibration: Path,
     calibrated: tuple[Machine, tuple[Frame, ...]],
-    options: Options,
+    options: MergeOptions,
 ) -> list[HalfMerge]:
     """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
     machine, frames = calibrated
@@ -176,7 +176,9 @@ def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
         )
 
 
-def _facts(export: ExportedDesign, run: Run, calibration: Path, options: Options) -> dict[str, Any]:
+def _facts(
+    export: ExportedDesign, run: Run, calibration: Path, options: MergeOptions
+) -> dict[str, Any]:
     return {
         "object": f"photographs of {run.folder.name}",
         "design": export.spec.name,

@@ -27,7 +27,7 @@ FULL_LIGHT, LEAST_LIGHT = 0.99, 0.02
 
 
 @dataclass(frozen=True)
-class Options:
+class MergeOptions:
     """How photographs are corrected.
 
     Attributes:
@@ -74,7 +74,7 @@ class Corrections:
         return np.asarray(np.rint(values), dtype=np.uint8)
 
 
-def corrections(options: Options, camera: LensCamera) -> Corrections:
+def corrections(options: MergeOptions, camera: LensCamera) -> Corrections:
     """Prepare the corrections of a camera's photographs."""
     gain = None
     if options.flat:

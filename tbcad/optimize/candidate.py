@@ -56,7 +56,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Limits:
+class MachineLimits:
     """What a candidate may need at most.
 
     Attributes:
@@ -74,7 +74,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class DesignCandidate:
     """A place and what it gives.
 
     Attributes:
@@ -126,19 +126,19 @@ def placed(spec: Spec, place: Place) -> Spec:
 
 
 def evaluate(
-    spec: Spec, ssim_within: Limits | None, place: Place, method: ViewsBy = "nearest"
-) -> Candidate:
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: ViewsBy = "nearest"
+) -> DesignCandidate:
     """Design the mirrors of a place, count pixels, and compare views within limits, if given."""
     try:
         designed = design(placed(spec, place))
         figures = figures_of(designed)
         if ssim_within and ssim_within.excess(figures) == 0:
             figures = replace(figures, ssim=mean_ssim(designed, method))
-        return Candidate(place, figures)
+        return DesignCandidate(place, figures)
     except ValidationError as error:
-        return Candidate(place, None, error.errors()[0]["msg"])
+        return DesignCandidate(place, None, error.errors()[0]["msg"])
     except SpecError as error:
-        return Candidate(place, None, str(error))
+        return DesignCandidate(place, None, str(error))
 
 
 def figures_of(designed: MirrorDesign) -> Figures:
@@ -176,14 +176,14 @@ def size_of(array: MirrorArray) -> float:
     return float(max(2 * points, *np.ptp(rest, axis=0)))
 
 
-def store_bytes(key: str, judged: dict[Place, Candidate]) -> bytes:
+def store_bytes(key: str, judged: dict[Place, DesignCandidate]) -> bytes:
     """The file of candidates of the design with a key."""
     head = {"schema": SCHEMA, "design": key}
     rows = [head, *map(asdict, judged.values())]
     return "".join(json.dumps(row) + "\n" for row in rows).encode()
 
 
-def read_store(store: Path, key: str) -> dict[Place, Candidate]:
+def read_store(store: Path, key: str) -> dict[Place, DesignCandidate]:
     """Judgements of an earlier search of the same key; none where there is no file."""
     if not store.exists():
         return {}
@@ -200,7 +200,7 @@ def read_store(store: Path, key: str) -> dict[Place, Candidate]:
     return {one.place: one for one in found}
 
 
-def _candidate(row: Record) -> Candidate:
+def _candidate(row: Record) -> DesignCandidate:
     place, figures = row["place"], row["figures"]
     x, z, semi_minor, along_x, along_y = np.array(place, dtype=float).tolist()
     if figures is not None and not isinstance(figures, dict):
@@ -208,7 +208,7 @@ def _candidate(row: Record) -> Candidate:
     numbers = {
         name: None if number is None else float(number) for name, number in (figures or {}).items()
     }
-    return Candidate(
+    return DesignCandidate(
         (x, z, semi_minor, along_x, along_y),
         Figures(**numbers) if figures else None,  # type: ignore[arg-type]
         str(row["reason"]),

@@ -9,7 +9,7 @@ import numpy as np
 
 from tbcad.figure_files import PlotFormat
 from tbcad.formats.toml import toml_text
-from tbcad.optimize.candidate import Candidate, Figures, placed
+from tbcad.optimize.candidate import DesignCandidate, Figures, placed
 from tbcad.optimize.search import SearchResult
 from tbcad.simulate.study.plots import Panel, Series, plot_file
 from tbcad.simulate.study.tables import Table, csv_text
@@ -120,7 +120,7 @@ def _column(some: list[Figures], name: str) -> Floats:
     return np.array([getattr(one, name) for one in some])
 
 
-def _record(one: Candidate) -> dict[str, str | int | float | None]:
+def _record(one: DesignCandidate) -> dict[str, str | int | float | None]:
     numbers = {name: getattr(one.figures, name, None) for name in FIGURES}
     place = dict(zip(COLUMNS, one.place, strict=False))
     return {**place, **numbers, "reason": one.reason}

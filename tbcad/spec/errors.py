@@ -121,12 +121,9 @@ def unknown_key(where: str, key: str, model: type[BaseModel]) -> SpecError:
             f"{where}: {key} is a section: set one of {', '.join(_inside(key, known))}"
         )
     likely = nearest_key(key, known)
-    hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(_siblings(key, known))
+    siblings = _inside(key.rpartition(".")[0], known) or _inside("", known)
+    hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(siblings)
     return SpecError(f"{where}: unknown key {key}: {hint}")
-
-
-def _siblings(key: str, known: list[str]) -> list[str]:
-    return _inside(key.rpartition(".")[0], known) or _inside("", known)
 
 
 def _inside(section: str, known: list[str]) -> list[str]:

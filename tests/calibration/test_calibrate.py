@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 import tbcad.calibration.run
 from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
-from tbcad.calibration.detection.detection import Detection, Reason, Rejected
+from tbcad.calibration.detection.detection import Detection, Rejected, Rejection
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
@@ -142,7 +142,7 @@ def test_saturated_highlights_are_counted_and_ask_for_a_shorter_exposure(
     calibrated: Calibration, detection: Detection
 ) -> None:
     most = len(detection.highlights)
-    reasons = [Reason.SATURATED] * most + [Reason.HIDDEN] * 3 + [Reason.OUTSIDE] * 7
+    reasons = [Rejection.SATURATED] * most + [Rejection.HIDDEN] * 3 + [Rejection.OUTSIDE] * 7
     rejected = tuple(Rejected(0, 0, 0, reason) for reason in reasons)
     result = replace(calibrated, detection=replace(detection, rejected=rejected))
     judged = verdict(result)

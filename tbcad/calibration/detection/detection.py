@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.calibration.detection.expected import Expected
-from tbcad.calibration.detection.spots import FULL, Spots, Unmeasured
+from tbcad.calibration.detection.spots import FULL, BrightSpots, Unmeasured, stacked
 from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints
@@ -34,10 +34,9 @@ ELSEWHERE = "is this the run of another export, or is the camera far out of plac
 LEAST, MOST = 0.94, 1.08
 FAINT = 0.1
 BESIDE = 0.1  # share of a highlight's light from which another spot beside it matters
-PHOTOGRAPH_PX = 1e5  # apart: photographs in one tree
 
 
-class Reason(StrEnum):
+class Rejection(StrEnum):
     """Why a highlight is not used."""
 
     NO_PHOTOGRAPH = "no photograph"
@@ -64,7 +63,7 @@ class Rejected:
     frame: int
     sphere: int
     led: int
-    reason: Reason
+    reason: Rejection
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,10 @@ class Detection:
 
 
 def no_highlights(
-    spots: Spots, unmeasured: Unmeasured, photographs: int, reasons: Sequence[Reason | None] = ()
+    spots: BrightSpots,
+    unmeasured: Unmeasured,
+    photographs: int,
+    reasons: Sequence[Rejection | None] = (),
 ) -> InputError:
     """The error of a run without highlights.
 
@@ -97,7 +99,7 @@ def no_highlights(
     saturated = int(np.count_nonzero(spots.full >= FULL))
     if reasons:
         numbers = Counter(str(reason) for reason in reasons if reason is not None)
-        del numbers[Reason.OUTSIDE]
+        del numbers[Rejection.OUTSIDE]
     else:
         elsewhere = len(spots) - saturated
         numbers = Counter({"saturated": saturated, "where no highlight is expected": elsewhere})
@@ -129,7 +131,9 @@ def _step(spots: int, saturated: int, unmeasured: Unmeasured, photographs: int) 
     return ELSEWHERE
 
 
-def relative_light(expected: Expected, partner: Ints, spots: Spots, exposure: Floats) -> Floats:
+def relative_light(
+    expected: Expected, partner: Ints, spots: BrightSpots, exposure: Floats
+) -> Floats:
     """Light of each paired highlight over its sphere's and LED's usual light, (n,); else NaN.
 
     The spot of each is -1 for none, (n,); exposures (m,) are over the usual one.
@@ -146,22 +150,22 @@ def relative_light(expected: Expected, partner: Ints, spots: Spots, exposure: Fl
 
 
 def verdicts(
-    expected: Expected, partner: Ints, spots: Spots, share: Floats, hidden: Bools
-) -> list[Reason | None]:
+    expected: Expected, partner: Ints, spots: BrightSpots, share: Floats, hidden: Bools
+) -> list[Rejection | None]:
     """Why each highlight is not used, or None; of n highlights, the spot of each or -1."""
-    found: list[Reason | None] = [None] * len(partner)
+    found: list[Rejection | None] = [None] * len(partner)
     on = partner >= 0
     spot = np.where(on, partner, 0)
-    tests: tuple[tuple[Bools, Reason], ...] = (
-        (on & (share > MOST), Reason.MERGED),
-        (on & (share < LEAST), Reason.HIDDEN),
-        (on & (share < FAINT), Reason.FAINT),
-        (on & _beside_others(expected, partner, spots), Reason.MERGED),
-        (on & _doubled(spots)[spot], Reason.DOUBLE),
-        (on & (spots.full[spot] >= FULL), Reason.SATURATED),
-        (~on & expected.inside, Reason.MISSING),
-        (~on & expected.inside & hidden, Reason.HIDDEN),
-        (~expected.inside, Reason.OUTSIDE),
+    tests: tuple[tuple[Bools, Rejection], ...] = (
+        (on & (share > MOST), Rejection.MERGED),
+        (on & (share < LEAST), Rejection.HIDDEN),
+        (on & (share < FAINT), Rejection.FAINT),
+        (on & _beside_others(expected, partner, spots), Rejection.MERGED),
+        (on & _doubled(spots)[spot], Rejection.DOUBLE),
+        (on & (spots.full[spot] >= FULL), Rejection.SATURATED),
+        (~on & expected.inside, Rejection.MISSING),
+        (~on & expected.inside & hidden, Rejection.HIDDEN),
+        (~expected.inside, Rejection.OUTSIDE),
     )
     for wrong, reason in tests:
         for number in np.flatnonzero(wrong).tolist():
@@ -169,40 +173,34 @@ def verdicts(
     return found
 
 
-def _doubled(spots: Spots) -> Bools:
+def _doubled(spots: BrightSpots) -> Bools:
     """Which spots have another of some light within the discs that both are summed over, (m,)."""
     doubled = np.zeros(len(spots), dtype=bool)
-    places = np.column_stack([spots.pixel, PHOTOGRAPH_PX * spots.frame, PHOTOGRAPH_PX * spots.led])
-    for one, other in _near(places, 2 * float(spots.radius.max(initial=0))):
-        reach = spots.radius[one] + spots.radius[other]
-        near = ((places[one] - places[other]) ** 2).sum(axis=1) < reach**2
-        for here, there in ((one, other), (other, one)):
-            doubled[here[near & (spots.light[there] > BESIDE * spots.light[here])]] = True
+    places = stacked(spots.frame, spots.led, spots.pixel)
+    one, other = _near(places, 2 * float(spots.radius.max(initial=0)))
+    reach = spots.radius[one] + spots.radius[other]
+    near = ((places[one] - places[other]) ** 2).sum(axis=1) < reach**2
+    for here, there in ((one, other), (other, one)):
+        doubled[here[near & (spots.light[there] > BESIDE * spots.light[here])]] = True
     return doubled
 
 
-def _beside_others(expected: Expected, partner: Ints, spots: Spots) -> Bools:
+def _beside_others(expected: Expected, partner: Ints, spots: BrightSpots) -> Bools:
     """Which paired highlights have that of another sphere within their disc, found or not, (n,)."""
     beside = np.zeros(len(partner), dtype=bool)
     inside = np.flatnonzero(expected.inside)
-    places = np.column_stack(
-        [
-            (expected.pixel + expected.centroid)[inside],
-            PHOTOGRAPH_PX * expected.frame[inside],
-            PHOTOGRAPH_PX * expected.led[inside],
-        ]
-    )
+    pixel = expected.pixel + expected.centroid
+    places = stacked(expected.frame[inside], expected.led[inside], pixel[inside])
     radius = np.where(partner >= 0, spots.radius[np.maximum(partner, 0)], 0.0)[inside]
-    for one, other in _near(places, float(radius.max(initial=0))):
-        distance = ((places[one] - places[other]) ** 2).sum(axis=1)
-        for here in (one, other):
-            beside[inside[here[distance < radius[here] ** 2]]] = True
+    one, other = _near(places, float(radius.max(initial=0)))
+    distance = ((places[one] - places[other]) ** 2).sum(axis=1)
+    for here in (one, other):
+        beside[inside[here[distance < radius[here] ** 2]]] = True
     return beside
 
 
-def _near(places: Floats, radius: float) -> list[tuple[Ints, Ints]]:
-    """Pairs of places (n, 4) within a radius."""
+def _near(places: Floats, radius: float) -> Ints:
+    """Pairs of places (n, 4) within a radius, (2, p)."""
     if not len(places) or radius <= 0:
-        return []
-    pairs = cKDTree(places).query_pairs(radius, output_type="ndarray").astype(np.int64)
-    return [(pairs[:, 0], pairs[:, 1])]
+        return np.zeros((2, 0), dtype=np.int64)
+    return np.asarray(cKDTree(places).query_pairs(radius, output_type="ndarray").T, np.int64)

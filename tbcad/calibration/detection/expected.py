@@ -88,7 +88,7 @@ def maybe_hidden(machine: Machine, expected: Expected, room: Room) -> Bools:
     start = machine.leds[expected.led]
     way = unit(centre - start)
     level = norm(way[:, :2]) ** 2
-    along = -dot_level(start, way) / np.maximum(level, np.finfo(float).tiny)
+    along = -dot(start[:, :2], way[:, :2]) / np.maximum(level, np.finfo(float).tiny)
     nearest = start + along[:, None] * way
     inside = room.radius**2 - norm(nearest[:, :2]) ** 2
     half = np.sqrt(np.maximum(inside, 0) / np.maximum(level, np.finfo(float).tiny))
@@ -96,8 +96,3 @@ def maybe_hidden(machine: Machine, expected: Expected, room: Room) -> Bools:
     low, high = (start[:, 2] + end * way[:, 2] for end in (np.maximum(first, 0), last))
     crosses = (np.minimum(low, high) < room.top) & (np.maximum(low, high) > room.bottom)
     return np.asarray((inside > 0) & (last > 0) & crosses)
-
-
-def dot_level(a: Floats, b: Floats) -> Floats:
-    """Scalar products (n,) of vectors (n, 3) without their heights."""
-    return dot(a[:, :2], b[:, :2])

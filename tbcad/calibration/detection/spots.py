@@ -32,10 +32,11 @@ CLIP = 5.0  # in numbers: larger differences of dark photographs are of hot pixe
 FULL_ELECTRONS = 10_000.0
 # What the model of domes leaves open, dust, and what a lens as sharp as its pixels adds, pixels.
 FLOOR_PX = 0.006
+PHOTOGRAPH_PX = 1e5  # apart: spots of different photographs never pair
 
 
 @dataclass(frozen=True)
-class Spots:
+class BrightSpots:
     """Bright spots, over n of them.
 
     Attributes:
@@ -64,9 +65,9 @@ class Spots:
     def __len__(self) -> int:
         return len(self.frame)
 
-    def only(self, which: Bools | Ints) -> "Spots":
+    def only(self, which: Bools | Ints) -> "BrightSpots":
         """Some of them."""
-        return Spots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
+        return BrightSpots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
 
 
 @dataclass(frozen=True)
@@ -91,19 +92,22 @@ class Unmeasured:
         )
 
 
-def joined_spots(parts: list[Spots]) -> Spots:
+def joined_spots(parts: list[BrightSpots]) -> BrightSpots:
     """All spots of several photographs."""
     if not parts:
         empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
-        return Spots(none, none, np.zeros((0, 2)), *[empty] * 6)
-    return Spots(
-        **{one.name: np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(Spots)}
+        return BrightSpots(none, none, np.zeros((0, 2)), *[empty] * 6)
+    return BrightSpots(
+        **{
+            one.name: np.concatenate([getattr(p, one.name) for p in parts])
+            for one in fields(BrightSpots)
+        }
     )
 
 
 def find_spots(
     image: Image16, dark: Image16 | None, frame: int, led: int
-) -> tuple[Spots, Unmeasured]:
+) -> tuple[BrightSpots, Unmeasured]:
     """The spots of a photograph (h, w, 3) by one LED, less a dark one, and what else is bright."""
     largest = np.iinfo(image.dtype).max
     threshold = max(round(THRESHOLD * largest), 1)
@@ -117,7 +121,7 @@ def find_spots(
     sums = [_measured(image, dark, *one) for one in places if _radius(one[0]) <= MAX_RADIUS_PX]
     table = np.array([one for one in sums if one is not None]).reshape(-1, COLUMNS)
     light, radius, shot, spread, colours, full = table[:, 2:].T
-    found = Spots(
+    found = BrightSpots(
         frame=np.full(len(table), frame),
         led=np.full(len(table), led),
         pixel=table[:, :2],
@@ -209,7 +213,7 @@ def reading_variance(dark: Image16, other: Image16) -> float:
     return float((change**2).mean() / 2) + ROUNDING
 
 
-def gain(spots: Spots, reading: float, largest: float) -> float:
+def gain(spots: BrightSpots, reading: float, largest: float) -> float:
     """Variance of light over light, in numbers."""
     pixels = np.pi * spots.radius**2
     known = spots.colours != 0
@@ -220,7 +224,12 @@ def gain(spots: Spots, reading: float, largest: float) -> float:
     return float(max(variance / (spots.light[known].sum() / COLOURS), 0.0))
 
 
-def centroid_sigmas(spots: Spots, reading: float, of_light: float) -> Floats:
+def centroid_sigmas(spots: BrightSpots, reading: float, of_light: float) -> Floats:
     """Standard deviation of each centroid, of column and of row, pixels, (n,)."""
     variance = (of_light * spots.shot + COLOURS * reading * spots.spread) / spots.light**2
     return np.asarray(np.sqrt(variance + FLOOR_PX**2))
+
+
+def stacked(frame: Ints, led: Ints, pixel: Floats) -> Floats:
+    """Places of all photographs, each in a plane of its own, (n, 4)."""
+    return np.column_stack([pixel, PHOTOGRAPH_PX * frame, PHOTOGRAPH_PX * led])

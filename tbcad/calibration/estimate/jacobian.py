@@ -77,10 +77,13 @@ def light_images(
     by_point = by_image @ camera.axes
     moved = sphere_slopes(prior, values, machine, frame, sphere)
     columns = (*camera_columns(prior), prior.first[Block.RADII] + sphere[:, None], *moved.columns)
+    turned = _left_jacobian(prior.blocks(values)[Block.CAMERA_TURN]).T[None]
+    by_logarithm, (x, y) = np.eye(LENS), camera.focal  # of the focal lengths
+    by_logarithm[:2, :2] = [[x, x / 2], [y, -y / 2]]
     derivatives = (
-        by_image @ turn_slopes(prior.blocks(values)[Block.CAMERA_TURN], image),
+        by_image @ np.cross(turned, image[:, None]).swapaxes(1, 2),
         by_point @ (seen.by_pinhole - np.eye(3)),
-        lens_slopes(by_lens, machine),
+        by_lens @ by_logarithm,
         by_point @ seen.by_radius[..., None],
         *(by_point @ seen.by_centre @ value for value in moved.values),
     )
@@ -95,19 +98,6 @@ def camera_columns(prior: Prior) -> tuple[Ints, Ints, Ints]:
         prior.first[Block.PINHOLE] + np.arange(3),
         np.concatenate([prior.first[block] + np.arange(size) for block, size in lens]),
     )
-
-
-def turn_slopes(turn: Floats, turned: Floats) -> Floats:
-    """Derivatives (n, 3, 3) of rotated vectors (n, 3) by the rotation vector (3,)."""
-    return np.asarray(np.cross(_left_jacobian(turn).T[None], turned[:, None]).swapaxes(1, 2))
-
-
-def lens_slopes(by_lens: Floats, machine: Machine) -> Floats:
-    """From derivatives (n, d, LENS) by focal lengths to those by their logarithms."""
-    change = np.eye(LENS)
-    x, y = machine.camera.focal
-    change[:2, :2] = [[x, x / 2], [y, -y / 2]]
-    return np.asarray(by_lens @ change)
 
 
 def sphere_slopes(

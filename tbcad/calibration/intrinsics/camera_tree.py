@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.calibration.intrinsics.lens import USABLE, Lens, lens_of, numbers_of
+from tbcad.calibration.intrinsics.lens import USABLE, CalibratedLens, lens_of, numbers_of
 from tbcad.errors import InputError
 from tbcad.types import Floats
 
@@ -45,7 +45,7 @@ SKEW = 1e-6  # of the focal length, that is taken for none
 FULL = {"0", "1"}  # binning of a picture of all pixels
 
 
-def camera_lens(tree: Node, name: str) -> Lens:
+def camera_lens(tree: Node, name: str) -> CalibratedLens:
     """The lens of the only camera of a file's tree of mappings, lists and texts.
 
     Raises:

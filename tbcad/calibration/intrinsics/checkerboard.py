@@ -13,7 +13,7 @@ from tbcad.calibration.intrinsics.boards import (
     BoardCorners,
     find_corners,
 )
-from tbcad.calibration.intrinsics.lens import Lens, cv
+from tbcad.calibration.intrinsics.lens import CalibratedLens, cv
 from tbcad.errors import InputError
 from tbcad.formats.pictures import visible_files
 from tbcad.runs.images import read_image
@@ -47,7 +47,7 @@ class SolvedLens:
         reach: how far out corners lie, as a share of the distance from centre to corner.
     """
 
-    lens: Lens
+    lens: CalibratedLens
     boards: int
     unused: tuple[str, ...]
     corners: int
@@ -141,7 +141,7 @@ def solve_corners(
     """Solve a lens from corners in photographs of a size; InputError: they are of no lens."""
     boards = without_outliers(seen, size)
     solution = _solution(boards, size)
-    lens = Lens(
+    lens = CalibratedLens(
         focal=solution.values[:2],
         principal=solution.values[2:4],
         distortion=solution.values[4:],

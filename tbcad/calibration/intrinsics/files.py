@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import yaml
 
 from tbcad.calibration.intrinsics.camera_tree import Tree, camera_lens
-from tbcad.calibration.intrinsics.lens import USABLE, Lens, lens_of
+from tbcad.calibration.intrinsics.lens import USABLE, CalibratedLens, lens_of
 from tbcad.errors import InputError
 from tbcad.spec.files import read_text
 
@@ -33,7 +33,7 @@ LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 MAX_DEPTH = 20  # a list of Kalibr is four deep
 
 
-def read_lens(path: Path) -> Lens:
+def read_lens(path: Path) -> CalibratedLens:
     """The lens in a file.
 
     Raises:
@@ -57,7 +57,7 @@ def read_lens(path: Path) -> Lens:
     return lens.checked(name)
 
 
-def _mrcal(text: str, name: str) -> Lens:
+def _mrcal(text: str, name: str) -> CalibratedLens:
     try:
         found: Any = ast.literal_eval(text.strip())
         model = str(found.get("lensmodel", found.get("lens_model")))
@@ -77,7 +77,7 @@ def _mrcal(text: str, name: str) -> Lens:
     return lens_of(numbers[:4], numbers[4:], (width, height), name)
 
 
-def _colmap(lines: list[str], name: str) -> Lens:
+def _colmap(lines: list[str], name: str) -> CalibratedLens:
     if len(lines) != 1:
         raise InputError(f"{name} has {len(lines)} cameras: keep the line of the run's")
     _, model, width, height, *given = lines[0].split()
@@ -90,7 +90,7 @@ def _colmap(lines: list[str], name: str) -> Lens:
         )
     numbers = [given[place] for place in order]
     lens = lens_of(numbers[:4], numbers[4:], (width, height), name)
-    return Lens(
+    return CalibratedLens(
         lens.focal, lens.principal - COLMAP_CENTRE, lens.distortion, lens.width_px, lens.height_px
     )
 

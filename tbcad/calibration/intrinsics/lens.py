@@ -22,7 +22,7 @@ INSTALL = "pip install 'tbcad[machine]'"
 
 
 @dataclass(frozen=True)
-class Lens:
+class CalibratedLens:
     """Focal lengths, principal point and distortion by OpenCV's model.
 
     Attributes:
@@ -49,7 +49,7 @@ class Lens:
             camera, focal=self.focal, principal=self.principal, distortion=self.distortion
         )
 
-    def checked(self, name: str) -> "Lens":
+    def checked(self, name: str) -> "CalibratedLens":
         """This lens, or an InputError with the name of its file if no camera can have it."""
         if (self.focal <= 0).any():
             raise InputError(f"{name}: focal lengths must be above 0: export it again")
@@ -85,7 +85,7 @@ class Lens:
 
 def lens_of(
     intrinsics: Iterable[object], coefficients: Iterable[object], size: Iterable[object], name: str
-) -> Lens:
+) -> CalibratedLens:
     """A lens from a file's 4 intrinsics, OpenCV's coefficients of distortion, columns and rows.
 
     Raises:
@@ -106,7 +106,7 @@ def lens_of(
             f"{name} is of pictures of {width:g} x {height:g} pixels: allowed are whole numbers to "
             f"{MAX_PX}"
         )
-    return Lens(values[:2], values[2:], distortion, int(width), int(height))
+    return CalibratedLens(values[:2], values[2:], distortion, int(width), int(height))
 
 
 def _model(coefficients: int) -> str:
@@ -139,7 +139,7 @@ def cv() -> Any:
     return cv2
 
 
-def opencv_text(lens: Lens, facts: dict[str, float | int | str]) -> str:
+def opencv_text(lens: CalibratedLens, facts: dict[str, float | int | str]) -> str:
     """A lens as OpenCV's YAML, which cv2.FileStorage and `read_lens` read, with further keys."""
     (fx, fy), (cx, cy) = lens.focal.tolist(), lens.principal.tolist()
     lines = [

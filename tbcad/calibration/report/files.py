@@ -27,7 +27,7 @@ from tbcad.calibration.report.tables import (
     sphere_covariances,
     spheres_table,
 )
-from tbcad.calibration.report.verdict import Verdict
+from tbcad.calibration.report.verdict import CalibrationVerdict
 from tbcad.figure_files import PlotFormat, figure_file
 from tbcad.geometry.vectors import norm
 from tbcad.machine.machine import Machine
@@ -43,7 +43,7 @@ COVARIANCE = "covariance.npz"
 def write_calibration(
     folder: Path,
     result: Calibration,
-    judged: Verdict,
+    judged: CalibrationVerdict,
     basis: dict[str, Any],
     plot: PlotFormat = "png",
 ) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from tbcad.calibration.report.tables import angle_deviations
 from tbcad.calibration.uncertainty import FIGURES, motion_fit, shared_motions
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
+from tbcad.machine.built import is_cap
 from tbcad.machine.machine import Machine
 from tbcad.optics.reflection import reflected_rays
 from tbcad.simulate.study.tables import Table
@@ -94,7 +95,7 @@ def _of_spheres(result: Calibration, known: Covariance, truth: Machine) -> list[
     rest = _besides_motion(designed.centre)
     besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
     moved = [rest @ one.centre.ravel() for one in (designed, truth, found)]
-    caps = result.setup.plan.body_radius < result.setup.plan.radius
+    caps = is_cap(result.setup.plan)
     centres = [one.centre for one in (designed, truth, found)]
     return [
         _kind("centres", "um", MICROMETRES, *centres, sigma[:, :3]),

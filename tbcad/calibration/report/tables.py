@@ -7,6 +7,7 @@ from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block, Prior
+from tbcad.machine.built import is_cap
 from tbcad.runs.exposure import exposure_name
 from tbcad.simulate.study.tables import Table
 from tbcad.types import Floats, Ints
@@ -23,7 +24,7 @@ def spheres_table(result: Calibration, known: Covariance) -> Table:
     sigma = np.sqrt(np.diagonal(sphere_covariances(result, known), axis1=1, axis2=2))
     h, used = result.found.highlights, result.found.used
     count = np.bincount(h.sphere[used], minlength=len(before))
-    caps = result.setup.plan.body_radius < result.setup.plan.radius
+    caps = is_cap(result.setup.plan)
     columns: dict[str, ArrayLike] = {
         "ball": np.arange(1, len(before) + 1),
         "kind": np.where(caps, "cap", "ball"),

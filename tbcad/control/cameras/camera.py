@@ -26,7 +26,7 @@ class Shot:
     settings: dict[str, Setting]
 
 
-class Camera(Protocol):
+class RunCamera(Protocol):
     """A camera that is connected; what most need not do is done by default.
 
     Attributes:

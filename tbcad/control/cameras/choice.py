@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
 
-from tbcad.control.cameras.camera import Camera, Shot
+from tbcad.control.cameras.camera import RunCamera, Shot
 from tbcad.control.cameras.gphoto import GphotoCamera
 from tbcad.control.cameras.image_facts import image_facts, suffix_of
 from tbcad.control.machine import CameraFault
@@ -25,7 +25,7 @@ QUIET_S = 0.3  # a file that has not grown for so long, and can be read, is comp
 GPHOTO, COMMAND, FOLDER = "gphoto2", "command:", "folder:"
 
 
-class CommandCamera(Camera):
+class CommandCamera(RunCamera):
     """A command with `{output}` in the place of the image's path, without its suffix."""
 
     released = False
@@ -87,7 +87,7 @@ def _filled(word: str, fields: dict[str, str]) -> str:
     return word
 
 
-class WatchedFolder(Camera):
+class WatchedFolder(RunCamera):
     """The new file that appears after a release is the photograph."""
 
     def __init__(
@@ -176,7 +176,7 @@ def check_can_expose(text: str, times: PhaseTimes) -> None:
         )
 
 
-def connected_camera(text: str, timeout_s: float) -> Camera:
+def connected_camera(text: str, timeout_s: float) -> RunCamera:
     """The camera that a text names, whose photographs may take so long."""
     check_camera_name(text)
     if text.startswith(COMMAND):

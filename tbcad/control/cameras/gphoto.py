@@ -8,7 +8,7 @@ import math
 from types import ModuleType
 from typing import Any
 
-from tbcad.control.cameras.camera import Camera, Shot, are_near, shutter_seconds
+from tbcad.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import suffix_of
 from tbcad.control.machine import CameraFault
 from tbcad.control.port import INSTALL
@@ -28,7 +28,7 @@ MANUAL_EXPOSURE = "set the camera to manual exposure"
 AUTOFOCUS, OFF = "autofocus", "Off"  # of the driver, before each release
 
 
-class GphotoCamera(Camera):
+class GphotoCamera(RunCamera):
     """The one camera that is plugged in."""
 
     released = False

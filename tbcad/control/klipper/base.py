@@ -18,7 +18,7 @@ from tbcad.control.klipper.files import (
 )
 from tbcad.control.klipper.host import HOLD_FIRST, MOTOR, READY, Klipper
 from tbcad.control.machine import ControllerReset, MachineFault
-from tbcad.control.plan import Plan
+from tbcad.control.plan import ControlPlan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
 from tbcad.types import Progress
@@ -38,7 +38,7 @@ class KlipperBase:
 
     switch_s = 0.5  # as measured, with Klipper on the same computer
 
-    def __init__(self, klipper: Klipper, plan: Plan, files: KlipperFiles) -> None:
+    def __init__(self, klipper: Klipper, plan: ControlPlan, files: KlipperFiles) -> None:
         """Drive a machine as its build says."""
         self._klipper, self._plan, self._files = klipper, plan, files
         self._at = plan.program.start.angle_deg

@@ -56,7 +56,7 @@ class Disconnected(MachineFault):
 
 
 @dataclass(frozen=True)
-class State:
+class KlipperState:
     """State of Klipper: ready, startup, error, shutdown or disconnected; and its message."""
 
     name: str
@@ -94,14 +94,14 @@ class Klipper:
         if state.name != READY:
             raise MachineFault(f"{state.what}: {state.safe}")
 
-    def state(self) -> State:
+    def state(self) -> KlipperState:
         """State of Klipper; Unreachable: Moonraker gives no answer."""
         try:
             info = self._server.get(INFO)
-            return State(str(info["state"]), str(info["state_message"]))
+            return KlipperState(str(info["state"]), str(info["state_message"]))
         except Refused as fault:
             if fault.code in NO_KLIPPER:
-                return State(DISCONNECTED, "")
+                return KlipperState(DISCONNECTED, "")
             raise
         except (KeyError, TypeError):
             raise MachineFault(f"{INFO} tells no state: {ELSEWHERE}") from None

@@ -29,7 +29,7 @@ class Error:
     length: float = 0.0
 
     @property
-    def deviation(self) -> float:
+    def sigma(self) -> float:
         """Standard deviation."""
         return self.spread if self.distribution == "normal" else self.spread / sqrt(3)
 
@@ -104,5 +104,5 @@ class Errors:
         """
         if self.warp.spread == 0:
             return self.sphere_radius
-        spread = hypot(self.sphere_radius.deviation, self.warp.spread / sqrt(2))
+        spread = hypot(self.sphere_radius.sigma, self.warp.spread / sqrt(2))
         return Error(spread, self.sphere_radius.mean)

@@ -91,13 +91,6 @@ def sharpness(
     return Sharpness(table[0], table[1::2], table[2::2])
 
 
-def designed_ssim(
-    cameras: tuple[Reflector, Reflector], scene: Scene, reference: ReferenceViews
-) -> Floats:
-    """SSIM of each view of a shell as designed, (v,)."""
-    return _ssim(_light_field(cameras, scene, reference.capture_mm), reference)
-
-
 @dataclass(frozen=True)
 class BuiltReflector(SubstitutedReflector):
     """A camera and its mirrors at their places in a build.
@@ -224,6 +217,8 @@ def view_ssims(specs: dict[str, Spec]) -> dict[str, float]:
     scene = prepared_scene(built_in_object(capture_mm))
     reference = reference_views(scene, capture_mm)
     return {
-        words: float(designed_ssim(reflectors(design(one)), scene, reference).mean())
+        words: float(
+            _ssim(_light_field(reflectors(design(one)), scene, capture_mm), reference).mean()
+        )
         for words, one in specs.items()
     }

@@ -98,7 +98,7 @@ def _shapes(k: int, t: int) -> dict[str, Shape]:
     }
 
 
-class _Stop(Record):
+class _WindUpStop(Record):
     stop: int
     wind_up_deg: Annotated[float, Field(ge=-MAX_DEG, le=MAX_DEG)]
 
@@ -112,7 +112,7 @@ def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
         InputError: the file is missing, malformed, or of another plan.
     """
     path = export.folder / STOPS
-    rows = read_csv(path, _Stop, MISSING)
+    rows = read_csv(path, _WindUpStop, MISSING)
     if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
         raise InputError(
             f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"

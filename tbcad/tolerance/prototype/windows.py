@@ -64,7 +64,7 @@ class RunWindows:
 
 
 @dataclass(frozen=True)
-class PrototypeModel:
+class PrototypeWindows:
     """The prototype as designed, as the fast model needs it.
 
     Attributes:
@@ -96,14 +96,14 @@ class PrototypeModel:
 
 def prototype_model(
     reflectors: tuple[Reflector, Reflector], plan: Plan, wind_up: Floats
-) -> PrototypeModel:
+) -> PrototypeWindows:
     """The fast model of both cameras, the plan, and the base's turn under gravity at its stops."""
     a, b = prototype_runs(reflectors, plan)
     view = reflectors[0].camera
     axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
     virtual = virtual_camera_numbers(both[1].halved)
-    return PrototypeModel(view.pinhole, axes, plan, both, virtual, wind_up)
+    return PrototypeWindows(view.pinhole, axes, plan, both, virtual, wind_up)
 
 
 def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
@@ -155,7 +155,7 @@ class PrototypeResult:
 class PrototypeCase:
     """Simulates builds of the prototype; it can be sent to another process."""
 
-    model: PrototypeModel
+    model: PrototypeWindows
     errors: Errors
     seed: int
 
@@ -186,7 +186,7 @@ class RunPose:
     highlight: Floats
 
 
-def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int) -> RunPose:
+def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: int) -> RunPose:
     """Camera and balls when each mirror of one run is photographed."""
     run, plan = model.runs[half], model.plan
     on_base = (tilted_centres(plan, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
@@ -211,13 +211,13 @@ def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
     return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
 
 
-def _lens(model: PrototypeModel, tilt: Floats, focal: float) -> Floats:
+def _lens(model: PrototypeWindows, tilt: Floats, focal: float) -> Floats:
     """A longer focal length makes pictures larger: a pixel's ray is nearer to the axis."""
     nearer = np.array([[1 / focal], [1 / focal], [1.0]])
     return np.asarray(nearer * Rotation.from_rotvec(tilt).apply(model.axes))
 
 
-def calibrated_pose(model: PrototypeModel, half: int, pose: RunPose) -> RunPose:
+def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
     """The same with windows that the software has moved to the actual balls.
 
     It knows the camera then, and turns every window about the pinhole, until the middle of the
@@ -235,7 +235,7 @@ def _shortest_rotations(start: Floats, end: Floats) -> Floats:
     return np.asarray(np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None])
 
 
-def prototype_result(model: PrototypeModel, draws: PrototypeDraws) -> PrototypeResult:
+def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> PrototypeResult:
     """Coverage and pointing errors of s prototypes, with designed and with calibrated windows.
 
     Coverage is twice the minimum distance from the object's centre of all rays camera -> edge of
@@ -253,7 +253,7 @@ def prototype_result(model: PrototypeModel, draws: PrototypeDraws) -> PrototypeR
     return result
 
 
-def _seen(model: PrototypeModel, poses: list[RunPose]) -> tuple[Floats, Floats]:
+def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:
     pairs = list(zip(model.runs, poses, strict=True))
     diameter = np.full(int(model.virtual.max()) + 1, np.inf)
     np.minimum.at(diameter, model.virtual, np.concatenate([_coverage(*pair) for pair in pairs]))
