@@ -8,10 +8,17 @@ from tbcad.calibration.calibrate import Setup
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import highlights_with_slopes
 from tbcad.calibration.estimate.parameters import Block
-from tbcad.calibration.led_layout import best_layout, with_partners
+from tbcad.calibration.led_layout import (
+    best_layout,
+    layout_cost,
+    led_room,
+    ray_errors,
+    shell_information,
+    sphere_information,
+    with_partners,
+)
 from tbcad.calibration.priors import shell_prior
-from tbcad.calibration.single_spheres import ray_errors, sphere_information
-from tbcad.calibration.study import layout_cost, led_room, shell_information, whole_errors
+from tbcad.calibration.study import whole_errors
 from tbcad.calibration.uncertainty import known_rays
 from tbcad.machine.designed import designed_shell, read_leds
 from tbcad.prototype.stage.leds import MIN_SEEN
