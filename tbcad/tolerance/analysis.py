@@ -212,14 +212,12 @@ def _process_options(
     if not simulator.options.every_process:
         return (chosen,)
     progress(EVERY_PROCESS)
-    return tuple(_process_option(simulator, name, worst) for name in BUILT_IN)
-
-
-def _process_option(simulator: _Simulator, name: str, worst: WorstCoverage) -> ProcessOption:
-    export = simulator.export
-    simulator.detail(name)
-    errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
-    return ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None)
+    export, options = simulator.export, []
+    for name in BUILT_IN:
+        simulator.detail(name)
+        errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
+        options.append(ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None))
+    return tuple(options)
 
 
 def _margins(

@@ -144,7 +144,7 @@ def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
     """
     partner, judged = losses.partner, len(losses.loss) // 2
     loss, other = losses.loss[:judged], losses.loss[judged:]
-    mean, deviation = _mean_and_deviation(np.concatenate([other, other[..., partner]], axis=1))
+    mean, deviation = _mean_and_sigma(np.concatenate([other, other[..., partner]], axis=1))
     level = np.where(loss > losses.spare, (loss - mean) / deviation, -np.inf).max(axis=(1, 2))
     k = -coverage_at_yield(-level, wanted_yield)
     margins = mean + k * deviation if np.isfinite(k) else np.zeros(len(mean))
@@ -153,7 +153,7 @@ def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
     return np.asarray(np.round(steps * STEP_MM, 6))
 
 
-def _mean_and_deviation(loss: Floats) -> tuple[Floats, Floats]:
+def _mean_and_sigma(loss: Floats) -> tuple[Floats, Floats]:
     """Mean and root mean square deviation upwards of losses (..., m), mm, (m,) each.
 
     Losses are skew, each the largest of several edges: what is below the mean says little of those

@@ -11,7 +11,7 @@ from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.estimate.solve import Estimate
-from tbcad.calibration.report.tables import angle_deviations
+from tbcad.calibration.report.tables import angle_sigmas
 from tbcad.calibration.uncertainty import FIGURES, motion_fit, shared_motions
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
@@ -128,9 +128,9 @@ def _of_base(result: Calibration, known: Covariance, truth: Machine) -> list[Kin
     tilts = [one.axis @ prior.across.T for one in machines]
     places = [_base_places(one, prior.across) for one in machines]
     return [
-        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_deviations(prior, known))),
+        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_sigmas(prior, known))),
         _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, Block.TILT)),
-        _kind("base in each frame", "um", MICROMETRES, *places, _place_deviations(result, known)),
+        _kind("base in each frame", "um", MICROMETRES, *places, _place_sigmas(result, known)),
     ]
 
 
@@ -142,7 +142,7 @@ def _base_places(machine: Machine, across: Floats) -> Floats:
     return np.asarray((point - turned + shift) @ across.T)
 
 
-def _place_deviations(result: Calibration, known: Covariance) -> Floats:
+def _place_sigmas(result: Calibration, known: Covariance) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
     frames = np.arange(len(angle))

@@ -60,9 +60,9 @@ def angles_table(result: Calibration, known: Covariance) -> Table:
         "planned_deg": planned,
         "estimated_deg": angle,
         "difference_deg": angle - planned,
-        "sigma_deg": np.degrees(angle_deviations(found.prior, known)),
+        "sigma_deg": np.degrees(angle_sigmas(found.prior, known)),
         **{f"shift_{axis}_mm": shift[:, i] for i, axis in enumerate(AXES)},
-        "sigma_shift_mm": _runout_deviations(found.prior, known),
+        "sigma_shift_mm": _runout_sigmas(found.prior, known),
     }
     return Table.of_columns("angles", columns)
 
@@ -107,23 +107,23 @@ def residuals_table(result: Calibration) -> Table:
     return Table.of_columns("residuals", columns)
 
 
-def angle_deviations(prior: Prior, known: Covariance) -> Floats:
+def angle_sigmas(prior: Prior, known: Covariance) -> Floats:
     """Of each frame's angle, with the offset of its series, radians, (f,)."""
     frames = np.arange(len(prior.mean.angle))
     columns = np.stack(
         [prior.first[Block.OFFSET] + prior.series, prior.first[Block.ANGLES] + frames], axis=1
     )
-    return _deviations(prior, known, columns)
+    return _sigmas(prior, known, columns)
 
 
-def _runout_deviations(prior: Prior, known: Covariance) -> Floats:
+def _runout_sigmas(prior: Prior, known: Covariance) -> Floats:
     """Root mean square of each frame's shift, mm, (f,)."""
     frames = np.arange(len(prior.mean.angle))
     ways = [(prior.first[Block.RUNOUT] + 2 * frames + way)[:, None] for way in (0, 1)]
-    return np.asarray(np.hypot(*(_deviations(prior, known, columns) for columns in ways)))
+    return np.asarray(np.hypot(*(_sigmas(prior, known, columns) for columns in ways)))
 
 
-def _deviations(prior: Prior, known: Covariance, columns: Ints) -> Floats:
+def _sigmas(prior: Prior, known: Covariance, columns: Ints) -> Floats:
     ones = np.ones((len(columns), 1, columns.shape[1]))
     slopes = Slopes((columns,), (ones,)).matrix(prior)
     return np.asarray(np.sqrt(known.of(slopes, 1)[:, 0, 0]))

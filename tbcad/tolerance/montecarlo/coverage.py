@@ -42,32 +42,23 @@ class MirrorCoverage:
 
 def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False) -> MirrorCoverage:
     """Coverage of each mirror of one half, for s builds; see `trace_cell_edges` for worst_only."""
-    outlines = _outlines(half, draws, worst_only)
-    area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
-    crossings = outlines[..., CROSSINGS].astype(np.int64)
-    return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
-
-
-def _outlines(half: EdgeModel, draws: ShellDraws, worst_only: bool) -> Floats:
-    """What `trace_cell_edges` finds in s builds, (s, m, 3)."""
     outlines = np.empty((len(draws), len(half), 3))
     surfaces, views = surface_tables(half, draws), view_tables(half, draws)
     forms, pairs = form_tables(half, draws), half.pairs.arrays
     if worst_only:  # pictures do not count: cameras that only turn see the same
         views[:, RIGHT:] = views[:1, RIGHT:]
     for build in range(len(draws)):
-        if build > 0 and _same(build, surfaces, forms, views):
+        tables = surfaces, forms, views
+        if build > 0 and all(np.array_equal(one[build - 1], one[build]) for one in tables):
             outlines[build] = outlines[build - 1]
             continue
         outlines[build] = trace_cell_edges(
             surfaces[build], forms[build], pairs, half.halved, views[build], half.screen,
             worst_only,
         )  # fmt: skip
-    return outlines
-
-
-def _same(build: int, *tables: Floats) -> bool:
-    return all(np.array_equal(table[build - 1], table[build]) for table in tables)
+    area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
+    crossings = outlines[..., CROSSINGS].astype(np.int64)
+    return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
 
 
 def virtual_camera_numbers(halved: Bools) -> Ints:
