@@ -121,7 +121,7 @@ def _one_ball(setup: Setup, layout: Layout) -> Record:
     known = _bound(alone, USUAL_PX, (frame, sphere, led))
     rays = np.unique(np.stack([frame, sphere]), axis=1)
     errors = known_rays(alone, np.zeros(len(alone.free)), known, rays[0], rays[1])
-    return _shares(errors.whole_place_mm, errors.whole_turn_mrad)
+    return _shares(errors.whole.place_mm, errors.whole.turn_mrad)
 
 
 def _whole_table(setup: Setup, layouts: list[Layout], progress: Progress) -> Table:
@@ -139,11 +139,11 @@ def _whole_table(setup: Setup, layouts: list[Layout], progress: Progress) -> Tab
                 "leds": len(layout.leds),
                 "process": process,
                 "noise_px": noise,
-                **_shares(errors.place_mm, errors.turn_mrad),
-                "in_run_mm": float(np.median(errors.in_run_place_mm)),
-                "in_run_mrad": float(np.median(errors.in_run_turn_mrad)),
-                "in_design_mm": float(np.median(errors.whole_place_mm)),
-                "in_design_mrad": float(np.median(errors.whole_turn_mrad)),
+                **_shares(errors.relative.place_mm, errors.relative.turn_mrad),
+                "in_run_mm": float(np.median(errors.in_run.place_mm)),
+                "in_run_mrad": float(np.median(errors.in_run.turn_mrad)),
+                "in_design_mm": float(np.median(errors.whole.place_mm)),
+                "in_design_mrad": float(np.median(errors.whole.turn_mrad)),
             }
         )
     return Table.of_records("calibration-machine", records)

@@ -66,7 +66,7 @@ def test_injected_errors_are_recovered(calibrated: Calibration, built: BuiltProt
     known = calibrated.rays.known
     pixel = centre_pixels(found.machine, known.frame, known.sphere)
     missed = at_plane(*traced(built.machine, pixel, known.frame, known.sphere), known.direction)
-    ratio = np.sqrt((missed**2).sum(axis=1).mean() / (known.whole_place_mm**2).mean())
+    ratio = np.sqrt((missed**2).sum(axis=1).mean() / (known.whole.place_mm**2).mean())
     assert ratio < 2
 
 

@@ -132,8 +132,8 @@ def test_errors_of_rays_are_those_predicted(calibrated: Calibration, built: Buil
     rays = calibrated.rays.known
     errors = ray_errors(calibrated.found, built.machine, rays.frame, rays.sphere)
     for found, place, turn in (
-        (errors.relative, rays.place_mm, rays.turn_mrad),
-        (errors.in_run, rays.in_run_place_mm, rays.in_run_turn_mrad),
+        (errors.relative, rays.relative.place_mm, rays.relative.turn_mrad),
+        (errors.in_run, rays.in_run.place_mm, rays.in_run.turn_mrad),
     ):
         for off, sigma in ((place_mm(found), place), (turn_mrad(found), turn)):
             assert np.sqrt((off**2).mean()) < 3 * np.sqrt((sigma**2).mean())

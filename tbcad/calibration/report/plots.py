@@ -136,7 +136,7 @@ def _rays(figure: "Figure", result: Calibration) -> None:
     points = axes.scatter(
         from_zenith * way[:, 0] / level,
         from_zenith * way[:, 1] / level,
-        c=known.place_mm,
+        c=known.relative.place_mm,
         s=14,
     )
     figure.colorbar(points, ax=axes, label="standard deviation at the object's centre, mm")

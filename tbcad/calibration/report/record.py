@@ -99,7 +99,7 @@ def covariance_bytes(result: Calibration, known: Covariance) -> bytes:
         information_column=upper.col[kept].astype(np.int32),
         information=upper.data[kept],
         sphere=sphere_covariances(result, known),
-        ray=result.rays.known.covariance,
+        ray=result.rays.known.whole.covariance,
     )
     return file.getvalue()
 

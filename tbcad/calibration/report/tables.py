@@ -76,12 +76,12 @@ def rays_table(result: Calibration) -> Table:
         "stop": [frames[i].stop for i in known.frame],
         "ball": known.sphere + 1,
         **{f"direction_{axis}": known.direction[:, i] for i, axis in enumerate(AXES)},
-        "sigma_mrad": known.turn_mrad,
-        "sigma_mm": known.place_mm,
-        "sigma_in_run_mrad": known.in_run_turn_mrad,
-        "sigma_in_run_mm": known.in_run_place_mm,
-        "sigma_in_design_mrad": known.whole_turn_mrad,
-        "sigma_in_design_mm": known.whole_place_mm,
+        "sigma_mrad": known.relative.turn_mrad,
+        "sigma_mm": known.relative.place_mm,
+        "sigma_in_run_mrad": known.in_run.turn_mrad,
+        "sigma_in_run_mm": known.in_run.place_mm,
+        "sigma_in_design_mrad": known.whole.turn_mrad,
+        "sigma_in_design_mm": known.whole.place_mm,
         "pixel_mm": known.pixel_mm,
     }
     return Table.of_columns("rays", columns)

@@ -66,18 +66,18 @@ class CalibrationVerdict:
 def verdict(result: Calibration) -> CalibrationVerdict:
     """Judge a calibration."""
     known = result.rays.known
-    short = float((known.place_mm > NEEDED_PIXELS * known.pixel_mm).mean())
+    short = float((known.relative.place_mm > NEEDED_PIXELS * known.pixel_mm).mean())
     doubts = _doubts(result)
     pulled = _pulled(result)
     enough = short <= 1 - SHARE / 100
     trusted = Answer.DOUBTFUL if doubts else Answer.GOOD
     return CalibrationVerdict(
         answer=trusted if enough else Answer.NOT_GOOD,
-        place_mm=_median_and_most(known.place_mm),
-        turn_mrad=_median_and_most(known.turn_mrad),
-        in_run=(float(np.median(known.in_run_place_mm)), float(np.median(known.in_run_turn_mrad))),
-        whole_mm=_median_and_most(known.whole_place_mm),
-        whole_mrad=_median_and_most(known.whole_turn_mrad),
+        place_mm=_median_and_most(known.relative.place_mm),
+        turn_mrad=_median_and_most(known.relative.turn_mrad),
+        in_run=(float(np.median(known.in_run.place_mm)), float(np.median(known.in_run.turn_mrad))),
+        whole_mm=_median_and_most(known.whole.place_mm),
+        whole_mrad=_median_and_most(known.whole.turn_mrad),
         needed_mm=NEEDED_PIXELS * float(np.median(known.pixel_mm)),
         short=short,
         doubts=doubts,

@@ -50,4 +50,4 @@ def test_the_whole_shell_in_seconds(paper_design: MirrorDesign) -> None:
     known = ray_uncertainty(found[0], np.zeros(count, dtype=np.int64), np.arange(count))
     assert time.process_time() - begun < SECONDS
     assert square < chi2.ppf(0.999, len(prior.free))
-    assert len(known.place_mm) == count == 847
+    assert len(known.relative.place_mm) == count == 847
