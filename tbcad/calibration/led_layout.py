@@ -63,7 +63,6 @@ def ray_errors(
     chosen: list[int],
     noise_px: float,
     sigma: tuple[float, float],
-    photographs: int = 1,
 ) -> tuple[Floats, Floats]:
     """Root mean square errors of rays at the object's centre, mm, and of directions, mrad, (m,).
 
@@ -72,9 +71,8 @@ def ray_errors(
         chosen: numbers of the LEDs.
         noise_px: standard deviation of each figure of a highlight.
         sigma: prior standard deviations of centre and radius, mm; infinite for none, 0 for known.
-        photographs: in which each LED is measured.
     """
-    data = information.by_led[chosen].sum(axis=0) * photographs / noise_px**2
+    data = information.by_led[chosen].sum(axis=0) / noise_px**2
     known = np.array([sigma[0]] * 3 + [sigma[1]])
     free = known > 0
     prior = np.diag(1 / known[free] ** 2)

@@ -74,7 +74,7 @@ class RunRequest:
 
 def dry_run(request: RunRequest) -> DryRun:
     """What a run would do, without port and camera; nothing is written."""
-    plan, options = _prepared(request, send_settings=False)
+    plan, options = _prepared(request)
     taken = set(read_run(request.out).exposures) if request.resume else set[str]()
     names = [phase.name for phase in options.phases]
     remaining = [
@@ -116,7 +116,7 @@ def run_machine(
     Raises:
         InputError: something was wrong before the first photograph of the run.
     """
-    plan, options = _prepared(request, send_settings)
+    plan, options = _prepared(request)
     check_camera_name(camera)
     check_can_expose(camera, options.times)
     with ExitStack() as stack:
@@ -169,7 +169,7 @@ def _faults_as_input_errors(port: str) -> Iterator[None]:
         raise InputError(f"{fault}: make room, or name another folder") from None
 
 
-def _prepared(request: RunRequest, send_settings: bool) -> tuple[ControlPlan, RunSelection]:
+def _prepared(request: RunRequest) -> tuple[ControlPlan, RunSelection]:
     """Plan and choice, or those of the run that is resumed."""
     plan = read_control_plan(request.exports)
     phases = chosen_phases(plan, request.phases, request.times)
@@ -179,7 +179,7 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[ControlPlan, Ru
         refuse_inputs(request.out, (request.exports,))
         refuse_inside(request.out, request.out.resolve())
         check_new(request.out)
-        return plan, RunSelection(frames, phases, size, send_settings, request.times)
+        return plan, RunSelection(frames, phases, size, request.times)
     record = read_record(request.out)
     _check_same_export(request, plan, record)
     known = ",".join(name for name in record.phases if name != DARK_LIT)
@@ -201,7 +201,7 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[ControlPlan, Ru
                 f"{request.out} was begun with another {name}: leave it out with --resume"
             )
     size = record.width_px, record.height_px
-    return plan, RunSelection(record.frames, recorded, size, send_settings, record.times)
+    return plan, RunSelection(record.frames, recorded, size, record.times)
 
 
 def _check_same_export(request: RunRequest, plan: ControlPlan, record: RunRecord) -> None:

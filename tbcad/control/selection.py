@@ -34,14 +34,12 @@ class RunSelection:
         frames: positions in order.
         phases: lights at each, in order.
         size_px: columns and rows that photographs must have.
-        send_settings: whether the controller's settings are sent to it where they differ.
         times: of exposure, as far as the camera is told them.
     """
 
     frames: tuple[Frame, ...]
     phases: tuple[LightPhase, ...]
     size_px: tuple[int, int]
-    send_settings: bool = False
     times: PhaseTimes = field(default_factory=PhaseTimes)
 
     @property

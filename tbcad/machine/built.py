@@ -72,21 +72,20 @@ def random_build(
     plan: Plan,
     errors: Errors,
     seed: int,
-    build: int = 0,
     *,
     wind_up: Floats,
 ) -> BuiltPrototype:
-    """One simulated build; the same that `tbcad tolerance` simulates, with a real lens and LEDs.
+    """The first simulated build; the same that `tbcad tolerance` simulates, with a real lens and LEDs.
 
     The wind-up is the turn of the base under gravity at the plan's stops, radians, (t,).
     """
-    draws = draw_prototypes(errors, seed, [build], is_cap(plan), wind_up)
-    return _built(designed, plan, draws, draw_other_errors(len(designed.leds), seed, build))
+    draws = draw_prototypes(errors, seed, [0], is_cap(plan), wind_up)
+    return _built(designed, plan, draws, draw_other_errors(len(designed.leds), seed))
 
 
-def draw_other_errors(leds: int, seed: int, build: int = 0, camera: int = 0) -> OtherErrors:
+def draw_other_errors(leds: int, seed: int, camera: int = 0) -> OtherErrors:
     """Errors of the lens, the sensor and so many LEDs, for a camera by its number from 0."""
-    key = np.random.SeedSequence(seed, spawn_key=(build, OTHER_STREAM + camera))
+    key = np.random.SeedSequence(seed, spawn_key=(0, OTHER_STREAM + camera))
     random = np.random.Generator(np.random.Philox(key))
     return OtherErrors(
         leds=LED_MM * random.standard_normal((leds, 3)),

@@ -114,20 +114,18 @@ def _led_middle(machine: Machine, frames: tuple[Frame, ...]) -> Floats:
     return np.asarray(machine.leds.mean(axis=0) * _flip(half_of(frames)))
 
 
-def random_half(
-    export: ExportedDesign, half: int, errors: Errors, seed: int, build: int = 0
-) -> BuiltPrototype:
-    """One camera of a simulated build, the same that `tbcad tolerance` simulates.
+def random_half(export: ExportedDesign, half: int, errors: Errors, seed: int) -> BuiltPrototype:
+    """One camera of the first simulated build, the same that `tbcad tolerance` simulates.
 
     The mean of the scales along the axes is used for all three, and form errors are left out: a
     sphere stays a sphere.
     """
     designed, grooves = designed_half(export, half), export.reflectors[half].walls
     maps = warp_maps_of(edge_models(export.reflectors), errors)
-    drawn = draw(errors, seed, [build], len(designed.radius), maps, len(grooves))
+    drawn = draw(errors, seed, [0], len(designed.radius), maps, len(grooves))
     draws = _turned(drawn[half], _flip(half))
-    leds = draw_other_errors(len(designed.leds), seed, build).leds * _flip(half)
-    other = replace(draw_other_errors(len(designed.leds), seed, build, half), leds=leds)
+    leds = draw_other_errors(len(designed.leds), seed).leds * _flip(half)
+    other = replace(draw_other_errors(len(designed.leds), seed, half), leds=leds)
     scale, tilt = float(draws.scale.mean()), Rotation.from_rotvec(draws.shell_tilt[0])
     machine = replace(
         designed,

@@ -66,7 +66,7 @@ def covariance(first: Floats, second: Floats, length: float) -> Floats:
     return result
 
 
-def pivots(points: Floats, length: float, missing: float = MISSING_VARIANCE) -> Ints:
+def pivots(points: Floats, length: float) -> Ints:
     """Numbers of the points (n, 3) from whose values the field follows at all others.
 
     Incomplete Cholesky factorisation with the largest remaining variance as the pivot, until the
@@ -74,7 +74,7 @@ def pivots(points: Floats, length: float, missing: float = MISSING_VARIANCE) -> 
     """
     left, chosen = np.ones(len(points)), list[int]()
     columns = np.empty((len(points), len(points)))
-    while left.max() > missing:
+    while left.max() > MISSING_VARIANCE:
         pivot = int(np.argmax(np.round(left, COMPARED_DIGITS)))
         known = columns[:, : len(chosen)]
         column = covariance(points, points[[pivot]], length)[:, 0] - known @ known[pivot]
