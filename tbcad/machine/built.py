@@ -75,7 +75,7 @@ def random_build(
     *,
     wind_up: Floats,
 ) -> BuiltPrototype:
-    """The first simulated build; the same that `tbcad tolerance` simulates, with a real lens and LEDs.
+    """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs.
 
     The wind-up is the turn of the base under gravity at the plan's stops, radians, (t,).
     """

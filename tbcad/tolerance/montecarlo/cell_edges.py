@@ -10,9 +10,9 @@ import numpy as np
 
 from tbcad.compiled import compiled_loop
 from tbcad.tolerance.montecarlo.edge_samples import (
-    SAMPLE,
+    DISTANCE,
+    PLACES,
     SAMPLES,
-    Samples,
     least_sample,
     lower_bound,
     parabola_minimum,
@@ -76,7 +76,7 @@ def trace_cell_edges(
     pair, offset, face, reach = pairs
     formed = len(forms) > 0
     result = np.zeros((len(halved), 3))
-    parts, count, samples = np.empty((len(pair), COLUMNS)), 0, np.empty(1, dtype=SAMPLE)[0]
+    parts, count, samples = np.empty((len(pair), COLUMNS)), 0, np.empty(PLACES)
     edge, spans, spare = np.empty(EDGE_COLUMNS), np.empty((INTERVALS, 2)), np.empty((INTERVALS, 2))
     for e in range(len(pair)):
         p, q = pair[e, 0], pair[e, 1]
@@ -119,7 +119,7 @@ def _count_crossings(
     screen: Floats,
     p: int,
     q: int,
-    samples: Samples,
+    samples: Floats,
     result: Floats,
 ) -> None:
     """Add the crossings of an edge's images off the spheres of both its faces.
@@ -140,7 +140,7 @@ def _sample(
     surfaces: Floats,
     forms: Floats,
     faces: tuple[int, int],
-    samples: Samples,
+    samples: Floats,
 ) -> None:
     """Fill in points of the edge of two faces, and rays to them."""
     sample_points(edge, span[0], span[1], view, samples)
@@ -149,7 +149,7 @@ def _sample(
 
 
 @compiled_loop
-def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples: Samples) -> None:
+def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples: Floats) -> None:
     if len(forms) == 0:
         reflect_samples(surfaces[mirror], view, samples)
     else:
@@ -158,14 +158,14 @@ def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples
 
 @compiled_loop
 def _put_part(
-    part: Floats, mirror: int, other: int, edge: Floats, low: float, high: float, samples: Samples
+    part: Floats, mirror: int, other: int, edge: Floats, low: float, high: float, samples: Floats
 ) -> None:
     least, step = least_sample(samples), (high - low) / (SAMPLES - 1)
     part[MIRROR], part[OTHER] = mirror, other
     for k in range(EDGE_COLUMNS):
         part[EDGE + k] = edge[k]
     part[LOW], part[HIGH] = max(low, low + (least - 1) * step), min(high, low + (least + 1) * step)
-    part[LEAST], part[BOUND] = samples.distance[least], lower_bound(samples, least)
+    part[LEAST], part[BOUND] = samples[DISTANCE + least], lower_bound(samples, least)
 
 
 @compiled_loop
@@ -176,7 +176,7 @@ def _minima(
     parts: Floats,
     m: int,
     worst_only: bool,
-    samples: Samples,
+    samples: Floats,
 ) -> Floats:
     """Minimum distance squared of each mirror's rays, (m,); see `trace_cell_edges`."""
     sampled, refined = np.full(m, inf), np.full(m, inf)
@@ -195,7 +195,7 @@ def _minima(
 
 @compiled_loop
 def _refined(
-    surfaces: Floats, forms: Floats, view: Floats, part: Floats, limit: float, samples: Samples
+    surfaces: Floats, forms: Floats, view: Floats, part: Floats, limit: float, samples: Floats
 ) -> float:
     """Minimum distance squared of the rays at a part of an edge.
 
@@ -207,7 +207,7 @@ def _refined(
         if r > 0:
             least, step = least_sample(samples), (high - low) / (SAMPLES - 1)
             if lower_bound(samples, least) > limit:
-                return float(samples.distance[least])
+                return float(samples[DISTANCE + least])
             low, high = max(low, low + (least - 1) * step), min(high, low + (least + 1) * step)
         _sample(edge, (low, high), view, surfaces, forms, (mirror, other), samples)
         _reflect(surfaces, forms, mirror, view, samples)

@@ -1,13 +1,10 @@
 """Rays through evenly spaced points of an edge, all of an edge at once: compiled.
 
-Each quantity of the samples lies side by side, so that the loops over them become vector
-instructions of the processor. The points are those of both mirrors at the edge.
+The samples lie side by side in one array, quantity after quantity, so that the loops over them
+become vector instructions of the processor. The points are those of both mirrors at the edge.
 """
 
 from math import sqrt
-from typing import Annotated, Protocol, TypeAlias
-
-import numpy as np
 
 from tbcad.compiled import compiled_loop
 from tbcad.geometry.loop_vectors import Vector, cross, dot, minus, plus_scaled, vector
@@ -22,9 +19,19 @@ from tbcad.tolerance.montecarlo.visible_edges import (
 )
 from tbcad.types import Floats
 
-SAMPLES = 9  # of an edge
-Triples: TypeAlias = Annotated[Floats, 3, 16]  # room for vectors of numbers
-Numbers: TypeAlias = Annotated[Floats, 16]
+# Samples of an edge, and places from one quantity of the samples to the next.
+SAMPLES = 9
+STRIDE = 16
+# Quantities of three numbers: the point before its shell is scaled, and after; the ray to it; the
+# ray that is reflected there, and its moment about the object's centre.
+POINT, SCALED, RAY, REFLECTED, MOMENT = (3 * k * STRIDE for k in range(5))
+# Quantities of one number: the reflected ray's distance squared from the object's centre, its
+# place on the screen, the point's place in the picture.
+DISTANCE, SCREEN_X, SCREEN_Y, PICTURE_X, PICTURE_Y = (k * STRIDE for k in range(15, 20))
+# Of each of an edge's faces: its normal at the point, of three numbers, and its waviness there.
+FIRST_NORMAL, SECOND_NORMAL = 20 * STRIDE, 23 * STRIDE
+FIRST_HEIGHT, SECOND_HEIGHT = 26 * STRIDE, 27 * STRIDE
+PLACES = 28 * STRIDE
 # Rows of a view; axes of a screen.
 PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
 FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
@@ -33,44 +40,22 @@ FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
 MAX_FALL = 0.5
 
 
-class Samples(Protocol):
-    """Quantities of all samples of an edge, side by side in one record of the dtype SAMPLE."""
-
-    point: Triples  # before its shell is scaled
-    scaled: Triples
-    ray: Triples  # to the scaled point
-    reflected: Triples
-    moment: Triples  # of the reflected ray about the object's centre
-    distance: Numbers  # of the reflected ray from the object's centre, squared
-    screen_x: Numbers
-    screen_y: Numbers
-    picture_x: Numbers
-    picture_y: Numbers
-    first_normal: Triples  # of each of the edge's faces
-    second_normal: Triples
-    first_height: Numbers  # of the waviness of each
-    second_height: Numbers
-
-
-SAMPLE = np.dtype(
-    [(name, np.float64, kind.__metadata__) for name, kind in Samples.__annotations__.items()]
-)
-
-
 @compiled_loop
-def get_sample(quantity: Floats, s: int) -> Vector:
+def get_sample(samples: Floats, quantity: int, s: int) -> Vector:
     """A quantity of three numbers at a sample."""
-    return quantity[0, s], quantity[1, s], quantity[2, s]
+    first = quantity + s
+    return samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE]
 
 
 @compiled_loop
-def put_sample(quantity: Floats, s: int, value: Vector) -> None:
+def put_sample(samples: Floats, quantity: int, s: int, value: Vector) -> None:
     """Fill in a quantity of three numbers at a sample."""
-    quantity[0, s], quantity[1, s], quantity[2, s] = value
+    first = quantity + s
+    samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE] = value
 
 
 @compiled_loop
-def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: Samples) -> None:
+def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: Floats) -> None:
     """Fill in points of an edge (`find_edge`), and rays to them, from parameter low to high."""
     start, tangent, outward = vector(edge, START), vector(edge, TANGENT), vector(edge, OUTWARD)
     bend, scale, pinhole = edge[BEND], vector(view[SCALE]), vector(view[PINHOLE])
@@ -79,25 +64,25 @@ def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: 
         w = 1 + bend * bend * t * t / 4
         chord = plus_scaled(start, t / w, tangent)
         point = plus_scaled(chord, -bend * t * t / 2 / w, outward)
-        put_sample(samples.point, s, point)
+        put_sample(samples, POINT, s, point)
         point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
-        put_sample(samples.scaled, s, point)
-        put_sample(samples.ray, s, minus(point, pinhole))
+        put_sample(samples, SCALED, s, point)
+        put_sample(samples, RAY, s, minus(point, pinhole))
 
 
 @compiled_loop
-def reflect_samples(surface: Floats, view: Floats, samples: Samples) -> None:
+def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
     """Fill in the rays that a surface (7,) reflects at the points, their moments and distances."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
     scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     for s in range(SAMPLES):
-        gradient = plus_scaled(normal, curvature, minus(get_sample(samples.point, s), apex))
+        gradient = plus_scaled(normal, curvature, minus(get_sample(samples, POINT, s), apex))
         reflect_sample(gradient, scale, middle, samples, s)
 
 
 @compiled_loop
 def reflect_sample(
-    gradient: Vector, scale: Vector, middle: Vector, samples: Samples, s: int
+    gradient: Vector, scale: Vector, middle: Vector, samples: Floats, s: int
 ) -> None:
     """Fill in the ray that is reflected at a sample, its moment and distance.
 
@@ -110,17 +95,17 @@ def reflect_sample(
         s: number of the sample.
     """
     across = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
-    ray = get_sample(samples.ray, s)
+    ray = get_sample(samples, RAY, s)
     # Neither the normal nor the ray has to be of unit length.
     out = plus_scaled(ray, -(2 * dot(ray, across) / dot(across, across)), across)
-    moment = cross(minus(get_sample(samples.scaled, s), middle), out)
-    put_sample(samples.reflected, s, out)
-    put_sample(samples.moment, s, moment)
-    samples.distance[s] = dot(moment, moment) / dot(out, out)
+    moment = cross(minus(get_sample(samples, SCALED, s), middle), out)
+    put_sample(samples, REFLECTED, s, out)
+    put_sample(samples, MOMENT, s, moment)
+    samples[DISTANCE + s] = dot(moment, moment) / dot(out, out)
 
 
 @compiled_loop
-def screen_crossings(screen: Floats, samples: Samples) -> int:
+def screen_crossings(screen: Floats, samples: Floats) -> int:
     """How often the reflected line on a screen crosses the positive half of its first axis.
 
     A ray is not followed to the screen, which it may meet far away or never. It is turned about the
@@ -131,14 +116,14 @@ def screen_crossings(screen: Floats, samples: Samples) -> int:
     facing = vector(screen[FACING])
     first, second = vector(screen[FIRST_AXIS]), vector(screen[SECOND_AXIS])
     for s in range(SAMPLES):
-        out, moment = get_sample(samples.reflected, s), get_sample(samples.moment, s)
+        out, moment = get_sample(samples, REFLECTED, s), get_sample(samples, MOMENT, s)
         against, along = sqrt(dot(out, out)) - dot(out, facing), dot(moment, facing)
-        samples.screen_x[s] = against * dot(moment, second) + along * dot(out, second)
-        samples.screen_y[s] = -against * dot(moment, first) - along * dot(out, first)
+        samples[SCREEN_X + s] = against * dot(moment, second) + along * dot(out, second)
+        samples[SCREEN_Y + s] = -against * dot(moment, first) - along * dot(out, first)
     count = 0
     for s in range(SAMPLES - 1):
-        x, y = samples.screen_x, samples.screen_y
-        count += crosses_half_axis(x[s], y[s], x[s + 1], y[s + 1])
+        a, b = SCREEN_X + s, SCREEN_Y + s
+        count += crosses_half_axis(samples[a], samples[b], samples[a + 1], samples[b + 1])
     return count
 
 
@@ -151,14 +136,14 @@ def crosses_half_axis(x: float, y: float, next_x: float, next_y: float) -> bool:
 
 
 @compiled_loop
-def picture_area(view: Floats, samples: Samples) -> float:
+def picture_area(view: Floats, samples: Floats) -> float:
     """Area between the picture's centre and the points' line in it, by Richardson's rule."""
     right, down, forward = vector(view[RIGHT]), vector(view[DOWN]), vector(view[FORWARD])
     for s in range(SAMPLES):
-        ray = get_sample(samples.ray, s)
+        ray = get_sample(samples, RAY, s)
         depth = dot(ray, forward)
-        samples.picture_x[s] = dot(ray, right) / depth
-        samples.picture_y[s] = dot(ray, down) / depth
+        samples[PICTURE_X + s] = dot(ray, right) / depth
+        samples[PICTURE_Y + s] = dot(ray, down) / depth
     fine, coarse = 0.0, 0.0
     for s in range(SAMPLES - 1):
         fine += _parallelogram(samples, s, s + 1)
@@ -168,27 +153,28 @@ def picture_area(view: Floats, samples: Samples) -> float:
 
 
 @compiled_loop
-def _parallelogram(samples: Samples, a: int, b: int) -> float:
+def _parallelogram(samples: Floats, a: int, b: int) -> float:
     area: float = (
-        samples.picture_x[a] * samples.picture_y[b] - samples.picture_y[a] * samples.picture_x[b]
+        samples[PICTURE_X + a] * samples[PICTURE_Y + b]
+        - samples[PICTURE_Y + a] * samples[PICTURE_X + b]
     )
     return area
 
 
 @compiled_loop
-def least_sample(samples: Samples) -> int:
+def least_sample(samples: Floats) -> int:
     """Number of the sample with the minimum distance."""
     least = 0
     for s in range(1, SAMPLES):
-        if samples.distance[s] < samples.distance[least]:
+        if samples[DISTANCE + s] < samples[DISTANCE + least]:
             least = s
     return least
 
 
 @compiled_loop
-def lower_bound(samples: Samples, least: int) -> float:
+def lower_bound(samples: Floats, least: int) -> float:
     """What no distance squared between the samples is below; `least`: see `least_sample`."""
-    distances = samples.distance
+    distances = samples[DISTANCE:]
     bound: float = distances[least] - MAX_FALL * rise_beside(distances, SAMPLES, least)
     return bound
 
@@ -202,12 +188,12 @@ def rise_beside(values: Floats, count: int, least: int) -> float:
 
 
 @compiled_loop
-def parabola_minimum(samples: Samples) -> float:
+def parabola_minimum(samples: Floats) -> float:
     """Minimum of the distances squared, on the parabola through its neighbours."""
     best = least_sample(samples)
-    minimum: float = samples.distance[best]
+    minimum: float = samples[DISTANCE + best]
     if best in (0, SAMPLES - 1):
         return minimum
-    before, after = samples.distance[best - 1], samples.distance[best + 1]
+    before, after = samples[DISTANCE + best - 1], samples[DISTANCE + best + 1]
     bend, slope = before - 2 * minimum + after, after - before
     return max(minimum - (slope * slope / (8 * bend) if bend > 0 else 0.0), 0.0)

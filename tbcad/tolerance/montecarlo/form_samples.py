@@ -14,11 +14,17 @@ from typing import TypeAlias
 from tbcad.compiled import compiled_loop
 from tbcad.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.tolerance.montecarlo.edge_samples import (
+    FIRST_HEIGHT,
+    FIRST_NORMAL,
     OBJECT,
     PINHOLE,
+    POINT,
+    RAY,
     SAMPLES,
     SCALE,
-    Samples,
+    SCALED,
+    SECOND_HEIGHT,
+    SECOND_NORMAL,
     get_sample,
     put_sample,
     reflect_sample,
@@ -89,57 +95,43 @@ def slope(form: Form, offset: Vector) -> Vector:
 
 @compiled_loop
 def displace_samples(
-    view: Floats, surfaces: Floats, forms: Floats, faces: tuple[int, int], samples: Samples
+    view: Floats, surfaces: Floats, forms: Floats, faces: tuple[int, int], samples: Floats
 ) -> None:
     """Displace points of an edge of two faces, and rays to them, by the faces' forms."""
     scale, pinhole = vector(view[SCALE]), vector(view[PINHOLE])
-    _put_face(
-        surfaces[faces[0]],
-        forms[faces[0]],
-        samples.point,
-        samples.first_normal,
-        samples.first_height,
-    )
-    _put_face(
-        surfaces[faces[1]],
-        forms[faces[1]],
-        samples.point,
-        samples.second_normal,
-        samples.second_height,
-    )
+    _put_face(surfaces[faces[0]], forms[faces[0]], samples, FIRST_NORMAL, FIRST_HEIGHT)
+    _put_face(surfaces[faces[1]], forms[faces[1]], samples, SECOND_NORMAL, SECOND_HEIGHT)
     for s in range(SAMPLES):
-        first, second = get_sample(samples.first_normal, s), get_sample(samples.second_normal, s)
-        above, other_above = samples.first_height[s], samples.second_height[s]
+        first, second = get_sample(samples, FIRST_NORMAL, s), get_sample(samples, SECOND_NORMAL, s)
+        above, other_above = samples[FIRST_HEIGHT + s], samples[SECOND_HEIGHT + s]
         cosine = dot(first, second)
         sine_squared = max(1 - cosine * cosine, SMALLEST_SINE_SQUARED)
-        point = get_sample(samples.point, s)
+        point = get_sample(samples, POINT, s)
         point = plus_scaled(point, (above - cosine * other_above) / sine_squared, first)
         point = plus_scaled(point, (other_above - cosine * above) / sine_squared, second)
-        put_sample(samples.point, s, point)
+        put_sample(samples, POINT, s, point)
         point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
-        put_sample(samples.scaled, s, point)
-        put_sample(samples.ray, s, minus(point, pinhole))
+        put_sample(samples, SCALED, s, point)
+        put_sample(samples, RAY, s, minus(point, pinhole))
 
 
 @compiled_loop
-def _put_face(
-    surface: Floats, form: Floats, points: Floats, normals: Floats, heights: Floats
-) -> None:
+def _put_face(surface: Floats, form: Floats, samples: Floats, normals: int, heights: int) -> None:
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
     numbers = form_numbers(form)
     for s in range(SAMPLES):
-        offset = minus(get_sample(points, s), apex)
-        put_sample(normals, s, plus_scaled(normal, curvature, offset))
-        heights[s] = height(numbers, offset)
+        offset = minus(get_sample(samples, POINT, s), apex)
+        put_sample(samples, normals, s, plus_scaled(normal, curvature, offset))
+        samples[heights + s] = height(numbers, offset)
 
 
 @compiled_loop
-def reflect_formed_samples(surface: Floats, form: Floats, view: Floats, samples: Samples) -> None:
+def reflect_formed_samples(surface: Floats, form: Floats, view: Floats, samples: Floats) -> None:
     """As `reflect_samples`, for a mirror with waviness."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
     scale, middle = vector(view[SCALE]), vector(view[OBJECT])
     numbers = form_numbers(form)
     for s in range(SAMPLES):
-        offset = minus(get_sample(samples.point, s), apex)
+        offset = minus(get_sample(samples, POINT, s), apex)
         gradient = plus_scaled(normal, curvature, offset)
         reflect_sample(minus(gradient, slope(numbers, offset)), scale, middle, samples, s)

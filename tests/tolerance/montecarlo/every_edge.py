@@ -20,7 +20,7 @@ from tbcad.tolerance.montecarlo.edge_model import (
     view_tables,
 )
 from tbcad.tolerance.montecarlo.edge_samples import (
-    SAMPLE,
+    PLACES,
     SAMPLES,
     least_sample,
     parabola_minimum,
@@ -55,7 +55,7 @@ def every_edge(half: EdgeModel, draws: ShellDraws) -> np.ndarray:
 @njit
 def _trace(surfaces, forms, pairs, halved, view, screen):  # type: ignore[no-untyped-def]
     pair, offset, face, reach = pairs
-    result, samples = np.zeros((len(halved), 3)), np.empty(1, dtype=SAMPLE)[0]
+    result, samples = np.zeros((len(halved), 3)), np.empty(PLACES)
     result[:, MISS_SQUARED] = np.inf
     edge, spans, spare = np.empty(EDGE_COLUMNS), np.empty((INTERVALS, 2)), np.empty((INTERVALS, 2))
     for e in range(len(pair)):
