@@ -10,8 +10,9 @@ from scipy.optimize import brentq
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.optics.object_light import closest_passage, passing_distances
-from tbcad.spec.design import MAX_SEMI_MINOR, OpticsSpec, Spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.sizes import MAX_SEMI_MINOR, OpticsSpec
 from tbcad.types import Floats
 
 if TYPE_CHECKING:
