@@ -27,7 +27,7 @@ from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, WorstCase, simulate
+from tbcad.tolerance.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, edge_model
@@ -61,7 +61,7 @@ def tolerance(folder: Path, rounds: int, meshed: int = MESHED) -> list[Row]:
         measured(f"{n} simulated builds, each", one, "ms")
         for n, one in zip(COUNTS, each, strict=True)
     ]
-    search = WorstCase(task.edge_models, ERRORS, SEED)
+    search = CoverageCase(task.edge_models, ERRORS, SEED, worst_only=True)
     worst = in_turns([partial(simulate, search, COUNTS[-1])], rounds)[0]
     return [
         *rows,

@@ -24,7 +24,7 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.shipped import shipped_designs
+from tbcad.spec.load import shipped_designs
 
 DOCS = Path(__file__).parent
 RESULTS, PAGE, PICTURES = DOCS / "gallery.json", DOCS / "gallery.md", DOCS / "pictures"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.calibration.estimate.parameters import Prior
-from tbcad.calibration.priors import Fitted, prototype_prior
+from tbcad.calibration.priors import prototype_prior
 from tbcad.machine.built import is_cap, random_build
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Machine
@@ -98,8 +98,8 @@ def small_run(
         seed,
     )
     series = np.array([frame.object_turn_deg // 180 for frame in frames])
-    known = Fitted(plan.body_centre, is_cap(plan), series)
-    return Small(run, prototype_prior(designed.of_frames(kept), kinds, known))
+    known = plan.body_centre, is_cap(plan), series
+    return Small(run, prototype_prior(designed.of_frames(kept), kinds, *known))
 
 
 def photograph_centroid(image: Floats, place: Floats, radius: int) -> Floats:

@@ -215,7 +215,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         "BUILT_IN": ("diamond",),
     }.items():
         monkeypatch.setattr(f"tbcad.tolerance.analysis.{name}", value)
-    monkeypatch.setattr("tbcad.tolerance.view_quality.VIEWPOINTS", ((60.0,), 1, 640.0))
+    monkeypatch.setattr("tbcad.tolerance.montecarlo.sharpness.VIEWPOINTS", ((60.0,), 1, 640.0))
 
 
 def smaller(words: tuple[str, ...]) -> list[str]:

@@ -9,7 +9,7 @@ import pytest
 
 import tbcad
 from tbcad.output.overview import overview
-from tbcad.spec.shipped import shipped_designs
+from tbcad.spec.load import shipped_designs
 
 DOCS = Path(__file__).parents[1] / "docs"
 

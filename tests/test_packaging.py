@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.spec.shipped import shipped_designs
+from tbcad.spec.load import shipped_designs
 from tbcad.version import __version__
 
 ROOT = Path(__file__).parents[1]

@@ -10,7 +10,7 @@ from tbcad.api import calibrate, merge, simulate_run
 from tbcad.calibration.options import CalibrationOptions
 from tbcad.geometry.vectors import norm
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.corrections import Options
+from tbcad.merged_run.stop_photographs import MergeOptions
 from tbcad.mirrors.array import design
 from tbcad.mirrors.record import write_record
 from tbcad.simulate.capture.light_field import LightField
@@ -54,7 +54,7 @@ class ShellLoop:
 
     def quality(self, calibration: str) -> float:
         """Mean SSIM of views of the photographs merged by a machine."""
-        out, options = self.folder / f"by-{calibration}", Options(brightness=1 / OBJECT_LIGHT)
+        out, options = self.folder / f"by-{calibration}", MergeOptions(brightness=1 / OBJECT_LIGHT)
         run = self.folder / "run"
         record = merge(run, self.folder / calibration, self.export, options, out=out)
         assert set(record["based_on"]) == {*CAMERAS}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tbcad.control.outcome import Outcome
     from tbcad.control.selection import Preflight
     from tbcad.control.session import Ask, Show
-    from tbcad.merged_run.corrections import Options as MergeOptions
+    from tbcad.merged_run.stop_photographs import MergeOptions
     from tbcad.runs.photographs import Run
     from tbcad.simulate.object_files.contents import Up
     from tbcad.simulate.scene.object_from_file import Unit
@@ -210,7 +210,7 @@ def solve_intrinsics(
     from tbcad.atomic_files import replace_files
     from tbcad.calibration.intrinsics.boards import Board, parse_dictionary
     from tbcad.calibration.intrinsics.checkerboard import solve_lens
-    from tbcad.calibration.intrinsics.opencv import opencv_text
+    from tbcad.calibration.intrinsics.lens import opencv_text
     from tbcad.output.single_files import check_file
 
     if out is not None:
@@ -254,9 +254,9 @@ def merge(
         InputError: one cannot be read, they do not belong together, or out cannot be replaced.
     """
     from tbcad.machine.calibrated_export import export_of
-    from tbcad.merged_run.corrections import Options as MergeOptions
     from tbcad.merged_run.files import write_merge
     from tbcad.merged_run.merge import prepared_merge
+    from tbcad.merged_run.stop_photographs import MergeOptions
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
@@ -305,7 +305,7 @@ def as_built(
     check_replaceable(Path(out), "as-built", force, (known, built))
     progress("solids")
     with large_libraries():
-        from tbcad.as_built.export import as_built as write_files
+        from tbcad.as_built.files import as_built as write_files
     with replacing(Path(out), "as-built", force, (known, built)) as folder:
         record = write_files(known, built, folder)
         write_manifest(folder, "as-built")

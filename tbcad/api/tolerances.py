@@ -93,7 +93,7 @@ def inspect(
     """
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
-    from tbcad.tolerance.wanted_yield import check_yield
+    from tbcad.tolerance.options import check_yield
 
     check_yield(wanted)
     check_replaceable(Path(out), "inspection", force, (exports,))

@@ -67,17 +67,11 @@ class AsBuiltTolerance:
 def as_built_tolerance(
     calibration: Path, exports: Path, builds: int, seed: int
 ) -> AsBuiltTolerance:
-    """Study one machine with what its calibration leaves unknown.
+    """Study one machine with what its calibration leaves unknown, by so many simulated truths.
 
     A ray that is off by d at the object moves the edge of what its mirror shows by at most d, and
     costs at most 2 d of coverage. The errors d of the mirrors are drawn independently, each with
-    its own deviation of rays.csv.
-
-    Args:
-        calibration: folder with machine.json and rays.csv.
-        exports: that was calibrated.
-        builds: number of simulated truths.
-        seed: of all of them.
+    its own standard deviation of rays.csv.
 
     Raises:
         InputError: one cannot be read, or they do not belong together.

@@ -1,28 +1,31 @@
 """From a run's highlights to a calibrated machine, and what it is based on."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.calibration.cross_validation import Halves, cross_validation
 from tbcad.calibration.detection.detection import Detection
-from tbcad.calibration.estimate.parameters import Prior
+from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.calibration.intrinsics.lens import Lens
-from tbcad.calibration.priors import Fitted, prototype_prior, shell_prior
-from tbcad.calibration.setup_files import read_zero_error
-from tbcad.calibration.uncertainty import RayUncertainty, ray_uncertainty
+from tbcad.calibration.intrinsics.lens import CalibratedLens
+from tbcad.calibration.priors import Measured, prototype_prior, read_zero_error, shell_prior
+from tbcad.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
 from tbcad.errors import InputError
+from tbcad.machine.built import is_cap
 from tbcad.machine.designed import designed_prototype
-from tbcad.machine.machine import Machine
+from tbcad.machine.machine import Highlights, Machine
 from tbcad.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.runs.exposure import Frame
 from tbcad.runs.record import Geometry
 from tbcad.simulate.prototype.plan import RECORD, Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.wind_up import STOPS, read_wind_up
-from tbcad.types import Ints, Progress
+from tbcad.tolerance.prototype.draws import STOPS, read_wind_up
+from tbcad.types import Bools, Ints, Progress
+
+MIN_HIGHLIGHTS = 10  # of a half
+HALVES = {"angles": "frame", "LEDs": "led"}
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,6 @@ class Setup:
     """A machine before it is calibrated: a prototype, or of a shell see `ShellSetup`.
 
     Attributes:
-        export: of its design.
-        plan: its balls and stops.
         frames: that are photographed, in the order of the machine's.
         designed: the machine, at the angles of these frames.
         lens: of its camera, where it is known.
@@ -41,31 +42,31 @@ class Setup:
     plan: Plan
     frames: tuple[Frame, ...]
     designed: Machine
-    lens: Lens | None = None
+    lens: CalibratedLens | None = None
 
-    def prior(self, errors: Errors, measured: tuple[tuple[int, float, float], ...] = ()) -> Prior:
-        """What is known of it by its process and by radii that are measured."""
-        fitted = Fitted(
-            body_centre=self.plan.body_centre,
-            is_cap=np.asarray(self.plan.body_radius < self.plan.radius),
-            series=np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
-            zero_error=read_zero_error(self.export.folder / RECORD),
-            lens_known=self.lens is not None,
-            measured=measured,
-        )
+    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
+        """Means and standard deviations by its process and by radii that are measured."""
         stop = np.array([frame.stop - 1 for frame in self.frames])
         known = (self.export.folder / STOPS).is_file()  # not of exports by old versions
         wind_up = read_wind_up(self.export, self.plan)[stop] if known else 0.0
-        turned = self.designed.angle + wind_up
-        return prototype_prior(replace(self.designed, angle=turned), errors, fitted)
+        return prototype_prior(
+            replace(self.designed, angle=self.designed.angle + wind_up),
+            errors,
+            self.plan.body_centre,
+            is_cap(self.plan),
+            np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
+            read_zero_error(self.export.folder / RECORD),
+            self.lens is not None,
+            measured,
+        )
 
 
 @dataclass(frozen=True)
 class ShellSetup(Setup):
     """One camera of a shell before it is calibrated: its mirrors are the balls of its plan."""
 
-    def prior(self, errors: Errors, measured: tuple[tuple[int, float, float], ...] = ()) -> Prior:
-        """What is known of it by its process.
+    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
+        """Means and standard deviations by its process.
 
         Raises:
             InputError: radii are given as measured, which only balls and caps can be.
@@ -79,17 +80,10 @@ def prepared_setup(
     export: ExportedDesign,
     frames: tuple[Frame, ...],
     size: tuple[int, int],
-    lens: Lens | None,
+    lens: CalibratedLens | None,
     geometry: Geometry = "prototype",
 ) -> Setup:
-    """The machine of an export as the frames of a run show it.
-
-    Args:
-        export: of its design.
-        frames: of the run's record; of a shell those of one camera.
-        size: width and height of the run's photographs.
-        lens: of the camera, where it is known.
-        geometry: of the run.
+    """The machine of an export as frames of a run, of a shell those of one camera, show it.
 
     Raises:
         InputError: the export has no prototype or LEDs, or another picture's size than the run.
@@ -123,8 +117,6 @@ class MirrorRays:
     """The middle rays of the mirrors whose stops were photographed, over m of them.
 
     Attributes:
-        ids: of the mirrors.
-        known: how well each ray is known.
         absent: ids of the mirrors whose frames the run does not have.
     """
 
@@ -134,16 +126,30 @@ class MirrorRays:
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """A calibrated machine.
+class Halves:
+    """How two halves of the highlights agree, by rays at angles that are known.
 
     Attributes:
-        setup: before.
-        detection: of the highlights.
-        found: the estimate.
-        rays: of the mirrors.
-        halves: how halves of the data agree.
+        by: what is apart: "angles" or "LEDs".
+        counts: highlights of each half.
+        found_mm: root mean square distance of both halves' rays at the object's centre.
+        expected_mm: as their covariances say.
     """
+
+    by: str
+    counts: tuple[int, int]
+    found_mm: float
+    expected_mm: float
+
+    @property
+    def ratio(self) -> float:
+        """Of what is found to what is expected."""
+        return self.found_mm / self.expected_mm
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated machine."""
 
     setup: Setup
     detection: Detection
@@ -155,11 +161,7 @@ class Calibration:
 def calibrate(
     setup: Setup, detection: Detection, prior: Prior, progress: Progress = lambda _: None
 ) -> Calibration:
-    """Estimate the machine, and how well its rays are known.
-
-    Raises:
-        InputError: there are no highlights.
-    """
+    """Estimate the machine, and how well its rays are known."""
     found = estimate(prior, detection.highlights, progress)
     progress("uncertainty of the rays")
     ids, absent, frame, sphere = ray_places(setup)
@@ -190,3 +192,54 @@ def ray_places(setup: Setup) -> tuple[tuple[str, ...], tuple[str, ...], Ints, In
         raise InputError("the run has no stop of the plan: name the export that was photographed")
     frame, sphere = np.array(places).T
     return tuple(ids), tuple(absent), frame, sphere
+
+
+def cross_validation(
+    found: Estimate, frame: Ints, sphere: Ints, progress: Progress
+) -> tuple[Halves, ...]:
+    """Calibrate from every other frame and from the rest, likewise LEDs; compare rays (m,)."""
+    results = []
+    for by, field in HALVES.items():
+        even = getattr(found.highlights, field) % 2 == 0
+        parts = [found.used & side for side in (even, ~even)]
+        if min(part.sum() for part in parts) >= MIN_HIGHLIGHTS:
+            results.append(_compared(found, by, parts, (frame, sphere), progress))
+    return tuple(results)
+
+
+def _compared(
+    found: Estimate, by: str, parts: list[Bools], rays: tuple[Ints, Ints], progress: Progress
+) -> Halves:
+    progress(f"halves with {by} apart")
+    one, other = (estimate(found.prior, _subset(found, part), start=found.values) for part in parts)
+    slopes, _ = ray_slopes(found.prior, found.values, *rays)
+    slopes = slopes[:, _static(found)]
+    inverses = [np.linalg.inv(half.information.toarray()) for half in (one, other)]
+    both = inverses[0] @ inverses[1]
+    spread = (inverses[0] + inverses[1] - both - both.T)[np.ix_(_static(found), _static(found))]
+    difference = slopes @ (one.values - other.values)[_static(found)]
+    places = slopes.toarray().reshape(-1, 4, slopes.shape[1])[:, :2]
+    expected = np.einsum("mdq,qr,mdr->", places, spread, places, optimize=True)
+    squares = difference.reshape(-1, 4)[:, :2] ** 2
+    count = len(squares)
+    return Halves(
+        by=by,
+        counts=(len(one.highlights), len(other.highlights)),
+        found_mm=math.sqrt(float(squares.sum()) / count),
+        expected_mm=math.sqrt(float(expected) / count),
+    )
+
+
+def _static(found: Estimate) -> Ints:
+    """Free parameters that are not of single frames, of which a half sees every other one."""
+    prior = found.prior
+    single = np.zeros(len(prior.flat_sigma), dtype=bool)
+    for block in (Block.ANGLES, Block.RUNOUT):
+        single[prior.first[block] : prior.first[block] + prior.sigma[block].size] = True
+    return np.flatnonzero(~single[prior.free])
+
+
+def _subset(found: Estimate, part: Bools) -> Highlights:
+    h = found.highlights
+    sigma = h.sigma[part] * found.noise_factor
+    return Highlights(h.frame[part], h.sphere[part], h.led[part], h.pixel[part], sigma)

@@ -18,7 +18,6 @@ class CalibrationOptions:
         settings: "kind=value" texts that change errors of the process.
         measured: radii of spheres, "BALL=MM" or "BALL=MM:SIGMA".
         intrinsics: file of the camera's lens; None to estimate the lens too.
-        plot: kind of the plots' files.
     """
 
     process: str | None = None

@@ -5,15 +5,21 @@ process says is a judgement, below.
 """
 
 import math
-from dataclasses import dataclass, replace
+import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
 from tbcad.calibration.estimate.parameters import Block, Prior
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import Record, read_json
 from tbcad.geometry.vectors import norm
+from tbcad.machine.built import LED_MM
 from tbcad.machine.machine import Machine
-from tbcad.machine.other_errors import LED_MM
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.simulate.prototype.plan import MISSING, SCHEMA
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats, Ints
 
 PRINCIPAL_SHARE = 0.01
@@ -23,16 +29,30 @@ OBLONG = 1e-3
 """By which pixels are not square: mask-made sensors are square to better; judgement."""
 DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
 """k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
-15); judgement, wider than tbcad.machine.other_errors, because highlights tell it well. k3 is fixed:
+15); judgement, wider than tbcad.machine.built, because highlights tell it well. k3 is fixed:
 those of a few balls do not tell it from k2."""
-UNIFORM = math.sqrt(3)  # half width of a uniform distribution over its standard deviation
+MEASURED_MM = 0.01
+"""Standard deviation of a radius that is measured without saying how well: by a micrometer screw
+over the body, or a spherometer."""
+PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
+Measured = tuple[tuple[int, float, float], ...]
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """What is special about the machine to be calibrated.
+def prototype_prior(
+    machine: Machine,
+    errors: Errors,
+    body_centre: Floats,
+    is_cap: Bools,
+    series: Ints,
+    zero_error: float = 0.0,
+    lens_known: bool = False,
+    measured: Measured = (),
+) -> Prior:
+    """Prior of a prototype as designed, whose balls are on a base that rotates.
 
-    Attributes:
+    Args:
+        machine: as designed.
+        errors: of its process.
         body_centre: of the bodies in the seats, mm, (k, 3); the spheres' own for balls.
         is_cap: which spheres are made instead of purchased, (k,).
         series: number of the series that each frame belongs to, (f,).
@@ -40,60 +60,38 @@ class Fitted:
         lens_known: whether focal lengths, principal point and distortion are given.
         measured: radii that are measured, mm, with their standard deviations, by number of sphere.
     """
-
-    body_centre: Floats
-    is_cap: Bools
-    series: Ints
-    zero_error: float = 0.0
-    lens_known: bool = False
-    measured: tuple[tuple[int, float, float], ...] = ()
-
-
-def prototype_prior(machine: Machine, errors: Errors, fitted: Fitted) -> Prior:
-    """Prior of a prototype whose balls are on a base that rotates.
-
-    Args:
-        machine: as designed.
-        errors: of its process.
-        fitted: what else is known.
-    """
-    radius, radii = _radii(machine, errors, fitted)
-    arm = norm(machine.centre - fitted.body_centre)
-    tilted = np.where(fitted.is_cap, arm * deviation(errors.cap_tilt), 0.0)
-    centres = np.hypot(deviation(errors.seat), tilted)
-    growth = math.hypot(errors.scale_isotropic.mean, deviation(errors.scale_isotropic))
-    frames, offset = len(machine.angle), fitted.zero_error / UNIFORM
-    sigma = _camera(machine, errors, fitted.lens_known) | {
-        Block.TILT: np.full(2, deviation(errors.axis_tilt)),
-        Block.AXIS_POINT: np.full(2, deviation(errors.shell_shift)),
+    radius, radii = _radii(machine, errors, is_cap, measured)
+    arm = norm(machine.centre - body_centre)
+    tilted = np.where(is_cap, arm * errors.cap_tilt.sigma, 0.0)
+    centres = np.hypot(errors.seat.sigma, tilted)
+    growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
+    frames, offset = len(machine.angle), zero_error / math.sqrt(3)
+    sigma = _camera(machine, errors, lens_known) | {
+        Block.TILT: np.full(2, errors.axis_tilt.sigma),
+        Block.AXIS_POINT: np.full(2, errors.shell_shift.sigma),
         Block.OFFSET: np.full(
-            int(fitted.series.max()) + 1, math.hypot(offset, deviation(errors.rotation_angle))
+            int(series.max()) + 1, math.hypot(offset, errors.rotation_angle.sigma)
         ),
-        Block.CARRIER: np.array([growth, deviation(errors.shell_shift)]),
+        Block.CARRIER: np.array([growth, errors.shell_shift.sigma]),
         Block.LEDS: np.full(machine.leds.shape, _led(errors)),
         Block.CENTRES: np.repeat(centres[:, None], 3, axis=1),
         Block.RADII: radii,
-        Block.ANGLES: np.full(frames, deviation(errors.rotation_angle)),
-        Block.RUNOUT: np.full((frames, 2), deviation(errors.axis_runout)),
+        Block.ANGLES: np.full(frames, errors.rotation_angle.sigma),
+        Block.RUNOUT: np.full((frames, 2), errors.axis_runout.sigma),
     }
-    return Prior(_with_radii(machine, radius), fitted.series, sigma)
+    return Prior(replace(machine, radius=radius), series, sigma)
 
 
 def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> Prior:
-    """Prior of one shell with its camera; LEDs are held at the object's place, all at once.
+    """Prior of one designed shell with its camera; LEDs are held at the object's place together.
 
     In the frame of the shell: how its whole place is off is the camera's and the LEDs' error here.
-
-    Args:
-        machine: as designed, with one frame.
-        errors: of its process.
-        lens_known: whether focal lengths, principal point and distortion are given.
     """
-    spheres, shift = len(machine.radius), deviation(errors.shell_shift)
+    spheres, shift = len(machine.radius), errors.shell_shift.sigma
     camera = _camera(machine, errors, lens_known)
-    camera[Block.CAMERA_TURN] = np.hypot(camera[Block.CAMERA_TURN], deviation(errors.shell_tilt))
+    camera[Block.CAMERA_TURN] = np.hypot(camera[Block.CAMERA_TURN], errors.shell_tilt.sigma)
     camera[Block.PINHOLE] = np.hypot(camera[Block.PINHOLE], shift)
-    growth = math.hypot(errors.scale_isotropic.mean, deviation(errors.scale_isotropic))
+    growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
     sigma = camera | {
         Block.TILT: np.zeros(2),
         Block.AXIS_POINT: np.zeros(2),
@@ -101,7 +99,7 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
         Block.CARRIER: np.array([growth, 0.0]),
         Block.LEDS: np.full(machine.leds.shape, math.hypot(_led(errors), shift)),
         Block.CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
-        Block.RADII: np.full(spheres, deviation(errors.whole_radius)),
+        Block.RADII: np.full(spheres, errors.whole_radius.sigma),
         Block.ANGLES: np.zeros(1),
         Block.RUNOUT: np.zeros((1, 2)),
     }
@@ -110,14 +108,9 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
 
 def _centres(machine: Machine, errors: Errors) -> Floats:
     """Of each centre along each axis, mm: its own error, and the warp that moves and turns it."""
-    warp, own = errors.warp, deviation(errors.sphere_centre)
+    warp, own = errors.warp, errors.sphere_centre.sigma
     turned = machine.radius / warp.length if warp.length else 0.0 * machine.radius
     return np.asarray(np.hypot(own, warp.spread * np.hypot(1, turned)))
-
-
-def deviation(error: Error) -> float:
-    """Standard deviation of a kind of error."""
-    return error.spread if error.distribution == "normal" else error.spread / UNIFORM
 
 
 def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Floats]:
@@ -126,13 +119,13 @@ def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Flo
     A camera whose principal point is off is turned until its picture is in place again.
     """
     principal = 0.0 if lens_known else PRINCIPAL_SHARE * machine.camera.width_px
-    tilt = deviation(errors.camera_tilt)
+    tilt = errors.camera_tilt.sigma
     aimed = math.hypot(tilt, principal / float(machine.camera.focal.mean()))
     known = 0.0 if lens_known else 1.0
     return {
         Block.CAMERA_TURN: np.array([aimed, aimed, tilt]),
-        Block.PINHOLE: np.full(3, deviation(errors.camera_shift)),
-        Block.FOCAL: known * np.array([deviation(errors.camera_focal), OBLONG]),
+        Block.PINHOLE: np.full(3, errors.camera_shift.sigma),
+        Block.FOCAL: known * np.array([errors.camera_focal.sigma, OBLONG]),
         Block.PRINCIPAL: np.full(2, principal),
         Block.DISTORTION: known * np.array(DISTORTIONS),
     }
@@ -140,18 +133,56 @@ def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Flo
 
 def _led(errors: Errors) -> float:
     """Of an LED's light along each axis: the whole stage's, and its own."""
-    return math.hypot(deviation(errors.shell_shift), LED_MM)
+    return math.hypot(errors.shell_shift.sigma, LED_MM)
 
 
-def _radii(machine: Machine, errors: Errors, fitted: Fitted) -> tuple[Floats, Floats]:
-    """Means and standard deviations."""
+def _radii(
+    machine: Machine, errors: Errors, is_cap: Bools, measured: Measured
+) -> tuple[Floats, Floats]:
     made, bought = errors.whole_radius, errors.ball_radius
-    radius = machine.radius + np.where(fitted.is_cap, made.mean, bought.mean)
-    sigma = np.where(fitted.is_cap, deviation(made), deviation(bought))
-    for number, value, uncertainty in fitted.measured:
+    radius = machine.radius + np.where(is_cap, made.mean, bought.mean)
+    sigma = np.where(is_cap, made.sigma, bought.sigma)
+    for number, value, uncertainty in measured:
         radius[number], sigma[number] = value, uncertainty
     return radius, sigma
 
 
-def _with_radii(machine: Machine, radius: Floats) -> Machine:
-    return replace(machine, radius=radius)
+class _Home(Record):
+    zero_error_deg: float = Field(ge=0, le=180)
+
+
+class _ZeroErrorFile(Record):
+    home: _Home | None = None
+
+
+def read_zero_error(path: Path) -> float:
+    """Half width of the base's angle zero by the record of a prototype, radians; 0 if not said.
+
+    Raises:
+        InputError: the record cannot be read.
+    """
+    home = read_json(path, _ZeroErrorFile, SCHEMA, MISSING).home
+    return 0.0 if home is None else math.radians(home.zero_error_deg)
+
+
+def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
+    """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm."""
+    return tuple(_measured(text, balls) for text in texts)
+
+
+def _measured(text: str, balls: int) -> tuple[int, float, float]:
+    found = PATTERN.fullmatch(text.replace(" ", ""))
+    try:
+        ball, radius, sigma = found.groups() if found else ("", "", "")
+        values = int(ball) - 1, float(radius), float(sigma or MEASURED_MM)
+    except ValueError:
+        raise InputError(
+            f"--measured {text!r:.60} is not BALL=RADIUS_MM or BALL=RADIUS_MM:SIGMA_MM: write for "
+            "instance 1=43.21:0.01"
+        ) from None
+    if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
+        raise InputError(
+            f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation above "
+            "0 mm: change it"
+        )
+    return values

@@ -11,9 +11,9 @@ from tbcad.calibration.detection.detect import detect
 from tbcad.calibration.detection.expected import Room
 from tbcad.calibration.intrinsics.files import read_lens
 from tbcad.calibration.options import DEFAULT_PROCESS, CalibrationOptions
+from tbcad.calibration.priors import parse_measured
 from tbcad.calibration.report.files import write_calibration, write_recovered
-from tbcad.calibration.report.verdict import Verdict, verdict, verdict_text
-from tbcad.calibration.setup_files import parse_measured
+from tbcad.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
 from tbcad.errors import InputError
 from tbcad.figure_files import PlotFormat
 from tbcad.machine.designed import dome_radius
@@ -21,8 +21,7 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.record import TRUTH, read_machine
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, files_named
-from tbcad.runs.photographs import Run, read_run
-from tbcad.runs.same_export import check_same_export
+from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.tolerance.process.process import Process, load_process, process_errors
 from tbcad.types import Progress
@@ -41,17 +40,12 @@ class WrittenCalibration:
     """A calibration whose files are written.
 
     Attributes:
-        folder: that holds them.
-        result: the calibration.
-        verdict: what to think of it.
-        text: the verdict in words.
-        record: the object of calibration.json.
         others: of a shell's other camera.
     """
 
     folder: Path
     result: Calibration
-    verdict: Verdict
+    verdict: CalibrationVerdict
     text: str
     record: dict[str, Any]
     others: tuple["WrittenCalibration", ...] = ()
@@ -139,11 +133,7 @@ def _written(
 
 
 def _truth(run: Run, setup: Setup) -> Machine | None:
-    """The machine of a simulated run; None of a real one, and where its file was taken away.
-
-    Raises:
-        InputError: the file cannot be read, or is of another run.
-    """
+    """The machine of a simulated run; None of a real one, and where its file was taken away."""
     if run.record.geometry == "shell":
         return None  # its calibration is in the frame of the shell, its truth in the design's
     path = run.folder / TRUTH

@@ -4,7 +4,7 @@ Two questions: what four LEDs tell of each sphere alone, all else known; and wha
 of the whole machine, nothing known but by the process.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -14,15 +14,22 @@ from tbcad.calibration.calibrate import Setup, prepared_setup, ray_places
 from tbcad.calibration.estimate.covariance import Covariance, covariance
 from tbcad.calibration.estimate.jacobian import highlights_with_slopes
 from tbcad.calibration.estimate.parameters import Block, Prior
-from tbcad.calibration.led_layout import LedRoom, best_layout, with_partners
-from tbcad.calibration.single_spheres import SphereInformation, ray_errors, sphere_information
-from tbcad.calibration.study_plots import panels
-from tbcad.calibration.uncertainty import SPHERE_MM, RayUncertainty, known_rays
-from tbcad.geometry.vectors import norm, unit
-from tbcad.machine.designed import designed_shell, read_leds
+from tbcad.calibration.led_layout import (
+    FREE,
+    PRIOR_MM,
+    USUAL_PROCESS,
+    USUAL_PX,
+    Layout,
+    layouts,
+    mirror_distance,
+    ray_errors,
+    shell_information,
+)
+from tbcad.calibration.uncertainty import RayUncertainty, known_rays
+from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Machine
-from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
+from tbcad.prototype.stage.leds import hidden_by_object
+from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Cell, Record, Table
 from tbcad.runs.exposure import Frame
@@ -32,10 +39,7 @@ from tbcad.tolerance.process.process import load_process, process_errors
 from tbcad.types import Floats, Ints, Progress
 
 NOISES_PX = (0.02, 0.05, 0.1, 0.2)
-NUMBERS = (4, 6, 8, 16)
 PROCESSES = ("fdm", "sls", "sla", "cnc")
-USUAL_PX, USUAL_PROCESS = 0.05, "fdm"
-FREE, PRIOR_MM = np.inf, 0.025
 LARGE_MM = 10.0  # prior standard deviation that tells nothing
 ONE_BALL = "free, 50 stops"
 TURNS: tuple[Literal[0, 180], ...] = (0, 180)
@@ -56,29 +60,16 @@ NOTES = (
 )
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Places of LEDs.
-
-    Attributes:
-        name: "design" or "best".
-        leds: mm, (l, 3).
-    """
-
-    name: str
-    leds: Floats
-
-
 def calibration_study(export: ExportedDesign, progress: Progress) -> Study:
     """The study of an export with a prototype."""
     progress("LEDs that tell most")
-    layouts = _layouts(export, progress)
+    placed = layouts(export, progress)
     progress("spheres alone")
     setup = designed_setup(export)
-    alone = _alone_table(setup, layouts)
+    alone = _alone_table(setup, placed)
     progress("whole machines")
-    whole = _whole_table(setup, layouts, progress)
-    places = _places_table(layouts)
+    whole = _whole_table(setup, placed, progress)
+    places = _places_table(placed)
     figures = _figures(alone, whole)
     return Study(
         "calibration", figures, (alone, whole, places), panels(whole, USUAL_PROCESS), NOTES
@@ -92,53 +83,6 @@ def _places_table(layouts: list[Layout]) -> Table:
         for number, led in enumerate(layout.leds, 1)
     )
     return Table("calibration-leds", ("layout", "leds", "led", "x_mm", "y_mm", "z_mm"), rows)
-
-
-def _layouts(export: ExportedDesign, progress: Progress) -> list[Layout]:
-    room = led_room(export)
-    places = room.places()
-    information = shell_information(export, with_partners(places))
-    layouts = [Layout("design", read_leds(export.folder))]
-    for number in NUMBERS:
-        chosen = best_layout(
-            room, places, number, lambda leds: layout_cost(information, leds), progress
-        )
-        layouts.append(Layout("best", with_partners(places)[chosen]))
-    return layouts
-
-
-def led_room(export: ExportedDesign) -> LedRoom:
-    """Where LEDs may be on the stage of an export."""
-    stage = export.spec.prototype.stage
-    part = load_parts()[stage.led]
-    pillar = pillar_radius(stage, part)
-    return LedRoom(
-        inner=pillar + max(stage.disc_mm, stage.object_diameter_mm) / 2 + POCKET_PLAY_MM,
-        outer=export.capture_mm / 2,
-        lowest=float(read_leds(export.folder)[:, 2].min()),
-        apart=2 * pillar,
-        pillar=pillar,
-    )
-
-
-def shell_information(export: ExportedDesign, leds: Floats) -> SphereInformation:
-    """What LEDs tell of each mirror of camera a, by one photograph."""
-    machine = designed_shell(export.reflectors[0], leds)
-    virtual = export.reflectors[0].u * _distance(export)
-    seen = ~hidden_by_object(export.spec.prototype.stage, leds, virtual, export.capture_mm / 2)
-    return sphere_information(machine.camera, machine.centre, machine.radius, leds, seen)
-
-
-def layout_cost(information: SphereInformation, leds: list[int]) -> float:
-    """Mean square error of rays within the capture sphere, mm^2."""
-    mm, mrad = ray_errors(information, leds, USUAL_PX, (PRIOR_MM, PRIOR_MM))
-    return float((mm**2 + (SPHERE_MM * mrad / 1000) ** 2).mean())
-
-
-def _distance(export: ExportedDesign) -> float:
-    """Of the virtual cameras from the object's centre, mm: the ellipsoid's major axis."""
-    apex = export.reflectors[0].mirrors.apex[0]
-    return float(norm(apex) + norm(apex - export.reflectors[0].camera.pinhole))
 
 
 def _alone_table(setup: Setup, layouts: list[Layout]) -> Table:
@@ -177,7 +121,7 @@ def _one_ball(setup: Setup, layout: Layout) -> Record:
     known = _bound(alone, USUAL_PX, (frame, sphere, led))
     rays = np.unique(np.stack([frame, sphere]), axis=1)
     errors = known_rays(alone, np.zeros(len(alone.free)), known, rays[0], rays[1])
-    return _shares(errors.whole_place_mm, errors.whole_turn_mrad)
+    return _shares(errors.whole.place_mm, errors.whole.turn_mrad)
 
 
 def _whole_table(setup: Setup, layouts: list[Layout], progress: Progress) -> Table:
@@ -195,25 +139,18 @@ def _whole_table(setup: Setup, layouts: list[Layout], progress: Progress) -> Tab
                 "leds": len(layout.leds),
                 "process": process,
                 "noise_px": noise,
-                **_shares(errors.place_mm, errors.turn_mrad),
-                "in_run_mm": float(np.median(errors.in_run_place_mm)),
-                "in_run_mrad": float(np.median(errors.in_run_turn_mrad)),
-                "in_design_mm": float(np.median(errors.whole_place_mm)),
-                "in_design_mrad": float(np.median(errors.whole_turn_mrad)),
+                **_shares(errors.relative.place_mm, errors.relative.turn_mrad),
+                "in_run_mm": float(np.median(errors.in_run.place_mm)),
+                "in_run_mrad": float(np.median(errors.in_run.turn_mrad)),
+                "in_design_mm": float(np.median(errors.whole.place_mm)),
+                "in_design_mrad": float(np.median(errors.whole.turn_mrad)),
             }
         )
     return Table.of_records("calibration-machine", records)
 
 
 def whole_errors(setup: Setup, leds: Floats, process: str, noise_px: float) -> RayUncertainty:
-    """How well the mirrors' rays are known after a whole run.
-
-    Args:
-        setup: of an export, with the frames that are photographed.
-        leds: places of the LEDs, mm, (l, 3).
-        process: that made the prototype.
-        noise_px: of the highlights.
-    """
+    """How well the mirrors' rays are known after a whole run with LEDs (l, 3) at places in mm."""
     lit = replace(setup, designed=replace(setup.designed, leds=leds))
     prior = lit.prior(process_errors(load_process(process)))
     seen = _seen(setup, prior.mean, np.arange(len(setup.frames)))
@@ -238,7 +175,7 @@ def _seen(setup: Setup, machine: Machine, frames: Ints) -> tuple[Ints, Ints, Int
     inside = ((pixel >= 0) & (pixel <= size - 1)).all(axis=1)
     export = setup.export
     apex = machine.centres(frame, sphere)
-    virtual = unit(apex + machine.radius[sphere, None] * unit(-apex)) * _distance(export)
+    virtual = unit(apex + machine.radius[sphere, None] * unit(-apex)) * mirror_distance(export)
     hidden = hidden_by_object(
         export.spec.prototype.stage, machine.leds, virtual, export.capture_mm / 2
     )
@@ -287,3 +224,34 @@ def _figures(alone: Table, whole: Table) -> tuple[Figure, ...]:
         Figure("rays after a run, fdm", "mm", usual["mm_50"]),
         Figure("rays after a run, fdm", "mrad", usual["mrad_50"]),
     )
+
+
+def panels(whole: Table, process: str) -> tuple[Panel, ...]:
+    """Errors at the object of whole machines, by noise and by number of LEDs."""
+    records = whole.records()
+    noise = [r for r in records if r["layout"] == "design" and r["process"] == process]
+    leds = [r for r in records if r["layout"] == "best"]
+    return tuple(
+        Panel(
+            title,
+            label,
+            "mm at the object's centre",
+            tuple(
+                Series(name, _values(rows, x), _values(rows, f"mm_{share}"), style)
+                for name, share, style in (("median", 50, "C0o-"), ("95 %", 95, "C1o-"))
+            ),
+        )
+        for title, label, x, rows in (
+            (
+                "Rays after a run, fdm, LEDs of the design",
+                "noise of highlights, px",
+                "noise_px",
+                noise,
+            ),
+            ("Rays after a run, fdm, best LEDs", "number of LEDs", "leds", leds),
+        )
+    )
+
+
+def _values(records: list[Record], name: str) -> Floats:
+    return np.array([r[name] for r in records], dtype=np.float64)

@@ -34,6 +34,28 @@ APART_MM = 10.0
 
 
 @dataclass(frozen=True)
+class RayCovariance:
+    """Of m rays, from the sphere to the object.
+
+    Attributes:
+        covariance: of the place in the plane through the object's centre along two directions, mm,
+            and of the rotation toward these, radians, (m, 4, 4).
+    """
+
+    covariance: Floats
+
+    @property
+    def place_mm(self) -> Floats:
+        """Root mean square distance at the object's centre, mm, (m,)."""
+        return _root(self.covariance[:, :2, :2])
+
+    @property
+    def turn_mrad(self) -> Floats:
+        """Root mean square angle between the ray and the true one, mrad, (m,)."""
+        return 1000 * _root(self.covariance[:, 2:, 2:])
+
+
+@dataclass(frozen=True)
 class RayUncertainty:
     """Of the rays that show the object's centre, over m of them.
 
@@ -41,61 +63,24 @@ class RayUncertainty:
         frame: in which each is photographed, (m,).
         sphere: that shows it, (m,).
         direction: unit vectors from the sphere toward the object, (m, 3).
-        covariance: of the place in the plane through the centre along two directions, mm, and of
-            the rotation toward these, radians, (m, 4, 4).
-        relative: likewise, besides what a motion of the whole machine would do, (m, 4, 4).
-        in_run: likewise, besides a motion of its own in each run: what the rays of one run know of
-            each other, wherever the axis of the object's half turn is, (m, 4, 4).
+        whole: in the frame of the design.
+        relative: besides what a motion of the whole machine would do.
+        in_run: besides a motion of its own in each run: what the rays of one run know of each
+            other, wherever the axis of the object's half turn is.
         pixel_mm: width of a pixel of the photograph at the object's centre, mm, (m,).
     """
 
     frame: Ints
     sphere: Ints
     direction: Floats
-    covariance: Floats
-    relative: Floats
-    in_run: Floats
+    whole: RayCovariance
+    relative: RayCovariance
+    in_run: RayCovariance
     pixel_mm: Floats
-
-    @property
-    def place_mm(self) -> Floats:
-        """Root mean square distance at the object's centre, mm, (m,)."""
-        return _root(self.relative[:, :2, :2])
-
-    @property
-    def turn_mrad(self) -> Floats:
-        """Root mean square angle between the ray and the true one, mrad, (m,)."""
-        return 1000 * _root(self.relative[:, 2:, 2:])
-
-    @property
-    def in_run_place_mm(self) -> Floats:
-        """As place_mm, among the rays of one run, mm, (m,)."""
-        return _root(self.in_run[:, :2, :2])
-
-    @property
-    def in_run_turn_mrad(self) -> Floats:
-        """As turn_mrad, among the rays of one run, mrad, (m,)."""
-        return 1000 * _root(self.in_run[:, 2:, 2:])
-
-    @property
-    def whole_place_mm(self) -> Floats:
-        """As place_mm, in the frame of the design: with the whole machine's motion, mm, (m,)."""
-        return _root(self.covariance[:, :2, :2])
-
-    @property
-    def whole_turn_mrad(self) -> Floats:
-        """As turn_mrad, in the frame of the design, mrad, (m,)."""
-        return 1000 * _root(self.covariance[:, 2:, 2:])
 
 
 def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:
-    """Covariance of an estimate's rays.
-
-    Args:
-        found: the machine with its information.
-        frame: in which each ray is photographed, (m,).
-        sphere: that shows it, (m,).
-    """
+    """Covariance of an estimate's rays by spheres (m,) in frames (m,)."""
     known = covariance(found.prior, found.information)
     return known_rays(found.prior, found.values, known, frame, sphere)
 
@@ -103,15 +88,7 @@ def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertaint
 def known_rays(
     prior: Prior, values: Floats, known: Covariance, frame: Ints, sphere: Ints
 ) -> RayUncertainty:
-    """Covariance of the rays of a machine whose parameters have a covariance.
-
-    Args:
-        prior: of the machine.
-        values: its free parameters in prior standard deviations, (q,).
-        known: their covariance.
-        frame: in which each ray is photographed, (m,).
-        sphere: that shows it, (m,).
-    """
+    """Covariance of rays (m,) of a machine whose free parameters (q,) have a covariance."""
     slopes, direction = ray_slopes(prior, values, frame, sphere)
     of_all, of_each = shared_motions(prior, frame, direction)
     every = known.of(slopes, FIGURES)
@@ -119,9 +96,9 @@ def known_rays(
         frame=frame,
         sphere=sphere,
         direction=direction,
-        covariance=every,
-        relative=besides_motions(known, slopes, of_all, every),
-        in_run=besides_motions(known, slopes, of_each, every),
+        whole=RayCovariance(every),
+        relative=RayCovariance(besides_motions(known, slopes, of_all, every)),
+        in_run=RayCovariance(besides_motions(known, slopes, of_each, every)),
         pixel_mm=pixel_widths(prior, values, frame, sphere),
     )
 

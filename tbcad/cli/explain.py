@@ -11,7 +11,7 @@ from tbcad.cli.app import app
 from tbcad.screen import WIDTH
 
 if TYPE_CHECKING:
-    from tbcad.reference.entries import Entry
+    from tbcad.reference.entries import ReferenceEntry
 
 SCHEMA = "tbcad-explain/1"
 KINDS = ("term", "section", "key", "check")
@@ -51,13 +51,13 @@ def explain(
     return 0
 
 
-def _checks() -> "Iterator[Entry]":
+def _checks() -> "Iterator[ReferenceEntry]":
     """The checks of the verification, as it describes them itself."""
     from tbcad_verify.report.key_figures import KEY_FIGURES
     from tbcad_verify.report.methods import AS_BUILT, EXPORT, methods
     from tbcad_verify.report.remedies import remedy_by_name
 
-    from tbcad.reference.entries import Entry
+    from tbcad.reference.entries import ReferenceEntry
 
     labels = {one.check: one.label for one in KEY_FIGURES}
     for one in (*methods(EXPORT), *methods(AS_BUILT)):
@@ -67,10 +67,10 @@ def _checks() -> "Iterator[Entry]":
                 "tolerance": one.tolerance,
                 "if it fails": remedy_by_name(check),
             }
-            yield Entry("check", check, facts, (labels.get(check, check),))
+            yield ReferenceEntry("check", check, facts, (labels.get(check, check),))
 
 
-def _lines(entry: "Entry") -> Iterator[str]:
+def _lines(entry: "ReferenceEntry") -> Iterator[str]:
     yield f"{entry.name} ({entry.kind})"
     for heading, value in entry.facts.items():
         text = value if isinstance(value, str) else ", ".join(value)
@@ -78,7 +78,7 @@ def _lines(entry: "Entry") -> Iterator[str]:
         yield _wrapped(text, begin, " " * len(begin))
 
 
-def _lists(entries: "list[Entry]") -> Iterator[str]:
+def _lists(entries: "list[ReferenceEntry]") -> Iterator[str]:
     from tbcad.reference.keys import key_sections
 
     yield _list("Terms", _names(entries, "term"))
@@ -93,12 +93,12 @@ def _list(heading: str, names: list[str]) -> str:
     return f"{heading}:\n{_wrapped('; '.join(names), '  ', '  ')}"
 
 
-def _list_as_json(entries: "list[Entry]") -> str:
+def _list_as_json(entries: "list[ReferenceEntry]") -> str:
     names = {kind: _names(entries, kind) for kind in KINDS}
     return json_text.dumps({"schema": SCHEMA, **names}, indent=1, ensure_ascii=False)
 
 
-def _names(entries: "list[Entry]", kind: str) -> list[str]:
+def _names(entries: "list[ReferenceEntry]", kind: str) -> list[str]:
     return [entry.name for entry in entries if entry.kind == kind]
 
 

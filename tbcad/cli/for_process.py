@@ -24,8 +24,8 @@ def asked_process(name: str | None, share: float | None) -> "tuple[Process | Non
     """
     if name is None and share is None:
         return None, DEFAULT_YIELD
+    from tbcad.tolerance.options import check_yield
     from tbcad.tolerance.process.process import load_process
-    from tbcad.tolerance.wanted_yield import check_yield
 
     if name is None:
         raise InputError(
@@ -41,12 +41,13 @@ def design_for(spec: "Spec", process: "Process", wanted: float, screen: "Stages"
     """The design with edges and margins for a process and a yield; notes say what they cost."""
     from tbcad.tolerance.process_design import (
         costs_text,
+        edges_for_process,
+        edges_text,
         margins_text,
         pixel_costs,
         ssim_costs,
         ssim_text,
     )
-    from tbcad.tolerance.process_edges import edges_for_process, edges_text
 
     choice = edges_for_process(spec, process, wanted, screen.detail)
     found = choice.made

@@ -34,7 +34,7 @@ def init(
 
     Keys that are comments have their defaults, so the file as written is the design it begins from.
     """
-    from tbcad.spec.shipped import shipped_designs
+    from tbcad.spec.load import shipped_designs
 
     if show:
         typer.echo(_list(json))
@@ -60,7 +60,7 @@ def init(
 def _list(json: bool) -> str:
     """The designs that come with tbcad, with the first paragraph that each says of itself."""
     from tbcad.spec.files import read_text
-    from tbcad.spec.shipped import shipped_designs
+    from tbcad.spec.load import shipped_designs
 
     about = {}
     for name, file in shipped_designs().items():

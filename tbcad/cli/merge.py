@@ -74,10 +74,10 @@ def merge(
     if exports is not None:
         check_is_export(exports)
     from tbcad.api import merge as merged
-    from tbcad.merged_run.corrections import Options
+    from tbcad.merged_run.stop_photographs import MergeOptions
 
     out = out or CAPTURES / run.resolve().name
-    options = Options(vignetting, tuple(flat or ()), encoding, brightness)
+    options = MergeOptions(vignetting, tuple(flat or ()), encoding, brightness)
     with stages(2) as screen:
         record = merged(
             run,

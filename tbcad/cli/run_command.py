@@ -128,9 +128,9 @@ def run(
         other = "--resume" if resume else "--no-preflight"
         raise InputError(f"--preflight-only goes without {other}: leave one of both out")
     if dry_run:
+        from tbcad.control.outcome import dry_run_lines, dry_run_record
         from tbcad.control.run import RunRequest
         from tbcad.control.run import dry_run as planned
-        from tbcad.control.verdict import dry_run_lines, dry_run_record
         from tbcad.runs.exposure import PhaseTimes
 
         times = PhaseTimes(leds_s, lit_s)
@@ -154,7 +154,7 @@ def run(
             "the machine is ready"
         )
     from tbcad.api import run as photograph
-    from tbcad.control.verdict import outcome_lines, preflight_lines
+    from tbcad.control.outcome import outcome_lines, preflight_lines
     from tbcad.screen import stages
 
     outcome = photograph(

@@ -3,10 +3,10 @@
 from math import inf
 from time import sleep
 
-from tbcad.control.faults import PIN_FIRST, MachineFault
 from tbcad.control.grbl import HOME, SYNC, Grbl
+from tbcad.control.machine import PIN_FIRST, MachineFault
 from tbcad.control.messages import Status
-from tbcad.control.plan import SETTINGS, Plan
+from tbcad.control.plan import SETTINGS, ControlPlan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
 from tbcad.types import Progress
@@ -27,7 +27,7 @@ class Base:
 
     switch_s = 0.02  # two lines
 
-    def __init__(self, grbl: Grbl, plan: Plan) -> None:
+    def __init__(self, grbl: Grbl, plan: ControlPlan) -> None:
         """Drive a machine as its export says."""
         self._grbl, self._plan = grbl, plan
         self._offset: float | None = None
@@ -37,10 +37,6 @@ class Base:
         """Wait until the controller answers, and tells that it has the build's firmware.
 
         Nothing is set before: settings have other meanings in another firmware.
-
-        Raises:
-            MachineFault: it does not answer.
-            InputError: it has another firmware.
         """
         self._grbl.connect()
         wanted, found = self._plan.firmware, self._grbl.firmware()
@@ -68,15 +64,7 @@ class Base:
         }
 
     def check_settings(self, note: Progress, *, send: bool) -> None:
-        """Compare the controller's settings with the export's.
-
-        Args:
-            note: told each setting that is sent, and what it was.
-            send: set those that differ, instead of refusing.
-
-        Raises:
-            InputError: some differ.
-        """
+        """Compare the controller's settings with the export's; send what differs, or refuse."""
         differing = self.settings_that_differ()
         if send:
             for number, (was, wanted) in differing.items():
@@ -119,11 +107,7 @@ class Base:
         return HOMING_SEARCH * travel / seek * 60 + HOMING_SPARE_S
 
     def drive(self, move: Move, settle_s: float = 0.0) -> None:
-        """Drive to a place and rest there.
-
-        Raises:
-            MachineFault: the base is not there then.
-        """
+        """Drive to a place and rest there, or a MachineFault."""
         self._grbl.command(move.line)
         expected = travel_s(abs(move.angle_deg - self._at), self._plan)
         dwell = f"G4 P{settle_s:.3f}" if settle_s else SYNC
@@ -146,7 +130,6 @@ class Base:
         )
 
     def _angle(self, status: Status) -> float | None:
-        """Base angle of a report; None before the controller has told enough."""
         if (work := status.place("WPos", self._plan.axis)) is not None:
             return work
         place = status.place("MPos", self._plan.axis)
@@ -201,7 +184,7 @@ def _shown(value: float | None) -> str:
     return "missing" if value is None else f"{value:g}"
 
 
-def travel_s(degrees: float, plan: Plan) -> float:
+def travel_s(degrees: float, plan: ControlPlan) -> float:
     """Duration of a motion from rest to rest, s."""
     speed, rise = plan.motion.feed_deg_min / 60, plan.motion.acceleration_deg_s2
     if degrees * rise < speed**2:

@@ -15,9 +15,16 @@ from collections import deque
 from collections.abc import Callable
 from time import monotonic
 
-from tbcad.control.faults import ControllerReset, MachineFault
-from tbcad.control.grbl_codes import STATES, alarm_meaning, error_meaning
-from tbcad.control.messages import RESTING, Message, Status, firmware_of, parse
+from tbcad.control.machine import ControllerReset, MachineFault
+from tbcad.control.messages import (
+    RESTING,
+    STATES,
+    Message,
+    Status,
+    firmware_of,
+    meaning,
+    parse,
+)
 from tbcad.control.port import Port
 from tbcad.types import Progress
 
@@ -38,13 +45,7 @@ class Grbl:
     """A controller on a port."""
 
     def __init__(self, port: Port, note: Progress, clock: Callable[[], float] = monotonic) -> None:
-        """Speak to a controller.
-
-        Args:
-            port: it is plugged into.
-            note: called with what the operator should know.
-            clock: seconds.
-        """
+        """Speak to a controller; notes are what the operator should know."""
         self._port, self._note, self._clock = port, note, clock
         self._unread, self._messages = b"", deque[Message]()
         self._asked = self._heard = clock()
@@ -60,9 +61,6 @@ class Grbl:
         A controller that did not begin anew when the port was opened may have part of a line from
         a program that was killed: a soft reset at rest clears it and keeps the motor on. One that
         is silent homes, or was stopped by an alarm, which a soft reset ends as well.
-
-        Raises:
-            MachineFault: nothing answers, or no GRBL does.
         """
         begun = self._clock()
         while self._clock() - begun < BANNER_S and not self.greeting:
@@ -89,11 +87,7 @@ class Grbl:
         return firmware_of([self.greeting, *(one.text for one in self.command(BUILD_INFO))])
 
     def status(self) -> Status:
-        """A fresh status report.
-
-        Raises:
-            MachineFault: the controller does not answer, is in alarm, or began anew.
-        """
+        """A fresh status report; MachineFault: there is none, an alarm, or a new beginning."""
         self._drain("?")
         begun = self._clock()
         asked = False
@@ -223,12 +217,12 @@ class Grbl:
         """Raise what ends a run."""
         if message.kind == "error":
             self.pending = ""
-            meaning = error_meaning(message.code)
-            raise MachineFault(f"the controller refuses {line!r}: {message.text}: {meaning}")
+            told = f"{message.text}: {meaning(message)}"
+            raise MachineFault(f"the controller refuses {line!r}: {told}")
         if message.kind == "alarm":
             self._stopped = True
-            meaning = alarm_meaning(message.code)
-            raise MachineFault(f"the controller stopped at {line!r}: {message.text}: {meaning}")
+            told = f"{message.text}: {meaning(message)}"
+            raise MachineFault(f"the controller stopped at {line!r}: {told}")
         if message.kind == "banner":
             raise ControllerReset(
                 f"the controller began anew at {line!r} ({message.text}): it has forgotten its "
@@ -252,7 +246,6 @@ class Grbl:
         return True
 
     def _next(self, wait: bool = True) -> Message | None:
-        """The next line that came, if one did."""
         if not self._messages:
             self._unread += self._port.read(wait)
             *lines, self._unread = self._unread.split(b"\n")

@@ -3,10 +3,34 @@
 from typing import Protocol
 
 from tbcad.control.program import Move
+from tbcad.errors import one_line
 from tbcad.types import Progress
 
+PIN_FIRST = (
+    "leave the supply on, for only the motor holds the base: zero pin in first, or the base falls"
+)
+"""What is safe when a machine does not do what it is told."""
 
-class Machine(Protocol):
+
+class _Fault(Exception):
+    def __init__(self, text: str) -> None:
+        """Keep the text as one line: parts of it come from a controller or a camera."""
+        super().__init__(one_line(text))
+
+
+class MachineFault(_Fault):
+    """The base cannot go on: the run stops here, and can be resumed."""
+
+
+class ControllerReset(MachineFault):
+    """The controller began anew in mid-run: it has forgotten its angle."""
+
+
+class CameraFault(_Fault):
+    """A photograph that was not taken, or cannot be used: the run goes on with the next."""
+
+
+class DrivenMachine(Protocol):
     """Motions and lights of one machine; all but `secure` raise MachineFault when it fails.
 
     Attributes:

@@ -31,7 +31,7 @@ DIRECTION = 3  # the setting that is changed where the base turns against its ar
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
 
 
-class _Camera(Record):
+class _CameraSize(Record):
     width_px: int = Field(ge=16, le=65_536)
     height_px: int = Field(ge=16, le=65_536)
 
@@ -46,10 +46,10 @@ class _Spec(Record):
 
 class _Design(Record):
     spec: _Spec
-    cameras: tuple[_Camera, _Camera]
+    cameras: tuple[_CameraSize, _CameraSize]
 
 
-class Phase(Record):
+class LightPhase(Record):
     """A light, and the digital output that switches it; None: no output is on."""
 
     name: PhaseName
@@ -59,31 +59,28 @@ class Phase(Record):
 class _Controller(Record):
     firmware: Literal["grblhal", "grbl"]
     axis: Literal["X", "A"]
-    phases: tuple[Phase, ...] = Field(min_length=1)
+    phases: tuple[LightPhase, ...] = Field(min_length=1)
 
 
 class _Prototype(Record):
     controller: _Controller
 
 
-class _Stop(Record):
+class _PlannedStop(Record):
     stop: int = Field(ge=1)
     base_angle_deg: Finite
 
 
 @dataclass(frozen=True)
-class Plan:
+class ControlPlan:
     """All that a run needs of an export.
 
     Attributes:
         sha256: of each file that it depends on, by name.
         size_px: columns and rows of the design's camera.
         firmware: of the controller, "grblhal" or "grbl".
-        axis: letter of the base's axis.
         phases: of a stop, in order.
-        motion: times and speeds.
         settings: of the controller, by number.
-        program: the motions.
         frames: of both runs, in order.
     """
 
@@ -91,7 +88,7 @@ class Plan:
     size_px: tuple[int, int]
     firmware: Literal["grblhal", "grbl"]
     axis: str
-    phases: tuple[Phase, ...]
+    phases: tuple[LightPhase, ...]
     motion: MotionSpec
     settings: dict[int, float]
     program: Program
@@ -103,19 +100,15 @@ class Plan:
         return tuple(phase.output for phase in self.phases if phase.output is not None)
 
 
-def read_control_plan(folder: Path) -> Plan:
-    """Read what a run needs of a folder that `tbcad build` wrote with a prototype.
-
-    Raises:
-        InputError: something is missing or does not fit; it says what.
-    """
+def read_control_plan(folder: Path) -> ControlPlan:
+    """Read what a run needs of a folder that `tbcad build` wrote with a prototype."""
     design = read_json(
         folder / DESIGN_FILE, _Design, DESIGN_SCHEMA, "name a folder that tbcad build wrote"
     )
     controller = read_json(folder / RECORD, _Prototype, SCHEMA, MISSING).controller
     program = read_program(folder)
     angles = _angles(folder / STOPS, program)
-    return Plan(
+    return ControlPlan(
         sha256={name: _sha256(folder / name) for name in FILES},
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
         firmware=controller.firmware,
@@ -133,11 +126,7 @@ def read_control_plan(folder: Path) -> Plan:
 
 
 def read_settings(path: Path) -> dict[int, float]:
-    """Settings of the controller by number, without the direction, which is found by trying.
-
-    Raises:
-        InputError: there is no such file, or a line is neither comment nor setting.
-    """
+    """Settings of the controller by number, without the direction, which is found by trying."""
     settings: dict[int, float] = {}
     for number, line in enumerate(_text(path).splitlines(), 1):
         if line.startswith("("):
@@ -152,7 +141,7 @@ def read_settings(path: Path) -> dict[int, float]:
 
 def _angles(path: Path, program: Program) -> dict[int, float]:
     """Base angle of each stop, which the program must drive to."""
-    angles = {row.stop: row.base_angle_deg for row in read_csv(path, _Stop, MISSING)}
+    angles = {row.stop: row.base_angle_deg for row in read_csv(path, _PlannedStop, MISSING)}
     for stop, angle in angles.items():
         move = program.stops.get(stop)
         if move is None or abs(move.angle_deg - angle) > ANGLE_DEG:

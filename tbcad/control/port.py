@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from tbcad.control.faults import MachineFault
+from tbcad.control.machine import MachineFault
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,11 +34,7 @@ class SerialPort:
     """A port of pyserial's; its errors are those of a machine."""
 
     def __init__(self, name: str) -> None:
-        """Open a port.
-
-        Raises:
-            InputError: it cannot be opened, or pyserial is not installed.
-        """
+        """Open a port."""
         try:
             import serial
         except ImportError:

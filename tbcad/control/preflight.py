@@ -34,7 +34,7 @@ Shoot = Callable[[str, float | None], Shot]
 """Takes the photograph of a phase with an exposure time; None: that which the camera has."""
 
 
-class State(StrEnum):
+class LightState(StrEnum):
     """What to think of a photograph."""
 
     GOOD = "good"
@@ -48,13 +48,12 @@ class Seen:
     """What a photograph shows.
 
     Attributes:
-        state: what to think of it.
         peak: level of its brightest light, of the largest number.
         saturated: share of the highlights, or of the lit pixels, that are.
         highlights: number of them; None where no single LED shines.
     """
 
-    state: State
+    state: LightState
     peak: float
     saturated: float
     highlights: int | None = None
@@ -62,7 +61,7 @@ class Seen:
     @property
     def factor(self) -> float:
         """Of the exposure that would be right; where nothing tells it, one that is worth a try."""
-        if self.state == State.SATURATED:
+        if self.state == LightState.SATURATED:
             return 1 / STEP
         return TARGET / self.peak if self.peak > THRESHOLD else STEP
 
@@ -73,20 +72,16 @@ class Seen:
         seen = (
             f"peak {self.peak:.0%} of the largest number, {self.saturated:.0%} of {what} saturated"
         )
-        if self.state in (State.GOOD, State.STRAY):
+        if self.state in (LightState.GOOD, LightState.STRAY):
             return f"{self.state}: {seen}"
-        how = "or less" if self.state == State.SATURATED else "or so"
+        how = "or less" if self.state == LightState.SATURATED else "or so"
         return f"{self.state}: {seen}: {self.factor:.2g} times the exposure {how} would be right"
 
 
 def preflight(times: dict[str, float | None], shoot: Shoot, where: str, note: Progress) -> None:
     """Photograph one stop under each light, and say what is wrong.
 
-    Args:
-        times: exposure time of each phase, s; None: that which the camera has.
-        shoot: takes a photograph.
-        where: the camera and the stop in words.
-        note: called with a line for each phase.
+    A time of None is that which the camera has; a note is given for each phase.
 
     Raises:
         InputError: an exposure will not do; it says which would.
@@ -97,12 +92,14 @@ def preflight(times: dict[str, float | None], shoot: Shoot, where: str, note: Pr
         image = _image(phase, shoot(phase, seconds))
         if phase in (DARK, DARK_LIT):
             dark[phase] = image
-        seen[phase] = look(phase, image, _dark_of(phase, dark))
+        seen[phase] = look(
+            phase, image, dark.get(DARK_LIT, dark.get(DARK)) if phase == LIT else dark.get(DARK)
+        )
     seen = _leds_together(seen)
     for phase, one in seen.items():
         exposure = "" if times[phase] is None else f" at {times[phase]:g} s"
         note(f"preflight, {where}: {phase}{exposure} is {one.text}")
-    wrong = {phase: one.state for phase, one in seen.items() if one.state != State.GOOD}
+    wrong = {phase: one.state for phase, one in seen.items() if one.state != LightState.GOOD}
     if wrong:
         right = {phase: _right(phase, times[phase], seen[phase], shoot) for phase in _worst(seen)}
         told = ", ".join(f"{phase} is {state}" for phase, state in wrong.items())
@@ -117,7 +114,9 @@ def look(phase: str, image: Image16, dark: Image16 | None) -> Seen:
     if phase in (DARK, DARK_LIT):
         peak = float(np.quantile(level, 0.99))
         return Seen(
-            State.STRAY if peak > MOST_STRAY else State.GOOD, peak, float((level >= FULL).mean())
+            LightState.STRAY if peak > MOST_STRAY else LightState.GOOD,
+            peak,
+            float((level >= FULL).mean()),
         )
     bright = (level if dark is None else level - _level(dark)) > THRESHOLD
     if phase == LIT:
@@ -146,23 +145,21 @@ def _peaks(level: Floats, bright: Bools) -> Floats:
 def _judged(levels: Floats, kind: str) -> Seen:
     number = None if kind == LIT else len(levels)
     if not len(levels):
-        return Seen(State.TOO_DARK, 0.0, 0.0, number)
+        return Seen(LightState.TOO_DARK, 0.0, 0.0, number)
     peak, saturated = float(np.quantile(levels, BRIGHTEST[kind])), float((levels >= FULL).mean())
     if saturated > MOST_SATURATED[kind]:
-        return Seen(State.SATURATED, peak, saturated, number)
-    return Seen(State.GOOD if peak >= LEAST_PEAK else State.TOO_DARK, peak, saturated, number)
-
-
-def _dark_of(phase: str, dark: dict[str, Image16]) -> Image16 | None:
-    return dark.get(DARK_LIT, dark.get(DARK)) if phase == LIT else dark.get(DARK)
+        return Seen(LightState.SATURATED, peak, saturated, number)
+    return Seen(
+        LightState.GOOD if peak >= LEAST_PEAK else LightState.TOO_DARK, peak, saturated, number
+    )
 
 
 def _leds_together(seen: dict[str, Seen]) -> dict[str, Seen]:
     """LEDs share one exposure: one that shows less is good where another shows enough."""
-    enough = any(one.highlights and one.state != State.TOO_DARK for one in seen.values())
+    enough = any(one.highlights and one.state != LightState.TOO_DARK for one in seen.values())
     return {
-        phase: replace(one, state=State.GOOD)
-        if enough and one.highlights and one.state == State.TOO_DARK
+        phase: replace(one, state=LightState.GOOD)
+        if enough and one.highlights and one.state == LightState.TOO_DARK
         else one
         for phase, one in seen.items()
     }
@@ -171,11 +168,11 @@ def _leds_together(seen: dict[str, Seen]) -> dict[str, Seen]:
 def _worst(seen: dict[str, Seen]) -> list[str]:
     """The brightest LED, unless LEDs are as they should be, and the lit object likewise."""
     leds = {phase: one for phase, one in seen.items() if one.highlights is not None}
-    saturated = [phase for phase, one in leds.items() if one.state == State.SATURATED]
-    good = any(one.state == State.GOOD for one in leds.values())
+    saturated = [phase for phase, one in leds.items() if one.state == LightState.SATURATED]
+    good = any(one.state == LightState.GOOD for one in leds.values())
     some = saturated or ([] if good else list(leds))
     some.sort(key=lambda phase: (-leds[phase].saturated, -leds[phase].peak))
-    is_lit = LIT in seen and seen[LIT].state != State.GOOD
+    is_lit = LIT in seen and seen[LIT].state != LightState.GOOD
     return some[:1] + [LIT] * is_lit
 
 
@@ -191,13 +188,12 @@ def _right(phase: str, seconds: float | None, seen: Seen, shoot: Shoot) -> float
             seen = look(phase, _image(phase, shoot(phase, seconds)), None)
         except InputError:  # the camera has no such exposure
             return None
-        if seen.state == State.GOOD:
+        if seen.state == LightState.GOOD:
             return seconds
     return None
 
 
-def _step(wrong: Mapping[str, State], right: Mapping[str, float | None]) -> str:
-    """What to do."""
+def _step(wrong: Mapping[str, LightState], right: Mapping[str, float | None]) -> str:
     options = [
         f"--exposure-{'lit' if phase == LIT else 'leds'} {seconds:.3g}"
         for phase, seconds in right.items()
@@ -209,6 +205,6 @@ def _step(wrong: Mapping[str, State], right: Mapping[str, float | None]) -> str:
             "change the camera's exposure, or say one for each light with --exposure-leds and "
             "--exposure-lit"
         )
-    if State.STRAY in wrong.values():
+    if LightState.STRAY in wrong.values():
         steps.append("darken the room")
     return ", and ".join(steps or ["see to the LED's wires, or leave it out with --phases"])

@@ -25,7 +25,6 @@ class Move:
     """A motion of the base.
 
     Attributes:
-        line: of G-code.
         angle_deg: base angle that it ends at.
     """
 
@@ -59,11 +58,7 @@ class Program:
 
 
 def read_program(folder: Path) -> Program:
-    """The program of an export.
-
-    Raises:
-        InputError: there is none, or it is not one that tbcad build wrote.
-    """
+    """The program of an export that tbcad build wrote."""
     path = folder / PROGRAM
     if not path.is_file():
         raise InputError(f"{path} is not there: build the prototype too, tbcad build")

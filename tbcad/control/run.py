@@ -6,25 +6,33 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
+from tbcad.control.base import Base
 from tbcad.control.cameras.choice import (
     check_camera_name,
     check_can_expose,
     connected_camera,
 )
-from tbcad.control.connection import machine_at
-from tbcad.control.estimate import (
+from tbcad.control.grbl import Grbl
+from tbcad.control.klipper.base import KlipperBase
+from tbcad.control.klipper.files import read_klipper_files
+from tbcad.control.klipper.host import Klipper
+from tbcad.control.klipper.moonraker import PREFIX, Moonraker, read_address
+from tbcad.control.machine import DrivenMachine, MachineFault
+from tbcad.control.outcome import DryRun, Outcome
+from tbcad.control.plan import ControlPlan, read_control_plan
+from tbcad.control.port import SerialPort
+from tbcad.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
+    Preflight,
+    RunSelection,
     Shots,
+    chosen_frames,
+    chosen_phases,
     count,
     disk_bytes,
     expected_seconds,
 )
-from tbcad.control.faults import MachineFault
-from tbcad.control.machine import Machine
-from tbcad.control.outcome import Outcome
-from tbcad.control.plan import Plan, read_control_plan
-from tbcad.control.selection import Preflight, RunOptions, chosen_frames, chosen_phases
 from tbcad.control.session import Ask, Session, Show
 from tbcad.errors import InputError
 from tbcad.output.content import refuse_inside
@@ -44,8 +52,6 @@ class RunRequest:
     """What is asked for.
 
     Attributes:
-        exports: folder that tbcad build wrote.
-        out: folder of the run.
         phases: names with commas between; None: all, or those of the run that is resumed.
         stops: numbers and ranges with commas between; None likewise.
         runs: "a", "b" or "ab"; None: both, or as in the run that is resumed.
@@ -66,35 +72,9 @@ class RunRequest:
     preflight: Preflight = "first"
 
 
-@dataclass(frozen=True)
-class DryRun:
-    """What a run would do.
-
-    Attributes:
-        plan: of the export.
-        remaining: photographs to be taken.
-        seconds: that it would take, about.
-        disk_bytes: that it would need, about.
-    """
-
-    plan: Plan
-    remaining: list[Shots]
-    seconds: float
-    disk_bytes: int
-
-    @property
-    def photographs(self) -> int:
-        """Number of photographs."""
-        return count(self.remaining)
-
-
 def dry_run(request: RunRequest) -> DryRun:
-    """What a run would do, without port and camera; nothing is written.
-
-    Raises:
-        InputError: export, folder or choice will not do.
-    """
-    plan, options = _prepared(request, send_settings=False)
+    """What a run would do, without port and camera; nothing is written."""
+    plan, options = _prepared(request)
     taken = set(read_run(request.out).exposures) if request.resume else set[str]()
     names = [phase.name for phase in options.phases]
     remaining = [
@@ -136,7 +116,7 @@ def run_machine(
     Raises:
         InputError: something was wrong before the first photograph of the run.
     """
-    plan, options = _prepared(request, send_settings)
+    plan, options = _prepared(request)
     check_camera_name(camera)
     check_can_expose(camera, options.times)
     with ExitStack() as stack:
@@ -168,7 +148,7 @@ def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
 
 
 @contextmanager
-def _secured(base: Machine, note: Progress) -> Iterator[None]:
+def _secured(base: DrivenMachine, note: Progress) -> Iterator[None]:
     """Hold the base and switch lights off if an error comes through; tell what is not safe."""
     try:
         yield
@@ -189,7 +169,7 @@ def _faults_as_input_errors(port: str) -> Iterator[None]:
         raise InputError(f"{fault}: make room, or name another folder") from None
 
 
-def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOptions]:
+def _prepared(request: RunRequest) -> tuple[ControlPlan, RunSelection]:
     """Plan and choice, or those of the run that is resumed."""
     plan = read_control_plan(request.exports)
     phases = chosen_phases(plan, request.phases, request.times)
@@ -199,7 +179,7 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
         refuse_inputs(request.out, (request.exports,))
         refuse_inside(request.out, request.out.resolve())
         check_new(request.out)
-        return plan, RunOptions(frames, phases, size, send_settings, request.times)
+        return plan, RunSelection(frames, phases, size, request.times)
     record = read_record(request.out)
     _check_same_export(request, plan, record)
     known = ",".join(name for name in record.phases if name != DARK_LIT)
@@ -212,7 +192,7 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
         (
             "--exposure",
             request.times if request.times != PhaseTimes() else None,
-            _same_times(request.times, record),
+            all(request.times.of(phase) == record.times.of(phase) for phase in record.phases),
         ),
     )
     for name, value, same in given:
@@ -221,15 +201,10 @@ def _prepared(request: RunRequest, send_settings: bool) -> tuple[Plan, RunOption
                 f"{request.out} was begun with another {name}: leave it out with --resume"
             )
     size = record.width_px, record.height_px
-    return plan, RunOptions(record.frames, recorded, size, send_settings, record.times)
+    return plan, RunSelection(record.frames, recorded, size, record.times)
 
 
-def _same_times(times: PhaseTimes, record: RunRecord) -> bool:
-    """Whether all phases of a run were photographed with these exposure times."""
-    return all(times.of(phase) == record.times.of(phase) for phase in record.phases)
-
-
-def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> None:
+def _check_same_export(request: RunRequest, plan: ControlPlan, record: RunRecord) -> None:
     if record.source != "camera":
         raise InputError(f"{request.out} is a simulated run: name another folder")
     other = [
@@ -240,3 +215,17 @@ def _check_same_export(request: RunRequest, plan: Plan, record: RunRecord) -> No
             f"{request.out} is a run of another export: {other[0]} of {request.exports} differs; "
             "name the export that it was begun with"
         )
+
+
+def machine_at(
+    port: str, folder: Path, plan: ControlPlan, note: Progress, stack: ExitStack
+) -> DrivenMachine:
+    """Open a port, which the stack closes: of a serial line, or "moonraker:" and a URL."""
+    if port.startswith(PREFIX):
+        server = Moonraker(read_address(port.removeprefix(PREFIX)))
+        return KlipperBase(Klipper(server, note), plan, read_klipper_files(folder))
+    if "://" in port:
+        raise InputError(f"--port is {port!r:.60}: for Klipper say {PREFIX}http://HOST")
+    line = SerialPort(port)
+    stack.callback(line.close)
+    return Base(Grbl(line, note), plan)

@@ -6,8 +6,13 @@ from functools import partial
 from itertools import groupby
 from pathlib import Path
 
-from tbcad.control.cameras.camera import Camera, Shot
-from tbcad.control.estimate import (
+from tbcad.control.cameras.camera import RunCamera, Shot
+from tbcad.control.machine import CameraFault, DrivenMachine, MachineFault
+from tbcad.control.outcome import Outcome
+from tbcad.control.plan import ControlPlan
+from tbcad.control.selection import (
+    Preflight,
+    RunSelection,
     Shots,
     bytes_each,
     check_disk,
@@ -17,19 +22,14 @@ from tbcad.control.estimate import (
     expected_seconds,
     size_text,
 )
-from tbcad.control.faults import CameraFault, MachineFault
-from tbcad.control.machine import Machine
-from tbcad.control.outcome import Outcome
-from tbcad.control.plan import Plan
-from tbcad.control.selection import Preflight, RunOptions
 from tbcad.control.shooting import (
     Photograph,
     check_like_record,
     exposure_of,
     light_on,
+    run_record,
     taken_twice,
 )
-from tbcad.control.trials import run_record
 from tbcad.errors import InputError
 from tbcad.runs.exposure import Frame, exposure_name
 from tbcad.runs.writing import DiskFault, RunWriter, new_run, resumed_run
@@ -48,7 +48,9 @@ Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
 class Session:
     """One machine and one run."""
 
-    def __init__(self, plan: Plan, options: RunOptions, base: Machine, camera: Camera) -> None:
+    def __init__(
+        self, plan: ControlPlan, options: RunSelection, base: DrivenMachine, camera: RunCamera
+    ) -> None:
         """Run with a machine and a camera that are connected."""
         self._plan, self._options = plan, options
         self._base, self._camera = base, camera
@@ -150,7 +152,6 @@ class Session:
             raise InputError(f"the camera: {fault}") from None
 
     def _light(self, phase: str) -> AbstractContextManager[None]:
-        """Have the light of a phase on."""
         lights = {one.name: one for one in self._options.phases}
         return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
@@ -211,7 +212,6 @@ class Session:
         self._homed = True
 
     def _position(self, shots: Shots, note: Progress) -> None:
-        """All photographs at one position."""
         self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
         for name in shots.phases:
             with self._light(name):
@@ -261,7 +261,6 @@ class Session:
 
 
 def _turned(remaining: list[Shots]) -> bool:
-    """Whether the object is turned at the first position."""
     return bool(remaining and remaining[0].frame.object_turn_deg)
 
 

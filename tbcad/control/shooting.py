@@ -1,22 +1,24 @@
 """One photograph: taken, read, compared with what the run is locked to, and recorded."""
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from time import monotonic
 
-from tbcad.control.cameras.camera import Camera, Shot, are_near, shutter_seconds
+from tbcad.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
-from tbcad.control.faults import CameraFault
-from tbcad.control.machine import Machine
-from tbcad.control.plan import Phase
+from tbcad.control.machine import CameraFault, DrivenMachine
+from tbcad.control.plan import ControlPlan, LightPhase
+from tbcad.control.selection import RunSelection
+from tbcad.errors import InputError
 from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
-from tbcad.runs.record import RunRecord
+from tbcad.runs.record import PhaseExposure, RunRecord
 
 SHUTTER = "shutterspeed"
 UNNAMED = "unnamed camera"
+OF_EXPOSURE = (SHUTTER, "shutterspeed2", "exposure_s")  # settings that an exposure time changes
 
 
 @dataclass(frozen=True)
@@ -24,9 +26,6 @@ class Photograph:
     """A photograph that can be read.
 
     Attributes:
-        shot: as the camera gave it.
-        facts: what its file says.
-        seconds: that it took.
         asked_s: exposure time that the camera was told, s; None: it keeps its own.
     """
 
@@ -58,7 +57,7 @@ class Photograph:
 
 
 @contextmanager
-def light_on(base: Machine, phase: Phase, seconds: float) -> Iterator[None]:
+def light_on(base: DrivenMachine, phase: LightPhase, seconds: float) -> Iterator[None]:
     """Have the light of a phase on, and let it settle for some seconds."""
     outputs = () if phase.output is None else (phase.output,)
     for output in outputs:
@@ -76,14 +75,12 @@ def light_on(base: Machine, phase: Phase, seconds: float) -> Iterator[None]:
 
 
 def taken_twice(
-    camera: Camera, base: Machine, seconds: float | None, check: Callable[[Photograph], None]
+    camera: RunCamera,
+    base: DrivenMachine,
+    seconds: float | None,
+    check: Callable[[Photograph], None],
 ) -> Photograph:
-    """A photograph that passes a check; a second one, over a new session, if the first fails.
-
-    Raises:
-        CameraFault: both fail.
-        MachineFault: the controller does not release the camera.
-    """
+    """A photograph that passes a check; a second one, over a new session, if the first fails."""
     try:
         photograph = take(camera, base, seconds)
         check(photograph)
@@ -94,13 +91,8 @@ def taken_twice(
     return photograph
 
 
-def take(camera: Camera, base: Machine, seconds: float | None = None) -> Photograph:
-    """Take one photograph.
-
-    Args:
-        camera: that takes it.
-        base: whose controller may release the camera.
-        seconds: exposure time; None: that which the camera has.
+def take(camera: RunCamera, base: DrivenMachine, seconds: float | None = None) -> Photograph:
+    """Take one photograph, with an exposure time or that which the camera has.
 
     Raises:
         CameraFault: there is none, it cannot be read, or it has another exposure time.
@@ -124,11 +116,7 @@ def take(camera: Camera, base: Machine, seconds: float | None = None) -> Photogr
 
 
 def check_like_record(record: RunRecord, phase: str, photograph: Photograph) -> None:
-    """Refuse a photograph that is not like the others of its run.
-
-    Raises:
-        CameraFault: it has another size or setting, or is of another camera.
-    """
+    """Refuse a photograph that is not like the others of its run by a CameraFault."""
     if photograph.model != record.camera:
         raise CameraFault(f"the camera is {photograph.model}, and the run's is {record.camera}")
     size = photograph.facts.width_px, photograph.facts.height_px
@@ -158,3 +146,47 @@ def exposure_of(photograph: Photograph, frame: Frame, phase: str) -> Exposure:
         taken=datetime.now(UTC),
         settings=photograph.settings,
     )
+
+
+def run_record(
+    plan: ControlPlan, options: RunSelection, trials: Mapping[str, Photograph], seconds: float
+) -> RunRecord:
+    """The record of a run, by a photograph for each phase and its expected duration."""
+    try:
+        locked = common_settings(trials.values())
+    except CameraFault as fault:
+        raise InputError(f"the camera: {fault}") from None
+    trial = next(iter(trials.values()))
+    return RunRecord(
+        export_sha256=plan.sha256,
+        source="camera",
+        camera=trial.model,
+        width_px=trial.facts.width_px,
+        height_px=trial.facts.height_px,
+        phases=tuple(trials),
+        frames=options.frames,
+        locked=locked,
+        exposures={
+            name: PhaseExposure(
+                asked_s=one.asked_s,
+                settings={key: value for key, value in one.settings.items() if key not in locked},
+            )
+            for name, one in trials.items()
+            if one.asked_s is not None
+        },
+        seconds=round(seconds, 1),
+    )
+
+
+def common_settings(photographs: Iterable[Photograph]) -> dict[str, Setting]:
+    """Settings that are the same at all exposure times; CameraFault: others differ."""
+    first, *others = [photograph.settings for photograph in photographs]
+    for other in others:
+        for name in sorted((first.keys() | other.keys()) - {*OF_EXPOSURE}):
+            if first.get(name) != other.get(name):
+                raise CameraFault(
+                    f"{name} is {first.get(name)} at one exposure time and {other.get(name)} at "
+                    "another: set it to one value"
+                )
+    same = [name for name in first if all(first[name] == other.get(name) for other in others)]
+    return {name: first[name] for name in same}

@@ -14,10 +14,9 @@ from tbcad.errors import InputError
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.formats.step_named import read_named_solid
 from tbcad.formats.step_tolerances import FaceTolerances, write_tolerances
-from tbcad.inspection.deviations import MM_PER_UM
-from tbcad.inspection.limits import Limits
+from tbcad.inspection.limits import MirrorLimits
 from tbcad.inspection.read_back import check_read_back
-from tbcad.inspection.sensitivity import Sensitivities
+from tbcad.inspection.sensitivity import MM_PER_UM, Sensitivities
 from tbcad.mirrors.array import mirror_ids
 from tbcad.optics.cells import Cells
 from tbcad.optics.pedestals.cells import PedestalCells
@@ -49,9 +48,7 @@ class Half:
 
     Attributes:
         name: of its solid, "shell_a".
-        ids: of its mirrors.
         surfaces: of the solid, below the coat.
-        limits: of the mirrors.
         dowel_mm: diameter of the holes for dowel pins.
         walls: of each mirror's pedestal: names of the faces, with a point (mm) and the normal of
             their planes, (6,); none where spheres meet.
@@ -60,7 +57,7 @@ class Half:
     name: str
     ids: tuple[str, ...]
     surfaces: Surfaces
-    limits: Limits
+    limits: MirrorLimits
     dowel_mm: float
     walls: tuple[dict[str, Floats], ...]
 
@@ -101,7 +98,7 @@ class Half:
         return [dict(zip(self.columns, (name, *row), strict=True)) for name, row in named]
 
 
-def halves(export: ExportedDesign, limits: Limits) -> tuple[Half, Half]:
+def halves(export: ExportedDesign, limits: MirrorLimits) -> tuple[Half, Half]:
     """Both halves of an export with their part of the limits."""
     coat = export.spec.mirrors.coating_um * MM_PER_UM
     m = len(export.reflectors[0])
@@ -110,7 +107,7 @@ def halves(export: ExportedDesign, limits: Limits) -> tuple[Half, Half]:
             f"shell_{one.camera_id}",
             tuple(mirror_ids(one.camera_id, m)),
             one.mirrors.offset(-coat),
-            Limits(limits.each[k * m :][:m], limits.sigma[k * m :][:m], limits.seat_um),
+            MirrorLimits(limits.each[k * m :][:m], limits.sigma[k * m :][:m], limits.seat_um),
             export.spec.shell.foot_flange.dowel_hole_mm,
             _walls(tuple(mirror_ids(one.camera_id, m)), one.cells),
         )
@@ -178,11 +175,7 @@ def dowel_face(solid: Solid, diameter: float) -> str:
 
 
 def notes(wall_um: Floats | None = None) -> dict[str, str]:
-    """What tolerances of faces cannot say.
-
-    Args:
-        wall_um: by how much the walls of each pedestal may be off, (m,).
-    """
+    """What tolerances of faces cannot say; walls of pedestals may be off by micrometres, (m,)."""
     walls = {}
     if wall_um is not None:
         limit = f"{wall_um.min():.1f} um along their normals, or as the zones allow"
@@ -200,7 +193,7 @@ def roughness_nm() -> float:
 
 
 def write_record(
-    folder: Path, found: Sensitivities, limits: Limits, facts: dict[str, Any]
+    folder: Path, found: Sensitivities, limits: MirrorLimits, facts: dict[str, Any]
 ) -> dict[str, Any]:
     """Write the record of an inspection, and return it."""
     smallest = limits.each.min(axis=0).tolist()

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.inspection.deviations import Deviation
 from tbcad.inspection.files import halves, write_half, write_record
-from tbcad.inspection.limits import Limits, mirror_limits, whole_margin_steps
-from tbcad.inspection.sensitivity import Sensitivities, sensitivities
+from tbcad.inspection.limits import MirrorLimits, mirror_limits, whole_margin_steps
+from tbcad.inspection.sensitivity import Deviation, Sensitivities, sensitivities
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.tolerance.montecarlo.coverage import coverage
 from tbcad.tolerance.montecarlo.edge_model import edge_models
@@ -19,11 +18,7 @@ BUILDS, SEED = 50, 1
 
 
 def checked_export(folder: Path) -> ExportedDesign:
-    """Read an export whose shell can be inspected.
-
-    Raises:
-        InputError: it has no shell, or its mirrors are planar.
-    """
+    """Read an export whose shell can be inspected: it is there, and no mirror is planar."""
     export = read_export(folder)
     for name in ("shell_a.step", "shell_b.step"):
         if not (folder / name).is_file():
@@ -36,13 +31,7 @@ def checked_export(folder: Path) -> ExportedDesign:
 def inspect(
     export: ExportedDesign, wanted: float, folder: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Write the limits of every mirror into a folder, and return the record.
-
-    Args:
-        export: see `checked_export`.
-        wanted: yield with standard deviations as in the table.
-        folder: exists, and is the caller's to replace.
-        progress: called with the name of each stage.
+    """Write the limits of every mirror, for a wanted yield, into a folder, and return the record.
 
     Raises:
         InputError: the shell leaves no deviation, or its solids are not those of its record.
@@ -62,7 +51,7 @@ def inspect(
     return write_record(folder, found, limits, {**facts, "files": files})
 
 
-def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, Limits]:
+def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, MirrorLimits]:
     """Losses of an export's virtual cameras, and the limits that follow; see `mirror_limits`.
 
     Losses are taken for small deviations. They grow faster than those: another edge of a cell
@@ -81,7 +70,7 @@ def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, 
     return found, mirror_limits(found, export.capture_mm, wanted).within(steps, found)
 
 
-def minimum_at_limits(export: ExportedDesign, limits: Limits, builds: int = BUILDS) -> float:
+def minimum_at_limits(export: ExportedDesign, limits: MirrorLimits, builds: int = BUILDS) -> float:
     """Minimum coverage of simulated shells whose mirrors are all at their limits, mm.
 
     Each deviation is at its limit one way or the other, at random; tilts in random directions.

@@ -14,7 +14,7 @@ PLACES = np.array([3, 4, 5, 3])  # decimals of limits: a nanometre, or what turn
 
 
 @dataclass(frozen=True)
-class Limits:
+class MirrorLimits:
     """Limits of all mirrors, a's first: offset (um), tilt (mrad), radius (mm), walls (um) if any.
 
     Attributes:
@@ -27,23 +27,19 @@ class Limits:
     sigma: Floats
     seat_um: float
 
-    def within(self, steps: Floats, found: Sensitivities) -> "Limits":
+    def within(self, steps: Floats, found: Sensitivities) -> "MirrorLimits":
         """The same, no limit more than its part of the deviation whose loss is known."""
         largest = _floor(steps / kinds_and_seat(found), PLACES[: steps.shape[1]])
         return replace(self, each=np.minimum(self.each, largest))
 
 
-def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limits:
+def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> MirrorLimits:
     """Share each virtual camera's margin out to the mirrors that it depends on.
 
     Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
     mirror of a virtual camera the same limit; a mirror keeps the smallest limit that its virtual
-    cameras ask for. Sums are linear for `each`, and of squares for `sigma`.
-
-    Args:
-        found: losses of the virtual cameras.
-        target_mm: that every virtual camera must see.
-        wanted: share of the pairs of shells in which all do, between 0 and 1.
+    cameras ask for. Sums are linear for `each`, and of squares for `sigma`, with which the wanted
+    share of the pairs of shells is good.
 
     Raises:
         InputError: a virtual camera sees less than the target as designed.
@@ -62,17 +58,11 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Limi
     seat = margin / parts / _positive(found.seat)
     each, sigma = (_smallest(found.mirror, of[found.camera]) for of in (each, sigma))
     places = PLACES[: found.loss.shape[1]]
-    return Limits(_floor(each, places), _floor(sigma, places), float(_floor(seat.min(), 1)))
+    return MirrorLimits(_floor(each, places), _floor(sigma, places), float(_floor(seat.min(), 1)))
 
 
-def whole_margin_steps(found: Sensitivities, limits: Limits, radius: Floats) -> Floats:
-    """Deviations (2 m, kinds) that would take a whole margin if losses were linear.
-
-    Args:
-        found: losses.
-        limits: that follow from them.
-        radius: of the mirrors (2 m,), mm: no step is more than half of it.
-    """
+def whole_margin_steps(found: Sensitivities, limits: MirrorLimits, radius: Floats) -> Floats:
+    """Deviations (2 m, kinds) that would linearly take a whole margin; radii (2 m,), mm."""
     steps = kinds_and_seat(found) * np.maximum(limits.each, SMALLEST_LIMIT)
     column = KINDS.index("radius")
     steps[:, column] = np.minimum(steps[:, column], radius / 2)

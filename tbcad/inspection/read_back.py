@@ -25,11 +25,8 @@ def check_read_back(
 ) -> None:
     """Compare all zones and radii in a file with what they should be.
 
-    Args:
-        path: file.
-        given: what was written.
-        centres: of the mirrors' spheres, by id, mm.
-        walls: point (mm) and normal of each wall of a pedestal, by its face's name, (6,).
+    Centres of the mirrors' spheres are by id, mm; walls of pedestals by their faces' names, point
+    (mm) and normal, (6,).
 
     Raises:
         StepError: one is missing, doubled, or not as given: a fault of tbcad.

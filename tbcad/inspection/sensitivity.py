@@ -9,16 +9,80 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.inspection.deviations import MM_PER_UM, Deviation, independent_classes
+from tbcad.geometry.vectors import unit
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerance.montecarlo.coverage import coverage, virtual_camera_numbers
-from tbcad.tolerance.montecarlo.draws import ShellDraws
-from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerance.montecarlo.edge_model import CURVATURE, EdgeModel, EdgeModels, edge_models
+from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Floats, Ints
 
+MM_PER_UM = 1e-3
+RAD_PER_MRAD = 1e-3
 KINDS = ("offset", "tilt", "radius", "wall")
 STEP = np.array([1.0, 0.02, 0.05, 1.0])  # um, mrad, mm, um: edges move by some micrometres
 SEAT_STEP_UM = 10.0
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Deviations of all mirrors of one half, the apex being the point that stays in its place.
+
+    Attributes:
+        offset: of the apex along the normal, toward the light, micrometres, (..., m).
+        tilt: of the normal about two axes across it, mrad, (..., m, 2).
+        radius: by which the sphere is too large, its apex in place, mm, (..., m).
+        wall: of all walls of the mirror's pedestal out of it, micrometres, (..., m).
+    """
+
+    offset: Floats
+    tilt: Floats
+    radius: Floats
+    wall: Floats
+
+    @classmethod
+    def none(cls, builds: int, mirrors: int) -> "Deviation":
+        """No deviation in some builds."""
+        shape = (builds, mirrors)
+        return cls(np.zeros(shape), np.zeros((*shape, 2)), np.zeros(shape), np.zeros(shape))
+
+    def __neg__(self) -> "Deviation":
+        return Deviation(-self.offset, -self.tilt, -self.radius, -self.wall)
+
+    def draws(self, model: EdgeModel) -> ShellDraws:
+        """The deviations as errors of simulated builds, everything else being as designed."""
+        builds, m = self.offset.shape
+        return replace(
+            draw(Errors(), 0, range(builds), m, walls=len(model.walls))[0],
+            centre=self._centre(model),
+            radius=self.radius,
+            wall=-MM_PER_UM * self.wall[..., model.walls.mirror],
+        )
+
+    def _centre(self, model: EdgeModel) -> Floats:
+        """How far the spheres' centres are off, mm, (s, m, 3)."""
+        radius = 1 / model.table[: len(model), CURVATURE]
+        along = self.offset * MM_PER_UM - self.radius
+        across = np.einsum("smk,mkd->smd", self.tilt * RAD_PER_MRAD, tilt_axes(model.normal))
+        moved: Floats = along[..., None] * model.normal - radius[:, None] * across
+        return moved
+
+
+def tilt_axes(normal: Floats) -> Floats:
+    """Two unit vectors across each normal (m, 3) toward which it tilts, (m, 2, 3)."""
+    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    first = unit(np.cross(normal, least))
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def independent_classes(neighbours: list[Ints]) -> Ints:
+    """Class of each mirror, (m,): no two touch each other or the same third mirror."""
+    colour = np.full(len(neighbours), -1)
+    for mirror, near in enumerate(neighbours):
+        reach = np.concatenate([near, *(neighbours[one] for one in near)])
+        taken = set(colour[reach].tolist())
+        colour[mirror] = next(c for c in range(len(neighbours)) if c not in taken)
+    return colour
 
 
 @dataclass(frozen=True)
@@ -52,10 +116,8 @@ def sensitivities(
 ) -> Sensitivities:
     """Losses of all virtual cameras by all that they depend on.
 
-    Args:
-        cameras: both, with their mirrors as designed, which are spheres.
-        steps: deviation of each mirror, a's first, whose loss is taken, (2 m, kinds); without them
-            small ones.
+    Steps are the deviation of each mirror, a's first, whose loss is taken, (2 m, kinds); without
+    them small ones. Mirrors are spheres.
     """
     models = edge_models(cameras)
     designed = _coverage(models, Deviation.none(1, len(models[0])))[0]
@@ -123,7 +185,6 @@ def _coverage(models: EdgeModels, deviation: Deviation, half: int = 0) -> Floats
 
 
 def _worse(designed: Floats, coverages: Iterable[Floats]) -> Floats:
-    """What is lost in the worse sense."""
     lowest = np.min(list(coverages), axis=0)
     return np.asarray(np.maximum(designed - lowest, 0.0))
 
@@ -137,13 +198,10 @@ def _seat_losses(models: EdgeModels, half: int, designed: Floats) -> Floats:
     moved = SEAT_STEP_UM * MM_PER_UM * np.eye(3)
     total = np.zeros_like(designed)
     for field, step in (("shell_shift", moved), ("shell_tilt", moved / np.ptp(y))):
-        both = (_seated(models, half, field, sign * step) for sign in (1.0, -1.0))
+        both = []
+        for rows in (step, -step):
+            draws = [Deviation.none(len(rows), len(one)).draws(one) for one in models]
+            draws[half] = replace(draws[half], **{field: rows})
+            both.append(coverage(models, (draws[0], draws[1]))[0])
         total += np.sqrt((_worse(designed, both) ** 2).sum(axis=0)) / SEAT_STEP_UM
     return total
-
-
-def _seated(models: EdgeModels, half: int, field: str, rows: Floats) -> Floats:
-    """Coverage of all virtual cameras when a half is moved or turned, (s, v)."""
-    draws: list[ShellDraws] = [Deviation.none(len(rows), len(one)).draws(one) for one in models]
-    draws[half] = replace(draws[half], **{field: rows})
-    return coverage(models, (draws[0], draws[1]))[0]

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.machine.machine import Machine
-from tbcad.machine.other_errors import DISTORTION, LED_MM, PRINCIPAL_PX
 from tbcad.optics.camera import LensCamera
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.simulate.prototype.plan import Plan
@@ -15,6 +14,18 @@ from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerance.prototype.windows import tilted_centres
 from tbcad.types import Bools, Floats
+
+# Along each axis, mm. Drawings of T-1 LEDs allow 0.25 mm, and a printed pocket has 0.3 mm of play,
+# both as two standard deviations: root of 0.125^2 + 0.15^2.
+LED_MM = 0.2
+# Of k1, k2, p1, p2, k3 of OpenCV's model. Judgement: lenses sold as free from distortion are off by
+# 1 % at the corner of a picture of 90 degrees, where r^2 is 1.5.
+DISTORTION = (7e-3, 2e-3, 3e-4, 3e-4, 0.0)
+# Of the optical axis on the sensor, along rows and columns, pixels. Judgement: 0.07 mm as two
+# standard deviations on pixels of 3.45 um. The camera is turned until the picture is where it
+# belongs, so this comes with the opposite tilt.
+PRINCIPAL_PX = 10.0
+
 
 # Random stream of a build's other errors, beyond those of its shells and its prototype.
 OTHER_STREAM = 2000
@@ -25,7 +36,6 @@ class BuiltPrototype:
     """A prototype with its k bodies, which caps have beside their reflecting spheres.
 
     Attributes:
-        machine: camera, axis, reflecting spheres and LEDs.
         body_centre: of the spheres in the seats at base angle zero, mm, (k, 3).
         body_radius: mm, (k,).
         walls: that end the mirrors of a shell; they do not turn with the base.
@@ -39,7 +49,7 @@ class BuiltPrototype:
 
 @dataclass(frozen=True)
 class OtherErrors:
-    """Errors that are no process's; see tbcad.machine.other_errors.
+    """Errors that are no process's; see tbcad.machine.built.
 
     Attributes:
         leds: mm, (l, 3).
@@ -62,28 +72,20 @@ def random_build(
     plan: Plan,
     errors: Errors,
     seed: int,
-    build: int = 0,
     *,
     wind_up: Floats,
 ) -> BuiltPrototype:
-    """One simulated build; the same that `tbcad tolerance` simulates, with a real lens and LEDs.
+    """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs.
 
-    Args:
-        designed: from tbcad.machine.designed.
-        plan: of the same export.
-        errors: of the process.
-        seed: of all builds.
-        build: number of the build.
-        wind_up: turn of the base under gravity at the plan's stops, radians, (t,): see
-            tbcad.tolerance.prototype.wind_up.
+    The wind-up is the turn of the base under gravity at the plan's stops, radians, (t,).
     """
-    draws = draw_prototypes(errors, seed, [build], is_cap(plan), wind_up)
-    return _built(designed, plan, draws, draw_other_errors(len(designed.leds), seed, build))
+    draws = draw_prototypes(errors, seed, [0], is_cap(plan), wind_up)
+    return _built(designed, plan, draws, draw_other_errors(len(designed.leds), seed))
 
 
-def draw_other_errors(leds: int, seed: int, build: int = 0, camera: int = 0) -> OtherErrors:
+def draw_other_errors(leds: int, seed: int, camera: int = 0) -> OtherErrors:
     """Errors of the lens, the sensor and so many LEDs, for a camera by its number from 0."""
-    key = np.random.SeedSequence(seed, spawn_key=(build, OTHER_STREAM + camera))
+    key = np.random.SeedSequence(seed, spawn_key=(0, OTHER_STREAM + camera))
     random = np.random.Generator(np.random.Philox(key))
     return OtherErrors(
         leds=LED_MM * random.standard_normal((leds, 3)),

@@ -21,7 +21,7 @@ class _Led(Record):
     position_mm: Vector
 
 
-class _Document(Record):
+class _LedsFile(Record):
     leds: list[_Led]
 
 
@@ -44,12 +44,7 @@ def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
 
 
 def designed_shell(reflector: Reflector, leds: Floats) -> Machine:
-    """One camera of the shell with its mirrors as spheres that do not move.
-
-    Args:
-        reflector: camera and mirrors, all of them curved.
-        leds: that are held at the object's place to calibrate it, mm, (l, 3).
-    """
+    """One camera of the shell with its curved mirrors as spheres at rest; LEDs (l, 3), mm."""
     mirrors = reflector.mirrors
     radius = 1 / mirrors.curvature
     return Machine(
@@ -70,7 +65,7 @@ def read_leds(folder: Path) -> Floats:
         InputError: the record cannot be read, or names none.
     """
     path = folder / RECORD
-    leds = read_json(path, _Document, SCHEMA, MISSING).leds
+    leds = read_json(path, _LedsFile, SCHEMA, MISSING).leds
     if not leds:
         raise InputError(
             f"{path} names no LEDs, which calibrate the machine: build it with the default of "

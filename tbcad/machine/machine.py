@@ -21,7 +21,6 @@ class Machine:
     """The state of a machine with k spheres, f frames and l LEDs.
 
     Attributes:
-        camera: that takes the photographs.
         axis: unit vector of the axis that the base rotates about, (3,).
         axis_point: a point of the axis, mm, (3,).
         angle: of the base in each frame, radians, (f,).
@@ -87,5 +86,4 @@ class Highlights:
     sigma: Floats
 
     def __len__(self) -> int:
-        """Number of highlights."""
         return len(self.frame)

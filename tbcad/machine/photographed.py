@@ -20,15 +20,6 @@ def machine_runs(
     """Both runs of a machine: for camera a's mirrors, and for camera b's, the object turned.
 
     At a stop that is no frame of the machine the base is taken to be where the plan has it.
-
-    Args:
-        export: mirrors and cameras of the shell.
-        plan: which ball stands in for which mirror at which stop.
-        machine: where camera, axis and balls are.
-        frames: that the machine has angles of.
-
-    Raises:
-        InputError: the machine has another number of balls than the export.
     """
     a, b = (machine_run(export, plan, machine, frames, half) for half in range(len(TURNS)))
     return a, b

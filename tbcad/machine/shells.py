@@ -38,11 +38,7 @@ def shell_frame(half: int) -> Frame:
 
 
 def designed_half(export: ExportedDesign, half: int) -> Machine:
-    """One camera of an export's shell; LEDs are where the prototype's stage has them.
-
-    Args:
-        export: of the design.
-        half: 0 for camera a, 1 for camera b.
+    """One camera of an export's shell, 0 for a and 1 for b; LEDs as on the prototype's stage.
 
     Raises:
         InputError: a mirror is planar: it shows no LED that could be told from its place.
@@ -90,11 +86,7 @@ def half_of(frames: tuple[Frame, ...]) -> int:
 
 
 def plan_of(export: ExportedDesign, geometry: Geometry, frames: tuple[Frame, ...]) -> Plan:
-    """The plan of the one machine that took some frames of a run.
-
-    Raises:
-        InputError: it cannot be read.
-    """
+    """The plan of the one machine that took some frames of a run."""
     if geometry == "prototype":
         return read_plan(export)
     return shell_plan(export, half_of(frames))
@@ -104,9 +96,7 @@ def tied(machines: list[tuple[Machine, tuple[Frame, ...]]]) -> list[Machine]:
     """Machines, each moved as a whole to where its LEDs are those of the first.
 
     Photographs alone do not tell where a machine is; but both cameras of a shell see the same LEDs.
-
-    Args:
-        machines: with their frames; one prototype stays where it is.
+    One prototype stays where it is.
     """
     first, *others = machines
     anchor = _led_middle(*first) if others else 0.0  # a prototype's record may be without LEDs
@@ -124,30 +114,18 @@ def _led_middle(machine: Machine, frames: tuple[Frame, ...]) -> Floats:
     return np.asarray(machine.leds.mean(axis=0) * _flip(half_of(frames)))
 
 
-def random_half(
-    export: ExportedDesign, half: int, errors: Errors, seed: int, build: int = 0
-) -> BuiltPrototype:
-    """One camera of a simulated build, the same that `tbcad tolerance` simulates.
+def random_half(export: ExportedDesign, half: int, errors: Errors, seed: int) -> BuiltPrototype:
+    """One camera of the first simulated build, the same that `tbcad tolerance` simulates.
 
     The mean of the scales along the axes is used for all three, and form errors are left out: a
     sphere stays a sphere.
-
-    Args:
-        export: of the design.
-        half: 0 for camera a, 1 for camera b.
-        errors: of the process.
-        seed: of all builds.
-        build: number of the build.
-
-    Raises:
-        InputError: the mirrors are planar.
     """
     designed, grooves = designed_half(export, half), export.reflectors[half].walls
     maps = warp_maps_of(edge_models(export.reflectors), errors)
-    drawn = draw(errors, seed, [build], len(designed.radius), maps, len(grooves))
+    drawn = draw(errors, seed, [0], len(designed.radius), maps, len(grooves))
     draws = _turned(drawn[half], _flip(half))
-    leds = draw_other_errors(len(designed.leds), seed, build).leds * _flip(half)
-    other = replace(draw_other_errors(len(designed.leds), seed, build, half), leds=leds)
+    leds = draw_other_errors(len(designed.leds), seed).leds * _flip(half)
+    other = replace(draw_other_errors(len(designed.leds), seed, half), leds=leds)
     scale, tilt = float(draws.scale.mean()), Rotation.from_rotvec(draws.shell_tilt[0])
     machine = replace(
         designed,

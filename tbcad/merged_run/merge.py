@@ -13,12 +13,16 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS, machine_run, stops_known
 from tbcad.machine.record import RECORD, read_machine
 from tbcad.machine.shells import NOT_SERVED, plan_of, tied
-from tbcad.merged_run.corrections import Corrections, Options, corrections
 from tbcad.merged_run.ray_sigmas import ray_sigmas
-from tbcad.merged_run.stop_photographs import CorrectedPhotographs, common_exposure
+from tbcad.merged_run.stop_photographs import (
+    CorrectedPhotographs,
+    Corrections,
+    MergeOptions,
+    common_exposure,
+    corrections,
+)
 from tbcad.runs.exposure import LIT, Frame
-from tbcad.runs.photographs import Run, read_run
-from tbcad.runs.same_export import check_same_export
+from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.simulate.prototype.merge import merge_photographs, merge_plan
 from tbcad.simulate.prototype.plan import Plan
@@ -34,7 +38,6 @@ class HalfMerge:
 
     Attributes:
         run: where camera and balls are.
-        photographs: of its stops.
         pixels: of each mirror with a ray, filled in as the merge goes on, (m,).
     """
 
@@ -77,7 +80,6 @@ class Merge:
     Attributes:
         halves: for each camera of the shell that photographs were taken for.
         capture_mm: diameter of the capture sphere.
-        facts: what the merge is based on.
         ray_sigma_mm: root mean square error of the rays of each mirror at the object, by camera;
             None where the calibration does not say.
     """
@@ -95,14 +97,8 @@ class Merge:
         ]
 
 
-def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Options) -> Merge:
+def prepared_merge(folder: Path, calibration: Path, exports: Path, options: MergeOptions) -> Merge:
     """Read what a merge needs, but the photographs themselves.
-
-    Args:
-        folder: of the run.
-        calibration: folder with machine.json.
-        exports: folder that the machine was built from.
-        options: how the photographs are corrected.
 
     Raises:
         InputError: one cannot be read, they do not belong together, or nothing was photographed.
@@ -131,7 +127,7 @@ def _halves(
     export: ExportedDesign,
     calibration: Path,
     calibrated: tuple[Machine, tuple[Frame, ...]],
-    options: Options,
+    options: MergeOptions,
 ) -> list[HalfMerge]:
     """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
     machine, frames = calibrated
@@ -179,7 +175,9 @@ def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
         )
 
 
-def _facts(export: ExportedDesign, run: Run, calibration: Path, options: Options) -> dict[str, Any]:
+def _facts(
+    export: ExportedDesign, run: Run, calibration: Path, options: MergeOptions
+) -> dict[str, Any]:
     return {
         "object": f"photographs of {run.folder.name}",
         "design": export.spec.name,

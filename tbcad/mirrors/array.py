@@ -70,7 +70,6 @@ class MirrorArray:
         return len(self.u)
 
     def __repr__(self) -> str:
-        """Return camera, number of mirrors and minimum coverage."""
         minimum = self.coverage.min()
         return (
             f"<MirrorArray of camera {self.camera_id}: {len(self)} mirrors, "
@@ -125,15 +124,7 @@ class MirrorDesign:
 
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
-    """Directions, poses, radii and cells of all mirrors (section 3 of the paper).
-
-    Args:
-        spec: the design.
-        progress: called with the state of the search for radii.
-
-    Raises:
-        SpecError: when the spec's mirrors cannot be made; it names them.
-    """
+    """Directions, poses, radii and cells of all mirrors (section 3 of the paper); or SpecError."""
     array = _half_a(spec, progress)
     check_clearance(spec, array, _half_a)
     hfov = round(float(np.degrees(array.camera.hfov)), HFOV_DIGITS)
@@ -149,15 +140,11 @@ def numbering_order(u: Floats) -> Ints:
 
 
 def numbered_directions(n: int, stretch: tuple[float, float] = UNSTRETCHED) -> tuple[Floats, Ints]:
-    """Directions and faces of a stretched geodesic polyhedron, camera a's mirrors first.
-
-    Args:
-        n: frequency of the polyhedron.
-        stretch: along x and y (spec.design.OpticsSpec).
+    """Directions and faces of a geodesic polyhedron of frequency n, stretched along x and y.
 
     Returns:
-        Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and
-        the outward triangles over them, (20 n^2, 3).
+        Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and the
+        outward triangles over them, (20 n^2, 3).
     """
     vertices, faces = geodesic(n)
     u = stretched(vertices, *stretch)
@@ -233,7 +220,6 @@ def mirror_margins(spec: MirrorsSpec, mirrors: int) -> Floats:
 
 
 def _camera(sensor: CameraSpec, pinhole: Floats, corners: Floats) -> Camera:
-    """The camera in front of the corners (k, 3) of all cells, mm."""
     hfov = np.radians(_view_angle_deg(sensor, pinhole, corners))
     return fitted_camera(pinhole, corners, sensor.width_px, sensor.height_px, float(hfov))
 

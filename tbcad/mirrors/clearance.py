@@ -10,8 +10,9 @@ from scipy.optimize import brentq
 
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.optics.object_light import closest_passage, passing_distances
-from tbcad.spec.design import MAX_SEMI_MINOR, OpticsSpec, Spec
+from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
+from tbcad.spec.sizes import MAX_SEMI_MINOR, OpticsSpec
 from tbcad.types import Floats
 
 if TYPE_CHECKING:
@@ -27,11 +28,6 @@ STEPS_PER_MM = 10  # of the sizes tried
 
 def check_clearance(spec: Spec, array: MirrorArray, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
-
-    Args:
-        spec: of the design.
-        array: camera a's mirrors.
-        solve: the mirrors of another spec, to try remedies.
 
     Raises:
         SpecError: with the mirror, and sizes with which the light passes the object.

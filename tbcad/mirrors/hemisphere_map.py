@@ -16,9 +16,6 @@ def hemisphere_map(arrays: tuple[MirrorArray, MirrorArray]) -> str:
 
     Lambert's azimuthal projection: equal areas, the zenith in the middle, x to the right. Planar
     mirrors, which have no radius, have all one colour.
-
-    Args:
-        arrays: both cameras' mirrors.
     """
     u = np.concatenate([array.u for array in arrays])
     radius = np.concatenate([array.mirrors.radius for array in arrays])

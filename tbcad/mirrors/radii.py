@@ -79,11 +79,7 @@ class RadiusProblem:
 
     @cached_property
     def plan(self) -> PedestalPlan:
-        """Of pedestals, which depends neither on curvatures nor on aims.
-
-        Raises:
-            NotRegularError: the grooves leave no outline of a mirror.
-        """
+        """Of pedestals, which depends neither on curvatures nor on aims."""
         return self._plan(self.groove or 0.0)
 
     def _plan(self, groove: float) -> PedestalPlan:
@@ -129,11 +125,8 @@ def solve_radii(
 ) -> tuple[Cells, Floats]:
     """Cells of the mirrors with radii by a rule, and their coverage diameters (m,), mm.
 
-    Args:
-        rule: "traced" (exact rays), "paper" (eqs. 1 and 2 of the paper; nearly flat where those
-            give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.).
-        problem: poses and bounding planes of the mirrors.
-        progress: called with the state of the search.
+    Rules are "traced" (exact rays), "paper" (eqs. 1 and 2 of the paper; nearly flat where those
+    give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.).
 
     Raises:
         SpecError: when the mirrors do not close to one array, or rule traced finds no radii.

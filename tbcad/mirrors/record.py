@@ -49,14 +49,7 @@ def mirror_rows(array: MirrorArray) -> list[Row]:
 def write_record(
     folder: Path, design: MirrorDesign, shells: bool, mandrels: Sequence[Record] = ()
 ) -> None:
-    """Write mirrors.csv and design.json.
-
-    Args:
-        folder: to write into.
-        design: the mirrors.
-        shells: whether the shells' files are there too.
-        mandrels: records of the shells' negatives that are there too.
-    """
+    """Write mirrors.csv and design.json, with shells and their negatives where they are there."""
     write_table(
         folder / MIRRORS_FILE,
         COLUMNS,

@@ -22,13 +22,7 @@ ROUNDING_MM = 1e-9
 
 
 def aimed(mirrors: Surfaces, pinhole: Floats, aim: Floats) -> Surfaces:
-    """Camera a's mirrors, turned about their apices to send the ray there to a point on the x axis.
-
-    Args:
-        mirrors: that send the ray from the pinhole to the apex on to the origin, (m,).
-        pinhole: of camera a, mm, (3,).
-        aim: distance of the point from the origin, on camera b's side, mm, (m,).
-    """
+    """Camera a's mirrors, turned to send the ray at the apex to x = -aim, mm, (m,) each."""
     to_point = -aim[:, None] * X - mirrors.apex
     normal = unit(unit(pinhole - mirrors.apex) + unit(to_point))
     normal = np.where((aim == 0)[:, None], mirrors.normal, normal)
@@ -40,16 +34,8 @@ def cut_positions(cells: Cells, pinhole: Floats, radius: float | Floats) -> Floa
 
     The image is where the rays camera -> cut -> reflected pierce the plane through the origin that
     faces the virtual camera. Camera a's half sees what lies at larger x, camera b's, its mirror
-    image, what lies at smaller -x. Above zero neither sees a stretch twice as wide.
-
-    Args:
-        cells: of camera a's m mirrors.
-        pinhole: of camera a, mm, (3,).
-        radius: how far along the seam from the origin the image counts, of the object or for each
-            mirror, mm, () or (m,).
-
-    Returns:
-        Minus infinity for whole mirrors.
+    image, what lies at smaller -x. Above zero neither sees a stretch twice as wide. It counts
+    within a radius along the seam, () or (m,), and is minus infinity for whole mirrors.
     """
     mirror, x, along = cut_images(cells, pinhole)
     largest = np.full(cells.mirrors, -np.inf)
@@ -59,16 +45,7 @@ def cut_positions(cells: Cells, pinhole: Floats, radius: float | Floats) -> Floa
 
 
 def seam_gaps(cells: Cells, pinhole: Floats, radius: float) -> Floats:
-    """Widest stretch of the object (mm) that neither half of each mirror sees, mm, (m,).
-
-    Args:
-        cells: of camera a's m mirrors.
-        pinhole: of camera a, mm, (3,).
-        radius: of the object, mm.
-
-    Returns:
-        Zero for whole mirrors.
-    """
+    """Widest stretch of the object that neither half of each mirror sees, mm, (m,); or zero."""
     position = cut_positions(cells, pinhole, radius)
     return np.where(position > ROUNDING_MM, 2 * position, 0.0)
 

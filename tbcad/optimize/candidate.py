@@ -1,11 +1,16 @@
 """What is varied, and what a candidate is judged by."""
 
+import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import ValidationError
 
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
 from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.optimize.views import ViewsBy, mean_ssim
 from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels
@@ -22,6 +27,8 @@ CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
 
 Place = tuple[float, float, float, float, float]
 """Camera's x and z, and the semi-minor axis, mm; stretch of the directions along x and y."""
+SCHEMA = "tbcad-candidates/2"
+Record: TypeAlias = dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -48,12 +55,11 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Limits:
+class MachineLimits:
     """What a candidate may need at most.
 
     Attributes:
         size_mm: longest side of the machine.
-        view_angle_deg: of the lens.
     """
 
     size_mm: float
@@ -67,11 +73,10 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class DesignCandidate:
     """A place and what it gives.
 
     Attributes:
-        place: what was varied.
         figures: None where it cannot be made.
         reason: why it cannot, in one line.
     """
@@ -88,12 +93,7 @@ def place_of(spec: Spec) -> Place:
 
 
 def bounds(spec: Spec, size_mm: float) -> list[tuple[float, float]]:
-    """Least and largest of each variable; the place that a search begins from is within.
-
-    Args:
-        spec: the first design.
-        size_mm: longest side of the largest machine.
-    """
+    """Least and largest of each variable; the first design is within, whatever the size."""
     x, z, semi_minor, *stretch = place_of(spec)
     depth = max(CAMERA_Z * size_mm, -z)
     return [
@@ -125,27 +125,19 @@ def placed(spec: Spec, place: Place) -> Spec:
 
 
 def evaluate(
-    spec: Spec, ssim_within: Limits | None, place: Place, method: ViewsBy = "nearest"
-) -> Candidate:
-    """Design the mirrors of a place, and count pixels.
-
-    Args:
-        spec: the first design.
-        ssim_within: limits within which views are compared, too, since it takes longest; None:
-            nowhere.
-        place: what is varied.
-        method: of the views that are compared.
-    """
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: ViewsBy = "nearest"
+) -> DesignCandidate:
+    """Design the mirrors of a place, count pixels, and compare views within limits, if given."""
     try:
         designed = design(placed(spec, place))
         figures = figures_of(designed)
         if ssim_within and ssim_within.excess(figures) == 0:
             figures = replace(figures, ssim=mean_ssim(designed, method))
-        return Candidate(place, figures)
+        return DesignCandidate(place, figures)
     except ValidationError as error:
-        return Candidate(place, None, error.errors()[0]["msg"])
+        return DesignCandidate(place, None, error.errors()[0]["msg"])
     except SpecError as error:
-        return Candidate(place, None, str(error))
+        return DesignCandidate(place, None, str(error))
 
 
 def figures_of(designed: MirrorDesign) -> Figures:
@@ -181,3 +173,42 @@ def size_of(array: MirrorArray) -> float:
     points = np.abs(np.vstack([apex, array.camera.pinhole])[:, 0]).max()
     rest = np.vstack([apex, array.camera.pinhole])[:, 1:]
     return float(max(2 * points, *np.ptp(rest, axis=0)))
+
+
+def store_bytes(key: str, judged: dict[Place, DesignCandidate]) -> bytes:
+    """The file of candidates of the design with a key."""
+    head = {"schema": SCHEMA, "design": key}
+    rows = [head, *map(asdict, judged.values())]
+    return "".join(json.dumps(row) + "\n" for row in rows).encode()
+
+
+def read_store(store: Path, key: str) -> dict[Place, DesignCandidate]:
+    """Judgements of an earlier search of the same key; none where there is no file."""
+    if not store.exists():
+        return {}
+    try:
+        head, *rows = map(parse_json, store.read_text(encoding="utf-8").splitlines())
+        known = head["design"] == key
+        found = [_candidate(row) for row in rows]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
+    if not known:
+        raise InputError(
+            f"{store}: of another design or method: name another --out, or remove the file"
+        )
+    return {one.place: one for one in found}
+
+
+def _candidate(row: Record) -> DesignCandidate:
+    place, figures = row["place"], row["figures"]
+    x, z, semi_minor, along_x, along_y = np.array(place, dtype=float).tolist()
+    if figures is not None and not isinstance(figures, dict):
+        raise ValueError("figures are not an object")
+    numbers = {
+        name: None if number is None else float(number) for name, number in (figures or {}).items()
+    }
+    return DesignCandidate(
+        (x, z, semi_minor, along_x, along_y),
+        Figures(**numbers) if figures else None,  # type: ignore[arg-type]
+        str(row["reason"]),
+    )

@@ -9,7 +9,7 @@ import numpy as np
 
 from tbcad.figure_files import PlotFormat
 from tbcad.formats.toml import toml_text
-from tbcad.optimize.candidate import Candidate, Figures, placed
+from tbcad.optimize.candidate import DesignCandidate, Figures, placed
 from tbcad.optimize.search import SearchResult
 from tbcad.results.plots import Panel, Series, plot_file
 from tbcad.results.tables import Table, csv_text
@@ -38,14 +38,7 @@ Groups = dict[str, tuple[list[Figures], str]]
 def search_files(
     result: SearchResult, spec: Spec, out: Path, plot: PlotFormat = "png"
 ) -> dict[str, bytes]:
-    """The files of a search by name: the same search gives the same bytes.
-
-    Args:
-        result: of the search.
-        spec: the design that it began from.
-        out: the TOML file; the others are named after it.
-        plot: kind of the plot.
-    """
+    """The files of a search, beside out, by name: the same search gives the same bytes."""
     return {
         out.name: design_text(result, spec).encode(),
         f"{out.stem}-candidates.csv": csv_text(candidate_table(result)).encode(),
@@ -127,7 +120,7 @@ def _column(some: list[Figures], name: str) -> Floats:
     return np.array([getattr(one, name) for one in some])
 
 
-def _record(one: Candidate) -> dict[str, str | int | float | None]:
+def _record(one: DesignCandidate) -> dict[str, str | int | float | None]:
     numbers = {name: getattr(one.figures, name, None) for name in FIGURES}
     place = dict(zip(COLUMNS, one.place, strict=False))
     return {**place, **numbers, "reason": one.reason}

@@ -14,16 +14,17 @@ from scipy.optimize import Bounds, differential_evolution
 from tbcad.atomic_files import replace_files
 from tbcad.errors import InputError
 from tbcad.optimize.candidate import (
-    Candidate,
+    DesignCandidate,
     Figures,
-    Limits,
+    MachineLimits,
     Place,
     bounds,
     evaluate,
     place_of,
+    read_store,
     rounded,
+    store_bytes,
 )
-from tbcad.optimize.store import read_store, store_bytes
 from tbcad.optimize.views import ViewsBy
 from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
@@ -39,7 +40,7 @@ IMPOSSIBLE = 1e6  # value of a place where nothing can be made
 BEYOND = 1e2  # value of a place beyond the limits: more than any within
 EXCESS = 1e2  # value of a relative excess of 1 over a limit
 MOST = 0.7  # weight that one objective has at least, where it counts most
-ANY_SIZE = Limits(np.inf, np.inf)
+ANY_SIZE = MachineLimits(np.inf, np.inf)
 
 LOSSES: dict[Objective, Callable[[Figures], float]] = {
     "minimum": lambda one: -np.log(max(one.minimum_px, 1)),
@@ -56,7 +57,6 @@ class Search:
     """What a search is asked.
 
     Attributes:
-        spec: the design that it begins from.
         objectives: what is made better; all count alike, as ratios to the first design.
         budget: number of places that are judged at most.
         max_size_mm: longest side of the machine; None: of the first design's.
@@ -73,9 +73,9 @@ class Search:
     front: bool = False
     method: ViewsBy = "nearest"
 
-    def limits(self, start: Figures) -> Limits:
+    def limits(self, start: Figures) -> MachineLimits:
         """What candidates must keep, by the figures of the first design."""
-        return Limits(
+        return MachineLimits(
             self.max_size_mm or start.size_mm, self.max_view_angle_deg or start.view_angle_deg
         )
 
@@ -92,26 +92,19 @@ class SearchResult:
     """What a search found.
 
     Attributes:
-        start: the design that it began from.
-        limits: that candidates had to keep.
-        best: the best candidate.
         candidates: all that were judged, in the order in which they were.
         on_front: which of them no other one that keeps the limits betters in all objectives.
     """
 
-    start: Candidate
-    limits: Limits
-    best: Candidate
-    candidates: tuple[Candidate, ...]
+    start: DesignCandidate
+    limits: MachineLimits
+    best: DesignCandidate
+    candidates: tuple[DesignCandidate, ...]
     on_front: tuple[bool, ...]
 
 
 def parse_objectives(names: Sequence[str]) -> tuple[Objective, ...]:
-    """Objectives from their names, each once.
-
-    Raises:
-        InputError: a name is none.
-    """
+    """Objectives from their names, each once."""
     for name in names:
         if name not in OBJECTIVES:
             known = ", ".join(OBJECTIVES)
@@ -127,12 +120,8 @@ def search(
 ) -> SearchResult:
     """Search a better place of camera and ellipsoid.
 
-    Args:
-        asked: the design, what to improve, limits.
-        store: file of judgements (JSON lines): it is read when it exists, and written after
-            every generation, so that a search that was stopped goes on.
-        scheduler: address of a Dask scheduler; None for this machine's cores.
-        progress: called after every generation.
+    The store, a file of judgements (JSON lines), is read when it exists, and written after every
+    generation, so that a search that was stopped goes on.
 
     Raises:
         InputError: the first design cannot be made; the store is of another design.
@@ -178,11 +167,11 @@ def _even(objectives: int) -> Floats:
 
 def _evolve(
     asked: Search,
-    limits: Limits,
+    limits: MachineLimits,
     start: Place,
     generations: int,
-    judge: Callable[[Limits, Sequence[Place]], list[Candidate]],
-    value: Callable[[Candidate], float],
+    judge: Callable[[MachineLimits, Sequence[Place]], list[DesignCandidate]],
+    value: Callable[[DesignCandidate], float],
 ) -> None:
     """Judge generations of places, each nearer to the lowest value."""
     differential_evolution(
@@ -208,10 +197,10 @@ def _never_called(place: Floats) -> float:
 
 def _value(
     objectives: Sequence[Objective],
-    limits: Limits,
+    limits: MachineLimits,
     start: Figures,
     weights: Floats,
-    one: Candidate,
+    one: DesignCandidate,
 ) -> float:
     """What is minimised: the weighted mean of all objectives, relative to the first design."""
     if one.figures is None:
@@ -230,13 +219,13 @@ def objective_losses(objectives: Sequence[Objective], start: Figures, one: Figur
 
 def _judge(
     asked: Search,
-    judged: dict[Place, Candidate],
+    judged: dict[Place, DesignCandidate],
     store: Path | None,
     scheduler: str | None,
     progress: Progress,
-    limits: Limits,
+    limits: MachineLimits,
     places: Sequence[Place],
-) -> list[Candidate]:
+) -> list[DesignCandidate]:
     """Candidates at places, of which only those are worked out that the store does not have."""
     wanted = limits if "ssim" in asked.objectives else None
     new = [p for p in dict.fromkeys(places) if _is_open(asked.objectives, limits, judged.get(p))]
@@ -250,7 +239,9 @@ def _judge(
     return [judged[place] for place in places]
 
 
-def _is_open(objectives: Sequence[Objective], limits: Limits, known: Candidate | None) -> bool:
+def _is_open(
+    objectives: Sequence[Objective], limits: MachineLimits, known: DesignCandidate | None
+) -> bool:
     """Whether a candidate has to be judged, or judged again."""
     if known is None or known.figures is None:
         return known is None
@@ -264,9 +255,9 @@ def _lacks(objectives: Sequence[Objective], figures: Figures) -> bool:
 
 def _losses(
     objectives: Sequence[Objective],
-    limits: Limits,
+    limits: MachineLimits,
     start: Figures,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[DesignCandidate],
 ) -> Floats:
     """Losses of all candidates, (k, objectives); infinite beyond the limits."""
     none = [np.inf] * len(objectives)

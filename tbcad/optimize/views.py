@@ -39,8 +39,6 @@ class Truth:
     """What real cameras would see of the built-in object.
 
     Attributes:
-        scene: the object.
-        cameras: the viewpoints.
         pictures: from each, (h, w, 3).
     """
 
@@ -50,12 +48,7 @@ class Truth:
 
 
 def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:
-    """Mean SSIM of views over the frame, from the stated viewpoints.
-
-    Args:
-        design: the mirrors.
-        method: views by the nearest rays, or by a coarse field that is fitted to all rays.
-    """
+    """Mean SSIM of views over the frame, from the stated viewpoints."""
     with _one_at_a_time:
         truth = _truth(design.spec.optics.capture_diameter_mm)
     tiles = MirrorTiles(traced_light_field(design, truth.scene))

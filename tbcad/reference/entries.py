@@ -16,7 +16,7 @@ LIKENESS = 0.6
 
 
 @dataclass(frozen=True)
-class Entry:
+class ReferenceEntry:
     """One thing that is explained.
 
     Attributes:
@@ -43,7 +43,7 @@ def plain(name: str) -> str:
     return re.sub(r"[\s_,`-]+", "", text).casefold()
 
 
-def terms_and_keys() -> Iterator[Entry]:
+def terms_and_keys() -> Iterator[ReferenceEntry]:
     """Every term, section and key."""
     for term in glossary().terms:
         yield _term_entry(term)
@@ -51,13 +51,13 @@ def terms_and_keys() -> Iterator[Entry]:
         yield from _section_entries(section)
 
 
-def explained(word: str, entries: Iterable[Entry]) -> list[Entry]:
+def explained(word: str, entries: Iterable[ReferenceEntry]) -> list[ReferenceEntry]:
     """All entries of one name.
 
     Raises:
         InputError: there is none; it names those that are alike.
     """
-    by_name: dict[str, list[Entry]] = {}
+    by_name: dict[str, list[ReferenceEntry]] = {}
     shown: dict[str, str] = {}
     for entry in entries:
         for name in dict.fromkeys((entry.name, *entry.names)):
@@ -73,7 +73,7 @@ def explained(word: str, entries: Iterable[Entry]) -> list[Entry]:
     raise InputError(f"nothing is known of {word!r}: {hint}")
 
 
-def _term_entry(term: Term) -> Entry:
+def _term_entry(term: Term) -> ReferenceEntry:
     columns = [column for file in term.files for column in file.partition(": ")[2].split(", ")]
     symbols = [symbol for symbol in term.symbol.split(", ") if symbol]
     facts: dict[str, str | list[str]] = {
@@ -85,14 +85,14 @@ def _term_entry(term: Term) -> Entry:
         "files": list(term.files),
         "code": list(term.code),
     }
-    return Entry("term", term.name, _filled(facts), (*term.aliases, *symbols, *columns))
+    return ReferenceEntry("term", term.name, _filled(facts), (*term.aliases, *symbols, *columns))
 
 
-def _section_entries(section: KeySection) -> Iterator[Entry]:
+def _section_entries(section: KeySection) -> Iterator[ReferenceEntry]:
     if section.name:
         names = [key.name for key in section.keys]
         facts: dict[str, str | list[str]] = {"meaning": section.description, "keys": names}
-        yield Entry("section", section.name, facts, _ends(section.name))
+        yield ReferenceEntry("section", section.name, facts, _ends(section.name))
     for key in section.keys:
         facts = {
             "meaning": key.description,
@@ -101,7 +101,7 @@ def _section_entries(section: KeySection) -> Iterator[Entry]:
             "unit": key.unit,
             "allowed": key.allowed,
         }
-        yield Entry("key", key.name, _filled(facts), _ends(key.name))
+        yield ReferenceEntry("key", key.name, _filled(facts), _ends(key.name))
 
 
 def _ends(name: str) -> tuple[str, ...]:

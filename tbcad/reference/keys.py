@@ -44,7 +44,6 @@ class Key:
         type: "number", "one of several words" ...
         default: as TOML.
         unit: empty where it has none.
-        allowed: values.
         description: one sentence or two.
     """
 

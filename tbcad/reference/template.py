@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from tbcad.formats.toml import toml_text
 from tbcad.reference.keys import Key, KeySection, key_sections
 from tbcad.spec.files import Table, read_text, read_toml
-from tbcad.spec.shipped import PAPER, shipped_designs
+from tbcad.spec.load import PAPER, shipped_designs
 
 WIDTH = 100
 # Set in the file, so that they are seen; all others are comments until a user takes the # away.

@@ -97,3 +97,20 @@ def _exposure(folder: Path, record: RunRecord, frame: Frame, phase: str) -> Expo
     if changed:
         raise InputError(f"{path}: {changed[0]} is not what the run is locked to: {AGAIN}")
     return found
+
+
+def check_same_export(run: Run, exports: Path) -> None:
+    """Compare the files that the run depends on with what they were when it began.
+
+    Raises:
+        InputError: one has changed or is missing.
+    """
+    for name, digest in run.record.export_sha256.items():
+        path = exports / name
+        if not path.is_file():
+            raise InputError(f"{path} is not there, but {run.folder} was photographed with it")
+        if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
+            raise InputError(
+                f"{path} is not the file that {run.folder} was photographed with: name the export "
+                "of that run with --exports"
+            )

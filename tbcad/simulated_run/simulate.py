@@ -43,7 +43,7 @@ from tbcad.simulated_run.photographs import (
 )
 from tbcad.simulated_run.sensor import Image16, Sensor
 from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.wind_up import read_wind_up
+from tbcad.tolerance.prototype.draws import read_wind_up
 from tbcad.types import Progress
 
 CAMERA = "simulated"

@@ -40,12 +40,7 @@ def read_rows(
 ) -> Iterator[tuple[str, Row]]:
     """Yield each row that is not empty, with its place as text for error messages.
 
-    Args:
-        file: as `tbcad.spec.files.read_text` takes it.
-        name: of the file in error messages.
-        columns: that the header must name, each once.
-        numbers: columns of numbers; they are yielded with decimal points.
-        others: whether there may be other columns, which are left out.
+    Numbers are yielded with decimal points; columns beside the named ones are refused, or left out.
 
     Raises:
         SpecError: when the file cannot be read or is not such a table; it names the line.
@@ -122,7 +117,6 @@ def _names(cells: Sequence[str]) -> list[str]:
 def _places(
     header: list[str], columns: Sequence[str], where: str, separator: str, others: bool
 ) -> dict[str, int]:
-    """Position of each column."""
     found = _names(header)
     count = Counter(found)
     missing = [column for column in columns if column not in count]
@@ -167,22 +161,14 @@ def _write_points(rows: list[tuple[str, Row]], numbers: Collection[str]) -> None
 
 
 def required_text(where: str, row: Row, column: str) -> str:
-    """Return a cell that must not be empty.
-
-    Raises:
-        SpecError: when it is; it names the place and the column.
-    """
+    """Return a cell that must not be empty."""
     if not row[column]:
         raise SpecError(f"{where}, column {column}: empty: fill it in")
     return row[column]
 
 
 def positive_number(where: str, row: Row, column: str, maximum: float) -> float:
-    """Return a cell that must be a number above 0 and at most a maximum.
-
-    Raises:
-        SpecError: when it is not; it names the place, the column and what is allowed.
-    """
+    """Return a cell that must be a number above 0 and at most a maximum."""
     value = _value(row[column])
     if not 0 < value <= maximum:
         raise _no_number(where, row, column, f"above 0 to {maximum:g}")
@@ -190,11 +176,7 @@ def positive_number(where: str, row: Row, column: str, maximum: float) -> float:
 
 
 def number(where: str, row: Row, column: str, maximum: float) -> float:
-    """Return a cell that must be a number whose size is at most a maximum.
-
-    Raises:
-        SpecError: as `positive_number`.
-    """
+    """Return a cell that must be a number whose size is at most a maximum."""
     value = _value(row[column])
     if not abs(value) <= maximum:
         raise _no_number(where, row, column, f"from {-maximum:g} to {maximum:g}")
@@ -214,11 +196,7 @@ def _no_number(where: str, row: Row, column: str, allowed: str) -> SpecError:
 
 
 def check_unique(where: str, row: Row, column: str, known: set[str]) -> None:
-    """Add a cell to the values that a column already has.
-
-    Raises:
-        SpecError: when it is one of them; it names the place and the column.
-    """
+    """Add a cell to the values that a column already has, and refuse it if it is one of them."""
     if row[column] in known:
         raise SpecError(f"{where}, column {column}: {short_text(row[column])} twice: remove one")
     known.add(row[column])

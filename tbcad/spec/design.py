@@ -13,13 +13,12 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import PrototypeSpec
-from tbcad.spec.section import OrWord, Reason, Section, as_tuple
-from tbcad.spec.sizes import with_sizes
+from tbcad.spec.section import OrWord, Section, as_tuple
+from tbcad.spec.sizes import OpticsSpec, with_sizes
 
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
 FIT: Any = "fit"  # value of camera.hfov_deg that follows from the mirrors
 MAX_HFOV = 170  # degrees
-MAX_SEMI_MINOR = 5000.0
 
 
 def _current(value: object) -> object:
@@ -33,41 +32,11 @@ def _current(value: object) -> object:
     return value
 
 
-Point: TypeAlias = Annotated[
-    tuple[
-        Annotated[float, Field(gt=0, le=10_000)],
-        Annotated[float, Field(ge=-10_000, le=10_000)],
-        Annotated[float, Field(ge=-10_000, lt=0)],
-    ],
-    BeforeValidator(as_tuple),
-]
-Stretch: TypeAlias = Annotated[float, Field(ge=0.5, le=2.0)]
 EdgeKind: TypeAlias = Literal["valley", "pedestal"]
 RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
 MAX_MARGIN = 20.0
 MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
 Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
-
-
-class OpticsSpec(Section):
-    """Where the mirrors, the cameras and the object are."""
-
-    n: Annotated[int, Reason("at n = 1 no camera sees a mirror whole")] = Field(18, ge=2, le=60)
-    """Subdivision of the icosahedron: both halves together have about 5 n^2 mirrors, 1657 at n
-    = 18."""
-    capture_diameter_mm: float = Field(60.0, gt=0, le=1000)
-    """Diameter of the capture sphere, which every virtual camera must see whole. At the paper's
-    geometry 60 is the limit: larger, and the object blocks light between mirrors and cameras."""
-    camera_mm: Point = (100.0, 0.0, -100.0)
-    """Pinhole of camera a; camera b is its mirror image in the plane x = 0. z points up, the
-    object is at the origin."""
-    semi_minor_mm: float = Field(100.0, ge=1, le=MAX_SEMI_MINOR)
-    """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole. Larger:
-    mirrors farther away."""
-    stretch: Annotated[tuple[Stretch, Stretch], BeforeValidator(as_tuple)] = (1.0, 1.0)
-    """Directions of the virtual cameras, stretched along x and y and brought back to the unit
-    sphere; 1 and 1: those of the geodesic polyhedron, as the paper has them. Above 1: more of them
-    near the horizon, fewer near the zenith, where mirrors have fewest pixels."""
 
 
 class CameraSpec(Section):
@@ -212,7 +181,6 @@ class Spec(Section):
     prototype: PrototypeSpec = PrototypeSpec()
 
     def __repr__(self) -> str:
-        """Return name and subdivision; `spec_dict` gives every key."""
         return f"<Spec {self.name!r}: n = {self.optics.n}>"
 
     __str__ = __repr__

@@ -121,12 +121,9 @@ def unknown_key(where: str, key: str, model: type[BaseModel]) -> SpecError:
             f"{where}: {key} is a section: set one of {', '.join(_inside(key, known))}"
         )
     likely = nearest_key(key, known)
-    hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(_siblings(key, known))
+    siblings = _inside(key.rpartition(".")[0], known) or _inside("", known)
+    hint = f"did you mean {likely}?" if likely else "known are " + ", ".join(siblings)
     return SpecError(f"{where}: unknown key {key}: {hint}")
-
-
-def _siblings(key: str, known: list[str]) -> list[str]:
-    return _inside(key.rpartition(".")[0], known) or _inside("", known)
 
 
 def _inside(section: str, known: list[str]) -> list[str]:
@@ -136,14 +133,7 @@ def _inside(section: str, known: list[str]) -> list[str]:
 def validation_error(
     error: ValidationError, model: type[BaseModel], file: str, options: Collection[str] = ()
 ) -> SpecError:
-    """Return the first error of a validation as one line, and how many more there are.
-
-    Args:
-        error: what pydantic found.
-        model: the model that was validated.
-        file: where the design came from.
-        options: dotted keys that options have set.
-    """
+    """Return the first error of a validation as one line, and how many more there are."""
     first, *others = error.errors(include_url=False)
     key = ".".join(part for part in first["loc"] if isinstance(part, str))
     more = f" (and {len(others)} more)" if others else ""

@@ -27,16 +27,7 @@ Table: TypeAlias = dict[str, Any]
 
 
 def read_toml(file: Path | Traversable, name: str, kind: str) -> Table:
-    """Return a TOML file as a table.
-
-    Args:
-        file: text as for `read_text`.
-        name: of the file in error messages.
-        kind: what it should be, for error messages: "design", "process".
-
-    Raises:
-        SpecError: it cannot be read or is not TOML.
-    """
+    """Return a TOML file as a table; names and kinds are for errors, as of `read_text`."""
     text = read_text(file, name, kind)
     if found := DOTTED.search(text):
         line = text.count("\n", 0, found.start()) + 1
@@ -53,11 +44,7 @@ def read_toml(file: Path | Traversable, name: str, kind: str) -> Table:
 def read_text(file: Path | Traversable, name: str, kind: str, max_bytes: int = MAX_BYTES) -> str:
     """Return a text without byte order mark, its lines ended by line feeds alone.
 
-    Args:
-        file: UTF-8, or UTF-16 or UTF-32 with a byte order mark; lines end as on any system.
-        name: of the file in error messages.
-        kind: what it should be, for error messages.
-        max_bytes: that it may have.
+    It is UTF-8, or UTF-16 or UTF-32 with a byte order mark; lines end as on any system.
 
     Raises:
         SpecError: it cannot be read.

@@ -1,4 +1,4 @@
-"""Lengths of the prototype that follow from the optics where the spec leaves them to tbcad.
+"""The section [optics] of the design, and lengths of the prototype that follow from it.
 
 Every rule gives the paper's design the sizes it was tried with, and grows or shrinks with the part
 of the machine that the length must suit.
@@ -7,14 +7,25 @@ of the machine that the length must suit.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
-from tbcad.spec.section import AUTO, Section
+from pydantic import BeforeValidator, Field
+
+from tbcad.spec.section import AUTO, Reason, Section, as_tuple
 
 if TYPE_CHECKING:
-    from tbcad.spec.design import OpticsSpec
     from tbcad.spec.prototype import PrototypeSpec
 
+MAX_SEMI_MINOR = 5000.0
+Point: TypeAlias = Annotated[
+    tuple[
+        Annotated[float, Field(gt=0, le=10_000)],
+        Annotated[float, Field(ge=-10_000, le=10_000)],
+        Annotated[float, Field(ge=-10_000, lt=0)],
+    ],
+    BeforeValidator(as_tuple),
+]
+Stretch: TypeAlias = Annotated[float, Field(ge=0.5, le=2.0)]
 # Angle between neighbouring directions, of n: an edge of the icosahedron in n parts.
 EDGE_DEG = math.degrees(math.atan(2))
 MAX_DIRECTION_DEG, MEDIAN_DIRECTION_DEG = 3.5, 1.5  # of fine designs
@@ -45,6 +56,27 @@ BELOW_CAMERA_MM, BELOW_BASE_MM, FLOOR_STEP_MM = 30.0, 50.0, 10.0
 STEP_MM = 0.1  # that lengths are rounded to
 
 AnySection = TypeVar("AnySection", bound=Section)
+
+
+class OpticsSpec(Section):
+    """Where the mirrors, the cameras and the object are."""
+
+    n: Annotated[int, Reason("at n = 1 no camera sees a mirror whole")] = Field(18, ge=2, le=60)
+    """Subdivision of the icosahedron: both halves together have about 5 n^2 mirrors, 1657 at n
+    = 18."""
+    capture_diameter_mm: float = Field(60.0, gt=0, le=1000)
+    """Diameter of the capture sphere, which every virtual camera must see whole. At the paper's
+    geometry 60 is the limit: larger, and the object blocks light between mirrors and cameras."""
+    camera_mm: Point = (100.0, 0.0, -100.0)
+    """Pinhole of camera a; camera b is its mirror image in the plane x = 0. z points up, the
+    object is at the origin."""
+    semi_minor_mm: float = Field(100.0, ge=1, le=MAX_SEMI_MINOR)
+    """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole. Larger:
+    mirrors farther away."""
+    stretch: Annotated[tuple[Stretch, Stretch], BeforeValidator(as_tuple)] = (1.0, 1.0)
+    """Directions of the virtual cameras, stretched along x and y and brought back to the unit
+    sphere; 1 and 1: those of the geodesic polyhedron, as the paper has them. Above 1: more of them
+    near the horizon, fewer near the zenith, where mirrors have fewest pixels."""
 
 
 def with_sizes(prototype: PrototypeSpec, optics: OpticsSpec) -> PrototypeSpec:
@@ -113,7 +145,6 @@ def _floor(optics: OpticsSpec, balls: PrototypeSpec) -> float:
 
 
 def _distance(optics: OpticsSpec) -> float:
-    """From the origin to the pinhole, mm."""
     return math.hypot(*optics.camera_mm)
 
 

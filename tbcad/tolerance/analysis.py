@@ -12,17 +12,17 @@ from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.tolerance.margin import Margin, SolvedDesigns, margin
+from tbcad.tolerance.margin import Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerance.montecarlo.builds import (
     AnyResult,
     Case,
-    CoverageResult,
+    CoverageCase,
     MonteCarloCase,
     ShellResult,
-    WorstCase,
     YieldEstimate,
     estimate_yield,
     simulate,
+    yield_sentence,
 )
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Errors
@@ -32,11 +32,11 @@ from tbcad.tolerance.montecarlo.sensitivity import (
     one_at_a_time,
     shell_kinds,
 )
-from tbcad.tolerance.montecarlo.sharpness import Sharpness, sharpness
+from tbcad.tolerance.montecarlo.sharpness import Sharpness, reference_views, sharpness
 from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
-from tbcad.tolerance.prototype.wind_up import read_wind_up
-from tbcad.tolerance.prototype.windows import PrototypeCase, prototype_model
+from tbcad.tolerance.prototype.draws import read_wind_up
+from tbcad.tolerance.prototype.windows import PrototypeCase, PrototypeResult, prototype_model
 from tbcad.tolerance.stages import (
     EVERY_PROCESS,
     MARGINS,
@@ -45,8 +45,6 @@ from tbcad.tolerance.stages import (
     SINGLE_ERRORS,
     builds_stage,
 )
-from tbcad.tolerance.view_quality import reference_views
-from tbcad.tolerance.yield_text import yield_sentence
 from tbcad.types import Floats, Progress
 
 # Simulated builds in each step of a search; the process itself has as many as asked for.
@@ -60,10 +58,8 @@ class ProcessOption:
     """A process as an alternative for this design.
 
     Attributes:
-        name: of the process.
         estimate: yield with the design as it is.
         margin: that it needs for the wanted yield; None where it was not searched for.
-        builds: number of simulated builds that the yield is of.
     """
 
     name: str
@@ -73,33 +69,16 @@ class ProcessOption:
 
 
 @dataclass(frozen=True)
-class PrototypeYield:
-    """The prototype, built by the process.
-
-    Attributes:
-        uncalibrated: builds that are assumed to be the designed one.
-        calibrated: the same builds, with windows where the balls are.
-    """
-
-    uncalibrated: CoverageResult
-    calibrated: CoverageResult
-
-
-@dataclass(frozen=True)
 class Analysis:
     """Result of an analysis.
 
     Attributes:
-        process: that makes the builds.
-        options: of the analysis.
         target: minimum coverage of a good build, mm.
         cameras: camera a and b as designed.
         edge_models: the same for the fast model.
-        result: of the simulated builds.
         single_errors: effect of each kind of error by itself, the largest loss first.
         process_options: every built-in process, or this one alone.
         margin: that this process needs; None where it was not searched for.
-        sharpness: of pictures.
         prototype: None where the export has none.
     """
 
@@ -113,10 +92,9 @@ class Analysis:
     process_options: tuple[ProcessOption, ...]
     margin: Margin | None
     sharpness: Sharpness
-    prototype: PrototypeYield | None
+    prototype: PrototypeResult | None
 
     def __repr__(self) -> str:
-        """Return process, number of builds and yield."""
         builds = len(self.result.worst)
         return (
             f"<Analysis of {self.process.name}: yield {self.estimate.share:.1%} of {builds} builds>"
@@ -139,14 +117,8 @@ def analyse(
 ) -> Analysis:
     """Simulate many builds of an export by a process, and find what limits their yield.
 
-    Args:
-        export: the design as it was written.
-        process: how it is made.
-        scene_object: photographed for the sharpness.
-        options: number of builds, wanted yield, seed ...
-        progress: called with each stage.
-        detail: called with the steps of a stage.
-        answer: called with the yield, in words, as soon as it is known.
+    Progress is called with each stage, detail with the steps of a stage, answer with the yield, in
+    words, as soon as it is known.
 
     Raises:
         InputError: mirrors are planar, or the scheduler cannot be reached.
@@ -174,7 +146,9 @@ def analyse(
     prototype = None
     if (export.folder / "prototype.json").is_file():
         progress(PROTOTYPES)
-        prototype = _prototype_yield(simulator, errors)
+        plan = read_plan(export)
+        model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
+        prototype = simulator.all_builds(PrototypeCase(model, errors, options.seed))
     return Analysis(
         process, options, export.capture_mm, export.reflectors, simulator.edge_models, result,
         single_errors, process_options, own_margin, sharp, prototype,
@@ -211,7 +185,7 @@ class _Simulator:
 
     def worst_coverage(self, errors: Errors, models: EdgeModels | None = None) -> Floats:
         """Minimum coverage of the builds of a search, of the export or of another design."""
-        case = WorstCase(models or self.edge_models, errors, self.options.seed)
+        case = CoverageCase(models or self.edge_models, errors, self.options.seed, worst_only=True)
         return simulate(case, SEARCH_BUILDS, self._run_batches).worst
 
     def _run_batches(
@@ -238,21 +212,19 @@ def _process_options(
     if not simulator.options.every_process:
         return (chosen,)
     progress(EVERY_PROCESS)
-    return tuple(_process_option(simulator, name, worst) for name in BUILT_IN)
-
-
-def _process_option(simulator: _Simulator, name: str, worst: WorstCoverage) -> ProcessOption:
-    export = simulator.export
-    simulator.detail(name)
-    errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
-    return ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None)
+    export, options = simulator.export, []
+    for name in BUILT_IN:
+        simulator.detail(name)
+        errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
+        options.append(ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None))
+    return tuple(options)
 
 
 def _margins(
     simulator: _Simulator, process: Process, compared: Sequence[ProcessOption]
 ) -> tuple[tuple[ProcessOption, ...], Margin]:
     """The same processes with the margins that they need, and the margin of the one asked for."""
-    designs = SolvedDesigns()
+    designs = solved_designs()
     if not simulator.options.every_process:
         chosen = _margin(simulator, process, designs)
         return tuple(replace(option, margin=chosen) for option in compared), chosen
@@ -286,11 +258,3 @@ def _sharpness(
     return sharpness(
         export.reflectors, builds, scene, reference, residual, options.seed, progress=detail
     )
-
-
-def _prototype_yield(simulator: _Simulator, errors: Errors) -> PrototypeYield:
-    export = simulator.export
-    plan = read_plan(export)
-    model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
-    result = simulator.all_builds(PrototypeCase(model, errors, simulator.options.seed))
-    return PrototypeYield(result.uncalibrated, result.calibrated)

@@ -5,7 +5,7 @@ from tbcad_verify.report.as_made import AsMade, ProcessYield
 
 from tbcad.errors import InputError
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.tolerance.montecarlo.builds import WorstCase, estimate_yield, simulate
+from tbcad.tolerance.montecarlo.builds import CoverageCase, estimate_yield, simulate
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.process.process import BUILT_IN, load_process, process_errors
 from tbcad.types import Progress
@@ -21,14 +21,7 @@ def as_made(
     coating_um: float,
     detail: Progress = lambda _: None,
 ) -> AsMade:
-    """Simulate builds of both shells by every built-in process; the same answer every time.
-
-    Args:
-        cameras: both, with their mirrors as designed.
-        capture_mm: diameter that every virtual camera of a good build sees.
-        coating_um: designed thickness of the coat.
-        detail: called with the name of each process.
-    """
+    """Simulate builds of both shells by every built-in process; the same answer every time."""
     if not all((one.mirrors.curvature > 0).all() for one in cameras):
         return AsMade(reason="the mirrors are planar")
     models, yields = edge_models(cameras), []
@@ -43,7 +36,7 @@ def _process_yield(
 ) -> ProcessYield:
     errors = process_errors(load_process(name), coating_um)
     try:
-        worst = simulate(WorstCase(models, errors, SEED), BUILDS).worst
+        worst = simulate(CoverageCase(models, errors, SEED, worst_only=True), BUILDS).worst
     except InputError:  # errors larger than the radius of a mirror
         return ProcessYield(name, 0.0, 0.0)
     share = estimate_yield(worst, capture_mm).share

@@ -2,9 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from math import ceil
+from typing import TypeAlias
 
-from tbcad.mirrors.array import design
+import numpy as np
+
+from tbcad.mirrors.array import MirrorArray, design
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import MAX_MARGIN, Spec, spec_with
 from tbcad.spec.errors import SpecError
@@ -35,28 +40,13 @@ class Margin:
     reason: str = ""
 
 
-class SolvedDesigns:
-    """Fast models of designs with several margins, each solved once for all processes."""
+SolvedDesigns: TypeAlias = Callable[[Spec], EdgeModels]
+"""The fast model of a design, or a SpecError; each is solved once."""
 
-    def __init__(self) -> None:
-        """Begin without any design."""
-        self._models: dict[Spec, EdgeModels | SpecError] = {}
 
-    def of(self, spec: Spec) -> EdgeModels:
-        """The fast model of a design.
-
-        Raises:
-            SpecError: the design cannot be made.
-        """
-        if spec not in self._models:
-            try:
-                self._models[spec] = edge_models(reflectors(design(spec)))
-            except SpecError as error:
-                self._models[spec] = error
-        model = self._models[spec]
-        if isinstance(model, SpecError):
-            raise model
-        return model
+def solved_designs() -> SolvedDesigns:
+    """Fast models of designs with several margins, for all processes."""
+    return cache(lambda spec: edge_models(reflectors(design(spec))))
 
 
 def margin(
@@ -69,23 +59,16 @@ def margin(
 ) -> Margin:
     """The minimum margin with which the wanted share of builds covers enough.
 
-    Args:
-        spec: the design; its radii must follow rule traced.
-        errors: of the process.
-        wanted_yield: share of good builds.
-        worst: simulates builds.
-        progress: called with each margin.
-        designs: that other searches have solved; those of this one are added.
-
-    The loss of the worst camera hardly depends on the margin, so each try starts from the loss of
-    the last one; smaller mirrors lose a little more, hence several tries.
+    The spec's radii must follow rule traced. The loss of the worst camera hardly depends on the
+    margin, so each try starts from the loss of the last one; smaller mirrors lose a little more,
+    hence several tries.
     """
-    designs = designs or SolvedDesigns()
+    designs = designs or solved_designs()
     target, tried, share = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm, 0.0
     for _ in range(MAX_TRIES):
         progress(f"margin {tried:.2f} mm")
         try:
-            seen = worst(errors, designs.of(with_margin(spec, tried)))
+            seen = worst(errors, designs(with_margin(spec, tried)))
         except SpecError as error:
             return Margin(None, share, f"mirrors of margin {tried:.2f} mm: {error}")
         share = float((seen >= target).mean())
@@ -103,3 +86,34 @@ def margin(
 def with_margin(spec: Spec, mm: float) -> Spec:
     """The spec with another margin, the same for all mirrors."""
     return spec_with(spec, mirrors={"margin_mm": round(mm, 6), "radius_rule": "traced"})
+
+
+@dataclass(frozen=True)
+class SeeingPixels:
+    """Pixels of a virtual camera that see the capture sphere."""
+
+    median: float
+    minimum: float
+
+    def __str__(self) -> str:
+        """Both, as text."""
+        return f"{self.median:.0f} (minimum {self.minimum:.0f})"
+
+
+def seeing_pixels(spec: Spec) -> SeeingPixels:
+    """Count the pixels of a design by one ray through each."""
+    radius = spec.optics.capture_diameter_mm / 2
+    pixels = pixels_of_cameras(design(spec).arrays[0], radius)
+    return SeeingPixels(float(np.median(pixels)), float(pixels.min()))
+
+
+def pixels_of_cameras(array: MirrorArray, radius: float) -> Floats:
+    """Pixels that see a capture sphere, over the v virtual cameras of both halves, (v,).
+
+    The array is camera a's; both halves of a mirror on the seam count together.
+    """
+    camera = array.camera
+    sensor = Sensor(camera.width_px, camera.height_px)
+    seen = count_pixels(array, (sensor,), radius)[0].seen
+    halved = array.u[:, 0] == 0
+    return np.concatenate([np.where(halved, 2 * seen, seen), seen[~halved]])

@@ -3,7 +3,12 @@
 from dataclasses import dataclass
 
 from tbcad.errors import InputError
-from tbcad.tolerance.wanted_yield import check_yield
+
+
+def check_yield(wanted_yield: float) -> None:
+    """Refuse a share of good builds that is not between 0 and 1."""
+    if not 0 < wanted_yield < 1:
+        raise InputError(f"--yield {wanted_yield:g}: allowed is above 0, below 1, like 0.99")
 
 
 @dataclass(frozen=True)

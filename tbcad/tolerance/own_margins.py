@@ -15,7 +15,7 @@ import numpy as np
 from tbcad.mirrors.array import DIRECTION_DIGITS
 from tbcad.spec.design import MAX_MARGIN, Spec, spec_with
 from tbcad.spec.errors import SpecError
-from tbcad.tolerance.margin import STEP_MM, SolvedDesigns, with_margin
+from tbcad.tolerance.margin import STEP_MM, SolvedDesigns, solved_designs, with_margin
 from tbcad.tolerance.montecarlo.builds import coverage_at_yield
 from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels
@@ -85,24 +85,17 @@ def own_margins(
 ) -> OwnMargins | None:
     """Margins with which the wanted share of builds is good, none below the spec's margin_mm.
 
-    Args:
-        spec: the design; its radii must follow rule traced.
-        errors: of the process.
-        wanted_yield: share of good builds.
-        even: one margin for all mirrors to begin with, mm.
-        coverage: simulates builds.
-        progress: called with each try.
-        designs: that other searches have solved; those of this one are added.
+    One margin for all mirrors, even (mm), is tried first; the spec's radii must follow rule traced.
 
     Returns:
         None where no try was enough: margins too large, or mirrors that cannot be made.
     """
-    designs = designs or SolvedDesigns()
+    designs = designs or solved_designs()
     target, best = spec.optics.capture_diameter_mm, None
     tried, attempt = np.full(1, even), with_margin(spec, even)
     for _ in range(MAX_TRIES):
         try:
-            models = designs.of(attempt)
+            models = designs(attempt)
         except SpecError:
             break
         seen = coverage(errors, models)
@@ -128,14 +121,9 @@ def with_own_margins(spec: Spec, margins: Floats) -> Spec:
 def mirror_losses(
     models: EdgeModels, designed: Floats, seen: Floats, target: float, margins: Floats
 ) -> MirrorLosses:
-    """What each mirror loses.
+    """Losses of each mirror, against coverage without errors (v,), in s builds (s, v), mm.
 
-    Args:
-        models: of both halves as designed, m mirrors each.
-        designed: coverage of the virtual cameras without errors, mm, (v,).
-        seen: in s builds, mm, (s, v).
-        target: coverage of a good build, mm.
-        margins: that the design has, mm, (1,) or (m,).
+    The design has one margin, or its own for each mirror, mm, (1,) or (m,).
     """
     half, m = models[0], len(models[0])
     camera = virtual_camera_numbers(half.halved)
@@ -155,7 +143,7 @@ def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
     """
     partner, judged = losses.partner, len(losses.loss) // 2
     loss, other = losses.loss[:judged], losses.loss[judged:]
-    mean, deviation = _mean_and_deviation(np.concatenate([other, other[..., partner]], axis=1))
+    mean, deviation = _mean_and_sigma(np.concatenate([other, other[..., partner]], axis=1))
     level = np.where(loss > losses.spare, (loss - mean) / deviation, -np.inf).max(axis=(1, 2))
     k = -coverage_at_yield(-level, wanted_yield)
     margins = mean + k * deviation if np.isfinite(k) else np.zeros(len(mean))
@@ -164,7 +152,7 @@ def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
     return np.asarray(np.round(steps * STEP_MM, 6))
 
 
-def _mean_and_deviation(loss: Floats) -> tuple[Floats, Floats]:
+def _mean_and_sigma(loss: Floats) -> tuple[Floats, Floats]:
     """Mean and root mean square deviation upwards of losses (..., m), mm, (m,) each.
 
     Losses are skew, each the largest of several edges: what is below the mean says little of those
@@ -177,7 +165,6 @@ def _mean_and_deviation(loss: Floats) -> tuple[Floats, Floats]:
 
 
 def _partners(half: EdgeModel) -> Ints:
-    """Number of each mirror's image in y = 0, (m,)."""
     u, m = np.round(half.screen[:, 2], DIRECTION_DIGITS) + 0.0, len(half)
     if half.view.pinhole[1] != 0:
         return np.arange(m)

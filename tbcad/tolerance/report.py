@@ -11,12 +11,15 @@ from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.tolerance.analysis import Analysis
 from tbcad.tolerance.margin import Margin
-from tbcad.tolerance.montecarlo.builds import CoverageResult, estimate_yield
+from tbcad.tolerance.montecarlo.builds import (
+    CoverageResult,
+    estimate_yield,
+    percent,
+    yield_sentence,
+)
 from tbcad.tolerance.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
-from tbcad.tolerance.plots import directions, in_words, panels
+from tbcad.tolerance.plots import directions, in_words, panels, spread_dict, spread_sentence
 from tbcad.tolerance.process.process import ErrorSpec, Process
-from tbcad.tolerance.ray_spread import spread_dict, spread_sentence
-from tbcad.tolerance.yield_text import percent, yield_sentence
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"

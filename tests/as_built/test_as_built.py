@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tbcad.api import as_built
-from tbcad.as_built.deviations import colours, deviations, round_up
+from tbcad.as_built.files import colours, deviations, round_up
 from tbcad.errors import InputError
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm, unit

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tbcad.calibration.estimate.parameters import Prior
-from tbcad.calibration.priors import Fitted, prototype_prior
+from tbcad.calibration.priors import prototype_prior
 from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Highlights, Machine
 from tbcad.optics.camera import Camera, without_distortion
@@ -44,12 +44,9 @@ def small_machine(balls: int = 5, stops: int = 12, leds: int = 4) -> Machine:
 def small_prior(machine: Machine, process: str = "fdm") -> Prior:
     """Its prior; the last ball is a cap on a smaller body."""
     is_cap = np.arange(len(machine.radius)) == len(machine.radius) - 1
-    fitted = Fitted(
-        body_centre=machine.centre + np.where(is_cap[:, None], 5.0, 0.0),
-        is_cap=is_cap,
-        series=np.repeat([0, 1], len(machine.angle) // 2),
-    )
-    return prototype_prior(machine, process_errors(load_process(process)), fitted)
+    body = machine.centre + np.where(is_cap[:, None], 5.0, 0.0)
+    series = np.repeat([0, 1], len(machine.angle) // 2)
+    return prototype_prior(machine, process_errors(load_process(process)), body, is_cap, series)
 
 
 def drawn(prior: Prior, seed: int) -> tuple[np.ndarray, Machine]:

@@ -12,15 +12,15 @@ from scipy.stats import chi2
 
 import tbcad.calibration.run
 from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
-from tbcad.calibration.detection.detection import Detection, Reason, Rejected
+from tbcad.calibration.detection.detection import Detection, Rejected, Rejection
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
 from tbcad.calibration.options import CalibrationOptions
 from tbcad.calibration.report.files import write_calibration
+from tbcad.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.calibration.report.tables import rays_table, residuals_table
 from tbcad.calibration.report.verdict import Answer, verdict, verdict_text
-from tbcad.calibration.true_rays import at_plane, centre_pixels, traced
 from tbcad.cli import run as command
 from tbcad.errors import InputError
 from tbcad.machine.built import BuiltPrototype, random_build
@@ -66,7 +66,7 @@ def test_injected_errors_are_recovered(calibrated: Calibration, built: BuiltProt
     known = calibrated.rays.known
     pixel = centre_pixels(found.machine, known.frame, known.sphere)
     missed = at_plane(*traced(built.machine, pixel, known.frame, known.sphere), known.direction)
-    ratio = np.sqrt((missed**2).sum(axis=1).mean() / (known.whole_place_mm**2).mean())
+    ratio = np.sqrt((missed**2).sum(axis=1).mean() / (known.whole.place_mm**2).mean())
     assert ratio < 2
 
 
@@ -142,7 +142,7 @@ def test_saturated_highlights_are_counted_and_ask_for_a_shorter_exposure(
     calibrated: Calibration, detection: Detection
 ) -> None:
     most = len(detection.highlights)
-    reasons = [Reason.SATURATED] * most + [Reason.HIDDEN] * 3 + [Reason.OUTSIDE] * 7
+    reasons = [Rejection.SATURATED] * most + [Rejection.HIDDEN] * 3 + [Rejection.OUTSIDE] * 7
     rejected = tuple(Rejected(0, 0, 0, reason) for reason in reasons)
     result = replace(calibrated, detection=replace(detection, rejected=rejected))
     judged = verdict(result)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.calibration.cross_validation import Halves, cross_validation
+from tbcad.calibration.calibrate import Halves, cross_validation
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import estimate
 from tbcad.machine.machine import Highlights

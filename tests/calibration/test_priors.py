@@ -3,13 +3,19 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tbcad.calibration.estimate.parameters import Block
-from tbcad.calibration.priors import UNIFORM, Fitted, prototype_prior, shell_prior
-from tbcad.calibration.setup_files import MEASURED_MM, parse_measured, read_zero_error
+from tbcad.calibration.estimate.parameters import Block, Prior
+from tbcad.calibration.priors import (
+    MEASURED_MM,
+    parse_measured,
+    prototype_prior,
+    read_zero_error,
+    shell_prior,
+)
 from tbcad.errors import InputError
 from tbcad.tolerance.process.process import load_process, process_errors
 from tests.calibration.machines import small_machine
@@ -18,16 +24,17 @@ MACHINE = small_machine()
 BALLS = len(MACHINE.radius)
 ERRORS = process_errors(load_process("fdm"))
 CAP, ARM = 2, 9.0
-FITTED = Fitted(
-    body_centre=MACHINE.centre + np.where(np.arange(BALLS)[:, None] == CAP, [ARM, 0, 0], 0.0),
-    is_cap=np.arange(BALLS) == CAP,
-    series=np.repeat([0, 1], len(MACHINE.angle) // 2),
-    zero_error=0.01,
-)
+BODY = MACHINE.centre + np.where(np.arange(BALLS)[:, None] == CAP, [ARM, 0, 0], 0.0)
+SERIES = np.repeat([0, 1], len(MACHINE.angle) // 2)
+UNIFORM = np.sqrt(3)
+
+
+def prior_of(**known: Any) -> Prior:
+    return prototype_prior(MACHINE, ERRORS, BODY, np.arange(BALLS) == CAP, SERIES, 0.01, **known)
 
 
 def test_figures_are_those_of_the_process() -> None:
-    sigma = prototype_prior(MACHINE, ERRORS, FITTED).sigma
+    sigma = prior_of().sigma
     assert sigma[Block.CENTRES][0] == pytest.approx(np.full(3, ERRORS.seat.spread))
     tilted = np.hypot(ERRORS.seat.spread, ARM * ERRORS.cap_tilt.spread / UNIFORM)
     assert sigma[Block.CENTRES][CAP] == pytest.approx(np.full(3, tilted))
@@ -42,8 +49,7 @@ def test_figures_are_those_of_the_process() -> None:
 
 
 def test_a_measured_radius_replaces_the_drawing() -> None:
-    fitted = replace(FITTED, measured=((CAP, 17.61, 0.004),))
-    prior = prototype_prior(MACHINE, ERRORS, fitted)
+    prior = prior_of(measured=((CAP, 17.61, 0.004),))
     assert (prior.mean.radius[CAP], prior.sigma[Block.RADII][CAP]) == (17.61, 0.004)
     assert np.delete(prior.mean.radius, CAP) == pytest.approx(np.delete(MACHINE.radius, CAP))
     assert MACHINE.radius[CAP] != 17.61
@@ -52,11 +58,7 @@ def test_a_measured_radius_replaces_the_drawing() -> None:
 @pytest.mark.parametrize("of_shell", [False, True])
 def test_a_known_lens_is_fixed(of_shell: bool) -> None:
     still = replace(MACHINE, angle=np.zeros(1))
-    known = (
-        shell_prior(still, ERRORS, lens_known=True)
-        if of_shell
-        else prototype_prior(MACHINE, ERRORS, replace(FITTED, lens_known=True))
-    )
+    known = shell_prior(still, ERRORS, lens_known=True) if of_shell else prior_of(lens_known=True)
     for block in (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION):
         assert not known.sigma[block].any()
 

@@ -10,16 +10,18 @@ from scipy.stats import chi2
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance, covariance
 from tbcad.calibration.estimate.solve import estimate
+from tbcad.calibration.report.plots import COLUMNS, draw_recovered
 from tbcad.calibration.report.recovered import (
     BESIDES,
     SIGMAS,
     Kind,
+    place_mm,
+    ray_errors,
     recovered_errors,
     recovered_table,
+    turn_mrad,
 )
-from tbcad.calibration.report.recovered_plot import COLUMNS, draw_recovered
 from tbcad.calibration.report.tables import angles_table, spheres_table
-from tbcad.calibration.true_rays import place_mm, ray_errors, turn_mrad
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import unit
 from tbcad.machine.built import BuiltPrototype
@@ -130,8 +132,8 @@ def test_errors_of_rays_are_those_predicted(calibrated: Calibration, built: Buil
     rays = calibrated.rays.known
     errors = ray_errors(calibrated.found, built.machine, rays.frame, rays.sphere)
     for found, place, turn in (
-        (errors.relative, rays.place_mm, rays.turn_mrad),
-        (errors.in_run, rays.in_run_place_mm, rays.in_run_turn_mrad),
+        (errors.relative, rays.relative.place_mm, rays.relative.turn_mrad),
+        (errors.in_run, rays.in_run.place_mm, rays.in_run.turn_mrad),
     ):
         for off, sigma in ((place_mm(found), place), (turn_mrad(found), turn)):
             assert np.sqrt((off**2).mean()) < 3 * np.sqrt((sigma**2).mean())

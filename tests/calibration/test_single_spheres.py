@@ -8,10 +8,17 @@ from tbcad.calibration.calibrate import Setup
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import highlights_with_slopes
 from tbcad.calibration.estimate.parameters import Block
-from tbcad.calibration.led_layout import best_layout, with_partners
+from tbcad.calibration.led_layout import (
+    best_layout,
+    layout_cost,
+    led_room,
+    ray_errors,
+    shell_information,
+    sphere_information,
+    with_partners,
+)
 from tbcad.calibration.priors import shell_prior
-from tbcad.calibration.single_spheres import ray_errors, sphere_information
-from tbcad.calibration.study import layout_cost, led_room, shell_information, whole_errors
+from tbcad.calibration.study import whole_errors
 from tbcad.calibration.uncertainty import known_rays
 from tbcad.machine.designed import designed_shell, read_leds
 from tbcad.prototype.stage.leds import MIN_SEEN
@@ -37,8 +44,8 @@ def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: Exported
     identity = diags_array(np.ones(len(values)))
     known = covariance(prior, csc_array(slopes.T @ slopes / NOISE_PX**2 + identity))
     rays = known_rays(prior, values, known, np.zeros(count, dtype=np.int64), np.arange(count))
-    assert mm == pytest.approx(rays.whole_place_mm, rel=1e-6)
-    assert mrad == pytest.approx(rays.whole_turn_mrad, rel=1e-6)
+    assert mm == pytest.approx(rays.whole.place_mm, rel=1e-6)
+    assert mrad == pytest.approx(rays.whole.turn_mrad, rel=1e-6)
 
 
 def test_known_radius_helps_and_so_do_more_leds(export: ExportedDesign) -> None:
@@ -74,6 +81,6 @@ def test_best_layout_beats_others_and_keeps_to_the_room(export: ExportedDesign) 
 
 def test_less_noise_and_a_better_process_bound_rays_closer(setup: Setup) -> None:
     leds = setup.designed.leds
-    usual = np.median(whole_errors(setup, leds, "fdm", 0.1).place_mm)
-    assert np.median(whole_errors(setup, leds, "fdm", 0.05).place_mm) < usual
-    assert np.median(whole_errors(setup, leds, "cnc", 0.1).place_mm) < usual
+    usual = np.median(whole_errors(setup, leds, "fdm", 0.1).relative.place_mm)
+    assert np.median(whole_errors(setup, leds, "fdm", 0.05).relative.place_mm) < usual
+    assert np.median(whole_errors(setup, leds, "cnc", 0.1).relative.place_mm) < usual

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tbcad.calibration.led_layout import NUMBERS
 from tbcad.calibration.study import (
     NOISES_PX,
-    NUMBERS,
     ONE_BALL,
     PROCESSES,
     SHARES,

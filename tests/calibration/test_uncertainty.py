@@ -8,7 +8,7 @@ from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.calibration.true_rays import at_plane, centre_pixels, traced
+from tbcad.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.calibration.uncertainty import (
     SPHERE_MM,
     ray_slopes,
@@ -70,8 +70,8 @@ def test_motions_are_taken_off_as_by_a_fit_to_each_error(found: Estimate) -> Non
     known = ray_uncertainty(found, frame, sphere)
     row_turned = np.repeat(turned, 4)
     for groups, blocks in (
-        ([np.ones(len(row_turned), dtype=bool)], known.relative),
-        ([~row_turned, row_turned], known.in_run),
+        ([np.ones(len(row_turned), dtype=bool)], known.relative.covariance),
+        ([~row_turned, row_turned], known.in_run.covariance),
     ):
         rest = errors.copy()
         for rows in groups:
@@ -85,8 +85,8 @@ def test_motions_are_taken_off_as_by_a_fit_to_each_error(found: Estimate) -> Non
 def test_rays_of_one_run_know_each_other_better_than_both_runs_do(found: Estimate) -> None:
     """Nothing shows the axis that the object is turned about."""
     known = ray_uncertainty(found, *_all_rays(found.prior))
-    assert np.median(known.in_run_turn_mrad) < np.median(known.turn_mrad)
-    assert np.median(known.turn_mrad) < np.median(known.whole_turn_mrad)
+    assert np.median(known.in_run.turn_mrad) < np.median(known.relative.turn_mrad)
+    assert np.median(known.relative.turn_mrad) < np.median(known.whole.turn_mrad)
 
 
 def test_slopes_of_rays_are_those_of_traced_rays(prior: Prior) -> None:
@@ -130,7 +130,7 @@ def _errors_over_sigmas(prior: Prior, solves: int) -> np.ndarray:
         known = ray_uncertainty(result, *rays)
         pixel = centre_pixels(result.machine, *rays)
         missed = at_plane(*traced(machine, pixel, *rays), known.direction)
-        squares.append((missed**2).sum(axis=1) / known.whole_place_mm**2)
+        squares.append((missed**2).sum(axis=1) / known.whole.place_mm**2)
     return np.array(squares)
 
 

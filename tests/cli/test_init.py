@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.cli import run
-from tbcad.spec.load import load_spec
-from tbcad.spec.shipped import shipped_designs
+from tbcad.spec.load import load_spec, shipped_designs
 
 
 @pytest.fixture(autouse=True)

@@ -8,17 +8,17 @@ import pytest
 
 from tbcad.cli import run
 from tbcad.optimize import search as search_module
-from tbcad.optimize.candidate import Candidate, Figures, Limits, Place
+from tbcad.optimize.candidate import DesignCandidate, Figures, MachineLimits, Place
 from tbcad.spec.design import Spec
 from tests.exported_files import read_csv
 
 
 def closed_form(
-    spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
-) -> Candidate:
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+) -> DesignCandidate:
     """More pixels with a larger ellipsoid, in place of mirrors, which take long."""
     axis = place[2]
-    return Candidate(place, Figures(axis, 2 * axis, axis / 100, 100 / axis, 276, 89))
+    return DesignCandidate(place, Figures(axis, 2 * axis, axis / 100, 100 / axis, 276, 89))
 
 
 @pytest.fixture(autouse=True)
@@ -58,8 +58,8 @@ def test_a_search_that_was_stopped_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def stopped(
-        spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
-    ) -> Candidate:
+        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+    ) -> DesignCandidate:
         if place[2] > 130:
             raise KeyboardInterrupt
         return closed_form(spec, ssim_within, place)

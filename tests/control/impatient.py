@@ -17,8 +17,8 @@ WAITS_S = {
     "klipper.host.AGAIN_S": 0.01,
     "klipper.host.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
     "klipper.host.BACK_S": 1.0,
-    "cameras.watched_folder.POLL_S": 0.01,
-    "cameras.watched_folder.QUIET_S": 0.05,
+    "cameras.choice.POLL_S": 0.01,
+    "cameras.choice.QUIET_S": 0.05,
 }
 """By name below `tbcad.control`."""
 

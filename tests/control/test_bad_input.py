@@ -160,7 +160,7 @@ def test_grblhal_that_greets_as_grbl_is_known_by_its_build_info(rig: Rig) -> Non
 def test_full_disk_is_foreseen(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tbcad.control.estimate.free_bytes", lambda folder: 300_000)
+    monkeypatch.setattr("tbcad.control.selection.free_bytes", lambda folder: 300_000)
     line = refused(rig.words(), capsys)
     assert "need about 1.2 MB, 0.3 MB are free" in line
     assert not rig.out.exists()

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tbcad.control.faults import ControllerReset, MachineFault
 from tbcad.control.grbl import SYNC, Grbl
+from tbcad.control.machine import ControllerReset, MachineFault
 from tbcad.control.port import SerialPort
 from tests.control.grbl_double import PLANNER, GrblDouble
 from tests.control.rig import until

@@ -9,7 +9,7 @@ from PIL.TiffImagePlugin import IFDRational, ImageFileDirectory_v2
 
 from tbcad.cli import run as tbcad
 from tbcad.control.cameras.image_facts import EXIF, EXPOSURE, MAKE, MODEL, image_facts
-from tbcad.control.faults import CameraFault
+from tbcad.control.machine import CameraFault
 from tests.control.rig import SIZE, Rig
 
 ISO, WHITE_BALANCE = 0x8827, 0xA403

@@ -2,8 +2,7 @@
 
 import pytest
 
-from tbcad.control.grbl_codes import UNKNOWN, alarm_meaning, error_meaning
-from tbcad.control.messages import Status, parse
+from tbcad.control.messages import UNKNOWN, Status, meaning, parse
 
 
 @pytest.mark.parametrize(
@@ -41,6 +40,6 @@ def test_status_report_with_damaged_numbers() -> None:
 
 
 def test_meanings() -> None:
-    assert "homing is not enabled" in error_meaning(5)
-    assert "beyond the soft limits" in alarm_meaning(2)
-    assert error_meaning(250) == alarm_meaning(250) == UNKNOWN
+    assert "homing is not enabled" in meaning(parse("error:5"))
+    assert "beyond the soft limits" in meaning(parse("ALARM:2"))
+    assert meaning(parse("error:250")) == meaning(parse("ALARM:250")) == UNKNOWN

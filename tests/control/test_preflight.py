@@ -13,12 +13,11 @@ from PIL import Image
 from tbcad.cli import run as tbcad
 from tbcad.control.base import Base
 from tbcad.control.cameras.camera import Shot
-from tbcad.control.cameras.command import CommandCamera
+from tbcad.control.cameras.choice import CommandCamera
 from tbcad.control.cameras.image_facts import EXIF, EXPOSURE, ImageFacts
-from tbcad.control.faults import CameraFault
+from tbcad.control.machine import CameraFault
 from tbcad.control.preflight import look, preflight
-from tbcad.control.shooting import Photograph, take
-from tbcad.control.trials import common_settings
+from tbcad.control.shooting import Photograph, common_settings, take
 from tbcad.errors import InputError
 from tbcad.runs.exposure import PhaseTimes
 from tbcad.runs.photographs import read_run

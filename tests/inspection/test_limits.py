@@ -8,10 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tbcad.errors import InputError
-from tbcad.inspection.deviations import Deviation, independent_classes, tilt_axes
 from tbcad.inspection.inspect import minimum_at_limits
-from tbcad.inspection.limits import Limits, mirror_limits
-from tbcad.inspection.sensitivity import Sensitivities, sensitivities, touching
+from tbcad.inspection.limits import MirrorLimits, mirror_limits
+from tbcad.inspection.sensitivity import (
+    Deviation,
+    Sensitivities,
+    independent_classes,
+    sensitivities,
+    tilt_axes,
+    touching,
+)
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.reflector import reflectors
@@ -29,7 +35,7 @@ def found(small_design: MirrorDesign) -> Sensitivities:
 
 
 @pytest.fixture(scope="module")
-def limits(found: Sensitivities) -> Limits:
+def limits(found: Sensitivities) -> MirrorLimits:
     return mirror_limits(found, TARGET, 0.99)
 
 
@@ -106,11 +112,11 @@ def test_losses_are_those_of_mirrors_that_deviate_one_by_one(
     assert slow.max() > 1e-3
 
 
-def test_all_mirrors_at_their_limits_are_good(export: ExportedDesign, limits: Limits) -> None:
+def test_all_mirrors_at_their_limits_are_good(export: ExportedDesign, limits: MirrorLimits) -> None:
     assert minimum_at_limits(export, limits, builds=200) >= TARGET
 
 
-def test_limits_are_not_far_too_small(export: ExportedDesign, limits: Limits) -> None:
+def test_limits_are_not_far_too_small(export: ExportedDesign, limits: MirrorLimits) -> None:
     """At a few times the limits, shells are bad."""
     assert minimum_at_limits(export, replace(limits, each=4 * limits.each)) < TARGET
 

@@ -16,7 +16,7 @@ from tbcad.formats.step_named import read_named_solid
 from tbcad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
 from tbcad.inspection.files import Half, dowel_face, halves, tolerances
 from tbcad.inspection.inspect import found_limits, minimum_at_limits
-from tbcad.inspection.limits import Limits
+from tbcad.inspection.limits import MirrorLimits
 from tbcad.inspection.read_back import check_read_back
 from tbcad.inspection.sensitivity import Sensitivities, sensitivities
 from tbcad.mirrors.array import MirrorDesign
@@ -59,7 +59,7 @@ def export(folder: Path) -> ExportedDesign:
 
 
 @pytest.fixture(scope="module")
-def found(export: ExportedDesign) -> tuple[Sensitivities, Limits]:
+def found(export: ExportedDesign) -> tuple[Sensitivities, MirrorLimits]:
     return found_limits(export, 0.99)
 
 
@@ -74,7 +74,7 @@ def test_each_virtual_camera_depends_on_its_own_mirrors_alone(export: ExportedDe
 
 
 def test_all_mirrors_at_their_limits_are_good(
-    export: ExportedDesign, found: tuple[Sensitivities, Limits]
+    export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]
 ) -> None:
     assert minimum_at_limits(export, found[1], builds=200) >= TARGET
     assert minimum_at_limits(export, replace(found[1], each=4 * found[1].each)) < TARGET
@@ -82,7 +82,7 @@ def test_all_mirrors_at_their_limits_are_good(
 
 @pytest.mark.parametrize("kind", [0, 1, 3])
 def test_one_kind_alone_may_take_the_whole_margin(
-    export: ExportedDesign, found: tuple[Sensitivities, Limits], kind: int
+    export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits], kind: int
 ) -> None:
     """Five times its limit, a part of five each; no more than that: it is not far too small."""
     alone = np.zeros_like(found[1].each)
@@ -92,7 +92,7 @@ def test_one_kind_alone_may_take_the_whole_margin(
 
 
 def test_offsets_may_be_larger_than_where_spheres_meet(
-    found: tuple[Sensitivities, Limits],
+    found: tuple[Sensitivities, MirrorLimits],
 ) -> None:
     assert found[1].each[:, 0].min() > 5  # um; where spheres meet 0.5
     assert found[1].each[:, 3].min() > 1
@@ -138,7 +138,7 @@ def test_a_solid_that_is_read_has_each_face_by_its_name(
 
 
 @pytest.fixture(scope="module")
-def half(export: ExportedDesign, found: tuple[Sensitivities, Limits]) -> Half:
+def half(export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]) -> Half:
     return halves(export, found[1])[0]
 
 

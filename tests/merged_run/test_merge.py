@@ -12,7 +12,7 @@ from tbcad.api import merge
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
-from tbcad.merged_run.corrections import Options
+from tbcad.merged_run.stop_photographs import MergeOptions
 from tbcad.runs.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
@@ -29,7 +29,7 @@ from tests.machine_states import frames_of, machine_of
 from tests.photographed_runs import photographs_of, write_exposure, write_run
 
 CAPTURE_MM = 60.0
-EVEN = Options("off")
+EVEN = MergeOptions("off")
 """The photographs of these tests have no loss of light toward the edge, unless they say so."""
 Photographs = dict[str, np.ndarray]
 
@@ -152,7 +152,7 @@ class TestPerfectMachine:
         for frame in frames:
             for phase in (DARK, LIT):
                 set_exposure(run, frame, phase, exposure_of(frame))
-        options = Options("cos4", brightness=2.57)
+        options = MergeOptions("cos4", brightness=2.57)
         merge(run, calibration, export.folder, options, out=tmp_path / "merged")
         off = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
         assert off.max() <= 1
@@ -182,7 +182,7 @@ class TestPerfectMachine:
         flat = tmp_path / "a_0001_lit.png"
         white = np.full((310, 416, 3), 255, dtype=np.uint8)
         write_exposure(tmp_path, frames[0], LIT, taken(white, frames[0], LIT), flat.name)
-        options = Options(flat=(flat,), encoding="srgb")
+        options = MergeOptions(flat=(flat,), encoding="srgb")
         merge(run, calibration, export.folder, options, out=tmp_path / "merged")
         dark = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
         # Between pixels light is interpolated instead of its code.
@@ -291,7 +291,7 @@ class TestIncomplete:
             for name in phases:
                 own = seconds if (name, frame.stop) == (phase, 3) else 1.0
                 set_exposure(run, frame, name, own)
-        options = Options("off", brightness=2.57)
+        options = MergeOptions("off", brightness=2.57)
         record = merge(run, calibration, export.folder, options, out=tmp_path / "merged")
         half = record["based_on"]["a"]
         assert half["without_dark"] == without
@@ -371,7 +371,7 @@ class TestRefused:
         frame = Frame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
         image = np.full((100, 200, 3), 255, dtype=np.uint8)
         write_exposure(tmp_path, frame, LIT, image, "a_0001_lit.png")
-        options = Options(flat=(tmp_path / "a_0001_lit.png",))
+        options = MergeOptions(flat=(tmp_path / "a_0001_lit.png",))
         message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
         refused(run, calibration, export, tmp_path, message, options)
 
@@ -382,7 +382,7 @@ def refused(
     export: ExportedDesign,
     tmp_path: Path,
     message: str,
-    options: Options | None = None,
+    options: MergeOptions | None = None,
 ) -> None:
     with pytest.raises(InputError) as caught:
         merge(run, calibration, export.folder, options, out=tmp_path / "merged")

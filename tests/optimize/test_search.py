@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from tbcad.errors import InputError
 from tbcad.optimize import search as search_module
-from tbcad.optimize.candidate import STEP_MM, Candidate, Figures, Limits, Place
+from tbcad.optimize.candidate import STEP_MM, DesignCandidate, Figures, MachineLimits, Place
 from tbcad.optimize.files import comparison, design_text, search_files
 from tbcad.optimize.search import (
     Search,
@@ -30,14 +30,16 @@ BEST = (123.0, -140.0, 111.5, 1.3, 1.15)
 
 
 def closed_form(
-    spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
-) -> Candidate:
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+) -> DesignCandidate:
     """Pixels are most at BEST; the machine grows with x; there is none with a small axis."""
     if place[2] < 60:
-        return Candidate(place, None, "the ellipsoid is too small: enlarge it")
+        return DesignCandidate(place, None, "the ellipsoid is too small: enlarge it")
     off = float(np.linalg.norm(np.subtract(place, BEST) * [1, 1, 1, 50, 50]))
     size = 3 * place[0]
-    return Candidate(place, Figures(1000 - off, 2000 - off, 7 - off / 100, 1 + off, size, 89.0))
+    return DesignCandidate(
+        place, Figures(1000 - off, 2000 - off, 7 - off / 100, 1 + off, size, 89.0)
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -89,8 +91,8 @@ def test_judgements_are_not_made_twice(tmp_path: Path, monkeypatch: pytest.Monke
     expected = search(asked(120), tmp_path / "store.jsonl")
 
     def never(
-        spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
-    ) -> Candidate:
+        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+    ) -> DesignCandidate:
         raise AssertionError(place)
 
     monkeypatch.setattr(search_module, "evaluate", never)
@@ -160,8 +162,8 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
     again: list[Place] = []
 
     def with_ssim(
-        spec: Spec, ssim_within: Limits | None, place: Place, method: str = "nearest"
-    ) -> Candidate:
+        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+    ) -> DesignCandidate:
         again.append(place)
         one = closed_form(spec, ssim_within, place)
         assert ssim_within

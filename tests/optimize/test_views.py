@@ -5,7 +5,7 @@ import pytest
 
 from tbcad.mirrors.array import design
 from tbcad.optimize import views
-from tbcad.optimize.candidate import Limits, evaluate, place_of
+from tbcad.optimize.candidate import MachineLimits, evaluate, place_of
 from tbcad.optimize.views import mean_ssim
 from tbcad.reconstruction import picture
 from tbcad.reconstruction.picture import BY_FIELD
@@ -45,7 +45,7 @@ def test_the_viewpoints_are_those_of_the_study(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(("size_mm", "measured"), [(300.0, True), (200.0, False)])
 def test_views_are_compared_within_the_limits_only(size_mm: float, measured: bool) -> None:
-    one = evaluate(SPEC, Limits(size_mm, np.inf), place_of(SPEC))
+    one = evaluate(SPEC, MachineLimits(size_mm, np.inf), place_of(SPEC))
     assert one.figures
     assert (one.figures.ssim is not None) == measured
     assert evaluate(SPEC, None, place_of(SPEC)).figures.ssim is None  # type: ignore[union-attr]

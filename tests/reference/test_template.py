@@ -9,8 +9,7 @@ import pytest
 from tbcad.reference.keys import key_sections
 from tbcad.reference.template import ELSEWHERE, design_template
 from tbcad.spec.design import Spec
-from tbcad.spec.load import load_spec
-from tbcad.spec.shipped import PAPER, shipped_designs
+from tbcad.spec.load import PAPER, load_spec, shipped_designs
 
 NAMES = list(shipped_designs())
 KEYS = [key for section in key_sections() for key in section.keys]

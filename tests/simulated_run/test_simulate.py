@@ -17,7 +17,7 @@ from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run import simulate
 from tbcad.simulated_run.options import RunOptions
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.prototype.wind_up import read_wind_up
+from tbcad.tolerance.prototype.draws import read_wind_up
 from tests.simulated_runs import Small, fdm_errors, small_run
 
 PHASES = ("dark", "led_1", "lit")

@@ -15,11 +15,12 @@ from pydantic import ValidationError
 
 from tbcad.errors import InputError
 from tbcad.prototype.balls.catalogue import load_grades
-from tbcad.spec.design import FootFlangeSpec, OpticsSpec, Spec
+from tbcad.spec.design import FootFlangeSpec, Spec
 from tbcad.spec.errors import SpecError, allowed_text, dotted_fields, nearest_key, section_of
 from tbcad.spec.load import load_spec, spec_dict
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import GradeName
+from tbcad.spec.sizes import OpticsSpec
 
 KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
 NUMBERS = {key: field for key, field in KEYS.items() if field.annotation in (int, float)}

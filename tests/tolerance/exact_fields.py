@@ -10,7 +10,7 @@ import numpy as np
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.reflection import miss_distances
 from tbcad.tolerance.montecarlo.draws import ShellDraws
-from tbcad.tolerance.montecarlo.smooth_field import SmoothField
+from tbcad.tolerance.montecarlo.warp import SmoothField
 
 Heights: TypeAlias = Callable[[int, np.ndarray], np.ndarray]
 """Waviness of a mirror, by its number, at points (p, 3), mm."""

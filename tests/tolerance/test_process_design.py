@@ -12,7 +12,7 @@ from tbcad.mirrors.array import design
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
 from tbcad.tolerance import process_design as process_module
-from tbcad.tolerance.margin_pixels import pixels_of_cameras
+from tbcad.tolerance.margin import pixels_of_cameras
 from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.edge_model import edge_models
 from tbcad.tolerance.own_margins import OwnMargins

@@ -8,11 +8,17 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.spec.load import load_spec, spec_dict
 from tbcad.tolerance import process_design as process_module
-from tbcad.tolerance import process_edges as edges_module
-from tbcad.tolerance.margin_pixels import SeeingPixels, seeing_pixels
+from tbcad.tolerance.margin import SeeingPixels, seeing_pixels
 from tbcad.tolerance.process.process import Process, load_process
-from tbcad.tolerance.process_design import ProcessDesign, design_for_process, pixel_costs
-from tbcad.tolerance.process_edges import EdgeChoice, TriedEdges, edges_for_process, edges_text
+from tbcad.tolerance.process_design import (
+    EdgeChoice,
+    ProcessDesign,
+    TriedEdges,
+    design_for_process,
+    edges_for_process,
+    edges_text,
+    pixel_costs,
+)
 
 SMALL = ["n=4", "mirrors.margin_mm=0"]
 WANTED = 0.9
@@ -54,7 +60,7 @@ def test_valleys_where_pedestals_cannot_leave_more(monkeypatch: pytest.MonkeyPat
         searched.append(spec.shell.edges)
         return design_for_process(spec, *rest)
 
-    monkeypatch.setattr(edges_module, "design_for_process", search)
+    monkeypatch.setattr(process_module, "design_for_process", search)
     choice = edges_for_process(load_spec(None, SMALL), process, WANTED)
     assert searched == [choice.made.spec.shell.edges] == ["valley"]
     assert choice.other is not None
@@ -83,9 +89,9 @@ def test_pedestals_must_leave_a_per_cent_more(
     def pixels(spec):  # type: ignore[no-untyped-def]
         return SeeingPixels(1000 * (more if spec.shell.edges == "pedestal" else 1.0), 100)
 
-    monkeypatch.setattr(edges_module, "seeing_pixels", pixels)
+    monkeypatch.setattr(process_module, "seeing_pixels", pixels)
     monkeypatch.setattr(
-        edges_module, "design_for_process", lambda spec, *_: ProcessDesign(spec, 0.0)
+        process_module, "design_for_process", lambda spec, *_: ProcessDesign(spec, 0.0)
     )
     choice = edges_for_process(load_spec(None, SMALL), inserts(), WANTED)
     assert choice.made.spec.shell.edges == taken
@@ -103,7 +109,7 @@ def test_one_kind_without_margins_leaves_the_other(monkeypatch: pytest.MonkeyPat
             raise InputError(f"no {spec.shell.edges}")
         return ProcessDesign(spec, 0.0)
 
-    monkeypatch.setattr(edges_module, "design_for_process", search)
+    monkeypatch.setattr(process_module, "design_for_process", search)
     spec = load_spec(None, SMALL)
     impossible: Sequence[str] = ("valley",)
     choice = edges_for_process(spec, inserts(), WANTED)
@@ -127,7 +133,7 @@ def test_pedestals_that_cannot_be_made_are_not_taken() -> None:
 def test_what_cannot_be_asked_is_refused_before_anything_is_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(edges_module, "seeing_pixels", lambda _: pytest.fail("tried"))
+    monkeypatch.setattr(process_module, "seeing_pixels", lambda _: pytest.fail("tried"))
     with pytest.raises(InputError, match="rule paper"):
         edges_for_process(load_spec(None, [*SMALL, "radius_rule=paper"]), inserts(), WANTED)
 

@@ -15,10 +15,9 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.results.study import SUMMARY_COLUMNS, study_files
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.analysis import Analysis, ProcessOption, PrototypeYield
+from tbcad.tolerance.analysis import Analysis, ProcessOption
 from tbcad.tolerance.margin import Margin
 from tbcad.tolerance.montecarlo.builds import (
-    CoverageResult,
     MonteCarloCase,
     YieldEstimate,
     estimate_yield,
@@ -30,6 +29,7 @@ from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.montecarlo.sharpness import Sharpness
 from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import ErrorSpec, load_process
+from tbcad.tolerance.prototype.windows import PrototypeResult
 from tbcad.tolerance.report import UNITS, json_text, report_dict, summary_text, tolerance_study
 
 BUILDS, TARGET = 25, 60.0
@@ -74,14 +74,13 @@ def analysis(little: MirrorDesign) -> Analysis:
     )
 
 
-def prototype_yield(plain: float, known: float, offset: float = 2.0) -> PrototypeYield:
+def prototype_yield(plain: float, known: float, offset: float = 2.0) -> PrototypeResult:
     """Ten prototypes each, the shares of which are good."""
-
-    def result(share: float) -> CoverageResult:
-        coverage = np.where(np.arange(10) < round(10 * share), 61.0, 59.0)
-        return CoverageResult(coverage[:, None], np.full((10, 3), offset))
-
-    return PrototypeYield(result(plain), result(known))
+    offsets = np.full((10, 3), offset)
+    one, other = (
+        np.where(np.arange(10) < round(10 * share), 61.0, 59.0)[:, None] for share in (plain, known)
+    )
+    return PrototypeResult(one, offsets, other, offsets)
 
 
 def rows_of(analysis: Analysis, name: str) -> list[dict[str, str]]:

@@ -15,13 +15,13 @@ from tbcad.optics.reflection import miss_distances
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.tolerance.as_made import as_made
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, WorstCase, simulate
+from tbcad.tolerance.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sensitivity import scaled, shell_kinds
-from tbcad.tolerance.montecarlo.smooth_field import pivots, smooth_field
+from tbcad.tolerance.montecarlo.warp import pivots, smooth_field
 from tests.pedestal_designs import pedestal_design
 from tests.tolerance.exact_builds import traced_coverage, verified_coverage, write_meshes
 from tests.tolerance.exact_fields import displaced_coverage
@@ -225,7 +225,9 @@ def test_a_build_is_the_same_alone_or_among_others(halves: EdgeModels) -> None:
     together, alone = case(range(4)), case(range(2, 3))
     for name in ("coverage", "pixels", "angle"):
         assert np.array_equal(getattr(together, name)[2:3], getattr(alone, name)), name
-    assert np.array_equal(WorstCase(halves, errors, 5)(range(4)).worst, together.worst)
+    assert np.array_equal(
+        CoverageCase(halves, errors, 5, worst_only=True)(range(4)).worst, together.worst
+    )
 
 
 def test_errors_of_neighbours_cost_less_than_where_spheres_meet(
@@ -235,7 +237,8 @@ def test_errors_of_neighbours_cost_less_than_where_spheres_meet(
     errors = Errors(sphere_centre=Error(0.005), sphere_radius=Error(0.005))
     joined = edge_models(reflectors(small_design))
     pedestal, valley = (
-        simulate(WorstCase(of, errors, 1), 40).worst.mean() for of in (halves, joined)
+        simulate(CoverageCase(of, errors, 1, worst_only=True), 40).worst.mean()
+        for of in (halves, joined)
     )
     assert 60.6 - 0.1 > pedestal > 60.6 - 0.7
     assert 3 * (60.6 - pedestal) < 60.6 - valley

@@ -16,11 +16,10 @@ from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
+from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage, pointing
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.pointing import pointing
 from tbcad.tolerance.montecarlo.sensitivity import scaled
 from tests.tolerance.exact_builds import (
     bisected_coverage,

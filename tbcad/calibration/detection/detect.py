@@ -6,20 +6,33 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.calibration.detection.detection import Detection, Reason, Rejected
+from tbcad.calibration.detection.detection import (
+    Detection,
+    Rejected,
+    Rejection,
+    no_highlights,
+    relative_light,
+    verdicts,
+)
 from tbcad.calibration.detection.expected import Expected, Room, maybe_hidden
-from tbcad.calibration.detection.matching import NoPairs, highlights_of, match, shift_of
-from tbcad.calibration.detection.motion import Move, find_move
-from tbcad.calibration.detection.noise import centroid_sigmas, gain, reading_variance
-from tbcad.calibration.detection.nothing_found import no_highlights
+from tbcad.calibration.detection.matching import (
+    CameraMove,
+    NoPairs,
+    find_move,
+    highlights_of,
+    match,
+    shift_of,
+)
 from tbcad.calibration.detection.spots import (
     ROUNDING,
-    Spots,
+    BrightSpots,
     Unmeasured,
+    centroid_sigmas,
     find_spots,
+    gain,
     joined_spots,
+    reading_variance,
 )
-from tbcad.calibration.detection.verdicts import relative_light, verdicts
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
@@ -40,14 +53,12 @@ class _Read:
     """What a frame's photographs show.
 
     Attributes:
-        spots: of all LEDs.
-        unmeasured: what is bright besides.
         photographed: which LEDs' photographs could be read, (l,).
         faults: of the others, and of the dark one.
         dark: the dark photograph, if it could be read.
     """
 
-    spots: Spots
+    spots: BrightSpots
     unmeasured: Unmeasured
     photographed: Bools
     faults: tuple[str, ...]
@@ -161,7 +172,6 @@ def _spare_dark(run: Run) -> _Dark | None:
 
 
 def _seconds(run: Run, frame: Frame, phase: str) -> float | None:
-    """Exposure time of a photograph, s, if it is known."""
     exposure = run.exposure(frame, phase)
     return None if exposure is None else exposure.exposure_s
 
@@ -202,7 +212,7 @@ def _photograph(run: Run, frame: Frame, phase: str) -> tuple[Image16 | None, str
         return None, str(error)
 
 
-def _exposures(run: Run, spots: Spots, faults: list[str]) -> Floats:
+def _exposures(run: Run, spots: BrightSpots, faults: list[str]) -> Floats:
     """Exposure time of each spot's photograph over the usual one, (m,)."""
     frames = run.record.frames
     times = {
@@ -224,18 +234,21 @@ def _exposures(run: Run, spots: Spots, faults: list[str]) -> Floats:
 
 
 def _overrule(
-    reasons: list[Reason | None], expected: Expected, photographed: Bools, move: Move | None
+    reasons: list[Rejection | None],
+    expected: Expected,
+    photographed: Bools,
+    move: CameraMove | None,
 ) -> None:
     """Name what no highlight says itself: photographs that are not there, or not kept."""
     absent = ~photographed[expected.frame, expected.led] & expected.inside
     for number in np.flatnonzero(absent).tolist():
-        reasons[number] = Reason.NO_PHOTOGRAPH
+        reasons[number] = Rejection.NO_PHOTOGRAPH
     if move is not None:
         for number in np.flatnonzero(~move.kept[expected.frame] & expected.inside).tolist():
-            reasons[number] = Reason.MOVED
+            reasons[number] = Rejection.MOVED
 
 
-def _move_line(frames: tuple[Frame, ...], move: Move, shift: Floats) -> str:
+def _move_line(frames: tuple[Frame, ...], move: CameraMove, shift: Floats) -> str:
     before, after = (exposure_name(frames[move.first - k], "")[:-1] for k in (1, 0))
     far = np.hypot(*shift)
     how = f"by {far:.2f} px" if np.isfinite(far) else "so far that its highlights are not found"
@@ -246,12 +259,12 @@ def _move_line(frames: tuple[Frame, ...], move: Move, shift: Floats) -> str:
     )
 
 
-def _dead_leds(machine: Machine, expected: Expected, reasons: list[Reason | None]) -> list[str]:
-    """LEDs that do not shine, of those that are photographed."""
+def _dead_leds(machine: Machine, expected: Expected, reasons: list[Rejection | None]) -> list[str]:
+    """Lines on LEDs that do not shine, of those that are photographed."""
     lines = []
-    passed_over = (Reason.OUTSIDE, Reason.NO_PHOTOGRAPH, Reason.MOVED)
+    passed_over = (Rejection.OUTSIDE, Rejection.NO_PHOTOGRAPH, Rejection.MOVED)
     counted = np.array([reason not in passed_over for reason in reasons])
-    absent = np.array([reason in (Reason.MISSING, Reason.HIDDEN) for reason in reasons])
+    absent = np.array([reason in (Rejection.MISSING, Rejection.HIDDEN) for reason in reasons])
     for led in range(len(machine.leds)):
         mine = counted & (expected.led == led)
         if mine.any() and absent[mine].mean() > 1 - DEAD:
@@ -261,7 +274,7 @@ def _dead_leds(machine: Machine, expected: Expected, reasons: list[Reason | None
     return lines
 
 
-def _sigmas(good: Spots, spots: Spots, read: list[_Read]) -> Floats:
+def _sigmas(good: BrightSpots, spots: BrightSpots, read: list[_Read]) -> Floats:
     """Standard deviation of all spots' centroids, pixels, (m,)."""
     darks = [one.dark for one in read if one.dark is not None]
     reading = reading_variance(*darks[:2]) if len(darks) > 1 else ROUNDING
@@ -269,7 +282,7 @@ def _sigmas(good: Spots, spots: Spots, read: list[_Read]) -> Floats:
     return centroid_sigmas(spots, reading, gain(good, reading, largest))
 
 
-def _rejected(expected: Expected, reasons: list[Reason | None]) -> tuple[Rejected, ...]:
+def _rejected(expected: Expected, reasons: list[Rejection | None]) -> tuple[Rejected, ...]:
     keys = zip(
         expected.frame.tolist(), expected.sphere.tolist(), expected.led.tolist(), strict=True
     )

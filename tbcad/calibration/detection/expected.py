@@ -56,12 +56,7 @@ class Expected:
 
 
 def expected_highlights(machine: Machine, dome: float) -> Expected:
-    """All highlights of a machine.
-
-    Args:
-        machine: with its frames.
-        dome: radius of the LEDs' domes, mm.
-    """
+    """All highlights of a machine whose LEDs have domes of a radius in mm."""
     camera = machine.camera
     shape = len(machine.angle), len(machine.radius), len(machine.leds)
     frame, sphere, led = (index.ravel() for index in np.indices(shape))
@@ -93,7 +88,7 @@ def maybe_hidden(machine: Machine, expected: Expected, room: Room) -> Bools:
     start = machine.leds[expected.led]
     way = unit(centre - start)
     level = norm(way[:, :2]) ** 2
-    along = -dot_level(start, way) / np.maximum(level, np.finfo(float).tiny)
+    along = -dot(start[:, :2], way[:, :2]) / np.maximum(level, np.finfo(float).tiny)
     nearest = start + along[:, None] * way
     inside = room.radius**2 - norm(nearest[:, :2]) ** 2
     half = np.sqrt(np.maximum(inside, 0) / np.maximum(level, np.finfo(float).tiny))
@@ -101,8 +96,3 @@ def maybe_hidden(machine: Machine, expected: Expected, room: Room) -> Bools:
     low, high = (start[:, 2] + end * way[:, 2] for end in (np.maximum(first, 0), last))
     crosses = (np.minimum(low, high) < room.top) & (np.maximum(low, high) > room.bottom)
     return np.asarray((inside > 0) & (last > 0) & crosses)
-
-
-def dot_level(a: Floats, b: Floats) -> Floats:
-    """Scalar products (n,) of vectors (n, 3) without their heights."""
-    return dot(a[:, :2], b[:, :2])

@@ -6,13 +6,16 @@ expected places agree on is taken. Then the machine is estimated from the neares
 again.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.calibration.detection.expected import Expected, expected_highlights
-from tbcad.calibration.detection.spots import Spots
+from tbcad.calibration.detection.spots import BrightSpots, stacked
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
+from tbcad.geometry.vectors import norm
 from tbcad.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints, Progress
 
@@ -23,7 +26,10 @@ FIRST_FRAMES = 40  # that the first estimate is made of
 FIRST_PX, NEAR_PX, FINAL_PX = 30.0, 10.0, 2.5
 FIRST_SIGMA_PX, SIGMA_PX = 2.0, 0.3
 FEW = 4  # highlights of a frame
-PHOTOGRAPH_PX = 1e5  # apart: spots of different photographs never pair
+MIN_HIGHLIGHTS = 4  # of a frame, to say where it is
+MIN_FRAMES = 3  # on either side of a move
+MIN_MOVE_PX, MOVE_SIGMAS = 0.15, 8.0  # less is no move
+FEW_PAIRS = 0.3  # share of the usual number of pairs: fewer are not where the machine shows them
 
 
 class NoPairs(Exception):
@@ -31,15 +37,9 @@ class NoPairs(Exception):
 
 
 def match(
-    prior: Prior, spots: Spots, dome: float, progress: Progress
+    prior: Prior, spots: BrightSpots, dome: float, progress: Progress
 ) -> tuple[Expected, Ints, Estimate]:
-    """Pair spots with highlights.
-
-    Args:
-        prior: of the machine, whose frames and LEDs those of the spots are.
-        spots: of all photographs.
-        dome: radius of the LEDs' domes, mm.
-        progress: called with each step.
+    """Pair spots with highlights of a prior's machine, whose LEDs have domes of a radius in mm.
 
     Returns:
         The highlights that the machine should show; the spot of each, or -1, (n,); and the machine
@@ -47,7 +47,6 @@ def match(
 
     Raises:
         NoPairs: the spots fit no machine near the prior.
-        InputError: no machine explains them.
     """
     expected = expected_highlights(prior.mean, dome)
     some = np.unique(np.linspace(0, len(prior.mean.angle) - 1, FIRST_FRAMES).astype(np.int64))
@@ -69,10 +68,10 @@ def _places(expected: Expected) -> Floats:
     return expected.pixel + expected.centroid
 
 
-def _common_shift(expected: Expected, spots: Spots) -> Floats:
+def _common_shift(expected: Expected, spots: BrightSpots) -> Floats:
     """Shift (2,) from expected places to spots on which most pairs agree."""
     mine, theirs = _tree(expected.frame, expected.led, _places(expected), expected.inside)
-    others = cKDTree(_stacked(spots.frame, spots.led, spots.pixel))
+    others = cKDTree(stacked(spots.frame, spots.led, spots.pixel))
     pairs = others.sparse_distance_matrix(theirs, SHIFT_PX, output_type="ndarray")
     spot, highlight = pairs["i"], mine[pairs["j"]]
     shift = spots.pixel[spot] - _places(expected)[highlight]
@@ -86,7 +85,7 @@ def _common_shift(expected: Expected, spots: Spots) -> Floats:
     return np.asarray(edges[np.array(best) + 1])
 
 
-def shift_of(expected: Expected, spots: Spots) -> Floats:
+def shift_of(expected: Expected, spots: BrightSpots) -> Floats:
     """Middle shift (2,) of spots from the highlights next to them; NaN where few are near."""
     partner = paired(expected, _places(expected), spots, NEAR_PX)
     near = np.flatnonzero(partner >= 0)
@@ -95,15 +94,17 @@ def shift_of(expected: Expected, spots: Spots) -> Floats:
     return np.asarray(np.median(spots.pixel[partner[near]] - _places(expected)[near], axis=0))
 
 
-def paired(expected: Expected, places: Floats, spots: Spots, radius: float) -> Ints:
+def paired(expected: Expected, places: Floats, spots: BrightSpots, radius: float) -> Ints:
     """The spot of each highlight, or -1, (n,): each is the other's nearest within a radius."""
     partner = np.full(len(places), -1)
     mine, tree = _tree(expected.frame, expected.led, places, expected.inside)
-    stacked = _stacked(spots.frame, spots.led, spots.pixel)
+    places_of_spots = stacked(spots.frame, spots.led, spots.pixel)
     if not len(mine) or not len(spots):
         return partner
-    distance, nearest = np.array(cKDTree(stacked).query(tree.data, distance_upper_bound=radius))
-    nearest, back = nearest.astype(np.int64), np.array(tree.query(stacked)[1])
+    distance, nearest = np.array(
+        cKDTree(places_of_spots).query(tree.data, distance_upper_bound=radius)
+    )
+    nearest, back = nearest.astype(np.int64), np.array(tree.query(places_of_spots)[1])
     near = np.isfinite(distance)
     mutual = near & (back[np.where(near, nearest, 0)] == np.arange(len(mine)))
     partner[mine[mutual]] = nearest[mutual]
@@ -113,16 +114,11 @@ def paired(expected: Expected, places: Floats, spots: Spots, radius: float) -> I
 def _tree(frame: Ints, led: Ints, pixel: Floats, inside: Bools) -> tuple[Ints, cKDTree]:
     """Numbers of the places that are in the picture, and a tree of them."""
     which = np.flatnonzero(inside)
-    return which, cKDTree(_stacked(frame[which], led[which], pixel[which]))
-
-
-def _stacked(frame: Ints, led: Ints, pixel: Floats) -> Floats:
-    """Places of all photographs, each in a plane of its own, (n, 4)."""
-    return np.column_stack([pixel, PHOTOGRAPH_PX * frame, PHOTOGRAPH_PX * led])
+    return which, cKDTree(stacked(frame[which], led[which], pixel[which]))
 
 
 def highlights_of(
-    expected: Expected, partner: Ints, spots: Spots, sigma: Floats | float
+    expected: Expected, partner: Ints, spots: BrightSpots, sigma: Floats | float
 ) -> Highlights:
     """Paired highlights, their places less what shifts their centroids.
 
@@ -143,8 +139,55 @@ def highlights_of(
 
 
 def _estimated(
-    prior: Prior, expected: Expected, partner: Ints, spots: Spots, sigma: float
+    prior: Prior, expected: Expected, partner: Ints, spots: BrightSpots, sigma: float
 ) -> Estimate:
     if (partner < 0).all():
         raise NoPairs
     return estimate(prior, highlights_of(expected, partner, spots, sigma))
+
+
+@dataclass(frozen=True)
+class CameraMove:
+    """A move of the camera.
+
+    Attributes:
+        first: number of the first frame after it.
+        kept: whether each frame is on the side that is kept, (f,).
+    """
+
+    first: int
+    kept: Bools
+
+
+def find_move(estimate: Estimate, frames: int, spots: Floats) -> CameraMove | None:
+    """The one move of the camera that residuals, and spots in each frame (f,), show; or None."""
+    frame = estimate.highlights.frame
+    count = np.bincount(frame, minlength=frames).astype(np.int64)
+    lost = (count < FEW_PAIRS * np.median(count[count > 0])) & (spots > 0)
+    # All that is lost comes before or after one frame.
+    if lost.sum() >= MIN_FRAMES and np.count_nonzero(np.diff(lost.astype(int))) == 1:
+        first = int(np.flatnonzero(lost)[0]) if not lost[0] else int(np.flatnonzero(~lost)[0])
+        return CameraMove(first, ~lost)
+    return _step(estimate, count)
+
+
+def _step(estimate: Estimate, count: Ints) -> CameraMove | None:
+    known = np.flatnonzero(count >= MIN_HIGHLIGHTS)
+    if len(known) < 2 * MIN_FRAMES:
+        return None
+    frame = estimate.highlights.frame
+    middle = np.array([np.median(estimate.residual[frame == f], axis=0) for f in known])
+    before = np.arange(1, len(known))[:, None]
+    sums = np.cumsum(middle, axis=0)
+    step = (sums[-1] - sums[:-1]) / (len(known) - before) - sums[:-1] / before
+    # A step in the middle is known better than one near an end.
+    weight = np.sqrt(before * (len(known) - before) / len(known))
+    score = norm(step * weight)
+    score[: MIN_FRAMES - 1] = score[len(known) - MIN_FRAMES :] = 0
+    best = int(score.argmax())
+    scatter = float(np.median(np.abs(np.diff(middle, axis=0)))) + np.finfo(float).eps
+    if norm(step[best]) < MIN_MOVE_PX or score[best] < MOVE_SIGMAS * scatter:
+        return None
+    first = int(known[best + 1])
+    after = np.arange(len(count)) >= first
+    return CameraMove(first, after if after.sum() > (~after).sum() else ~after)

@@ -26,10 +26,17 @@ RING_PX = 2  # about the disc, for the light behind
 ROUNDING = 1 / 12  # variance of a number that is rounded
 COLUMNS = 8  # of a table of spots: place, sums and largest number
 ROUNDS = 4  # of finding the centroid in the disc about the last one
+COLOURS = 3
+CLIP = 5.0  # in numbers: larger differences of dark photographs are of hot pixels
+# Electrons that fill a pixel where colours do not tell: a sensor with pixels of 3.45 um.
+FULL_ELECTRONS = 10_000.0
+# What the model of domes leaves open, dust, and what a lens as sharp as its pixels adds, pixels.
+FLOOR_PX = 0.006
+PHOTOGRAPH_PX = 1e5  # apart: spots of different photographs never pair
 
 
 @dataclass(frozen=True)
-class Spots:
+class BrightSpots:
     """Bright spots, over n of them.
 
     Attributes:
@@ -56,12 +63,11 @@ class Spots:
     full: Floats
 
     def __len__(self) -> int:
-        """Number of spots."""
         return len(self.frame)
 
-    def only(self, which: Bools | Ints) -> "Spots":
+    def only(self, which: Bools | Ints) -> "BrightSpots":
         """Some of them."""
-        return Spots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
+        return BrightSpots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
 
 
 @dataclass(frozen=True)
@@ -81,33 +87,28 @@ class Unmeasured:
     black: int = 0
 
     def __add__(self, other: "Unmeasured") -> "Unmeasured":
-        """Of both."""
         return Unmeasured(
             *(getattr(self, one.name) + getattr(other, one.name) for one in fields(self))
         )
 
 
-def joined_spots(parts: list[Spots]) -> Spots:
+def joined_spots(parts: list[BrightSpots]) -> BrightSpots:
     """All spots of several photographs."""
     if not parts:
         empty, none = np.zeros(0), np.zeros(0, dtype=np.int64)
-        return Spots(none, none, np.zeros((0, 2)), *[empty] * 6)
-    return Spots(
-        **{one.name: np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(Spots)}
+        return BrightSpots(none, none, np.zeros((0, 2)), *[empty] * 6)
+    return BrightSpots(
+        **{
+            one.name: np.concatenate([getattr(p, one.name) for p in parts])
+            for one in fields(BrightSpots)
+        }
     )
 
 
 def find_spots(
     image: Image16, dark: Image16 | None, frame: int, led: int
-) -> tuple[Spots, Unmeasured]:
-    """The spots of a photograph by one LED, and what is bright besides.
-
-    Args:
-        image: (h, w, 3).
-        dark: the same without light, which is subtracted; None for none.
-        frame: number of the frame.
-        led: number of the LED.
-    """
+) -> tuple[BrightSpots, Unmeasured]:
+    """The spots of a photograph (h, w, 3) by one LED, less a dark one, and what else is bright."""
     largest = np.iinfo(image.dtype).max
     threshold = max(round(THRESHOLD * largest), 1)
     row, column = _bright(image, dark, threshold)
@@ -120,7 +121,7 @@ def find_spots(
     sums = [_measured(image, dark, *one) for one in places if _radius(one[0]) <= MAX_RADIUS_PX]
     table = np.array([one for one in sums if one is not None]).reshape(-1, COLUMNS)
     light, radius, shot, spread, colours, full = table[:, 2:].T
-    found = Spots(
+    found = BrightSpots(
         frame=np.full(len(table), frame),
         led=np.full(len(table), led),
         pixel=table[:, :2],
@@ -150,7 +151,6 @@ def _bright(image: Image16, dark: Image16 | None, threshold: int) -> tuple[Ints,
 
 
 def _clusters(row: Ints, column: Ints) -> Ints:
-    """Number of the cluster of each pixel."""
     pairs = cKDTree(np.column_stack([row, column])).query_pairs(
         NEIGHBOURS_PX, output_type="ndarray"
     )
@@ -205,3 +205,31 @@ def _colour_noise(light: NDArray[np.float64]) -> float:
     # Of three colours two are free, when their mean is taken off; empty pixels are not rounded.
     rounded = int(np.count_nonzero(light.any(axis=1)))
     return float(apart - (light.shape[1] - 1) * ROUNDING * rounded)
+
+
+def reading_variance(dark: Image16, other: Image16) -> float:
+    """Variance of a number without light, from two dark photographs."""
+    change = np.clip(dark.astype(np.float32) - other.astype(np.float32), -CLIP, CLIP)
+    return float((change**2).mean() / 2) + ROUNDING
+
+
+def gain(spots: BrightSpots, reading: float, largest: float) -> float:
+    """Variance of light over light, in numbers."""
+    pixels = np.pi * spots.radius**2
+    known = spots.colours != 0
+    if not known.any():
+        return largest / FULL_ELECTRONS
+    read = (reading - ROUNDING) * pixels[known].sum()
+    variance = spots.colours[known].sum() / (COLOURS - 1) - read
+    return float(max(variance / (spots.light[known].sum() / COLOURS), 0.0))
+
+
+def centroid_sigmas(spots: BrightSpots, reading: float, of_light: float) -> Floats:
+    """Standard deviation of each centroid, of column and of row, pixels, (n,)."""
+    variance = (of_light * spots.shot + COLOURS * reading * spots.spread) / spots.light**2
+    return np.asarray(np.sqrt(variance + FLOOR_PX**2))
+
+
+def stacked(frame: Ints, led: Ints, pixel: Floats) -> Floats:
+    """Places of all photographs, each in a plane of its own, (n, 4)."""
+    return np.column_stack([pixel, PHOTOGRAPH_PX * frame, PHOTOGRAPH_PX * led])

@@ -38,14 +38,9 @@ class Covariance:
     of_outer: Floats
 
     def of(self, slopes: csr_array, size: int) -> Floats:
-        """Covariance of n groups of figures.
+        """Covariance of n groups of figures, in the square of their unit, (n, size, size).
 
-        Args:
-            slopes: derivatives by the parameters, rows group by group, (n * size, q).
-            size: figures of a group.
-
-        Returns:
-            Of each group, in the square of its unit, (n, size, size).
+        Slopes are derivatives by the parameters, rows group by group, (n * size, q).
         """
         inner = slopes[:, self.inner]
         shape = (slopes.shape[0] // size, size, len(self.outer))
@@ -100,7 +95,6 @@ def _is_inner(prior: Prior) -> np.ndarray:
 
 
 def _block_inverse(matrix: csr_array) -> csr_array:
-    """The inverse of a matrix that is made of small blocks, in any order."""
     count, block = connected_components(matrix, directed=False)
     order = np.argsort(block, kind="stable")
     size = np.bincount(block, minlength=count)

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from tbcad.calibration.estimate.lens import LENS, projection
 from tbcad.calibration.estimate.parameters import Block, Prior
-from tbcad.calibration.estimate.reflection import reflections
+from tbcad.calibration.estimate.reflection import LENS, projection, reflections
 from tbcad.geometry.rotations import rotated
 from tbcad.machine.machine import Machine
 from tbcad.types import Floats, Ints
@@ -41,15 +40,7 @@ class Slopes:
 def highlights_with_slopes(
     prior: Prior, values: Floats, frame: Ints, sphere: Ints, led: Ints
 ) -> tuple[Floats, csr_array]:
-    """Columns and rows (n, 2), and their derivatives, (2 n, q).
-
-    Args:
-        prior: of the machine.
-        values: free parameters in prior standard deviations, (q,).
-        frame: of each highlight, (n,).
-        sphere: of each, (n,).
-        led: of each, (n,).
-    """
+    """Columns and rows (n, 2) of highlights (n,), and derivatives by values (q,), (2 n, q)."""
     machine = prior.machine(values)
     image = light_images(prior, values, machine, frame, sphere, machine.leds[led])
     slopes = Slopes(
@@ -86,10 +77,13 @@ def light_images(
     by_point = by_image @ camera.axes
     moved = sphere_slopes(prior, values, machine, frame, sphere)
     columns = (*camera_columns(prior), prior.first[Block.RADII] + sphere[:, None], *moved.columns)
+    turned = _left_jacobian(prior.blocks(values)[Block.CAMERA_TURN]).T[None]
+    by_logarithm, (x, y) = np.eye(LENS), camera.focal  # of the focal lengths
+    by_logarithm[:2, :2] = [[x, x / 2], [y, -y / 2]]
     derivatives = (
-        by_image @ turn_slopes(prior.blocks(values)[Block.CAMERA_TURN], image),
+        by_image @ np.cross(turned, image[:, None]).swapaxes(1, 2),
         by_point @ (seen.by_pinhole - np.eye(3)),
-        lens_slopes(by_lens, machine),
+        by_lens @ by_logarithm,
         by_point @ seen.by_radius[..., None],
         *(by_point @ seen.by_centre @ value for value in moved.values),
     )
@@ -104,19 +98,6 @@ def camera_columns(prior: Prior) -> tuple[Ints, Ints, Ints]:
         prior.first[Block.PINHOLE] + np.arange(3),
         np.concatenate([prior.first[block] + np.arange(size) for block, size in lens]),
     )
-
-
-def turn_slopes(turn: Floats, turned: Floats) -> Floats:
-    """Derivatives (n, 3, 3) of rotated vectors (n, 3) by the rotation vector (3,)."""
-    return np.asarray(np.cross(_left_jacobian(turn).T[None], turned[:, None]).swapaxes(1, 2))
-
-
-def lens_slopes(by_lens: Floats, machine: Machine) -> Floats:
-    """From derivatives (n, d, LENS) by focal lengths to those by their logarithms."""
-    change = np.eye(LENS)
-    x, y = machine.camera.focal
-    change[:2, :2] = [[x, x / 2], [y, -y / 2]]
-    return np.asarray(by_lens @ change)
 
 
 def sphere_slopes(

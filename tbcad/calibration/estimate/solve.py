@@ -39,15 +39,12 @@ class Estimate:
     """The machine that explains the highlights best.
 
     Attributes:
-        prior: what was known before.
-        highlights: all that were given.
         used: which of them are no outliers, (n,).
         values: free parameters in prior standard deviations, (q,).
         residual: highlight less prediction, pixels, (n, 2).
         information: inverse of the parameters' covariance in these units, (q, q).
         noise_factor: by which the noise is larger than the highlights say; 1 if not larger.
         freedom: number of figures of the used highlights, less the parameters that they fix.
-        steps: that the search took.
     """
 
     prior: Prior
@@ -82,14 +79,7 @@ def estimate(
     progress: Progress = lambda _: None,
     start: Floats | None = None,
 ) -> Estimate:
-    """Estimate a machine.
-
-    Args:
-        prior: what is known before.
-        highlights: measured.
-        progress: called with the state of the search.
-        start: parameters (q,) to start from, in prior standard deviations; the prior's mean if not
-            said.
+    """Estimate a machine, from parameters (q,) in prior standard deviations or the prior's mean on.
 
     Raises:
         InputError: there are no highlights, or nothing explains them.
@@ -198,7 +188,6 @@ def _factor(information: csc_array) -> SuperLU:
 
 
 def _squares(problem: _Problem, values: Floats) -> Floats:
-    """Of the residuals' lengths over what the highlights say of their noise, (n,)."""
     residual, _ = problem.at(values)
     return np.asarray((residual**2).sum(axis=1) / problem.highlights.sigma**2)
 

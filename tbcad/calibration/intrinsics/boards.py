@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.calibration.intrinsics.opencv import cv
+from tbcad.calibration.intrinsics.lens import cv
 from tbcad.errors import InputError
 
 MIN_SQUARES, MAX_SQUARES = 4, 60
@@ -34,7 +34,6 @@ class Board:
         squares: columns and rows.
         size_mm: width of a square.
         dictionary: of the markers of a ChArUco board, as OpenCV names it; None: a checkerboard.
-        marker_mm: width of a marker.
     """
 
     squares: tuple[int, int]
@@ -43,7 +42,6 @@ class Board:
     marker_mm: float | None = None
 
     def __post_init__(self) -> None:
-        """Check. Raises InputError: no such board can be."""
         if not SIZE_MM[0] <= self.size_mm <= SIZE_MM[1]:
             raise InputError(
                 f"--size {self.size_mm:g}: allowed is {SIZE_MM[0]:g} to {SIZE_MM[1]:g} mm: "
@@ -86,11 +84,7 @@ class BoardCorners:
 
 
 def parse_squares(text: str) -> tuple[int, int]:
-    """Columns and rows of squares of "9x6".
-
-    Raises:
-        InputError: it is no such text.
-    """
+    """Columns and rows of squares of "9x6", or an InputError."""
     found = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", text)
     columns, rows = (int(found[1]), int(found[2])) if found else (0, 0)
     if not (min(columns, rows) >= MIN_SQUARES and max(columns, rows) <= MAX_SQUARES):
@@ -102,11 +96,7 @@ def parse_squares(text: str) -> tuple[int, int]:
 
 
 def parse_dictionary(text: str) -> str:
-    """OpenCV's name of a dictionary of markers, of "4x4_50".
-
-    Raises:
-        InputError: it is no such text.
-    """
+    """OpenCV's name of a dictionary of markers, of "4x4_50", or an InputError."""
     found = DICTIONARY.fullmatch(text.strip())
     if not found or found[1][0] != found[1][2]:
         raise InputError(
@@ -117,15 +107,7 @@ def parse_dictionary(text: str) -> str:
 
 
 def find_corners(grey: Any, board: Board) -> BoardCorners | None:
-    """Find the corners between four squares that a photograph shows.
-
-    Args:
-        grey: uint8, (h, w).
-        board: whole, or partly out of the picture.
-
-    Returns:
-        At least `MIN_CORNERS`; None where there are fewer.
-    """
+    """Find at least `MIN_CORNERS` corners between four squares in grey, uint8, (h, w), or None."""
     if board.dictionary is not None:
         return _charuco(grey, board)
     whole = _whole(grey, board.squares)
@@ -198,12 +180,10 @@ def _fits(grid: Any, squares: tuple[int, int]) -> bool:
 
 
 def _spacing(grid: Any) -> float:
-    """The least distance of neighbouring corners, pixels."""
     return float(min(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)))
 
 
 def _places(grid: Any) -> Any:
-    """Columns and rows of a grid's corners, (n, 2)."""
     rows, columns = grid.shape[:2]
     return np.mgrid[0:columns, 0:rows].T.reshape(-1, 2).astype(np.float32)
 

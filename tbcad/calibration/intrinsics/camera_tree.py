@@ -2,14 +2,15 @@
 
 import re
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.calibration.intrinsics.lens import USABLE, Lens, lens_of, numbers_of
-from tbcad.calibration.intrinsics.trees import Tree
+from tbcad.calibration.intrinsics.lens import USABLE, CalibratedLens, lens_of, numbers_of
 from tbcad.errors import InputError
 from tbcad.types import Floats
 
+Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str"
 Node = dict[str, Tree]
 
 SIDE = r"(?P<side>_?(\d|left|right|l|r))?"
@@ -44,12 +45,8 @@ SKEW = 1e-6  # of the focal length, that is taken for none
 FULL = {"0", "1"}  # binning of a picture of all pixels
 
 
-def camera_lens(tree: Node, name: str) -> Lens:
-    """The lens of the only camera of a tree.
-
-    Args:
-        tree: mappings, lists and texts.
-        name: of the file, for errors.
+def camera_lens(tree: Node, name: str) -> CalibratedLens:
+    """The lens of the only camera of a file's tree of mappings, lists and texts.
 
     Raises:
         InputError: it has no camera or several, another model of the lens, or a part of the
@@ -154,7 +151,6 @@ def _check_all_pixels(camera: Node, name: str) -> None:
 
 
 def _coefficients(camera: Node, side: str, name: str) -> list[str]:
-    """Coefficients of the camera's own distortion."""
     found = [
         value
         for key, value in camera.items()
@@ -215,7 +211,6 @@ def _numbers(node: Tree, name: str) -> list[str]:
 
 
 def _size(camera: Node, name: str) -> tuple[Tree, Tree]:
-    """Columns and rows of the pictures, as the file has them."""
     widths, heights = _all(camera, WIDTH), _all(camera, HEIGHT)
     sizes: list[list[Tree]] = [list(pair) for pair in zip(widths, heights, strict=False)]
     sizes += [[]] if len(widths) != len(heights) else []

@@ -13,8 +13,7 @@ from tbcad.calibration.intrinsics.boards import (
     BoardCorners,
     find_corners,
 )
-from tbcad.calibration.intrinsics.lens import Lens
-from tbcad.calibration.intrinsics.opencv import cv
+from tbcad.calibration.intrinsics.lens import CalibratedLens, cv
 from tbcad.errors import InputError
 from tbcad.formats.pictures import visible_files
 from tbcad.runs.images import read_image
@@ -40,17 +39,15 @@ class SolvedLens:
     """A lens with what tells how good it is.
 
     Attributes:
-        lens: solved.
         boards: photographs that were used.
         unused: names of those in which no board was found.
-        corners: that were used.
         outliers: corners left out, which are far from where the solution shows them.
         rms_px: root mean square distance of corners from where the solution shows them.
         sigma: standard deviations of `NAMES`, (9,), by leaving out one photograph after the other.
         reach: how far out corners lie, as a share of the distance from centre to corner.
     """
 
-    lens: Lens
+    lens: CalibratedLens
     boards: int
     unused: tuple[str, ...]
     corners: int
@@ -67,12 +64,7 @@ class SolvedLens:
 
 
 def solve_lens(folder: Path, board: Board, progress: Progress) -> SolvedLens:
-    """Solve a lens from the photographs of a board in a folder.
-
-    Args:
-        folder: with the photographs, all of one camera and size.
-        board: that they show, whole or in part.
-        progress: called with the name of each photograph.
+    """Solve a lens from a folder of photographs of a board, whole or in part, by one camera.
 
     Raises:
         InputError: too few boards are found, sizes differ, or the solution makes no sense.
@@ -146,19 +138,10 @@ class _Solution:
 def solve_corners(
     seen: list[BoardCorners], size: tuple[int, int], unused: tuple[str, ...] = ()
 ) -> SolvedLens:
-    """Solve a lens from corners of boards.
-
-    Args:
-        seen: in each photograph.
-        size: columns and rows of the photographs.
-        unused: names of photographs without a board.
-
-    Raises:
-        InputError: they are of no lens.
-    """
+    """Solve a lens from corners in photographs of a size; InputError: they are of no lens."""
     boards = without_outliers(seen, size)
     solution = _solution(boards, size)
-    lens = Lens(
+    lens = CalibratedLens(
         focal=solution.values[:2],
         principal=solution.values[2:4],
         distortion=solution.values[4:],
@@ -200,7 +183,6 @@ def without_outliers(seen: list[BoardCorners], size: tuple[int, int]) -> list[Bo
 
 
 def _enough(boards: list[BoardCorners], near: list[BoardCorners]) -> list[BoardCorners]:
-    """Boards of which enough corners are near."""
     kept = [b for b, one in zip(boards, near, strict=True) if len(one.pixels) >= MIN_CORNERS]
     if len(kept) < MIN_BOARDS:
         raise InputError(

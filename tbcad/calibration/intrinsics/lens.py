@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,18 +18,17 @@ USABLE = (
     "use a pinhole with OpenCV's k1, k2, p1, p2, k3 (plumb_bob, radtan): calibrate with that "
     "model, as tbcad intrinsics does"
 )
+INSTALL = "pip install 'tbcad[machine]'"
 
 
 @dataclass(frozen=True)
-class Lens:
+class CalibratedLens:
     """Focal lengths, principal point and distortion by OpenCV's model.
 
     Attributes:
         focal: along rows and columns, pixels, (2,).
         principal: column and row of the optical axis; whole numbers are pixel centres, (2,).
         distortion: k1, k2, p1, p2, k3, (5,).
-        width_px: columns.
-        height_px: rows.
     """
 
     focal: Floats
@@ -38,11 +38,7 @@ class Lens:
     height_px: int
 
     def on(self, camera: LensCamera) -> LensCamera:
-        """A camera with this lens.
-
-        Raises:
-            InputError: the lens was calibrated at another size of the picture.
-        """
+        """A camera with this lens; InputError: the lens is of another size of picture."""
         size = camera.width_px, camera.height_px
         if (self.width_px, self.height_px) != size:
             raise InputError(
@@ -53,15 +49,8 @@ class Lens:
             camera, focal=self.focal, principal=self.principal, distortion=self.distortion
         )
 
-    def checked(self, name: str) -> "Lens":
-        """This lens, if a camera can have it.
-
-        Args:
-            name: of its file, for the error.
-
-        Raises:
-            InputError: it cannot.
-        """
+    def checked(self, name: str) -> "CalibratedLens":
+        """This lens, or an InputError with the name of its file if no camera can have it."""
         if (self.focal <= 0).any():
             raise InputError(f"{name}: focal lengths must be above 0: export it again")
         share = self.focal / self.width_px
@@ -96,14 +85,8 @@ class Lens:
 
 def lens_of(
     intrinsics: Iterable[object], coefficients: Iterable[object], size: Iterable[object], name: str
-) -> Lens:
-    """A lens from what a file says.
-
-    Args:
-        intrinsics: focal lengths and principal point, 4 numbers.
-        coefficients: of distortion, as many of OpenCV's as there are.
-        size: columns and rows of the pictures.
-        name: of the file, for errors.
+) -> CalibratedLens:
+    """A lens from a file's 4 intrinsics, OpenCV's coefficients of distortion, columns and rows.
 
     Raises:
         InputError: one is no number, or a coefficient after k3 is not zero.
@@ -123,7 +106,7 @@ def lens_of(
             f"{name} is of pictures of {width:g} x {height:g} pixels: allowed are whole numbers to "
             f"{MAX_PX}"
         )
-    return Lens(values[:2], values[2:], distortion, int(width), int(height))
+    return CalibratedLens(values[:2], values[2:], distortion, int(width), int(height))
 
 
 def _model(coefficients: int) -> str:
@@ -132,11 +115,7 @@ def _model(coefficients: int) -> str:
 
 
 def numbers_of(values: Iterable[object], name: str) -> Floats:
-    """Finite numbers from texts and numbers of a file, (n,).
-
-    Raises:
-        InputError: one is none.
-    """
+    """Finite numbers from texts and numbers of a file, (n,), or an InputError."""
     found = np.array([_number(value) for value in values], dtype=np.float64)
     if not np.isfinite(found).all():
         wrong = next(value for value in values if not np.isfinite(_number(value)))
@@ -149,3 +128,42 @@ def _number(value: object) -> float:
         return float(value) if isinstance(value, str | int | float) else np.nan
     except (ValueError, OverflowError):
         return np.nan
+
+
+def cv() -> Any:
+    """OpenCV, or an InputError where it is not installed."""
+    try:
+        import cv2
+    except ImportError:
+        raise InputError(f"OpenCV is needed for this: {INSTALL}") from None
+    return cv2
+
+
+def opencv_text(lens: CalibratedLens, facts: dict[str, float | int | str]) -> str:
+    """A lens as OpenCV's YAML, which cv2.FileStorage and `read_lens` read, with further keys."""
+    (fx, fy), (cx, cy) = lens.focal.tolist(), lens.principal.tolist()
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"image_width: {lens.width_px}",
+        f"image_height: {lens.height_px}",
+        *_yaml_matrix("camera_matrix", (3, 3), [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
+        *_yaml_matrix("distortion_coefficients", (5, 1), lens.distortion.tolist()),
+        *(f"{key}: {_yaml(value)}" for key, value in facts.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _yaml(value: float | int | str) -> str:
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def _yaml_matrix(name: str, shape: tuple[int, int], values: list[float]) -> list[str]:
+    numbers = ", ".join(repr(value) for value in values)
+    return [
+        f"{name}: !!opencv-matrix",
+        f"   rows: {shape[0]}",
+        f"   cols: {shape[1]}",
+        "   dt: d",
+        f"   data: [ {numbers} ]",
+    ]

@@ -9,15 +9,17 @@ import numpy as np
 
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import covariance
-from tbcad.calibration.report.plots import INCHES, plots
+from tbcad.calibration.report.plots import INCHES, draw_recovered, plots
 from tbcad.calibration.report.record import RECORD, calibration_record, covariance_bytes
 from tbcad.calibration.report.recovered import (
     BESIDES,
     Kind,
+    place_mm,
+    ray_errors,
     recovered_errors,
     recovered_table,
+    turn_mrad,
 )
-from tbcad.calibration.report.recovered_plot import draw_recovered
 from tbcad.calibration.report.tables import (
     angles_table,
     rays_table,
@@ -25,8 +27,7 @@ from tbcad.calibration.report.tables import (
     sphere_covariances,
     spheres_table,
 )
-from tbcad.calibration.report.verdict import Verdict
-from tbcad.calibration.true_rays import place_mm, ray_errors, turn_mrad
+from tbcad.calibration.report.verdict import CalibrationVerdict
 from tbcad.figure_files import PlotFormat, figure_file
 from tbcad.geometry.vectors import norm
 from tbcad.machine.machine import Machine
@@ -42,19 +43,11 @@ COVARIANCE = "covariance.npz"
 def write_calibration(
     folder: Path,
     result: Calibration,
-    judged: Verdict,
+    judged: CalibrationVerdict,
     basis: dict[str, Any],
     plot: PlotFormat = "png",
 ) -> dict[str, Any]:
-    """Write all files of a calibration, and return its record.
-
-    Args:
-        folder: exists, and is the caller's to replace.
-        result: the calibration.
-        judged: its verdict.
-        basis: names of run, export, process and lens.
-        plot: kind of the plots' files.
-    """
+    """Write all files of a calibration into the caller's folder, and return its record."""
     known = covariance(result.found.prior, result.found.information)
     record = calibration_record(result, judged, known, basis)
     write_machine(folder / MACHINE, result.found.machine, result.setup.frames)
@@ -77,14 +70,7 @@ def write_calibration(
 def write_recovered(
     folder: Path, result: Calibration, truth: Machine, plot: PlotFormat = "png"
 ) -> str:
-    """Write recovered.csv and its plot of a simulated run, and return what they say.
-
-    Args:
-        folder: of the calibration.
-        result: the calibration.
-        truth: the machine that was photographed.
-        plot: kind of the plot's file.
-    """
+    """Write recovered.csv and its plot of a simulated run, and return what they say."""
     kinds = recovered_errors(
         result, covariance(result.found.prior, result.found.information), truth
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.report.recovered import SIGMAS, Kind
 from tbcad.figure_files import PlotFormat, figure_file, legend_below
 from tbcad.types import Floats
 
@@ -21,16 +22,14 @@ BINS = 60
 ELLIPSE_POINTS = 60
 ELLIPSE_SIGMAS = 2.0
 ENLARGED = 0.15  # of the spheres' distance, for the largest shift
+COLUMNS = 4
+PANEL_INCHES = 2.6  # width and height of a panel
+PANEL_RANGE, PANEL_BINS = 4.0, 32  # of the histogram, in standard deviations
+TITLE_LINE = 26  # letters
 
 
 def plots(result: Calibration, spheres: Floats, kind: PlotFormat = "png") -> dict[str, bytes]:
-    """All plots by the names of their files.
-
-    Args:
-        result: the calibration.
-        spheres: covariance of centres and radii, mm^2, (k, 4, 4).
-        kind: of the files.
-    """
+    """All plots by the names of their files; covariances of spheres in mm^2, (k, 4, 4)."""
     drawings: dict[str, Callable[[Figure], None]] = {
         "residuals": lambda figure: _residual_arrows(figure, result),
         "residual_distribution": lambda figure: _histogram(figure, result),
@@ -137,7 +136,7 @@ def _rays(figure: "Figure", result: Calibration) -> None:
     points = axes.scatter(
         from_zenith * way[:, 0] / level,
         from_zenith * way[:, 1] / level,
-        c=known.place_mm,
+        c=known.relative.place_mm,
         s=14,
     )
     figure.colorbar(points, ax=axes, label="standard deviation at the object's centre, mm")
@@ -148,3 +147,62 @@ def _rays(figure: "Figure", result: Calibration) -> None:
         ylabel="degrees from the zenith, toward y",
     )
     axes.grid(True, alpha=0.25)
+
+
+def draw_recovered(figure: "Figure", kinds: tuple[Kind, ...]) -> None:
+    """One panel a kind, and one of all errors in standard deviations; sets the figure's size."""
+    rows = -(-(len(kinds) + 1) // COLUMNS)
+    figure.set_size_inches(PANEL_INCHES * COLUMNS, PANEL_INCHES * rows)
+    panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    for axes, kind in zip(panels, kinds, strict=False):
+        _panel(axes, kind)
+    _distribution(panels[len(kinds)], kinds)
+    for axes in panels[len(kinds) + 1 :]:
+        axes.set_visible(False)
+
+
+def _panel(axes: "Axes", kind: Kind) -> None:
+    both = np.concatenate([kind.injected, kind.recovered])
+    low, high = float(both.min()), float(both.max())
+    axes.plot([low, high], [low, high], "k-", lw=0.6, alpha=0.6)
+    axes.errorbar(
+        kind.injected,
+        kind.recovered,
+        yerr=SIGMAS * kind.sigma,
+        fmt="C0o",
+        ecolor="C1",
+        ms=2,
+        elinewidth=0.8,
+        label=kind.name,
+    )
+    axes.set_title(_wrapped(f"{kind.name}, {kind.unit}"), fontsize=7)
+    axes.set_xlabel("injected", fontsize=7)
+    axes.set_ylabel("recovered", fontsize=7)
+    axes.tick_params(labelsize=6)
+    text = f"{len(kind.sigma)} figures\n{kind.within:.0%} within {SIGMAS:g} sigma"
+    axes.text(0.04, 0.96, text, transform=axes.transAxes, va="top", fontsize=6)
+    axes.grid(True, alpha=0.25)
+
+
+def _distribution(axes: "Axes", kinds: tuple[Kind, ...]) -> None:
+    """All errors in their standard deviations next to the normal law, each kind alike."""
+    off = np.concatenate([kind.sigmas_off for kind in kinds])
+    weight = np.concatenate([np.full(len(k.sigma), 1 / len(k.sigma)) for k in kinds])
+    edges = np.linspace(-PANEL_RANGE, PANEL_RANGE, PANEL_BINS + 1).tolist()
+    axes.hist(
+        np.clip(off, -PANEL_RANGE, PANEL_RANGE), edges, density=True, weights=weight, color="C0"
+    )
+    x = np.linspace(-PANEL_RANGE, PANEL_RANGE, 200)
+    axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), "k--", lw=1)
+    axes.set_xlabel("error, standard deviations", fontsize=7)
+    axes.set_ylabel("density", fontsize=7)
+    axes.set_title("errors over their deviations,\neach kind alike; normal law", fontsize=7)
+    axes.tick_params(labelsize=6)
+    axes.grid(True, alpha=0.25)
+
+
+def _wrapped(title: str) -> str:
+    if len(title) <= TITLE_LINE:
+        return title
+    middle = title.rfind(" ", 0, TITLE_LINE)
+    return f"{title[:middle]}\n{title[middle + 1 :]}"

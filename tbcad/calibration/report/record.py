@@ -8,7 +8,7 @@ import numpy as np
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.report.tables import sphere_covariances
-from tbcad.calibration.report.verdict import Verdict, outliers, parameter_names
+from tbcad.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
 from tbcad.types import Floats
 
 CALIBRATION_SCHEMA = "tbcad-calibration/1"
@@ -17,7 +17,7 @@ DIGITS = 6
 
 
 def calibration_record(
-    result: Calibration, judged: Verdict, known: Covariance, basis: dict[str, Any]
+    result: Calibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
 ) -> dict[str, Any]:
     """The object of calibration.json.
 
@@ -99,7 +99,7 @@ def covariance_bytes(result: Calibration, known: Covariance) -> bytes:
         information_column=upper.col[kept].astype(np.int32),
         information=upper.data[kept],
         sphere=sphere_covariances(result, known),
-        ray=result.rays.known.covariance,
+        ray=result.rays.known.whole.covariance,
     )
     return file.getvalue()
 

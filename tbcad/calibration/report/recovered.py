@@ -1,6 +1,6 @@
 """Recovered errors of a simulated build next to those that were injected."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,11 +10,16 @@ from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block
-from tbcad.calibration.report.tables import angle_deviations
+from tbcad.calibration.estimate.solve import Estimate
+from tbcad.calibration.report.tables import angle_sigmas
+from tbcad.calibration.uncertainty import FIGURES, motion_fit, shared_motions
 from tbcad.geometry.rotations import rotated
+from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
+from tbcad.machine.built import is_cap
 from tbcad.machine.machine import Machine
+from tbcad.optics.reflection import reflected_rays
 from tbcad.results.tables import Table
-from tbcad.types import Bools, Floats
+from tbcad.types import Bools, Floats, Ints
 
 MICROMETRES, MILLI = 1000.0, 1000.0
 SIGMAS = 2.0
@@ -51,13 +56,7 @@ class Kind:
 
 
 def recovered_errors(result: Calibration, known: Covariance, truth: Machine) -> tuple[Kind, ...]:
-    """Errors by kind; what is fixed, or is not there, is left out.
-
-    Args:
-        result: the calibration.
-        known: covariance of its parameters.
-        truth: the machine that was photographed, with the same frames.
-    """
+    """Errors by kind, against the true machine with the same frames; none that are fixed."""
     kinds = (*_of_spheres(result, known, truth), *_of_base(result, known, truth))
     return tuple(
         _free(kind) for kind in (*kinds, *_of_camera(result, known, truth)) if kind.sigma.any()
@@ -96,7 +95,7 @@ def _of_spheres(result: Calibration, known: Covariance, truth: Machine) -> list[
     rest = _besides_motion(designed.centre)
     besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
     moved = [rest @ one.centre.ravel() for one in (designed, truth, found)]
-    caps = result.setup.plan.body_radius < result.setup.plan.radius
+    caps = is_cap(result.setup.plan)
     centres = [one.centre for one in (designed, truth, found)]
     return [
         _kind("centres", "um", MICROMETRES, *centres, sigma[:, :3]),
@@ -129,9 +128,9 @@ def _of_base(result: Calibration, known: Covariance, truth: Machine) -> list[Kin
     tilts = [one.axis @ prior.across.T for one in machines]
     places = [_base_places(one, prior.across) for one in machines]
     return [
-        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_deviations(prior, known))),
+        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_sigmas(prior, known))),
         _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, Block.TILT)),
-        _kind("base in each frame", "um", MICROMETRES, *places, _place_deviations(result, known)),
+        _kind("base in each frame", "um", MICROMETRES, *places, _place_sigmas(result, known)),
     ]
 
 
@@ -143,7 +142,7 @@ def _base_places(machine: Machine, across: Floats) -> Floats:
     return np.asarray((point - turned + shift) @ across.T)
 
 
-def _place_deviations(result: Calibration, known: Covariance) -> Floats:
+def _place_sigmas(result: Calibration, known: Covariance) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
     frames = np.arange(len(angle))
@@ -206,9 +205,72 @@ def _lens(machine: Machine) -> Floats:
 
 
 def _sigma(result: Calibration, known: Covariance, block: str) -> Floats:
-    """Of a block's parameters, zero where they are fixed."""
     prior = result.found.prior
     every = np.zeros(len(prior.flat_sigma))
     every[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
     first = prior.first[block]
     return every[first : first + prior.sigma[block].size]
+
+
+@dataclass(frozen=True)
+class RayErrors:
+    """Errors of m rays that show the object's centre: place in mm, direction in radians.
+
+    Attributes:
+        whole: in the frame of the design, (m, 4).
+        relative: besides the motion of all rays that fits them best, (m, 4).
+        in_run: besides such a motion in each run, (m, 4).
+    """
+
+    whole: Floats
+    relative: Floats
+    in_run: Floats
+
+
+def place_mm(errors: Floats) -> Floats:
+    """Distances at the object's centre of errors (m, 4), mm, (m,)."""
+    return norm(errors[:, :2])
+
+
+def turn_mrad(errors: Floats) -> Floats:
+    """Angles of errors (m, 4), mrad, (m,)."""
+    return 1000 * norm(errors[:, 2:])
+
+
+def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> RayErrors:
+    """Errors of rays of spheres (m,) in frames (m,), through the pixels that show the centre."""
+    machine = found.machine
+    pixel = centre_pixels(machine, frame, sphere)
+    _, direction = traced(machine, pixel, frame, sphere)
+    start, true_direction = traced(truth, pixel, frame, sphere)
+    across = perpendicular_axes(direction)
+    away = at_plane(start, true_direction, direction), true_direction - direction
+    errors = np.concatenate([(across @ one[..., None])[..., 0] for one in away], axis=1).ravel()
+    besides = [
+        errors - motions @ (motion_fit(motions) @ errors)
+        for motions in shared_motions(found.prior, frame, direction)
+    ]
+    return RayErrors(*(one.reshape(-1, FIGURES) for one in (errors, *besides)))
+
+
+def traced(machine: Machine, pixel: Floats, frame: Ints, sphere: Ints) -> tuple[Floats, Floats]:
+    """Points (m, 3) on spheres, and unit directions (m, 3) after them, of rays through pixels."""
+    camera = machine.camera
+    ray = camera.directions(pixel)
+    centre, radius = machine.centres(frame, sphere), machine.radius[sphere]
+    offset = centre - camera.pinhole
+    along = dot(ray, offset)
+    inside = radius**2 - dot(offset, offset) + along**2
+    point = camera.pinhole + (along - np.sqrt(inside))[:, None] * ray
+    return point, reflected_rays(camera.pinhole, point, unit(point - centre))
+
+
+def centre_pixels(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
+    """Pixels (m, 2) that show the object's centre."""
+    lit = replace(machine, leds=np.zeros((1, 3)))
+    return lit.highlights(frame, sphere, np.zeros_like(frame))
+
+
+def at_plane(point: Floats, direction: Floats, normal: Floats) -> Floats:
+    """Where lines meet planes through the origin, (m, 3)."""
+    return np.asarray(point - (dot(point, normal) / dot(direction, normal))[:, None] * direction)

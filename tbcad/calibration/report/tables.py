@@ -7,6 +7,7 @@ from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block, Prior
+from tbcad.machine.built import is_cap
 from tbcad.results.tables import Table
 from tbcad.runs.exposure import exposure_name
 from tbcad.types import Floats, Ints
@@ -23,7 +24,7 @@ def spheres_table(result: Calibration, known: Covariance) -> Table:
     sigma = np.sqrt(np.diagonal(sphere_covariances(result, known), axis1=1, axis2=2))
     h, used = result.found.highlights, result.found.used
     count = np.bincount(h.sphere[used], minlength=len(before))
-    caps = result.setup.plan.body_radius < result.setup.plan.radius
+    caps = is_cap(result.setup.plan)
     columns: dict[str, ArrayLike] = {
         "ball": np.arange(1, len(before) + 1),
         "kind": np.where(caps, "cap", "ball"),
@@ -59,9 +60,9 @@ def angles_table(result: Calibration, known: Covariance) -> Table:
         "planned_deg": planned,
         "estimated_deg": angle,
         "difference_deg": angle - planned,
-        "sigma_deg": np.degrees(angle_deviations(found.prior, known)),
+        "sigma_deg": np.degrees(angle_sigmas(found.prior, known)),
         **{f"shift_{axis}_mm": shift[:, i] for i, axis in enumerate(AXES)},
-        "sigma_shift_mm": _runout_deviations(found.prior, known),
+        "sigma_shift_mm": _runout_sigmas(found.prior, known),
     }
     return Table.of_columns("angles", columns)
 
@@ -75,12 +76,12 @@ def rays_table(result: Calibration) -> Table:
         "stop": [frames[i].stop for i in known.frame],
         "ball": known.sphere + 1,
         **{f"direction_{axis}": known.direction[:, i] for i, axis in enumerate(AXES)},
-        "sigma_mrad": known.turn_mrad,
-        "sigma_mm": known.place_mm,
-        "sigma_in_run_mrad": known.in_run_turn_mrad,
-        "sigma_in_run_mm": known.in_run_place_mm,
-        "sigma_in_design_mrad": known.whole_turn_mrad,
-        "sigma_in_design_mm": known.whole_place_mm,
+        "sigma_mrad": known.relative.turn_mrad,
+        "sigma_mm": known.relative.place_mm,
+        "sigma_in_run_mrad": known.in_run.turn_mrad,
+        "sigma_in_run_mm": known.in_run.place_mm,
+        "sigma_in_design_mrad": known.whole.turn_mrad,
+        "sigma_in_design_mm": known.whole.place_mm,
         "pixel_mm": known.pixel_mm,
     }
     return Table.of_columns("rays", columns)
@@ -106,24 +107,23 @@ def residuals_table(result: Calibration) -> Table:
     return Table.of_columns("residuals", columns)
 
 
-def angle_deviations(prior: Prior, known: Covariance) -> Floats:
+def angle_sigmas(prior: Prior, known: Covariance) -> Floats:
     """Of each frame's angle, with the offset of its series, radians, (f,)."""
     frames = np.arange(len(prior.mean.angle))
     columns = np.stack(
         [prior.first[Block.OFFSET] + prior.series, prior.first[Block.ANGLES] + frames], axis=1
     )
-    return _deviations(prior, known, columns)
+    return _sigmas(prior, known, columns)
 
 
-def _runout_deviations(prior: Prior, known: Covariance) -> Floats:
+def _runout_sigmas(prior: Prior, known: Covariance) -> Floats:
     """Root mean square of each frame's shift, mm, (f,)."""
     frames = np.arange(len(prior.mean.angle))
     ways = [(prior.first[Block.RUNOUT] + 2 * frames + way)[:, None] for way in (0, 1)]
-    return np.asarray(np.hypot(*(_deviations(prior, known, columns) for columns in ways)))
+    return np.asarray(np.hypot(*(_sigmas(prior, known, columns) for columns in ways)))
 
 
-def _deviations(prior: Prior, known: Covariance, columns: Ints) -> Floats:
-    """Of sums of parameters, by their numbers, (n, c)."""
+def _sigmas(prior: Prior, known: Covariance, columns: Ints) -> Floats:
     ones = np.ones((len(columns), 1, columns.shape[1]))
     slopes = Slopes((columns,), (ones,)).matrix(prior)
     return np.asarray(np.sqrt(known.of(slopes, 1)[:, 0, 0]))

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from tbcad.calibration.calibrate import Calibration
-from tbcad.calibration.detection.detection import Detection, Reason
+from tbcad.calibration.detection.detection import Detection, Rejection
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.runs.exposure import exposure_name
 from tbcad.screen import WIDTH
@@ -34,11 +34,10 @@ class Answer(StrEnum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CalibrationVerdict:
     """What to think of a calibration.
 
     Attributes:
-        answer: in a word.
         place_mm: root mean square error of the rays at the object's centre, median and 95 %, mm,
             besides a motion of all of them.
         turn_mrad: of their directions, mrad.
@@ -49,7 +48,6 @@ class Verdict:
         short: share of the rays that are less well known than half of their pixel.
         doubts: why it may not be trusted, one line each.
         pulled: parameters that the process does not explain, by name and prior deviations.
-        steps: what to do.
     """
 
     answer: Answer
@@ -65,21 +63,21 @@ class Verdict:
     steps: tuple[str, ...]
 
 
-def verdict(result: Calibration) -> Verdict:
+def verdict(result: Calibration) -> CalibrationVerdict:
     """Judge a calibration."""
     known = result.rays.known
-    short = float((known.place_mm > NEEDED_PIXELS * known.pixel_mm).mean())
+    short = float((known.relative.place_mm > NEEDED_PIXELS * known.pixel_mm).mean())
     doubts = _doubts(result)
     pulled = _pulled(result)
     enough = short <= 1 - SHARE / 100
     trusted = Answer.DOUBTFUL if doubts else Answer.GOOD
-    return Verdict(
+    return CalibrationVerdict(
         answer=trusted if enough else Answer.NOT_GOOD,
-        place_mm=_median_and_most(known.place_mm),
-        turn_mrad=_median_and_most(known.turn_mrad),
-        in_run=(float(np.median(known.in_run_place_mm)), float(np.median(known.in_run_turn_mrad))),
-        whole_mm=_median_and_most(known.whole_place_mm),
-        whole_mrad=_median_and_most(known.whole_turn_mrad),
+        place_mm=_median_and_most(known.relative.place_mm),
+        turn_mrad=_median_and_most(known.relative.turn_mrad),
+        in_run=(float(np.median(known.in_run.place_mm)), float(np.median(known.in_run.turn_mrad))),
+        whole_mm=_median_and_most(known.whole.place_mm),
+        whole_mrad=_median_and_most(known.whole.turn_mrad),
         needed_mm=NEEDED_PIXELS * float(np.median(known.pixel_mm)),
         short=short,
         doubts=doubts,
@@ -88,10 +86,16 @@ def verdict(result: Calibration) -> Verdict:
     )
 
 
-def verdict_text(result: Calibration, judged: Verdict) -> str:
+def verdict_text(result: Calibration, judged: CalibrationVerdict) -> str:
     """The verdict as it is printed: first the answer, at most 80 columns."""
     found = result.found
     place, turn = judged.place_mm, judged.turn_mrad
+    residual = float(np.sqrt((found.residual[found.used] ** 2).mean()))
+    counts = _not_used(result.detection)
+    told = "; ".join(f"{number} {reason}" for reason, number in counts.most_common())
+    left_out = [
+        f"{name} ball {ball} {sigma:.0f} sigma" for name, ball, _, sigma in outliers(result)
+    ]
     lines = [
         f"{judged.answer}: rays at the object are known to {place[0]:.3f} mm (median; "
         f"{place[1]:.3f} mm for {SHARE} %), {judged.needed_mm:.2f} mm is needed (half a pixel)",
@@ -104,15 +108,15 @@ def verdict_text(result: Calibration, judged: Verdict) -> str:
         "picture",
         f"from {int(found.used.sum())} highlights of {len(result.setup.frames)} frames, "
         f"{len(result.setup.designed.radius)} spheres and {len(result.setup.designed.leds)} LEDs",
-        f"residuals {_residual(result):.3f} px (root mean square each way), "
+        f"residuals {residual:.3f} px (root mean square each way), "
         f"{found.noise_factor:.2f} times what detection expects",
         *(
             f"halves with {half.by} apart differ by {half.found_mm:.3f} mm, expected "
             f"{half.expected_mm:.3f} mm"
             for half in result.halves
         ),
-        *_not_used_lines(result.detection),
-        *_outlier_lines(result),
+        *([f"not used ({counts.total()}): {told}"] if told else []),
+        *_listed("left out", left_out),
         *(f"doubt: {one}" for one in judged.doubts),
         *_listed("fault", result.detection.faults),
         *_listed("unlike the process", [f"{n} {s:+.1f} sigma" for n, s in judged.pulled]),
@@ -145,10 +149,6 @@ def parameter_names(prior: Prior) -> list[str]:
         for index in np.ndindex(shape):
             names.append(" ".join([block, *(str(i + 1) for i in index)]))
     return names
-
-
-def _residual(result: Calibration) -> float:
-    return float(np.sqrt((result.found.residual[result.found.used] ** 2).mean()))
 
 
 def _median_and_most(values: Floats) -> tuple[float, float]:
@@ -192,10 +192,11 @@ def _steps(result: Calibration, enough: bool, doubted: bool, pulled: bool) -> tu
     if result.detection.faults:
         steps.append("photograph what is missing again: tbcad run --resume")
     counts, used = _not_used(result.detection), len(result.detection.highlights)
-    if counts[Reason.SATURATED] > MOST_SATURATED * (used + counts.total()):
+    if counts[Rejection.SATURATED] > MOST_SATURATED * (used + counts.total()):
         steps.append(
-            f"{counts[Reason.SATURATED]} highlights are saturated: photograph the LEDs again with "
-            "a shorter exposure (tbcad run --exposure-leds; --preflight-only says which is right)"
+            f"{counts[Rejection.SATURATED]} highlights are saturated: photograph the LEDs again "
+            "with a shorter exposure (tbcad run --exposure-leds; --preflight-only says which is "
+            "right)"
         )
     elif not enough:
         steps.append(
@@ -212,22 +213,10 @@ def _steps(result: Calibration, enough: bool, doubted: bool, pulled: bool) -> tu
     return tuple(steps or ["tbcad merge"])
 
 
-def _not_used(detection: Detection) -> Counter[Reason]:
+def _not_used(detection: Detection) -> Counter[Rejection]:
     """Numbers of highlights that detection does not use, but those outside of the picture."""
     reasons = (rejected.reason for rejected in detection.rejected)
-    return Counter(reason for reason in reasons if reason is not Reason.OUTSIDE)
-
-
-def _not_used_lines(detection: Detection) -> list[str]:
-    counts = _not_used(detection)
-    told = "; ".join(f"{number} {reason}" for reason, number in counts.most_common())
-    return [f"not used ({counts.total()}): {told}"] if told else []
-
-
-def _outlier_lines(result: Calibration) -> list[str]:
-    left_out = outliers(result)
-    texts = [f"{name} ball {ball} {sigma:.0f} sigma" for name, ball, _, sigma in left_out]
-    return _listed("left out", texts)
+    return Counter(reason for reason in reasons if reason is not Rejection.OUTSIDE)
 
 
 def _listed(heading: str, texts: "list[str] | tuple[str, ...]") -> list[str]:

@@ -26,8 +26,8 @@ class Shot:
     settings: dict[str, Setting]
 
 
-class Camera(Protocol):
-    """A camera that is connected.
+class RunCamera(Protocol):
+    """A camera that is connected; what most need not do is done by default.
 
     Attributes:
         released: whether the controller's relay releases it.
@@ -36,35 +36,22 @@ class Camera(Protocol):
     released: bool
 
     def expose(self, seconds: float) -> None:
-        """Set the exposure time of the photographs that follow.
-
-        Raises:
-            CameraFault: the camera cannot.
-        """
+        """Set the exposure time of the photographs that follow."""
 
     def expect(self) -> None:
-        """Get ready for a photograph: what was there before is none.
-
-        Raises:
-            CameraFault: the camera does not answer.
-        """
+        """Get ready for a photograph: what was there before is none."""
+        return
 
     def photograph(self) -> Shot:
-        """Take a photograph, or wait for the one that was released.
-
-        Raises:
-            CameraFault: there is none.
-        """
+        """Take a photograph, or wait for the one that was released."""
 
     def again(self) -> None:
-        """Connect anew, after a fault.
-
-        Raises:
-            CameraFault: that failed.
-        """
+        """Connect anew, after a fault."""
+        return
 
     def close(self) -> None:
         """Give the camera up."""
+        return
 
 
 def shutter_seconds(text: str) -> float | None:

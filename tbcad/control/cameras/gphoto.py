@@ -8,9 +8,9 @@ import math
 from types import ModuleType
 from typing import Any
 
-from tbcad.control.cameras.camera import Shot, are_near, shutter_seconds
+from tbcad.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import suffix_of
-from tbcad.control.faults import CameraFault
+from tbcad.control.machine import CameraFault
 from tbcad.control.port import INSTALL
 from tbcad.errors import InputError
 from tbcad.runs.exposure import Setting
@@ -28,17 +28,13 @@ MANUAL_EXPOSURE = "set the camera to manual exposure"
 AUTOFOCUS, OFF = "autofocus", "Off"  # of the driver, before each release
 
 
-class GphotoCamera:
+class GphotoCamera(RunCamera):
     """The one camera that is plugged in."""
 
     released = False
 
     def __init__(self) -> None:
-        """Connect to the camera.
-
-        Raises:
-            InputError: the library is missing, or there is no camera, or its lens focuses itself.
-        """
+        """Connect to the camera, whose lens may not focus itself."""
         self._gp = _library()
         self._exposure_s: float | None = None
         try:
@@ -107,9 +103,6 @@ class GphotoCamera:
         except gp.GPhoto2Error:
             return {}
         return {text: time for text in texts if (time := shutter_seconds(text)) is not None}
-
-    def expect(self) -> None:
-        """Get ready: nothing to do."""
 
     def photograph(self) -> Shot:
         """Release the camera, and read the photograph and its settings."""

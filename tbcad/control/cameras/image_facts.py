@@ -13,7 +13,7 @@ from typing import Any
 
 from PIL import Image
 
-from tbcad.control.faults import CameraFault
+from tbcad.control.machine import CameraFault
 from tbcad.errors import InputError
 from tbcad.formats.camera_raw import RAW_SUFFIXES
 from tbcad.formats.pictures import PICTURE_SUFFIXES
@@ -41,8 +41,6 @@ class ImageFacts:
     """What a photograph's file says.
 
     Attributes:
-        width_px: columns.
-        height_px: rows.
         model: of the camera; empty if the file does not say.
         exposure_s: exposure time; None if the file does not say.
         settings: that must not change in a run, as far as the file says them.
@@ -56,11 +54,7 @@ class ImageFacts:
 
 
 def image_facts(data: bytes, suffix: str) -> ImageFacts:
-    """Read all of an image file.
-
-    Raises:
-        CameraFault: it is no image of a kind that a run takes, or not complete.
-    """
+    """Read all of an image file; CameraFault: of no kind that a run takes, or not complete."""
     if suffix not in PICTURE_SUFFIXES:
         raise CameraFault(
             f"the camera gives {suffix or 'nameless'} files: set its image format to JPEG, TIFF, "

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from math import ceil
 
 from tbcad.control.base import travel_s
-from tbcad.control.faults import ControllerReset, MachineFault
 from tbcad.control.klipper.files import (
     CONFIG,
     STEPPER,
@@ -18,7 +17,8 @@ from tbcad.control.klipper.files import (
     idle_that_lets_go,
 )
 from tbcad.control.klipper.host import HOLD_FIRST, MOTOR, READY, Klipper
-from tbcad.control.plan import Plan
+from tbcad.control.machine import ControllerReset, MachineFault
+from tbcad.control.plan import ControlPlan
 from tbcad.control.program import Move
 from tbcad.errors import InputError
 from tbcad.types import Progress
@@ -38,27 +38,19 @@ class KlipperBase:
 
     switch_s = 0.5  # as measured, with Klipper on the same computer
 
-    def __init__(self, klipper: Klipper, plan: Plan, files: KlipperFiles) -> None:
+    def __init__(self, klipper: Klipper, plan: ControlPlan, files: KlipperFiles) -> None:
         """Drive a machine as its build says."""
         self._klipper, self._plan, self._files = klipper, plan, files
         self._at = plan.program.start.angle_deg
 
     def connect(self) -> None:
-        """Wait until Klipper is ready, and refuse a printer that is printing.
-
-        Raises:
-            MachineFault: it is not ready, or prints.
-        """
+        """Wait until Klipper is ready, and refuse a printer that is printing."""
         self._klipper.connect()
         if self._klipper.objects("print_stats")["print_stats"].get("state") in BUSY:
             raise MachineFault("the printer prints a file: wait for its end, or cancel it")
 
     def check_settings(self, note: Progress, *, send: bool) -> None:
-        """Compare the printer's configuration with the build's.
-
-        Raises:
-            InputError: it differs, would let the motor go, or should be sent.
-        """
+        """Compare the printer's configuration with the build's; none can be sent."""
         if send:
             raise InputError(f"Klipper takes no settings: {INCLUDE}; leave --send-settings out")
         objects = self._klipper.objects("configfile", "idle_timeout", "stepper_enable")
@@ -78,11 +70,7 @@ class KlipperBase:
             raise InputError("Klipper does not tell whether its motor is on: update Klipper")
 
     def home(self) -> None:
-        """Bring the base to a known angle, all lights off.
-
-        Raises:
-            MachineFault: the switch is not found, or not released.
-        """
+        """Bring the base to a known angle, all lights off."""
         homing, known = self._files.homing, self._plan.program.known_deg
         self._klipper.script(f"{STEPPER} ENABLE=1 SET_POSITION=0", DONE, held=False)
         self._search()
@@ -112,24 +100,14 @@ class KlipperBase:
             )
 
     def _pieces(self, begin: float, end: float, speed: float) -> Iterator[float]:
-        """Where the pieces of a motion end; each takes PIECE_S at most.
-
-        Args:
-            begin: of the motion, degrees.
-            end: of the motion.
-            speed: degrees/s.
-        """
+        """Where the pieces of a motion in degrees end; each takes PIECE_S at most."""
         rise = self._plan.motion.acceleration_deg_s2
         top = min(speed, rise * PIECE_S / 2)
         count = max(1, ceil(abs(end - begin) / (top * (PIECE_S - top / rise))))
         return (begin + (end - begin) * k / count for k in range(1, count + 1))
 
     def drive(self, move: Move, settle_s: float = 0.0) -> None:
-        """Drive to a place and rest there.
-
-        Raises:
-            MachineFault: the motor was let go before, or Klipper does not do it.
-        """
+        """Drive to a place and rest there; MachineFault: the motor was let go before."""
         self._klipper.check_held()
         speed = self._plan.motion.feed_deg_min / 60
         for angle in self._pieces(self._at, move.angle_deg, speed):

@@ -48,7 +48,6 @@ class KlipperFiles:
     """Files of a build for Klipper.
 
     Attributes:
-        homing: of the program.
         config: values of klipper.cfg, by section and option.
     """
 
@@ -57,11 +56,7 @@ class KlipperFiles:
 
 
 def read_klipper_files(folder: Path) -> KlipperFiles:
-    """Read a build.
-
-    Raises:
-        InputError: it has no files for Klipper, or not those that tbcad writes.
-    """
+    """Read a build, or an InputError: it has not the files for Klipper that tbcad writes."""
     return KlipperFiles(_homing(folder / PROGRAM), _config(folder / CONFIG))
 
 
@@ -94,12 +89,7 @@ def _text(path: Path) -> str:
 
 
 def differences(wanted: dict[str, dict[str, str]], found: dict[str, Any]) -> Iterator[str]:
-    """What a printer has otherwise than a build.
-
-    Args:
-        wanted: values of klipper.cfg, by section and option.
-        found: settings of the printer's configfile likewise, as Klipper has parsed them.
-    """
+    """What a printer has otherwise than klipper.cfg, by its configfile as Klipper parsed it."""
     for section, options in wanted.items():
         if not isinstance(has := found.get(section), dict):
             yield f"[{section}] is missing"
@@ -145,9 +135,7 @@ def _numbers(value: Any) -> list[float] | None:
 def idle_that_lets_go(settings: dict[str, Any], status: dict[str, Any]) -> float | None:
     """Seconds after which an idle printer switches its motor off; None: not within a day.
 
-    Args:
-        settings: of the printer's configfile.
-        status: of its object idle_timeout, as far as this Klipper has one: SET_IDLE_TIMEOUT counts.
+    The status of its object idle_timeout, as far as this Klipper has one, counts before settings.
     """
     set_up = settings.get("idle_timeout", {})
     seconds = float(status.get("idle_timeout", set_up.get("timeout", DEFAULT_IDLE_S)))

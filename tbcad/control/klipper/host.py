@@ -16,8 +16,8 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from tbcad.control.faults import ControllerReset, MachineFault
 from tbcad.control.klipper.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
+from tbcad.control.machine import ControllerReset, MachineFault
 from tbcad.types import Progress
 
 MOTOR = "manual_stepper base"
@@ -56,7 +56,7 @@ class Disconnected(MachineFault):
 
 
 @dataclass(frozen=True)
-class State:
+class KlipperState:
     """State of Klipper: ready, startup, error, shutdown or disconnected; and its message."""
 
     name: str
@@ -80,21 +80,11 @@ class Klipper:
     def __init__(
         self, server: Moonraker, note: Progress, clock: Callable[[], float] = monotonic
     ) -> None:
-        """Speak to Klipper through Moonraker.
-
-        Args:
-            server: Moonraker.
-            note: called with what the operator should know.
-            clock: seconds.
-        """
+        """Speak to Klipper through Moonraker; notes are what the operator should know."""
         self._server, self._note, self._clock = server, note, clock
 
     def connect(self) -> None:
-        """Wait until Klipper is ready.
-
-        Raises:
-            MachineFault: it does not become so, or the server is not Moonraker.
-        """
+        """Wait until Klipper is ready; MachineFault: it is not, or the server is not Moonraker."""
         info = self._server.get("/server/info")
         if not isinstance(info, dict) or "klippy_state" not in info:
             raise MachineFault(f"the server is not Moonraker: {ELSEWHERE}")
@@ -104,18 +94,14 @@ class Klipper:
         if state.name != READY:
             raise MachineFault(f"{state.what}: {state.safe}")
 
-    def state(self) -> State:
-        """State of Klipper.
-
-        Raises:
-            Unreachable: Moonraker gives no answer.
-        """
+    def state(self) -> KlipperState:
+        """State of Klipper; Unreachable: Moonraker gives no answer."""
         try:
             info = self._server.get(INFO)
-            return State(str(info["state"]), str(info["state_message"]))
+            return KlipperState(str(info["state"]), str(info["state_message"]))
         except Refused as fault:
             if fault.code in NO_KLIPPER:
-                return State(DISCONNECTED, "")
+                return KlipperState(DISCONNECTED, "")
             raise
         except (KeyError, TypeError):
             raise MachineFault(f"{INFO} tells no state: {ELSEWHERE}") from None
@@ -133,21 +119,12 @@ class Klipper:
         return bool(self._server.get(ENDSTOPS, SWITCH_S).get(MOTOR) == "TRIGGERED")
 
     def check_ready(self) -> None:
-        """Ask for the state.
-
-        Raises:
-            MachineFault: it is not ready.
-        """
+        """Raise a MachineFault if Klipper is not ready."""
         if (state := self.state()).name != READY:
             raise (Disconnected if state.name == DISCONNECTED else MachineFault)(state.what)
 
     def check_held(self) -> None:
-        """Ask whether the motor is on.
-
-        Raises:
-            ControllerReset: it was let go.
-            MachineFault: Klipper is not ready.
-        """
+        """Raise a ControllerReset if the motor was let go."""
         self.check_ready()
         if self.objects("stepper_enable")["stepper_enable"].get("steppers", {}).get(MOTOR) is False:
             raise ControllerReset(LET_GO)

@@ -13,7 +13,7 @@ from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnec
 from typing import Any
 from urllib.parse import urlsplit
 
-from tbcad.control.faults import MachineFault
+from tbcad.control.machine import MachineFault
 from tbcad.errors import InputError
 
 PREFIX = "moonraker:"
@@ -61,8 +61,6 @@ class Address:
     """Where Moonraker listens.
 
     Attributes:
-        host: name or number.
-        port: of the host.
         path: before those of the API, without a slash at its end.
         secure: whether by https.
     """
@@ -74,11 +72,7 @@ class Address:
 
 
 def read_address(text: str) -> Address:
-    """Read a URL.
-
-    Raises:
-        InputError: it is none of a server.
-    """
+    """Read the URL of a server."""
     if any(sign in text for sign in "@?#"):
         raise InputError(f"--port has more than a host: {FORM}; an API key goes into {KEY}")
     try:
@@ -95,11 +89,7 @@ class Moonraker:
     """A server; each request has a connection of its own, from any thread."""
 
     def __init__(self, address: Address) -> None:
-        """Ask a server, with the API key of the environment if there is one.
-
-        Raises:
-            InputError: the key cannot be sent.
-        """
+        """Ask a server, with the API key of the environment if there is one."""
         self._address = address
         key = os.environ.get(KEY, "").strip()
         if not (key.isascii() and key.isprintable()):
@@ -107,21 +97,11 @@ class Moonraker:
         self._headers = {"Content-Type": "application/json"} | ({"X-Api-Key": key} if key else {})
 
     def get(self, path: str, limit_s: float = ANSWER_S) -> Any:
-        """Result of a GET request.
-
-        Raises:
-            Unreachable: there is no answer.
-            Refused: the answer is an error.
-        """
+        """Result of a GET request; Unreachable: no answer, Refused: the answer is an error."""
         return self._result("GET", path, None, limit_s)
 
     def post(self, path: str, body: dict[str, Any], limit_s: float | None = ANSWER_S) -> Any:
-        """Result of a POST request, waited for without end if there is no limit.
-
-        Raises:
-            Unreachable: there is no answer.
-            Refused: the answer is an error.
-        """
+        """Result of a POST request, waited for without end if there is no limit; else as `get`."""
         return self._result("POST", path, json.dumps(body), limit_s)
 
     def _result(self, method: str, path: str, body: str | None, limit_s: float | None) -> Any:
@@ -161,7 +141,6 @@ class Moonraker:
 
 
 def _error_text(response: HTTPResponse, answer: Any) -> str:
-    """What an answer without a result says."""
     error = answer.get("error") if isinstance(answer, dict) else None
     if isinstance(error, dict):
         return " ".join(str(error.get("message")).split())
@@ -171,7 +150,6 @@ def _error_text(response: HTTPResponse, answer: Any) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Why there is no answer, and what to do."""
     for kind, text in REASONS:
         if isinstance(error, kind):
             return text

@@ -9,45 +9,53 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 import numpy as np
 
 from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.tolerance.montecarlo.coverage import coverage
+from tbcad.tolerance.montecarlo.coverage import coverage, pointing
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels, warp_maps_of
 from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.montecarlo.pointing import pointing
 from tbcad.tolerance.montecarlo.warp import WarpMaps
+from tbcad.tolerance.process.process import Process
 from tbcad.types import Floats, Ints
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+
 # Builds in one unit of work: few enough that all workers end together.
 BUILDS_PER_BATCH = 10
 # Probability that the true yield lies in the reported interval.
 CONFIDENCE = 0.95
+AnyResult = TypeVar("AnyResult", bound="DataclassInstance")
+Case: TypeAlias = Callable[[range], AnyResult]
+RunBatches: TypeAlias = Callable[[Any, Sequence[range]], list[Any]]
 
 
 @dataclass(frozen=True)
-class CoverageResult:
-    """Coverage in s builds, in the order of their numbers, of v virtual cameras.
-
-    Attributes:
-        coverage: exact coverage diameters, mm, (s, v).
-        offset: distance at the object between the ray of each mirror's centre pixel and the
-            designed ray, a's mirrors, then b's, mm, (s, 2 m); not finite where the ray misses its
-            mirror.
-    """
+class CameraCoverage:
+    """Exact coverage diameters, mm, (s, v), in s builds, by number, of v virtual cameras."""
 
     coverage: Floats
-    offset: Floats
 
     def __len__(self) -> int:
-        """Number of builds."""
         return len(self.coverage)
 
     @property
     def worst(self) -> Floats:
         """Minimum coverage of each build, mm, (s,)."""
         return np.asarray(self.coverage.min(axis=1))
+
+
+@dataclass(frozen=True)
+class CoverageResult(CameraCoverage):
+    """Coverage and pointing errors.
+
+    Attributes:
+        offset: distance at the object between the ray of each mirror's centre pixel and the
+            designed ray, a's mirrors, then b's, mm, (s, 2 m); not finite where the ray misses its
+            mirror.
+    """
+
+    offset: Floats
 
     @property
     def worst_camera(self) -> Ints:
@@ -77,7 +85,6 @@ class YieldEstimate:
     """Share of builds whose every virtual camera covers enough.
 
     Attributes:
-        share: of the simulated builds.
         low: lower end of the confidence interval of the true share.
         high: upper end.
     """
@@ -93,8 +100,6 @@ class ShellCase:
 
     Attributes:
         edge_models: both halves as designed.
-        errors: of the process.
-        seed: of all builds.
         warp: what the process's warp does to both halves.
     """
 
@@ -104,7 +109,6 @@ class ShellCase:
     warp: WarpMaps | None = field(init=False)
 
     def __post_init__(self) -> None:
-        """Find the maps once for all batches."""
         object.__setattr__(self, "warp", warp_maps_of(self.edge_models, self.errors))
 
     def draws(self, builds: range) -> tuple[ShellDraws, ShellDraws]:
@@ -130,54 +134,25 @@ class MonteCarloCase(ShellCase):
 
 
 @dataclass(frozen=True)
-class WorstResult:
-    """Minimum coverage of s builds, mm, (s,), in the order of their numbers."""
-
-    worst: Floats
-
-
-@dataclass(frozen=True)
-class WorstCase(ShellCase):
-    """The same builds as MonteCarloCase's, but only their minimum coverage, in less time."""
-
-    def __call__(self, builds: range) -> WorstResult:
-        """Result of the builds of these numbers."""
-        diameter, _ = coverage(self.edge_models, self.draws(builds), worst_only=True)
-        return WorstResult(diameter.min(axis=1))
-
-
-@dataclass(frozen=True)
-class CameraCoverage:
-    """Exact coverage diameters of v virtual cameras in s builds, mm, (s, v)."""
-
-    coverage: Floats
-
-
-@dataclass(frozen=True)
 class CoverageCase(ShellCase):
-    """The same builds, but only what each virtual camera of them covers."""
+    """The same builds as MonteCarloCase's, but only what their virtual cameras cover.
+
+    Attributes:
+        worst_only: only the minimum of each build is exact, the others are not below it; in less
+            time.
+    """
+
+    worst_only: bool = False
 
     def __call__(self, builds: range) -> CameraCoverage:
         """Result of the builds of these numbers."""
-        return CameraCoverage(coverage(self.edge_models, self.draws(builds))[0])
-
-
-AnyResult = TypeVar("AnyResult", bound="DataclassInstance")
-Case: TypeAlias = Callable[[range], AnyResult]
-RunBatches: TypeAlias = Callable[[Any, Sequence[range]], list[Any]]
+        return CameraCoverage(coverage(self.edge_models, self.draws(builds), self.worst_only)[0])
 
 
 def simulate(
     case: Case[AnyResult], builds: int, run_batches: RunBatches = in_threads, first: int = 0
 ) -> AnyResult:
-    """Result of simulated builds; workers and batches do not change it.
-
-    Args:
-        case: simulates the builds of given numbers.
-        builds: how many, at least one.
-        run_batches: applies a case to batches in order: threads, processes or a cluster.
-        first: number of the first build.
-    """
+    """Result of builds, numbered from the first; workers and batches do not change it."""
     numbers = range(first, first + builds)
     batches = [numbers[part] for part in chunks(builds, BUILDS_PER_BATCH)]
     results: list[AnyResult] = run_batches(case, batches)
@@ -218,3 +193,19 @@ def wilson_interval(good: int, count: int) -> tuple[float, float]:
     width = z * sqrt(share * (1 - share) / count + (z / (2 * count)) ** 2)
     low, high = ((middle + sign * width) / (1 + z * z / count) for sign in (-1, 1))
     return (low if good else 0.0), (high if good < count else 1.0)
+
+
+def yield_sentence(process: Process, worst: Floats, target: float) -> str:
+    """How many builds are good, by minimum coverage of each (s,), and what a median one covers."""
+    return (
+        f"Built by {process.name} ({process.title}), "
+        f"{percent(estimate_yield(worst, target))} of the builds "
+        f"cover {target:g} mm with every virtual camera; the worst camera of a build "
+        f"covers {np.median(worst):.2f} mm (median; 1 % cover less than "
+        f"{np.quantile(worst, 0.01):.2f})."
+    )
+
+
+def percent(estimate: YieldEstimate) -> str:
+    """A share with its interval."""
+    return f"{estimate.share:.1%} ({estimate.low:.1%} to {estimate.high:.1%})"

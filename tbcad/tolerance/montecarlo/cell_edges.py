@@ -150,7 +150,6 @@ def _sample(
 
 @compiled_loop
 def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples: Floats) -> None:
-    """Fill in the rays that a mirror reflects at the points."""
     if len(forms) == 0:
         reflect_samples(surfaces[mirror], view, samples)
     else:
@@ -161,7 +160,6 @@ def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples
 def _put_part(
     part: Floats, mirror: int, other: int, edge: Floats, low: float, high: float, samples: Floats
 ) -> None:
-    """Fill in a part of an edge that has been sampled."""
     least, step = least_sample(samples), (high - low) / (SAMPLES - 1)
     part[MIRROR], part[OTHER] = mirror, other
     for k in range(EDGE_COLUMNS):

@@ -48,7 +48,6 @@ class ShellDraws:
     form: Floats
 
     def __len__(self) -> int:
-        """Number of builds."""
         return len(self.focal)
 
 
@@ -85,10 +84,7 @@ def draw(
 def shell_error_shapes(m: int, modes: int = 0, walls: int = 0) -> dict[str, Shape]:
     """Shape of each kind of error of a shell, in the order of the streams; only append to it.
 
-    Args:
-        m: number of mirrors of a half.
-        modes: number of vectors that the warp of a half follows from.
-        walls: number of walls of pedestals of a half.
+    A half has m mirrors, w walls of pedestals, and a warp that follows from so many vectors.
     """
     return {
         "sphere_centre": (2, m, 3),
@@ -150,17 +146,10 @@ def draw_kinds(
     shapes: Mapping[str, Shape],
     first_stream: int = 0,
 ) -> dict[str, Floats]:
-    """Random errors of each kind for s builds, (s, ...).
+    """Random errors of each kind, by shapes in the order of the streams, for s builds, (s, ...).
 
     A build depends on the seed and its number alone, not on the others drawn with it. Each kind of
     error has its own random stream, so that a change of one kind leaves the others as they are.
-
-    Args:
-        errors: of the process.
-        seed: of all builds.
-        builds: numbers of the builds.
-        shapes: shape of each kind's errors in one build, in the order of the streams.
-        first_stream: number of the first kind's stream.
     """
     return {
         kind: _draw_kind(getattr(errors, kind), seed, builds, first_stream + k, shape)

@@ -40,7 +40,6 @@ class EdgeModel:
     """One camera's half as designed: m mirrors and two planes.
 
     Attributes:
-        view: the camera.
         table: apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7).
         pairs: which of them may share an edge.
         halved: mirrors that the seam halves, (m,).
@@ -59,7 +58,6 @@ class EdgeModel:
     walls: GrooveWalls
 
     def __len__(self) -> int:
-        """Number of mirrors."""
         return len(self.halved)
 
     @property

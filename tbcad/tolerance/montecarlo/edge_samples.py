@@ -56,15 +56,7 @@ def put_sample(samples: Floats, quantity: int, s: int, value: Vector) -> None:
 
 @compiled_loop
 def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: Floats) -> None:
-    """Fill in points, and rays to them, for parameters from low to high.
-
-    Args:
-        edge: see tbcad.tolerance.montecarlo.visible_edges.find_edge.
-        low: first parameter.
-        high: last parameter.
-        view: see tbcad.tolerance.montecarlo.cell_edges.trace_cell_edges.
-        samples: to be filled in, (PLACES,).
-    """
+    """Fill in points of an edge (`find_edge`), and rays to them, from parameter low to high."""
     start, tangent, outward = vector(edge, START), vector(edge, TANGENT), vector(edge, OUTWARD)
     bend, scale, pinhole = edge[BEND], vector(view[SCALE]), vector(view[PINHOLE])
     for s in range(SAMPLES):

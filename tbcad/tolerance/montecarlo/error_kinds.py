@@ -29,7 +29,7 @@ class Error:
     length: float = 0.0
 
     @property
-    def deviation(self) -> float:
+    def sigma(self) -> float:
         """Standard deviation."""
         return self.spread if self.distribution == "normal" else self.spread / sqrt(3)
 
@@ -48,29 +48,12 @@ NO_ERROR = Error()
 class Errors:
     """Errors of a manufacturing process, one kind a field, in mm, radians and shares (1 = 100 %).
 
+    They are what the keys of tbcad.tolerance.process.process.Process say, with these of their own:
+
     Attributes:
-        sphere_centre: of each mirror's centre along each axis, mm.
-        sphere_radius: of each mirror's radius, mm.
-        scale_isotropic: share by which a shell is too large, one for each shell.
-        scale_axis: share by which both shells are too large along each axis of the frame.
-        shell_shift: of a whole shell along each axis, mm.
-        shell_tilt: of a whole shell about each axis through the object's centre, radians.
-        camera_shift: of each pinhole along each axis, mm.
-        camera_tilt: of each camera about each axis through its pinhole, radians.
-        camera_focal: share by which each camera's focal length is too long.
-        coating: by which a shell's coating is too thick, mm.
-        facets: coverage lost where a mirror is cut from flat facets, mm.
-        rotation_angle: of the prototype's base at each stop, radians.
-        axis_runout: of its axis, sideways, at each stop, mm.
-        axis_tilt: of its axis, radians.
-        ball_radius: of each ball's radius, mm.
-        seat: of each ball's centre along each axis, mm.
-        cap_tilt: of each cap about each axis across its own, through its body's centre, radians.
-        wind_up: share of the base's turn under gravity, worked out for each stop, that is there.
-        warp: smooth displacement of the points of a shell along each axis, mm; of length 0 an
-            error of each mirror's centre.
-        waviness: root mean square of the form error within a mirror, mm.
-        groove_wall: each wall of a pedestal along its normal, by itself, mm.
+        ball_radius: of each ball's radius, by its grade.
+        coating: by which a shell's coating is thicker than the design allows for.
+        warp: of length 0 an error of each mirror's centre.
     """
 
     sphere_centre: Error = NO_ERROR
@@ -104,5 +87,5 @@ class Errors:
         """
         if self.warp.spread == 0:
             return self.sphere_radius
-        spread = hypot(self.sphere_radius.deviation, self.warp.spread / sqrt(2))
+        spread = hypot(self.sphere_radius.sigma, self.warp.spread / sqrt(2))
         return Error(spread, self.sphere_radius.mean)

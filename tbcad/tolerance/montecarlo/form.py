@@ -112,19 +112,11 @@ def _double_factorial(n: int) -> int:
 
 
 def ray_spread(waviness: float, cell_radius: Floats, distance: Floats, incidence: Floats) -> Floats:
-    """Root mean square, over a mirror, of how far waviness displaces its rays at the object.
+    """RMS over a mirror (m,) of how far waviness displaces its rays at the object, mm.
 
     A normal that is turned by e turns the ray by 2 e in the plane of incidence and by 2 e cos i
-    across it; both have half of the squared slope.
-
-    Args:
-        waviness: root mean square of the height, mm.
-        cell_radius: of the disc that holds each mirror's cell, mm, (m,).
-        distance: of each mirror from the object's centre, mm, (m,).
-        incidence: angle of incidence at its apex, radians, (m,).
-
-    Returns:
-        Displacement, mm, (m,).
+    across it; both have half of the squared slope. Cells lie in a disc of a radius; distances are
+    from the object's centre; angles of incidence are those at the apices.
     """
     slope = waviness * sqrt(mean_square_slope()) / cell_radius
     turned: Floats = 2 * slope * np.sqrt((1 + np.cos(incidence) ** 2) / 2)

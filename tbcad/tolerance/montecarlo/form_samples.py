@@ -97,15 +97,7 @@ def slope(form: Form, offset: Vector) -> Vector:
 def displace_samples(
     view: Floats, surfaces: Floats, forms: Floats, faces: tuple[int, int], samples: Floats
 ) -> None:
-    """Displace points of an edge, and rays to them, by the forms of its faces.
-
-    Args:
-        view: see tbcad.tolerance.montecarlo.cell_edges.trace_cell_edges.
-        surfaces: apex, normal, curvature of all faces, (f, 7).
-        forms: of all faces, (f, FORM_COLUMNS).
-        faces: numbers of both faces.
-        samples: of the edge off the spheres (`sample_points`).
-    """
+    """Displace points of an edge of two faces, and rays to them, by the faces' forms."""
     scale, pinhole = vector(view[SCALE]), vector(view[PINHOLE])
     _put_face(surfaces[faces[0]], forms[faces[0]], samples, FIRST_NORMAL, FIRST_HEIGHT)
     _put_face(surfaces[faces[1]], forms[faces[1]], samples, SECOND_NORMAL, SECOND_HEIGHT)
@@ -125,7 +117,6 @@ def displace_samples(
 
 @compiled_loop
 def _put_face(surface: Floats, form: Floats, samples: Floats, normals: int, heights: int) -> None:
-    """Fill in a face's normals and heights at the points."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
     numbers = form_numbers(form)
     for s in range(SAMPLES):

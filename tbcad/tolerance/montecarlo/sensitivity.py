@@ -70,15 +70,7 @@ def scaled(errors: Errors, factor: float) -> Errors:
 def one_at_a_time(
     errors: Errors, kind: str, wanted_yield: float, target: float, worst: WorstCoverage
 ) -> SingleErrorEffect:
-    """Effect of one kind of error by itself.
-
-    Args:
-        errors: of the process.
-        kind: which of them.
-        wanted_yield: share of builds that are to be good.
-        target: minimum coverage of a good build, mm.
-        worst: simulates builds.
-    """
+    """Effect of one kind of error by itself, where builds must cover the target, mm."""
     single = only_kind(errors, kind)
     designed, seen = worst(Errors()).mean(), worst(single)
     return SingleErrorEffect(

@@ -10,23 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tbcad.mirrors.array import design
 from tbcad.optics.camera import Camera
 from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
 from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.simulate.scene.ray_casting import Scene
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector
+from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector, reflectors
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.viewpoints import image_quality
+from tbcad.simulate.views.viewpoints import ground_truths, image_quality, viewpoints_around
+from tbcad.spec.design import Spec
 from tbcad.tolerance.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
 # Random stream of the residual, apart from those of the kinds of error.
 CALIBRATION_STREAM = 2000
+# Elevations, azimuths and distance of the viewpoints.
+VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
 
 
 @dataclass(frozen=True)
@@ -68,16 +73,9 @@ def sharpness(
     seed: int = 1,
     progress: Progress = lambda _: None,
 ) -> Sharpness:
-    """Views of builds with errors, against the truth.
+    """Views of builds with errors, and with a random residual of calibration, against the truth.
 
-    Args:
-        cameras: both halves as designed.
-        builds: errors of each half of each build.
-        scene: the object.
-        reference: the views.
-        residual: of a mirror's direction after calibration, per axis, radians.
-        seed: of the residuals.
-        progress: called with each build.
+    The residual is of a mirror's direction, per axis, radians.
     """
     designed = _light_field(cameras, scene, reference.capture_mm)
     rows = [_ssim(designed, reference)]
@@ -92,21 +90,11 @@ def sharpness(
     return Sharpness(table[0], table[1::2], table[2::2])
 
 
-def designed_ssim(
-    cameras: tuple[Reflector, Reflector], scene: Scene, reference: ReferenceViews
-) -> Floats:
-    """SSIM of each view of a shell as designed, (v,)."""
-    return _ssim(_light_field(cameras, scene, reference.capture_mm), reference)
-
-
 @dataclass(frozen=True)
 class BuiltReflector(SubstitutedReflector):
     """A camera and its mirrors at their places in a build.
 
     The cells are those of the design: they only limit where in the picture a mirror may be.
-
-    Attributes:
-        built_walls: of the pedestals.
     """
 
     built_walls: GrooveWalls
@@ -144,14 +132,7 @@ def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflec
 def built_walls(
     walls: GrooveWalls, draws: ShellDraws, build: int, off: Floats | float = 0.0
 ) -> GrooveWalls:
-    """Walls as a build has them: moved with their shell, and each off by itself.
-
-    Args:
-        walls: as designed, w of them.
-        draws: of the builds.
-        build: index of the build.
-        off: along each wall's normal, mm, (w,) or one for all.
-    """
+    """Walls moved with their shell as a build has it, each off along its normal, mm, (w,)."""
     tilt, scale = Rotation.from_rotvec(draws.shell_tilt[build]), float(draws.scale[build].mean())
     point = walls.point + np.reshape(off, (-1, 1)) * walls.normal
     moved = tilt.apply(scale * point) + draws.shell_shift[build]
@@ -214,9 +195,29 @@ def _rotated(frame: Frame, residual: float, generator: np.random.Generator) -> d
 
 
 def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
-    """SSIM of each view, (v,)."""
     tiles = MirrorTiles(source)
     pictures = [synthesise(tiles, view, "nearest").image for view in reference.views]
     pairs = zip(reference.truths, pictures, strict=True)
     qualities = in_threads(lambda pair: image_quality(*pair), pairs)
     return np.array([quality.ssim for quality in qualities])
+
+
+def reference_views(
+    scene: Scene, capture_mm: float, progress: Progress = lambda _: None
+) -> ReferenceViews:
+    """The views that are compared, with their truths."""
+    views = viewpoints_around(*VIEWPOINTS).cameras(capture_mm)
+    return ReferenceViews(capture_mm, views, ground_truths(scene, views, progress))
+
+
+def view_ssims(specs: dict[str, Spec]) -> dict[str, float]:
+    """Mean SSIM of views of the built-in object by designs of one capture diameter."""
+    capture_mm = next(iter(specs.values())).optics.capture_diameter_mm
+    scene = prepared_scene(built_in_object(capture_mm))
+    reference = reference_views(scene, capture_mm)
+    return {
+        words: float(
+            _ssim(_light_field(reflectors(design(one)), scene, capture_mm), reference).mean()
+        )
+        for words, one in specs.items()
+    }

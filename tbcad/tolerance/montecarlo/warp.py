@@ -1,7 +1,7 @@
 """Warp of a one-piece shell: a smooth random displacement, and what it does to each mirror.
 
 Every point x of the shell is displaced by d(x), each component of which is a Gaussian random field
-(tbcad.tolerance.montecarlo.smooth_field). Neighbouring mirrors move, turn and bend together. A
+(tbcad.tolerance.montecarlo.warp). Neighbouring mirrors move, turn and bend together. A
 mirror becomes the sphere with astigmatism h that fits its displaced points best: with their normals
 n, n . d = n . e + r' + h, where the displacement e of the centre, the growth r' of the radius and h
 are sought. Shells that are moved, turned or scaled as a whole are followed exactly.
@@ -16,12 +16,73 @@ from tbcad.compiled import compiled_loop
 from tbcad.geometry.vectors import dot, perpendicular_axes
 from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.tolerance.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
-from tbcad.tolerance.montecarlo.smooth_field import SmoothField, pivots, smooth_field
-from tbcad.types import Floats
+from tbcad.types import Floats, Ints
 
+# Share of the variance that a field may lack at any point: 0.1 % of its standard deviation.
+MISSING_VARIANCE = 1e-6
+# Digits of a variance by which points are compared, so that rounding does not choose among equals.
+COMPARED_DIGITS = 9
 # Points of a mirror that are followed, besides its apex: on a circle at a share of its radius.
 RING_POINTS = 6
 RING_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class SmoothField:
+    """A field of unit variance, as a function of K standard normal numbers.
+
+    Attributes:
+        points: X, mm, (K, 3).
+        length: correlation length L, mm.
+        factor: F, lower triangular, (K, K).
+    """
+
+    points: Floats
+    length: float
+    factor: Floats
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def basis(self, places: Floats) -> Floats:
+        """What each random number adds to the field at places (p, 3), (p, K)."""
+        kernel = covariance(places, self.points, self.length)
+        solved = np.linalg.solve(self.factor, kernel.T).T
+        return np.ascontiguousarray(solved, dtype=np.float64)
+
+
+def smooth_field(points: Floats, length: float, chosen: Ints | None = None) -> SmoothField:
+    """The field of a part by its chosen points, or by `pivots` of all; nearer than the length."""
+    chosen = pivots(points, length) if chosen is None else chosen
+    some = points[chosen]
+    factor = np.asarray(np.linalg.cholesky(covariance(some, some, length)), dtype=np.float64)
+    return SmoothField(some, length, factor)
+
+
+def covariance(first: Floats, second: Floats, length: float) -> Floats:
+    """Covariance of a field of unit variance between points (p, 3) and (q, 3), (p, q)."""
+    square = sum((first[:, None, axis] - second[None, :, axis]) ** 2 for axis in range(3))
+    result: Floats = np.exp(square / (-2 * length * length))
+    return result
+
+
+def pivots(points: Floats, length: float) -> Ints:
+    """Numbers of the points (n, 3) from whose values the field follows at all others.
+
+    Incomplete Cholesky factorisation with the largest remaining variance as the pivot, until the
+    variance that is missing, of 1, is less at all points.
+    """
+    left, chosen = np.ones(len(points)), list[int]()
+    columns = np.empty((len(points), len(points)))
+    while left.max() > MISSING_VARIANCE:
+        pivot = int(np.argmax(np.round(left, COMPARED_DIGITS)))
+        known = columns[:, : len(chosen)]
+        column = covariance(points, points[[pivot]], length)[:, 0] - known @ known[pivot]
+        columns[:, len(chosen)] = column / np.sqrt(column[pivot])
+        left = np.maximum(left - columns[:, len(chosen)] ** 2, 0.0)
+        left[pivot] = 0.0
+        chosen.append(pivot)
+    return np.array(chosen, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -57,10 +118,7 @@ class WarpMap:
         return dot(field_values(self.wall_basis, numbers).T, self.wall_normal)
 
     def moved(self, numbers: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Displacements of the mirrors of one build.
-
-        Args:
-            numbers: random numbers, mm, (K, 3).
+        """Displacements of the mirrors of one build by random numbers (K, 3), mm.
 
         Returns:
             Of the centres (m, 3), by which radii grow (m,), of the foot plane at each mirror along
@@ -109,12 +167,7 @@ def field_values(basis: Floats, numbers: Floats) -> Floats:
 
 
 def warp_maps(halves: tuple[ShellShape, ShellShape], length: float) -> WarpMaps:
-    """The maps of both halves, whose fields follow from the same mirrors of each.
-
-    Args:
-        halves: as designed.
-        length: correlation length, mm.
-    """
+    """The maps of both halves, whose fields follow from the same mirrors of each; lengths in mm."""
     chosen = pivots(halves[0].table[:-2, :3], length)
     first, second = (
         _warp_map(half, smooth_field(half.table[:-2, :3], length, chosen)) for half in halves
@@ -151,12 +204,7 @@ def _circle() -> Floats:
 
 
 def mirror_points(table: Floats, radius: Floats) -> tuple[Floats, Floats]:
-    """Points of mirrors, apex and ring, and unit normals there, (m, q, 3) each.
-
-    Args:
-        table: apex, normal, curvature of the mirrors, (m, 7).
-        radius: of the rings in the tangent planes, mm, (m,).
-    """
+    """Points of mirrors (m, 7), apex and ring (m,), and unit normals there, (m, q, 3) each."""
     apex, normal, curvature = table[:, :3], table[:, 3:6], table[:, 6]
     across = radius[:, None, None] * (_circle() @ perpendicular_axes(normal))
     depth = curvature * radius**2 / (1 + np.sqrt(1 - (curvature * radius) ** 2))

@@ -189,14 +189,10 @@ class Process(Section):
 
 
 def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
-    """Return a built-in process, or one of a TOML file, with options on top.
+    """Return a built-in process, or one of a TOML file, with options "kind.key=value" on top.
 
     A file may name a built-in process as `based_on`; each kind of error that it has replaces the
     whole kind there, so that no figure keeps the source of another.
-
-    Args:
-        which: one of BUILT_IN, or the path of a TOML file.
-        overrides: "kind=magnitude" or "kind.key=value" texts, the later over the earlier.
 
     Raises:
         SpecError: anything that cannot be read, is unknown, or is not allowed.
@@ -215,10 +211,7 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
 def process_errors(process: Process, known_coating_um: float = 0.0) -> Errors:
     """Return the errors of a process in mm, radians and shares.
 
-    Args:
-        process: the process.
-        known_coating_um: thickness of the coating that the design allows for
-            (`mirrors.coating_um`); only what exceeds it is an error.
+    Only a coating beyond the known one, which the design allows for, is an error.
     """
     kinds = {key: value for key, value in process if isinstance(value, ErrorSpec)}
     coating = kinds["coating_um"]

@@ -2,15 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import REBUILD, Record, read_csv
+from tbcad.simulate.prototype.plan import MISSING, Plan
+from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats
 
 # Random streams of a build begin here, beyond those of its shells.
 FIRST_STREAM = 1000
+STOPS = "stops.csv"
+MAX_DEG = 10.0  # far beyond what a build permits
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,6 @@ class PrototypeDraws:
     focal: Floats
 
     def __len__(self) -> int:
-        """Number of builds."""
         return len(self.focal)
 
 
@@ -54,15 +61,9 @@ def draw_prototypes(
 ) -> PrototypeDraws:
     """Errors of some prototypes; see tbcad.tolerance.montecarlo.draws.draw_kinds.
 
-    Purchased balls have the errors of their grade, caps those of a mirror that is a part of its own
-    (`Errors.whole_radius`), each with its centre unchanged.
-
-    Args:
-        errors: of the process.
-        seed: of all builds.
-        builds: numbers of the builds.
-        is_cap: which of the balls are made instead of purchased, (k,).
-        wind_up: turn of the base under gravity at the t stops of one run, radians, (t,).
+    Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
+    its own (`Errors.whole_radius`), each with its centre unchanged. Gravity turns the base at the
+    t stops of one run by the wind-up, radians, (t,).
     """
     shapes = _shapes(len(is_cap), len(wind_up))
     errors = replace(errors, sphere_radius=errors.whole_radius)
@@ -95,3 +96,25 @@ def _shapes(k: int, t: int) -> dict[str, Shape]:
         "cap_tilt": (k, 2),
         "wind_up": (),
     }
+
+
+class _WindUpStop(Record):
+    stop: int
+    wind_up_deg: Annotated[float, Field(ge=-MAX_DEG, le=MAX_DEG)]
+
+
+def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
+    """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
+
+    Motor and belt yield to the base's weight: see tbcad.prototype.drive.loads.
+
+    Raises:
+        InputError: the file is missing, malformed, or of another plan.
+    """
+    path = export.folder / STOPS
+    rows = read_csv(path, _WindUpStop, MISSING)
+    if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
+        raise InputError(
+            f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"
+        )
+    return np.radians([row.wind_up_deg for row in rows])

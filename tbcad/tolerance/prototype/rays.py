@@ -140,16 +140,11 @@ def _put_minimum(side: Floats, miss: Floats) -> None:
 
 @compiled_loop
 def highlights(pinhole: Floats, centre: Floats, radius: Floats) -> Floats:
-    """Unit directions (m, 3) in which a camera sees the object's centre in balls.
+    """Unit directions (m, 3) in which a camera sees the object's centre in balls; lengths in mm.
 
     At that point the directions to the object and to the camera make the same angle with the
     normal. The normal lies between the directions of both from the ball's centre, and is found by
     false position (Illinois).
-
-    Args:
-        pinhole: mm, (3,).
-        centre: of the balls, mm, (m, 3).
-        radius: of the balls, mm, (m,).
     """
     result, camera = np.empty((len(radius), 3)), vector(pinhole)
     for i in range(len(radius)):
@@ -176,7 +171,6 @@ def highlights(pinhole: Floats, centre: Floats, radius: Floats) -> Floats:
 
 @compiled_loop
 def _normal(to_object: Vector, to_camera: Vector, share: float) -> Vector:
-    """Unit vector between two."""
     zero = (0.0, 0.0, 0.0)
     return unit(plus_scaled(plus_scaled(zero, 1 - share, to_object), share, to_camera))
 
@@ -192,7 +186,6 @@ def _cosine_difference(normal: Vector, camera: Vector, centre: Vector, radius: f
 
 @compiled_loop
 def _true_direction(direction: Floats, lens: Floats) -> Vector:
-    """True unit direction of a camera direction."""
     d = vector(direction)
     return unit(
         (dot(d, vector(lens[:, 0])), dot(d, vector(lens[:, 1])), dot(d, vector(lens[:, 2])))

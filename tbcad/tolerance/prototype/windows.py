@@ -64,13 +64,12 @@ class RunWindows:
 
 
 @dataclass(frozen=True)
-class PrototypeModel:
+class PrototypeWindows:
     """The prototype as designed, as the fast model needs it.
 
     Attributes:
         pinhole: mm, (3,).
         axes: the camera's right, down and forward, (3, 3).
-        plan: balls on the base, and its stops.
         runs: for camera a's mirrors and for camera b's.
         virtual: number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
         wind_up: turn of the base under gravity at each of t stops, radians, (t,).
@@ -97,14 +96,14 @@ class PrototypeModel:
 
 def prototype_model(
     reflectors: tuple[Reflector, Reflector], plan: Plan, wind_up: Floats
-) -> PrototypeModel:
+) -> PrototypeWindows:
     """The fast model of both cameras, the plan, and the base's turn under gravity at its stops."""
     a, b = prototype_runs(reflectors, plan)
     view = reflectors[0].camera
     axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
     virtual = virtual_camera_numbers(both[1].halved)
-    return PrototypeModel(view.pinhole, axes, plan, both, virtual, wind_up)
+    return PrototypeWindows(view.pinhole, axes, plan, both, virtual, wind_up)
 
 
 def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
@@ -154,15 +153,9 @@ class PrototypeResult:
 
 @dataclass(frozen=True)
 class PrototypeCase:
-    """Simulates builds of the prototype; it can be sent to another process.
+    """Simulates builds of the prototype; it can be sent to another process."""
 
-    Attributes:
-        model: the prototype as designed.
-        errors: of the process.
-        seed: of all builds.
-    """
-
-    model: PrototypeModel
+    model: PrototypeWindows
     errors: Errors
     seed: int
 
@@ -170,8 +163,7 @@ class PrototypeCase:
         """Result of the builds of these numbers."""
         model = self.model
         draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.wind_up)
-        uncalibrated, calibrated = coverage_and_offsets(model, draws)
-        return PrototypeResult(*uncalibrated, *calibrated)
+        return prototype_result(model, draws)
 
 
 @dataclass(frozen=True)
@@ -194,7 +186,7 @@ class RunPose:
     highlight: Floats
 
 
-def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int) -> RunPose:
+def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: int) -> RunPose:
     """Camera and balls when each mirror of one run is photographed."""
     run, plan = model.runs[half], model.plan
     on_base = (tilted_centres(plan, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
@@ -212,23 +204,20 @@ def run_pose(model: PrototypeModel, draws: PrototypeDraws, build: int, half: int
 def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
     """Centres of the reflecting spheres with their bodies tilted in their seats, mm, (k, 3).
 
-    A ball's own is its body's, and stays.
-
-    Args:
-        plan: with the balls.
-        tilt: of each body about two axes across its normal, radians, (k, 2).
+    Tilts are about two axes across the normal, radians, (k, 2). A ball's own is its body's, and
+    stays.
     """
     about = Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
     return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
 
 
-def _lens(model: PrototypeModel, tilt: Floats, focal: float) -> Floats:
+def _lens(model: PrototypeWindows, tilt: Floats, focal: float) -> Floats:
     """A longer focal length makes pictures larger: a pixel's ray is nearer to the axis."""
     nearer = np.array([[1 / focal], [1 / focal], [1.0]])
     return np.asarray(nearer * Rotation.from_rotvec(tilt).apply(model.axes))
 
 
-def calibrated_pose(model: PrototypeModel, half: int, pose: RunPose) -> RunPose:
+def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
     """The same with windows that the software has moved to the actual balls.
 
     It knows the camera then, and turns every window about the pinhole, until the middle of the
@@ -246,32 +235,25 @@ def _shortest_rotations(start: Floats, end: Floats) -> Floats:
     return np.asarray(np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None])
 
 
-def coverage_and_offsets(
-    model: PrototypeModel, draws: PrototypeDraws
-) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> PrototypeResult:
     """Coverage and pointing errors of s prototypes, with designed and with calibrated windows.
 
-    Returns:
-        Coverage diameter of v virtual cameras, mm, (s, v): twice the minimum distance from the
-        object's centre of all rays camera -> edge of the window -> reflected; zero where the
-        window does not contain the centre's image; the smaller of a mirror's halves at the seam.
-        Then the distance at the object between the ray in the middle of each window and the
-        designed ray, square to that, mm; infinite without a ball, (s, 2 m). Then both again, with
-        calibrated windows.
+    Coverage is twice the minimum distance from the object's centre of all rays camera -> edge of
+    the window -> reflected; zero where the window does not contain the centre's image; the smaller
+    of a mirror's halves at the seam. Offsets are the distance at the object between the ray in the
+    middle of each window and the designed ray, square to that; infinite without a ball.
     """
     v, m = int(model.virtual.max()) + 1, len(model.virtual)
-    uncalibrated, calibrated = (
-        (np.empty((len(draws), v)), np.empty((len(draws), m))) for _ in range(2)
-    )
+    result = PrototypeResult(*(np.empty((len(draws), size)) for size in (v, m, v, m)))
     for build in range(len(draws)):
         poses = [run_pose(model, draws, build, half) for half in HALVES]
         known = [calibrated_pose(model, half, poses[half]) for half in HALVES]
-        uncalibrated[0][build], uncalibrated[1][build] = _seen(model, poses)
-        calibrated[0][build], calibrated[1][build] = _seen(model, known)
-    return uncalibrated, calibrated
+        result.coverage[build], result.offset[build] = _seen(model, poses)
+        result.calibrated_coverage[build], result.calibrated_offset[build] = _seen(model, known)
+    return result
 
 
-def _seen(model: PrototypeModel, poses: list[RunPose]) -> tuple[Floats, Floats]:
+def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:
     pairs = list(zip(model.runs, poses, strict=True))
     diameter = np.full(int(model.virtual.max()) + 1, np.inf)
     np.minimum.at(diameter, model.virtual, np.concatenate([_coverage(*pair) for pair in pairs]))

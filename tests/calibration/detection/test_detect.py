@@ -12,9 +12,8 @@ import pytest
 from PIL import Image
 
 from tbcad.calibration.detection.detect import detect
-from tbcad.calibration.detection.detection import Detection, Reason
+from tbcad.calibration.detection.detection import Detection, Rejection, no_highlights
 from tbcad.calibration.detection.expected import Room, expected_highlights
-from tbcad.calibration.detection.nothing_found import no_highlights
 from tbcad.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
@@ -36,7 +35,7 @@ def errors(found: Highlights, small: Small) -> Floats:
     return found.pixel - small.machine.highlights(found.frame, found.sphere, found.led)
 
 
-def reasons(found: Detection) -> Counter[Reason]:
+def reasons(found: Detection) -> Counter[Rejection]:
     return Counter(one.reason for one in found.rejected)
 
 
@@ -69,7 +68,7 @@ def test_every_highlight_is_used_or_rejected_once(whole: Detection, small: Small
 
 def test_outside_is_what_the_truth_has_outside(whole: Detection, small: Small) -> None:
     inside = expected_highlights(small.machine, 1.5).inside
-    assert reasons(whole)[Reason.OUTSIDE] == pytest.approx((~inside).sum(), abs=3)
+    assert reasons(whole)[Rejection.OUTSIDE] == pytest.approx((~inside).sum(), abs=3)
 
 
 def test_an_led_that_never_lights(write: Callable[[Small], Path], export_folder: Path) -> None:
@@ -93,7 +92,7 @@ def test_a_camera_that_moves_in_mid_run(
     assert f"between {before} and {after}" in line
     assert float(line.split("by ")[1].split(" px")[0]) == pytest.approx(1.5, abs=0.3)
     assert found.highlights.frame.max() == 7
-    assert reasons(found)[Reason.MOVED] > 30
+    assert reasons(found)[Rejection.MOVED] > 30
     assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
 
 
@@ -130,7 +129,9 @@ def test_photographs_that_are_missing_or_damaged(copied: Path, small: Small) -> 
     (photographs / f"{damaged}.png").write_bytes(b"no picture")
     found = detected(copied, small)
     assert all(any(name in line for line in found.faults) for name in (lost, damaged))
-    absent = {(one.frame, one.led) for one in found.rejected if one.reason is Reason.NO_PHOTOGRAPH}
+    absent = {
+        (one.frame, one.led) for one in found.rejected if one.reason is Rejection.NO_PHOTOGRAPH
+    }
     assert absent == {(2, 1), (4, 1)}
     used = {*zip(found.highlights.frame.tolist(), found.highlights.led.tolist(), strict=True)}
     assert not used & absent
@@ -155,7 +156,7 @@ def test_another_exposure_is_named_and_scaled(copied: Path, small: Small, whole:
     assert f"{name} and 0 more were exposed otherwise" in " ".join(found.faults)
     # Its light is as before, so it now seems twice too bright.
     mine = [one for one in found.rejected if (one.frame, one.led) == (5, 0)]
-    assert Reason.MERGED in {one.reason for one in mine}
+    assert Rejection.MERGED in {one.reason for one in mine}
 
 
 @pytest.mark.parametrize(("seconds", "says"), [(2.0, "scaled"), (0.1, "too short")])
@@ -262,10 +263,10 @@ def _first(found: Detection) -> tuple[int, int, int, Floats]:
 
 @pytest.mark.parametrize(
     ("aside", "brightness", "reason"),
-    [(7.0, 200, Reason.DOUBLE), (2.0, 200, Reason.MERGED), (0.0, 255, Reason.SATURATED)],
+    [(7.0, 200, Rejection.DOUBLE), (2.0, 200, Rejection.MERGED), (0.0, 255, Rejection.SATURATED)],
 )
 def test_spots_that_are_no_highlights(
-    copied: Path, small: Small, whole: Detection, aside: float, brightness: int, reason: Reason
+    copied: Path, small: Small, whole: Detection, aside: float, brightness: int, reason: Rejection
 ) -> None:
     frame, sphere, led, place = _first(whole)
     name = exposure_name(small.run.frames[frame], f"led_{led + 1}")
@@ -285,8 +286,8 @@ def test_a_hidden_highlight_is_not_taken_for_another(
     room = Room(radius=20.0, bottom=-19.0, top=23.0)
     found = detect(read_run(folder), small.prior, room)
     off = np.hypot(*errors(found.highlights, small).T)
-    assert reasons(found)[Reason.HIDDEN] > 10
-    assert reasons(found)[Reason.MISSING] == 0
+    assert reasons(found)[Rejection.HIDDEN] > 10
+    assert reasons(found)[Rejection.MISSING] == 0
     assert off.max() < 10 * TARGET_PX
     assert np.sqrt((off**2).mean() / 2) < TARGET_PX
 

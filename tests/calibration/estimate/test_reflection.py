@@ -7,8 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tbcad.calibration.estimate.lens import projection
-from tbcad.calibration.estimate.reflection import reflections
+from tbcad.calibration.estimate.reflection import projection, reflections
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import LensCamera
 from tbcad.optics.reflection import reflection_points

@@ -45,4 +45,4 @@ def test_the_whole_shell(paper_design: MirrorDesign) -> None:
     _, square = found = _estimated(prior, 1)
     known = ray_uncertainty(found[0], np.zeros(count, dtype=np.int64), np.arange(count))
     assert square < chi2.ppf(0.999, len(prior.free))
-    assert len(known.place_mm) == count == 847
+    assert len(known.relative.place_mm) == count == 847

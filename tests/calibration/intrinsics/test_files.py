@@ -10,12 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tbcad.calibration.intrinsics.files import read_lens
-from tbcad.calibration.intrinsics.lens import Lens
-from tbcad.calibration.intrinsics.opencv import opencv_text
+from tbcad.calibration.intrinsics.lens import CalibratedLens, opencv_text
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera, without_distortion
 
-LENS = Lens(
+LENS = CalibratedLens(
     focal=np.array([1058.3, 1057.9]),
     principal=np.array([1040.25, 770.5]),
     distortion=np.array([-0.05, 0.01, 1e-3, -5e-4, 1e-3]),
@@ -73,7 +72,7 @@ def test_colmap_counts_from_the_pixels_corner(tmp_path: Path) -> None:
     _same(read_lens(file), np.array([-0.05, 0.01, 1e-3, -5e-4, 0]))
 
 
-def _same(found: Lens, distortion: np.ndarray) -> None:
+def _same(found: CalibratedLens, distortion: np.ndarray) -> None:
     assert found.focal == pytest.approx(LENS.focal)
     assert found.principal == pytest.approx(LENS.principal)
     assert found.distortion == pytest.approx(distortion)
@@ -190,7 +189,7 @@ def test_json_of_opencv(tmp_path: Path) -> None:
     _same(read_lens(_written(tmp_path, "json")), LENS.distortion)
 
 
-def _read(folder: Path, text: str) -> Lens:
+def _read(folder: Path, text: str) -> CalibratedLens:
     file = folder / "camera.yaml"
     file.write_text(text)
     return read_lens(file)

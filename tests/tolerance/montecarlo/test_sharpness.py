@@ -17,11 +17,10 @@ from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.viewpoints import ground_truths
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import mirror_coverage
+from tbcad.tolerance.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerance.montecarlo.edge_model import edge_model
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.pointing import pointing
 from tbcad.tolerance.montecarlo.sharpness import (
     BuiltReflector,
     ReferenceViews,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tbcad.geometry.vectors import perpendicular_axes
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels
-from tbcad.tolerance.montecarlo.smooth_field import (
+from tbcad.tolerance.montecarlo.warp import (
     MISSING_VARIANCE,
     SmoothField,
     covariance,

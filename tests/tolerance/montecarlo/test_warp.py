@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, WorstCase, simulate
+from tbcad.tolerance.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerance.montecarlo.coverage import mirror_coverage
 from tbcad.tolerance.montecarlo.draws import (
     ShellDraws,
@@ -22,8 +22,14 @@ from tbcad.tolerance.montecarlo.edge_model import (
 )
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.form import ASTIGMATISM
-from tbcad.tolerance.montecarlo.smooth_field import SmoothField, pivots, smooth_field
-from tbcad.tolerance.montecarlo.warp import RING_SHARE, WarpMap, mirror_points
+from tbcad.tolerance.montecarlo.warp import (
+    RING_SHARE,
+    SmoothField,
+    WarpMap,
+    mirror_points,
+    pivots,
+    smooth_field,
+)
 from tests.tolerance.exact_fields import displaced_coverage
 
 SLA = Errors(warp=Error(0.0346, length=50.0))
@@ -94,7 +100,7 @@ def test_without_length_it_is_each_mirrors_own_error(halves: EdgeModels) -> None
     assert not warped.foot.any()
     assert not warped.form.any()
     lost = [
-        simulate(WorstCase(halves, Errors(**{kind: Error(0.005)}), 1), 60).worst
+        simulate(CoverageCase(halves, Errors(**{kind: Error(0.005)}), 1), 60).worst
         for kind in ("warp", "sphere_centre")
     ]
     assert lost[0].mean() == pytest.approx(
@@ -112,7 +118,7 @@ def test_a_build_is_the_same_alone_or_among_others(halves: EdgeModels) -> None:
     together, alone = case(range(4)), case(range(2, 3))
     for name in ("coverage", "pixels", "angle"):
         assert np.array_equal(getattr(together, name)[2:3], getattr(alone, name)), name
-    fewer = WorstCase(halves, case.errors, 5)(range(4)).worst
+    fewer = CoverageCase(halves, case.errors, 5, worst_only=True)(range(4)).worst
     assert np.array_equal(fewer, together.worst)
 
 

@@ -26,11 +26,11 @@ from tbcad.tolerance.prototype.rays import (
 )
 from tbcad.tolerance.prototype.windows import (
     PrototypeCase,
-    PrototypeModel,
     PrototypeResult,
+    PrototypeWindows,
     calibrated_pose,
-    coverage_and_offsets,
     prototype_model,
+    prototype_result,
     run_pose,
 )
 from tests.prototype_exports import plan_of
@@ -68,7 +68,7 @@ def plan(layout: PrototypeLayout) -> Plan:
 
 
 @pytest.fixture(scope="module")
-def model(small_design: MirrorDesign, plan: Plan) -> PrototypeModel:
+def model(small_design: MirrorDesign, plan: Plan) -> PrototypeWindows:
     """Gravity turns its base as the sine of the base angle."""
     return prototype_model(reflectors(small_design), plan, 4e-3 * np.sin(plan.angle))
 
@@ -78,7 +78,7 @@ def runs(small_design: MirrorDesign, plan: Plan) -> Runs:
     return prototype_runs(reflectors(small_design), plan)
 
 
-def draws_of(model: PrototypeModel, count: int, **errors: Error) -> PrototypeDraws:
+def draws_of(model: PrototypeWindows, count: int, **errors: Error) -> PrototypeDraws:
     return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.wind_up)
 
 
@@ -100,7 +100,7 @@ def pictures(runs: Runs) -> list[Picture]:
 
 
 def slow(
-    model: PrototypeModel,
+    model: PrototypeWindows,
     runs: Runs,
     pictures: list[Picture],
     draws: PrototypeDraws,
@@ -121,7 +121,7 @@ def slow(
 
 
 def balls(
-    model: PrototypeModel, run: PrototypeRun, draws: PrototypeDraws, build: int, half: int
+    model: PrototypeWindows, run: PrototypeRun, draws: PrototypeDraws, build: int, half: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centre and radius of the ball in each window."""
     frame, centre = model.plan.frame, np.empty((len(run.reflector), 3))
@@ -140,21 +140,23 @@ def balls(
 
 
 def coverage_of(
-    model: PrototypeModel, draws: PrototypeDraws, calibrated: bool = False
+    model: PrototypeWindows, draws: PrototypeDraws, calibrated: bool = False
 ) -> np.ndarray:
-    return coverage_and_offsets(model, draws)[calibrated][0]
+    result = prototype_result(model, draws)
+    return result.calibrated_coverage if calibrated else result.coverage
 
 
 class TestCoverage:
     def test_without_errors_it_is_the_record(
-        self, model: PrototypeModel, layout: PrototypeLayout
+        self, model: PrototypeWindows, layout: PrototypeLayout
     ) -> None:
-        diameter, offset = coverage_and_offsets(model, draws_of(model, 1))[0]
+        result = prototype_result(model, draws_of(model, 1))
+        diameter, offset = result.coverage, result.offset
         m = len(layout.array)
         assert diameter[0, :m] == pytest.approx(layout.fit.coverage, abs=1e-4)
         assert offset.max() < 1e-9
 
-    def test_both_runs_are_alike(self, model: PrototypeModel, layout: PrototypeLayout) -> None:
+    def test_both_runs_are_alike(self, model: PrototypeWindows, layout: PrototypeLayout) -> None:
         """Mirror i of camera a and its twin of camera b are shown by the same ball."""
         diameter = coverage_of(model, draws_of(model, 1))[0]
         a, b = diameter[model.virtual].reshape(2, -1)
@@ -163,7 +165,7 @@ class TestCoverage:
 
     @pytest.mark.parametrize("kind", SPREAD)
     def test_each_error_against_the_slow_model(
-        self, model: PrototypeModel, runs: Runs, pictures: list[Picture], kind: str
+        self, model: PrototypeWindows, runs: Runs, pictures: list[Picture], kind: str
     ) -> None:
         draws = draws_of(model, 1, **{kind: SPREAD[kind]})
         diameter = coverage_of(model, draws)
@@ -172,7 +174,7 @@ class TestCoverage:
         assert diameter[0] == pytest.approx(slow(model, runs, pictures, draws), abs=SAMPLED_MM)
 
     def test_all_errors_together_against_the_slow_model(
-        self, model: PrototypeModel, runs: Runs, pictures: list[Picture]
+        self, model: PrototypeWindows, runs: Runs, pictures: list[Picture]
     ) -> None:
         draws = draws_of(model, 2, **SPREAD)
         diameter = coverage_of(model, draws)
@@ -181,7 +183,7 @@ class TestCoverage:
             assert diameter[build] == pytest.approx(expected, abs=SAMPLED_MM)
 
     def test_a_window_that_does_not_hold_the_middle_covers_nothing(
-        self, model: PrototypeModel
+        self, model: PrototypeWindows
     ) -> None:
         """As wide as the windows are, the camera is turned."""
         draws = draws_of(model, 1, camera_tilt=Error(mean=0.3))
@@ -199,7 +201,9 @@ def test_highlights_show_the_middle_of_the_object() -> None:
 
 
 class TestMotions:
-    def test_moving_all_alike_about_the_middle_changes_nothing(self, model: PrototypeModel) -> None:
+    def test_moving_all_alike_about_the_middle_changes_nothing(
+        self, model: PrototypeWindows
+    ) -> None:
         """The axis tilted, and the camera with it."""
         draws = draws_of(model, 1, axis_tilt=Error(5e-3), seat=Error(0.1))
         vector = draws.tilt @ model.plan.frame[1:]
@@ -209,7 +213,7 @@ class TestMotions:
         assert coverage_of(model, moved) == pytest.approx(coverage_of(model, still), abs=1e-9)
         assert np.abs(coverage_of(model, draws) - coverage_of(model, still)).max() > 0.5
 
-    def test_a_base_turned_on_is_a_camera_turned_back(self, model: PrototypeModel) -> None:
+    def test_a_base_turned_on_is_a_camera_turned_back(self, model: PrototypeWindows) -> None:
         """The pinhole lies on the axis."""
         delta = 3e-3
         base = draws_of(model, 1, rotation_angle=Error(mean=delta))
@@ -217,13 +221,13 @@ class TestMotions:
         assert coverage_of(model, base) == pytest.approx(coverage_of(model, camera), abs=1e-9)
 
     def test_a_base_turned_on_moves_the_ray_as_a_closed_form_says(
-        self, model: PrototypeModel, plan: Plan
+        self, model: PrototypeWindows, plan: Plan
     ) -> None:
         """A ball moved by e across the plane of incidence turns its normal by e / r there, the
         ray by 2 cos(i) as much across that plane: 2 rho cos(i) e / r at the distance rho."""
         delta = 1e-6
         draws = draws_of(model, 1, rotation_angle=Error(mean=delta))
-        _, offset = coverage_and_offsets(model, draws)[0]
+        offset = prototype_result(model, draws).offset
         rho, axis = norm(plan.apex), plan.frame[0]
         sideways = delta * norm(np.cross(axis, plan.centre))
         cosine = -(plan.normal * plan.apex).sum(axis=1) / rho
@@ -231,24 +235,25 @@ class TestMotions:
         assert offset[0] == pytest.approx(expected[plan.ball].ravel(), rel=1e-4)
 
     def test_known_motions_of_the_camera_about_its_pinhole_cost_nothing(
-        self, model: PrototypeModel
+        self, model: PrototypeWindows
     ) -> None:
         draws = draws_of(model, 1, camera_tilt=Error(5e-3), camera_focal=Error(5e-3))
         exact = coverage_of(model, draws_of(model, 1))
         fixed = coverage_of(model, draws)
-        known, offset = coverage_and_offsets(model, draws)[1]
+        result = prototype_result(model, draws)
+        known, offset = result.calibrated_coverage, result.calibrated_offset
         assert known == pytest.approx(exact, abs=1e-6)
         assert offset.max() < 1e-6
         assert fixed.min() < exact.min() - 1
 
-    def test_known_errors_cost_less(self, model: PrototypeModel) -> None:
+    def test_known_errors_cost_less(self, model: PrototypeWindows) -> None:
         draws = draws_of(model, 2, **SPREAD)
         fixed, known = (
             coverage_of(model, draws, calibrated=known).min(axis=1) for known in (False, True)
         )
         assert (fixed < known).all()
 
-    def test_a_known_tilt_of_a_cap_costs_little(self, model: PrototypeModel) -> None:
+    def test_a_known_tilt_of_a_cap_costs_little(self, model: PrototypeWindows) -> None:
         """What the limit of the caps' tilt is taken from: a share of the coverage once known."""
         exact = draws_of(model, 1)
         assert model.is_cap.any()
@@ -266,7 +271,7 @@ class TestSearchForTheMinimum:
     @pytest.mark.parametrize("calibrated", [False, True])
     @pytest.mark.parametrize("size", [0.0, 0.2, 1.0, 5.0])
     def test_same_as_on_every_side(
-        self, model: PrototypeModel, size: float, calibrated: bool
+        self, model: PrototypeWindows, size: float, calibrated: bool
     ) -> None:
         """The sides that are not searched hold no minimum: the same bits as of all of them."""
         scaled = {kind: Error(size * error.spread) for kind, error in SPREAD.items()}
@@ -302,7 +307,7 @@ def every_side_searched(
 
 
 class TestDraws:
-    def test_a_build_is_the_same_alone_and_among_others(self, model: PrototypeModel) -> None:
+    def test_a_build_is_the_same_alone_and_among_others(self, model: PrototypeWindows) -> None:
         of_model = model.is_cap, model.wind_up
         many = draw_prototypes(Errors(**SPREAD), 3, range(5), *of_model)
         one = draw_prototypes(Errors(**SPREAD), 3, [4], *of_model)
@@ -315,12 +320,12 @@ class TestDraws:
         drawn = draw_prototypes(errors, 1, range(2), cap, np.zeros(3))
         assert drawn.radius.tolist() == [[0.3, 0.002]] * 2
 
-    def test_stops_of_both_runs_are_apart(self, model: PrototypeModel) -> None:
+    def test_stops_of_both_runs_are_apart(self, model: PrototypeWindows) -> None:
         angle = draws_of(model, 400, rotation_angle=Error(2e-3)).angle
         assert angle.std() == pytest.approx(2e-3, rel=0.03)
         assert abs(np.corrcoef(angle[:, 0].ravel(), angle[:, 1].ravel())[0, 1]) < 0.03
 
-    def test_gravity_turns_the_base_alike_in_both_runs(self, model: PrototypeModel) -> None:
+    def test_gravity_turns_the_base_alike_in_both_runs(self, model: PrototypeWindows) -> None:
         """All of it in each build, up to a factor of the build."""
         angle = draws_of(model, 300, wind_up=Error(0.2, mean=1.0)).angle
         factor = angle[:, 0] @ model.wind_up / (model.wind_up @ model.wind_up)
@@ -331,7 +336,7 @@ class TestDraws:
 
 
 class TestMonteCarlo:
-    def test_later_builds_continue_earlier_ones(self, model: PrototypeModel) -> None:
+    def test_later_builds_continue_earlier_ones(self, model: PrototypeWindows) -> None:
         case = PrototypeCase(model, Errors(**SPREAD), 5)
         whole, later = simulate(case, 23), simulate(case, 6, first=17)
         for field in fields(PrototypeResult):
@@ -348,7 +353,7 @@ class TestMonteCarlo:
 
 
 def test_windows_left_in_their_places_see_less(
-    small_design: MirrorDesign, plan: Plan, model: PrototypeModel
+    small_design: MirrorDesign, plan: Plan, model: PrototypeWindows
 ) -> None:
     """Balls then stand aside of their windows' middles though nothing is off."""
     fixed = prototype_model(reflectors(small_design), replace(plan, moved=False), model.wind_up)
