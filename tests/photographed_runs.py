@@ -11,8 +11,8 @@ import numpy as np
 
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import machine_runs
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, LIT, PHOTOGRAPHS, Frame, exposure_name
-from tbcad.runs.record import RECORD, RUN_SCHEMA
+from tbcad.records.exposure import EXPOSURE_SCHEMA, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.records.run import RECORD, RUN_SCHEMA
 from tbcad.simulate.prototype.ball_rays import stop_photograph
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign

@@ -16,12 +16,14 @@ from tbcad.errors import InputError
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Machine
 from tbcad.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
-from tbcad.runs.exposure import Frame
-from tbcad.runs.record import Geometry
-from tbcad.simulate.prototype.plan import RECORD, Plan
+from tbcad.records.exposure import Frame
+from tbcad.records.prototype import NAME as RECORD
+from tbcad.records.run import Geometry
+from tbcad.records.tables import STOPS
+from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.wind_up import STOPS, read_wind_up
+from tbcad.tolerance.prototype.wind_up import read_wind_up
 from tbcad.types import Ints, Progress
 
 

@@ -4,11 +4,8 @@ import math
 import re
 from pathlib import Path
 
-from pydantic import Field
-
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Record, read_json
-from tbcad.simulate.prototype.plan import MISSING, SCHEMA
+from tbcad.records.prototype import Prototype
 
 MEASURED_MM = 0.01
 """Standard deviation of a radius that is measured without saying how well: by a micrometer screw
@@ -18,22 +15,13 @@ PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
 Measured = tuple[tuple[int, float, float], ...]
 
 
-class _Home(Record):
-    zero_error_deg: float = Field(ge=0, le=180)
-
-
-class _Document(Record):
-    home: _Home | None = None
-
-
 def read_zero_error(path: Path) -> float:
-    """Half width of the base's angle zero by the record of a prototype, radians; 0 if not said.
+    """Half width of the base's angle zero by the record of a prototype, radians.
 
     Raises:
         InputError: the record cannot be read.
     """
-    home = read_json(path, _Document, SCHEMA, MISSING).home
-    return 0.0 if home is None else math.radians(home.zero_error_deg)
+    return math.radians(Prototype.read(path).home.zero_error_deg)
 
 
 def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:

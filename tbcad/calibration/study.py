@@ -23,7 +23,7 @@ from tbcad.machine.designed import designed_shell, read_leds
 from tbcad.machine.machine import Machine
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
-from tbcad.runs.exposure import Frame
+from tbcad.records.exposure import Frame
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.study.study import Figure, Study

@@ -9,7 +9,7 @@ from pathlib import Path
 from tbcad.control.base import travel_s
 from tbcad.control.plan import Plan
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Frame
+from tbcad.records.exposure import Frame
 
 SIDECAR_BYTES = 8_192  # with the journal's line, as a disk's blocks count them
 SPARE = 1.1  # of disk: a lit object takes more bytes than the dark

@@ -5,9 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tbcad.control.plan import Phase, Plan
+from tbcad.control.plan import Plan
 from tbcad.errors import InputError
-from tbcad.runs.exposure import DARK_LIT, Frame, PhaseTimes
+from tbcad.records.exposure import DARK_LIT, Frame, PhaseTimes
+from tbcad.records.prototype_drive import Phase
 
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?$")
 RUNS = {"a": (0,), "b": (180,), "ab": (0, 180)}

@@ -11,9 +11,9 @@ from tbcad.control.cameras.camera import Camera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
 from tbcad.control.faults import CameraFault
 from tbcad.control.machine import Machine
-from tbcad.control.plan import Phase
-from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
-from tbcad.runs.record import RunRecord
+from tbcad.records.exposure import Exposure, Frame, Setting, exposure_name
+from tbcad.records.prototype_drive import Phase
+from tbcad.records.run import RunRecord
 
 SHUTTER = "shutterspeed"
 UNNAMED = "unnamed camera"

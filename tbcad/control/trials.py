@@ -7,8 +7,8 @@ from tbcad.control.plan import Plan
 from tbcad.control.selection import RunOptions
 from tbcad.control.shooting import SHUTTER, Photograph
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Setting
-from tbcad.runs.record import PhaseExposure, RunRecord
+from tbcad.records.exposure import Setting
+from tbcad.records.run import PhaseExposure, RunRecord
 
 OF_EXPOSURE = (SHUTTER, "shutterspeed2", "exposure_s")  # settings that an exposure time changes
 

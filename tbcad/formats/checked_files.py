@@ -30,7 +30,7 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
-Model = TypeVar("Model", bound=Record)
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_json(path: Path, model: type[Model], schema: str | None, missing: str) -> Model:

@@ -16,7 +16,7 @@ from tbcad.machine.shells import NOT_SERVED, plan_of, tied
 from tbcad.merged_run.corrections import Corrections, Options, corrections
 from tbcad.merged_run.ray_sigmas import ray_sigmas
 from tbcad.merged_run.stop_photographs import CorrectedPhotographs, common_exposure
-from tbcad.runs.exposure import LIT, Frame
+from tbcad.records.exposure import LIT, Frame
 from tbcad.runs.photographs import Run, read_run
 from tbcad.runs.same_export import check_same_export
 from tbcad.simulate.capture.geometry import CameraPhotographs

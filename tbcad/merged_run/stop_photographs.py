@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.merged_run.corrections import Corrections
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16
 from tbcad.runs.photographs import Run, read_photograph
 from tbcad.simulate.prototype.ball_rays import between_pixels

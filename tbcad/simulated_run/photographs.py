@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from tbcad.machine.built import BuiltPrototype
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulated_run.led_light import DOME_MM, FAINT_PX2, balls_of_frame, led_light
 from tbcad.simulated_run.object_light import object_light, pixel_directions

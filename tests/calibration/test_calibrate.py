@@ -26,7 +26,7 @@ from tbcad.errors import InputError
 from tbcad.machine.built import BuiltPrototype, random_build
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import TRUTH, read_machine, write_machine
-from tbcad.runs.exposure import DARK, exposure_name
+from tbcad.records.exposure import DARK, exposure_name
 from tbcad.runs.photographs import Run
 from tbcad.screen import WIDTH
 from tests.calibration.conftest import ERRORS, FAULT

@@ -20,7 +20,7 @@ from tbcad.control.preflight import look, preflight
 from tbcad.control.shooting import Photograph, take
 from tbcad.control.trials import common_settings
 from tbcad.errors import InputError
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 from tbcad.runs.photographs import read_run
 from tests.control import exposing_camera
 from tests.control.exposing_camera import radiance

@@ -13,7 +13,7 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.merged_run.corrections import Options
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.prototype.plan import Plan

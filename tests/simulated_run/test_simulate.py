@@ -10,7 +10,7 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.machine.record import TRUTH, read_machine
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 from tbcad.runs.photographs import read_photograph, read_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export

@@ -7,7 +7,7 @@ from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block, Prior
-from tbcad.runs.exposure import exposure_name
+from tbcad.records.exposure import exposure_name
 from tbcad.simulate.study.tables import Table
 from tbcad.types import Floats, Ints
 

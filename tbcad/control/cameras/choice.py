@@ -7,7 +7,7 @@ from tbcad.control.cameras.command import EXPOSURES, CommandCamera
 from tbcad.control.cameras.gphoto import GphotoCamera
 from tbcad.control.cameras.watched_folder import WatchedFolder
 from tbcad.errors import InputError
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 
 GPHOTO, COMMAND, FOLDER = "gphoto2", "command:", "folder:"
 

@@ -1,23 +1,13 @@
 """How far gravity turns the base of an export at each stop: read from stops.csv."""
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import Field
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import REBUILD, Record, read_csv
-from tbcad.simulate.prototype.plan import MISSING, Plan
+from tbcad.formats.checked_files import REBUILD
+from tbcad.records.tables import STOPS, read_stops
+from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.types import Floats
-
-STOPS = "stops.csv"
-MAX_DEG = 10.0  # far beyond what a build permits
-
-
-class _Stop(Record):
-    stop: int
-    wind_up_deg: Annotated[float, Field(ge=-MAX_DEG, le=MAX_DEG)]
 
 
 def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
@@ -29,7 +19,7 @@ def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
         InputError: the file is missing, malformed, or of another plan.
     """
     path = export.folder / STOPS
-    rows = read_csv(path, _Stop, MISSING)
+    rows = read_stops(export.folder)
     if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
         raise InputError(
             f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"
