@@ -1,6 +1,5 @@
 """Priors follow the process, what was measured, and what is given."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from tbcad.calibration.setup_files import MEASURED_MM, parse_measured, read_zero
 from tbcad.errors import InputError
 from tbcad.tolerance.process.process import load_process, process_errors
 from tests.calibration.machines import small_machine
+from tests.prototype_records import prototype_document, write_prototype
 
 MACHINE = small_machine()
 BALLS = len(MACHINE.radius)
@@ -81,8 +81,6 @@ def test_wrong_values_are_refused(text: str) -> None:
 
 
 def test_zero_error(tmp_path: Path) -> None:
-    file = tmp_path / "prototype.json"
-    file.write_text(json.dumps({"schema": "tbcad-prototype/2", "home": {"zero_error_deg": 90}}))
+    home = prototype_document()["home"] | {"zero_error_deg": 90}
+    file = write_prototype(tmp_path, home=home) / "prototype.json"
     assert read_zero_error(file) == pytest.approx(np.pi / 2)
-    file.write_text(json.dumps({"schema": "tbcad-prototype/2"}))
-    assert read_zero_error(file) == 0
