@@ -63,9 +63,9 @@ def test_lamps_of_a_record(tmp_path: Path) -> None:
     found = read_lamps(write_prototype(tmp_path, lamps=LAMP_SECTION))
     assert found is not None
     assert found.places.tolist() == [LAMP_SECTION["places"][0]["position_mm"]]
-    assert read_lamps(write_prototype(tmp_path)) is None
     edit_json(
         tmp_path / "prototype.json", lambda value: value.update(lamps=LAMP_SECTION | {"watt": "x"})
     )
     with pytest.raises(InputError, match="watt"):
         read_lamps(tmp_path)
+    assert read_lamps(write_prototype(tmp_path)) is None
