@@ -6,10 +6,11 @@ from pathlib import Path
 
 from tbcad.errors import InputError
 from tbcad.formats.csv_table import Row
-from tbcad.output.manifest import MANIFEST, Manifest, is_listed, read_manifest
+from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.records.design import NAME as DESIGN
 from tbcad.records.design import DesignRecord
+from tbcad.records.manifest import Manifest
 from tbcad.records.prototype import NAME as PROTOTYPE
 from tbcad.records.prototype import PrintedPartRecord
 

@@ -15,7 +15,6 @@ from tbcad.output.manifest import (
     MANIFEST,
     REPORT,
     REPORT_BEGIN,
-    Manifest,
     is_listed,
     is_report,
     read_manifest,
@@ -23,6 +22,7 @@ from tbcad.output.manifest import (
 from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom_view import read_parts_list
 from tbcad.records.design import MISSING
+from tbcad.records.manifest import Manifest
 from tbcad.report.page import bodies, mirrors
 from tbcad.report.page.packing import PackedArrays
 from tbcad.report.page.parts_list import files_html, parts_html
