@@ -70,7 +70,8 @@ def prototype_document(**changes: Any) -> Record:
         "power_off": dict.fromkeys(PowerOff.model_fields, 0.0),
     }
     document["holding"]["balls"] = []
-    document |= changes
+    ordered = [field.alias or name for name, field in Prototype.model_fields.items()]
+    document = {name: (document | changes)[name] for name in ordered}
     Prototype.model_validate(document)
     return document
 
