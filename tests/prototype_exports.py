@@ -10,7 +10,7 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files import balls_csv, plan_csv
-from tbcad.records.tables import StopRow, columns_of
+from tbcad.records.tables import StopRow
 from tbcad.simulate.prototype.plan import Plan
 from tests.prototype_records import write_prototype
 
@@ -59,7 +59,7 @@ def write_wind_up(folder: Path, stops: int) -> None:
 
 def write_stops(folder: Path, angles_deg: Sequence[float], wind_up_deg: Sequence[float]) -> None:
     """stops.csv, as far as it is read: of each stop its angle and how far gravity turns it."""
-    columns = columns_of(StopRow)
+    columns = StopRow.columns()
     rows = [
         {**dict.fromkeys(columns, 0), "stop": number, "base_angle_deg": angle, "wind_up_deg": more}
         for number, (angle, more) in enumerate(zip(angles_deg, wind_up_deg, strict=True), 1)

@@ -1,5 +1,6 @@
 """From a run's highlights to a calibrated machine, and what it is based on."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,16 +11,15 @@ from tbcad.calibration.estimate.parameters import Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
 from tbcad.calibration.intrinsics.lens import Lens
 from tbcad.calibration.priors import Fitted, prototype_prior, shell_prior
-from tbcad.calibration.setup_files import read_zero_error
 from tbcad.calibration.uncertainty import RayUncertainty, ray_uncertainty
 from tbcad.errors import InputError
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Machine
 from tbcad.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.records.exposure import Frame
-from tbcad.records.prototype import NAME as RECORD
+from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Geometry
-from tbcad.records.tables import STOPS
+from tbcad.records.tables import StopRow
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.error_kinds import Errors
@@ -47,16 +47,17 @@ class Setup:
 
     def prior(self, errors: Errors, measured: tuple[tuple[int, float, float], ...] = ()) -> Prior:
         """What is known of it by its process and by radii that are measured."""
+        home = Prototype.read(self.export.folder / NAME).home
         fitted = Fitted(
             body_centre=self.plan.body_centre,
             is_cap=np.asarray(self.plan.body_radius < self.plan.radius),
             series=np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
-            zero_error=read_zero_error(self.export.folder / RECORD),
+            zero_error=math.radians(home.zero_error_deg),
             lens_known=self.lens is not None,
             measured=measured,
         )
         stop = np.array([frame.stop - 1 for frame in self.frames])
-        known = (self.export.folder / STOPS).is_file()  # not of exports by old versions
+        known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
         wind_up = read_wind_up(self.export, self.plan)[stop] if known else 0.0
         turned = self.designed.angle + wind_up
         return prototype_prior(replace(self.designed, angle=turned), errors, fitted)

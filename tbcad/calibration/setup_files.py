@@ -1,11 +1,8 @@
-"""What else is known of a prototype: its angle zero, and radii that were measured."""
+"""Radii of balls that were measured, as the command takes them."""
 
-import math
 import re
-from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.records.prototype import Prototype
 
 MEASURED_MM = 0.01
 """Standard deviation of a radius that is measured without saying how well: by a micrometer screw
@@ -13,15 +10,6 @@ over the body, or a spherometer."""
 PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
 
 Measured = tuple[tuple[int, float, float], ...]
-
-
-def read_zero_error(path: Path) -> float:
-    """Half width of the base's angle zero by the record of a prototype, radians.
-
-    Raises:
-        InputError: the record cannot be read.
-    """
-    return math.radians(Prototype.read(path).home.zero_error_deg)
 
 
 def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:

@@ -15,11 +15,20 @@ from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME as RECORD
 from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
-from tbcad.records.tables import BALLS, MIRRORS, PICTURES, STOPS, read_stops
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
 from tbcad.spec.prototype import MotionSpec
 
 SETTINGS = "grbl_settings.txt"
-FILES = (DESIGN_FILE, MIRRORS, RECORD, BALLS, PICTURES, STOPS, PROGRAM, SETTINGS)
+FILES = (
+    DESIGN_FILE,
+    MirrorRow.FILE,
+    RECORD,
+    BallRow.FILE,
+    PictureRow.FILE,
+    StopRow.FILE,
+    PROGRAM,
+    SETTINGS,
+)
 """What a run depends on."""
 TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
@@ -106,8 +115,8 @@ def read_settings(path: Path) -> dict[int, float]:
 
 def _angles(folder: Path, program: Program) -> dict[int, float]:
     """Base angle of each stop, which the program must drive to."""
-    path = folder / STOPS
-    angles = {row.stop: row.base_angle_deg for row in read_stops(folder)}
+    path = folder / StopRow.FILE
+    angles = {row.stop: row.base_angle_deg for row in StopRow.read(folder)}
     for stop, angle in angles.items():
         move = program.stops.get(stop)
         if move is None or abs(move.angle_deg - angle) > ANGLE_DEG:

@@ -24,7 +24,7 @@ from tbcad.drawings.export import Export
 from tbcad.formats.checked_files import columns
 from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
 from tbcad.records.design import DesignRecord
-from tbcad.records.tables import MIRRORS, MirrorRow, read_mirrors
+from tbcad.records.tables import MirrorRow
 from tbcad.spec.design import OpticsSpec
 from tbcad.types import Floats
 
@@ -128,8 +128,8 @@ def layout_rows(export: Export) -> list[MirrorRow]:
     Raises:
         InputError: it is not as it was written.
     """
-    export.file(MIRRORS)
-    return read_mirrors(export.folder)
+    export.file(MirrorRow.FILE)
+    return MirrorRow.read(export.folder)
 
 
 def has_layout(design: DesignRecord) -> bool:

@@ -18,7 +18,7 @@ from tbcad.drawings.seats import Seat, seats_table
 from tbcad.formats.step_named import read_named_solid
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.records.prototype import PrintedPartRecord, Prototype
-from tbcad.records.tables import BALLS, read_balls
+from tbcad.records.tables import BallRow
 from tbcad.tolerance.process.process import load_process
 from tbcad.types import Floats
 
@@ -111,8 +111,8 @@ def _on_axis(
 def _seats(export: Export, axes: Floats, origin: Floats) -> Iterator[Seat]:
     """All seats, by the balls' list and the record."""
     assert export.machine is not None
-    export.file(BALLS)
-    balls = {ball.number: ball for ball in read_balls(export.folder)}
+    export.file(BallRow.FILE)
+    balls = {ball.number: ball for ball in BallRow.read(export.folder)}
     for one in export.machine.record.seats:
         row = balls[one.ball]
         takes = f"cap {one.ball}" if row.kind == "cap" else f"ball {row.size}"

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from math import hypot
 from pathlib import Path
 
-from tbcad.records.tables import RAYS, read_rays
+from tbcad.records.tables import RayRow
 
 
 def ray_sigmas(
@@ -26,8 +26,8 @@ def ray_sigmas(
     known = {
         ray.mirror: round(hypot(ray.sigma_mm, ray.sigma_mrad / 1000 * capture_mm / 4), 5)
         for folder in folders
-        if (folder / RAYS).is_file()
-        for ray in read_rays(folder).values()
+        if (folder / RayRow.FILE).is_file()
+        for ray in RayRow.read(folder)
     }
     return {
         camera: [known.get(f"{camera}{number + 1:04d}") for number in range(count)]

@@ -10,10 +10,9 @@ from tbcad.formats.csv_table import Row, write_table
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import CameraRecord, DesignRecord, MandrelRecord, ShellFiles
-from tbcad.records.tables import MIRRORS as MIRRORS_FILE
-from tbcad.records.tables import MirrorRow, columns_of
+from tbcad.records.tables import MirrorRow
 
-COLUMNS = columns_of(MirrorRow)
+COLUMNS = MirrorRow.columns()
 
 
 def mirror_rows(array: MirrorArray) -> list[Row]:
@@ -51,7 +50,7 @@ def write_record(
         mandrels: records of the shells' negatives that are there too.
     """
     write_table(
-        folder / MIRRORS_FILE,
+        folder / MirrorRow.FILE,
         COLUMNS,
         (row for array in design.arrays for row in mirror_rows(array)),
     )
@@ -71,7 +70,7 @@ def design_record(
         cameras=(_camera(a), _camera(b)),
         parts=tuple(ShellFiles(**shell_record(one)) for one in (a, b) if shells),
         mandrels=tuple(mandrels),
-        mirrors=MIRRORS_FILE,
+        mirrors=MirrorRow.FILE,
     )
 
 

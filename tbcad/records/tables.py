@@ -1,8 +1,7 @@
 """CSV tables of a build and of a calibration: a model for the rows of each, in millimetres."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field
 
@@ -10,9 +9,6 @@ from tbcad.formats.checked_files import Finite, Record, read_csv
 from tbcad.records.design import MISSING
 from tbcad.records.prototype import Prototype
 
-MIRRORS, BALLS, PICTURES, STOPS, RAYS = (
-    *("mirrors.csv", "balls.csv", "rotation_plan.csv", "stops.csv", "rays.csv"),
-)
 MAX_WIND_UP_DEG = 10.0  # far beyond what a build permits
 
 Length = Annotated[float, Field(gt=0, le=1e6)]
@@ -23,7 +19,28 @@ Number = Annotated[Finite | None, _empty]
 Radius = Annotated[Annotated[float, Field(gt=0, allow_inf_nan=False)] | None, _empty]
 
 
-class MirrorRow(Record):
+class TableRow(Record):
+    """A row of a table, whose columns are the fields of the model, in their order."""
+
+    FILE: ClassVar[str]
+    MISSING: ClassVar[str] = Prototype.MISSING
+
+    @classmethod
+    def columns(cls) -> tuple[str, ...]:
+        """The columns of the table."""
+        return tuple(cls.model_fields)
+
+    @classmethod
+    def read(cls, folder: Path) -> list[Self]:
+        """All rows of the table in a folder.
+
+        Raises:
+            InputError: it is missing, or a row does not fit.
+        """
+        return read_csv(folder / cls.FILE, cls, cls.MISSING)
+
+
+class MirrorRow(TableRow):
     """A mirror; planar ones have neither centre nor radius.
 
     Attributes:
@@ -35,6 +52,8 @@ class MirrorRow(Record):
         theta0_deg: half angle of what it shows of the capture sphere, and theta1_deg.
     """
 
+    FILE: ClassVar[str] = "mirrors.csv"
+    MISSING: ClassVar[str] = MISSING
     id: str
     camera: Literal["a", "b"]
     ux: Finite
@@ -59,7 +78,7 @@ class MirrorRow(Record):
     coverage_mm: Finite
 
 
-class BallRow(Record):
+class BallRow(TableRow):
     """A ball or cap with the base at angle zero; a cap has neither grade nor mass.
 
     Attributes:
@@ -73,6 +92,7 @@ class BallRow(Record):
         error_deg: largest error of direction.
     """
 
+    FILE: ClassVar[str] = "balls.csv"
     number: int
     kind: Literal["ball", "cap"]
     size: str
@@ -104,9 +124,10 @@ class BallRow(Record):
     error_deg: Finite
 
 
-class PictureRow(Record):
+class PictureRow(TableRow):
     """A mirror's picture: by which ball, at which stop, the object turned or not."""
 
+    FILE: ClassVar[str] = "rotation_plan.csv"
     order: int
     object_turn_deg: Finite
     stop: int = Field(ge=1, le=1_000_000)
@@ -118,9 +139,10 @@ class PictureRow(Record):
     error_deg: Finite
 
 
-class StopRow(Record):
+class StopRow(TableRow):
     """A stop of the base: what it shows, its worst errors, gravity's torque and wind-up."""
 
+    FILE: ClassVar[str] = "stops.csv"
     stop: int = Field(ge=1)
     base_angle_deg: Finite
     mirrors: int
@@ -131,7 +153,7 @@ class StopRow(Record):
     wind_up_deg: float = Field(ge=-MAX_WIND_UP_DEG, le=MAX_WIND_UP_DEG)
 
 
-class RayRow(Record):
+class RayRow(TableRow):
     """How well a calibration knows the middle ray of a mirror: of its columns those that are read.
 
     Attributes:
@@ -140,38 +162,9 @@ class RayRow(Record):
         pixel_mm: width of a pixel there.
     """
 
+    FILE: ClassVar[str] = "rays.csv"
+    MISSING: ClassVar[str] = "calibrate again with tbcad calibrate"
     mirror: MirrorName
     sigma_mm: Finite = Field(ge=0)
     sigma_mrad: Finite = Field(ge=0)
     pixel_mm: Finite = Field(gt=0)
-
-
-def columns_of(model: type[Record]) -> tuple[str, ...]:
-    """The columns of a table, in their order."""
-    return tuple(model.model_fields)
-
-
-def read_mirrors(folder: Path) -> list[MirrorRow]:
-    """All mirrors of a build; raises InputError."""
-    return read_csv(folder / MIRRORS, MirrorRow, MISSING)
-
-
-def read_balls(folder: Path) -> list[BallRow]:
-    """All balls of a build's prototype; raises InputError."""
-    return read_csv(folder / BALLS, BallRow, Prototype.MISSING)
-
-
-def read_pictures(folder: Path) -> list[PictureRow]:
-    """The plan of a build's prototype; raises InputError."""
-    return read_csv(folder / PICTURES, PictureRow, Prototype.MISSING)
-
-
-def read_stops(folder: Path) -> list[StopRow]:
-    """All stops of a build's prototype; raises InputError."""
-    return read_csv(folder / STOPS, StopRow, Prototype.MISSING)
-
-
-def read_rays(folder: Path) -> Mapping[str, RayRow]:
-    """Rays of a calibration, by mirror; raises InputError."""
-    rows = read_csv(folder / RAYS, RayRow, "calibrate again with tbcad calibrate")
-    return {row.mirror: row for row in rows}

@@ -13,7 +13,7 @@ import pyvista
 import trimesh
 
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
-from tbcad.records.tables import BallRow, read_balls
+from tbcad.records.tables import BallRow
 from tbcad.srgb import shown_colour
 from tbcad.types import Floats
 
@@ -115,7 +115,7 @@ def _base(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
 
 def _seat(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """The seat of the largest purchased ball: empty, and with the ball in it."""
-    balls = read_balls(folder)
+    balls = BallRow.read(folder)
     ball = max(
         [one for one in balls if one.kind == "ball"] or balls, key=lambda one: one.body_radius_mm
     )
@@ -178,7 +178,7 @@ def _centre(ball: BallRow) -> Floats:
 
 def _add_balls(plotter: pyvista.Plotter, folder: Path, only: int = 0) -> None:
     """Add the bought balls, or the one of this number."""
-    for ball in read_balls(folder):
+    for ball in BallRow.read(folder):
         if ball.kind == "ball" and only in (0, ball.number):
             sphere = pyvista.Sphere(
                 radius=ball.body_radius_mm,

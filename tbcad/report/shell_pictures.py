@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from tbcad.formats.checked_files import columns
 from tbcad.geometry.vectors import dot, unit
 from tbcad.records.design import NAME, DesignRecord
-from tbcad.records.tables import read_mirrors
+from tbcad.records.tables import MirrorRow
 from tbcad.types import Bools, Floats, Ints
 
 SIZE = (1600, 800)
@@ -148,7 +148,7 @@ def _outward(points: Floats, mirrors: ModelledMirrors) -> Floats:
 def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
     """One camera's mirrors of an export."""
     coat = DesignRecord.read(folder / NAME).coating_mm
-    rows = [row for row in read_mirrors(folder) if row.camera == camera]
+    rows = [row for row in MirrorRow.read(folder) if row.camera == camera]
     apex, normal = columns(rows, "px py pz"), columns(rows, "nx ny nz")
     radius = np.array([row.radius_mm or np.inf for row in rows])
     polar = columns(rows, "polar_deg")[:, 0]

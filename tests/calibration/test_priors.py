@@ -1,18 +1,16 @@
 """Priors follow the process, what was measured, and what is given."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tbcad.calibration.estimate.parameters import Block
 from tbcad.calibration.priors import UNIFORM, Fitted, prototype_prior, shell_prior
-from tbcad.calibration.setup_files import MEASURED_MM, parse_measured, read_zero_error
+from tbcad.calibration.setup_files import MEASURED_MM, parse_measured
 from tbcad.errors import InputError
 from tbcad.tolerance.process.process import load_process, process_errors
 from tests.calibration.machines import small_machine
-from tests.prototype_records import prototype_document, write_prototype
 
 MACHINE = small_machine()
 BALLS = len(MACHINE.radius)
@@ -78,9 +76,3 @@ def test_wrong_texts_are_refused(text: str) -> None:
 def test_wrong_values_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="allowed is ball 1 to 5"):
         parse_measured((text,), 5)
-
-
-def test_zero_error(tmp_path: Path) -> None:
-    home = prototype_document()["home"] | {"zero_error_deg": 90}
-    file = write_prototype(tmp_path, home=home) / "prototype.json"
-    assert read_zero_error(file) == pytest.approx(np.pi / 2)

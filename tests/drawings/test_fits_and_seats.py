@@ -23,7 +23,7 @@ from tbcad.prototype.files.bom_csv import COLUMNS
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import DesignRecord
 from tbcad.records.prototype import CapRecord, Prototype
-from tbcad.records.tables import BallRow, columns_of
+from tbcad.records.tables import BallRow
 from tbcad.spec.load import load_spec
 from tbcad.types import Floats
 from tests.prototype_records import printed_part, prototype_document
@@ -157,7 +157,7 @@ def export(folder: Path, carrier: Solid) -> Export:
         "by": 10,
         "bz": 16,
     }
-    rest = dict.fromkeys(columns_of(BallRow), 1)
+    rest = dict.fromkeys(BallRow.columns(), 1)
     balls: list[Row] = [rest | {"number": 1} | cap, rest | {"number": 2} | ball]
     write_table(folder / "balls.csv", tuple(rest), balls)
     write_manifest(folder, "build")

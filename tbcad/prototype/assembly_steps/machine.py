@@ -10,7 +10,7 @@ from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files.bom_view import read_parts_list
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts
 from tbcad.records.prototype import NAME, FastenerRecord, Prototype
-from tbcad.records.tables import read_balls
+from tbcad.records.tables import BallRow
 from tbcad.spec.csv_rows import read_rows
 
 WIRING = "wiring.csv"
@@ -102,7 +102,7 @@ def read_machine(folder: Path) -> Machine:
     rows = read_parts_list(folder).rows
     record = Prototype.read(folder / NAME)
     lines = [row for _, row in read_rows(_present(folder / WIRING), WIRING, wiring.COLUMNS)]
-    sizes = {ball.number: ball.size for ball in read_balls(folder) if ball.kind == "ball"}
+    sizes = {ball.number: ball.size for ball in BallRow.read(folder) if ball.kind == "ball"}
     return Machine(rows, record, tuple(lines), sizes, load_parts())
 
 

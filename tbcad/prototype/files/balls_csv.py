@@ -4,10 +4,10 @@ import numpy as np
 
 from tbcad.formats.csv_table import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.records.tables import BallRow, columns_of
+from tbcad.records.tables import BallRow
 from tbcad.types import Floats
 
-COLUMNS = columns_of(BallRow)
+COLUMNS = BallRow.columns()
 
 
 def ball_rows(layout: PrototypeLayout) -> list[Row]:

@@ -11,9 +11,9 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.loads import DriveLoads
 from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.records.tables import PictureRow, StopRow, columns_of
+from tbcad.records.tables import PictureRow, StopRow
 
-PICTURE_COLUMNS, STOP_COLUMNS = columns_of(PictureRow), columns_of(StopRow)
+PICTURE_COLUMNS, STOP_COLUMNS = PictureRow.columns(), StopRow.columns()
 HOLE_COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
 THREAD = "M5"
 

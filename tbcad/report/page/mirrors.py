@@ -7,14 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tbcad.formats.checked_files import columns
-from tbcad.records.tables import (
-    PICTURES,
-    MirrorRow,
-    PictureRow,
-    read_balls,
-    read_mirrors,
-    read_pictures,
-)
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow
 from tbcad.report.page.packing import PackedArrays
 from tbcad.report.page.verdict import Verdict
 from tbcad.types import Floats
@@ -46,7 +39,7 @@ class Quantity(NamedTuple):
 
 def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) -> dict[str, Any]:
     """All mirrors of both cameras for the page, with the prototype's balls if there are any."""
-    rows = read_mirrors(folder)
+    rows = MirrorRow.read(folder)
     plan = _plan(folder)
     quantities = [*_verified(rows, verdict), *_designed(rows), *_pointing(rows, plan)]
     known = [one for one in quantities if np.isfinite(one.values).any()]
@@ -120,9 +113,9 @@ def _packed(quantity: Quantity, arrays: PackedArrays) -> dict[str, Any]:
 
 def _plan(folder: Path) -> dict[str, PictureRow]:
     """The photograph of each mirror by its ball; none without a prototype."""
-    if not (folder / PICTURES).is_file():
+    if not (folder / PictureRow.FILE).is_file():
         return {}
-    return {row.mirror: row for row in read_pictures(folder)}
+    return {row.mirror: row for row in PictureRow.read(folder)}
 
 
 def _photograph(row: PictureRow | None) -> list[float] | None:
@@ -141,5 +134,5 @@ def _balls(folder: Path) -> list[dict[str, Any]]:
             "normal": [ball.nx, ball.ny, ball.nz],
             "radius": ball.radius_mm,
         }
-        for ball in read_balls(folder)
+        for ball in BallRow.read(folder)
     ]

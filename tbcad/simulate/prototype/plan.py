@@ -10,7 +10,7 @@ from tbcad.formats.checked_files import REBUILD, columns
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.records.tables import BALLS, PICTURES, BallRow, PictureRow, read_balls, read_pictures
+from tbcad.records.tables import BallRow, PictureRow
 from tbcad.simulate.scene.exported import ROUNDING, ExportedDesign
 from tbcad.types import Floats, Ints
 
@@ -72,9 +72,11 @@ def read_plan(exported: ExportedDesign) -> Plan:
     Raises:
         InputError: there is none, or what it says cannot be.
     """
-    record, table, plan_file = (exported.folder / name for name in (NAME, BALLS, PICTURES))
+    record, table, plan_file = (
+        exported.folder / name for name in (NAME, BallRow.FILE, PictureRow.FILE)
+    )
     document = Prototype.read(record)
-    balls, pictures = read_balls(exported.folder), read_pictures(exported.folder)
+    balls, pictures = BallRow.read(exported.folder), PictureRow.read(exported.folder)
     frame = np.array([document.frame.axis, document.frame.zero, document.frame.third])
     _check_frame(record, exported, frame)
     _check_balls(table, balls)

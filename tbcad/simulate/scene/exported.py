@@ -17,8 +17,7 @@ from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import CameraRecord, DesignRecord
-from tbcad.records.tables import MIRRORS as MIRRORS_FILE
-from tbcad.records.tables import MirrorRow, read_mirrors
+from tbcad.records.tables import MirrorRow
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.design import Spec
 from tbcad.types import Floats
@@ -55,7 +54,7 @@ def read_export(folder: Path) -> ExportedDesign:
     document = DesignRecord.read(path)
     if tuple(camera.id for camera in document.cameras) != ("a", "b"):
         raise InputError(f"{path}: cameras are not a and b: {REBUILD}")
-    table, mirrors = folder / MIRRORS_FILE, read_mirrors(folder)
+    table, mirrors = folder / MirrorRow.FILE, MirrorRow.read(folder)
     a, b = (
         _reflector(table, document, camera, [one for one in mirrors if one.camera == camera.id])
         for camera in document.cameras

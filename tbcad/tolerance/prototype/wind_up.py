@@ -4,7 +4,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import REBUILD
-from tbcad.records.tables import STOPS, read_stops
+from tbcad.records.tables import StopRow
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.types import Floats
@@ -18,8 +18,8 @@ def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
     Raises:
         InputError: the file is missing, malformed, or of another plan.
     """
-    path = export.folder / STOPS
-    rows = read_stops(export.folder)
+    path = export.folder / StopRow.FILE
+    rows = StopRow.read(export.folder)
     if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
         raise InputError(
             f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"

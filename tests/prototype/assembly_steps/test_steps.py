@@ -17,7 +17,7 @@ from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_
 from tbcad.prototype.electronics.wiring import COLUMNS as WIRING
 from tbcad.prototype.electronics.wiring import HOME
 from tbcad.prototype.files.bom_csv import COLUMNS
-from tbcad.records.tables import BallRow, columns_of
+from tbcad.records.tables import BallRow
 from tbcad.report.assembly_page import page
 from tests.prototype_records import (
     FRAME,
@@ -86,8 +86,8 @@ def write(folder: Path, design: Record, more: dict[str, int]) -> Path:
             source = "printed" if part in PRINTED else "bought"
             row = {"item": item, "quantity": count, "part": part, "what": part, "from": source}
             table.writerow(row)
-    ball = dict.fromkeys(columns_of(BallRow), 1) | {"kind": "ball", "size": "10 mm"}
-    write_table(folder / "balls.csv", columns_of(BallRow), [ball])
+    ball = dict.fromkeys(BallRow.columns(), 1) | {"kind": "ball", "size": "10 mm"}
+    write_table(folder / "balls.csv", BallRow.columns(), [ball])
     with (folder / "wiring.csv").open("w", newline="") as file:
         lines = csv.DictWriter(file, WIRING, lineterminator="\n")
         lines.writeheader()
