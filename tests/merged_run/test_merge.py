@@ -347,7 +347,8 @@ class TestIncomplete:
     ) -> None:
         first = frames[: len(plan.angle)]
         run = write_run(tmp_path / "half", export, first, perfect)
-        rays = "mirror,sigma_mm,sigma_mrad\na0001,0.04,2\nb0001,0.04,2\n"  # 2 mrad at 15 mm
+        head = "mirror,sigma_mm,sigma_mrad,pixel_mm"
+        rays = f"{head}\na0001,0.04,2,1\nb0001,0.04,2,1\n"  # 2 mrad at 15 mm
         (calibration / "rays.csv").write_text(rays, encoding="utf-8")
         record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
         assert list(record["based_on"]) == ["a"]
