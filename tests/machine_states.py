@@ -8,7 +8,7 @@ from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import unit
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Machine
-from tbcad.runs.exposure import Frame
+from tbcad.records.exposure import Frame
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 

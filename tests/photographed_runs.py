@@ -1,7 +1,6 @@
 """Folders of runs whose photographs are simulated without noise."""
 
 import hashlib
-import json
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import partial
@@ -12,8 +11,8 @@ import numpy as np
 
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import machine_runs
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, LIT, PHOTOGRAPHS, Frame, exposure_name
-from tbcad.runs.record import RECORD, RUN_SCHEMA
+from tbcad.records.exposure import LIT, PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.records.run import RECORD, RunRecord
 from tbcad.simulate.capture.photograph import Samples, row_bands
 from tbcad.simulate.parallel import in_threads
 from tbcad.simulate.prototype.ball_rays import photographed_pixels
@@ -80,19 +79,17 @@ def write_run(
             lit = photographs[exposure_name(frame, LIT)]
             image = change(lit if phase == LIT else np.zeros_like(lit), frame, phase)
             write_exposure(images, frame, phase, image, f"{name}.{suffix}")
-    record = {
-        "schema": RUN_SCHEMA,
-        "export_sha256": {name: digest(export.folder / name) for name in DEPENDS_ON},
-        "source": "simulated",
-        "camera": "test",
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "phases": phases,
-        "frames": [frame.model_dump() for frame in frames],
-        "locked": {},
-        "seconds": 0.0,
-    }
-    (folder / RECORD).write_text(json.dumps(record), encoding="utf-8")
+    RunRecord(
+        export_sha256={name: digest(export.folder / name) for name in DEPENDS_ON},
+        source="simulated",
+        camera="test",
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        phases=phases,
+        frames=frames,
+        locked={},
+        seconds=0.0,
+    ).write(folder / RECORD)
     return folder
 
 
@@ -108,19 +105,17 @@ def write_exposure(
     written, data = cv2.imencode(Path(file).suffix, image[..., ::-1])
     assert written
     (images / file).write_bytes(data.tobytes())
-    sidecar = {
-        "schema": EXPOSURE_SCHEMA,
-        "frame": frame.model_dump(),
-        "phase": phase,
-        "file": file,
-        "sha256": digest(images / file),
-        "width_px": image.shape[1],
-        "height_px": image.shape[0],
-        "exposure_s": exposure_s,
-        "taken": TAKEN.isoformat(),
-        "settings": {},
-    }
-    (images / file).with_suffix(".json").write_text(json.dumps(sidecar), encoding="utf-8")
+    Exposure(
+        frame=frame,
+        phase=phase,
+        file=file,
+        sha256=digest(images / file),
+        width_px=image.shape[1],
+        height_px=image.shape[0],
+        exposure_s=exposure_s,
+        taken=TAKEN,
+        settings={},
+    ).write((images / file).with_suffix(".json"))
 
 
 def digest(path: Path) -> str:

@@ -1,6 +1,6 @@
 """A prototype as the simulation meets it: its plan, and the files that it is read from."""
 
-import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,9 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files import balls_csv, plan_csv
+from tbcad.records.tables import StopRow
 from tbcad.simulate.prototype.plan import Plan
+from tests.prototype_records import write_prototype
 
 
 def plan_of(made: PrototypeLayout) -> Plan:
@@ -38,22 +40,28 @@ def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> P
     write_table(folder / "rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan)
     write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.ball_rows(made))
     axis, zero, third = made.array.ellipsoid.frame().tolist()
-    document = {
-        "schema": "tbcad-prototype/2",
-        "camera": "a",
-        "picture": little.spec.prototype.picture,
-        "frame": {"axis": axis, "zero": zero, "third": third},
-        "balls": "balls.csv",
-        "leds": [
+    write_prototype(
+        folder,
+        picture=little.spec.prototype.picture,
+        frame={"axis": axis, "zero": zero, "third": third},
+        leds=[
             {"name": f"led_{number}", "position_mm": place, "direction": [0.0, 0.0, 1.0]}
             for number, place in enumerate(little.spec.prototype.stage.leds_mm, 1)
         ],
-    }
-    (folder / "prototype.json").write_text(json.dumps(document), encoding="utf-8")
+    )
     return folder
 
 
 def write_wind_up(folder: Path, stops: int) -> None:
     """A base that gravity turns by another angle at each stop."""
-    rows = [{"stop": stop + 1, "wind_up_deg": 0.01 * stop} for stop in range(stops)]
-    write_table(folder / "stops.csv", ("stop", "wind_up_deg"), rows)
+    write_stops(folder, [0.0] * stops, [0.01 * stop for stop in range(stops)])
+
+
+def write_stops(folder: Path, angles_deg: Sequence[float], wind_up_deg: Sequence[float]) -> None:
+    """stops.csv, as far as it is read: of each stop its angle and how far gravity turns it."""
+    columns = StopRow.columns()
+    rows = [
+        {**dict.fromkeys(columns, 0), "stop": number, "base_angle_deg": angle, "wind_up_deg": more}
+        for number, (angle, more) in enumerate(zip(angles_deg, wind_up_deg, strict=True), 1)
+    ]
+    write_table(folder / "stops.csv", columns, rows)

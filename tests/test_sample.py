@@ -9,7 +9,7 @@ import pytest
 from tbcad_verify.run.verify import verify
 
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import COLUMNS, document, mirror_rows
+from tbcad.mirrors.record import COLUMNS, design_record, mirror_rows
 from tbcad.spec.load import load_spec
 from tests.exported_files import read_csv
 
@@ -49,7 +49,7 @@ def test_sample_has_the_mirrors_of_this_design_and_code(flat_design: MirrorDesig
 
 def test_sample_has_the_record_of_this_design_and_code(flat_design: MirrorDesign) -> None:
     recorded = json.loads((SAMPLE / "design.json").read_text())
-    expected = document(flat_design, shells=True)
+    expected = design_record(flat_design, shells=True).document()
     assert recorded.keys() == expected.keys()
     for key in ("schema", "spec", "parts", "mirrors"):
         assert recorded[key] == expected[key], key

@@ -11,31 +11,41 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import typer.main
 from pydantic import BaseModel
 from pydantic.json_schema import PydanticInvalidForJsonSchema
-from tbcad_verify.record.columns import Columns
-from tbcad_verify.record.export import Design, Manifest
-from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.prototype import Prototype
-from tbcad_verify.record.prototype_tables import Balls, PartsList, Plan, PlateHoles, Stops, Wiring
+from tbcad_verify.record.prototype_tables import PartsList, PlateHoles, Wiring
 
 import tbcad
 from tbcad.cli.app import app
 from tbcad.cli.help_order import HEADINGS
+from tbcad.records.calibration import CalibrationRecord
+from tbcad.records.design import DesignRecord
+from tbcad.records.document import Document
+from tbcad.records.exposure import Exposure
+from tbcad.records.machine import MachineRecord
+from tbcad.records.manifest import Manifest
+from tbcad.records.prototype import Prototype
+from tbcad.records.run import RunRecord
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow
 from tbcad.reference.template import design_template
 
 ROOT = Path(__file__).parents[2]
-RECORDS: dict[str, type[BaseModel]] = {
-    "design.json": Design,
+RECORDS: dict[str, type[Document]] = {
+    "design.json": DesignRecord,
     "manifest.json": Manifest,
     "prototype.json": Prototype,
+    "run.json": RunRecord,
+    "photographs/NAME.json": Exposure,
+    "machine.json": MachineRecord,
+    "calibration.json": CalibrationRecord,
 }
-TABLES: dict[str, type[Columns]] = {
-    "mirrors.csv": Mirrors,
-    "balls.csv": Balls,
+TABLES: dict[str, type[BaseModel]] = {
+    "mirrors.csv": MirrorRow,
+    "balls.csv": BallRow,
     "bom.csv": PartsList,
     "plate_holes.csv": PlateHoles,
     "wiring.csv": Wiring,
-    "rotation_plan.csv": Plan,
-    "stops.csv": Stops,
+    "rotation_plan.csv": PictureRow,
+    "stops.csv": StopRow,
+    "rays.csv": RayRow,
 }
 MARKUP = re.compile(r"\[/?[a-z]+\]")  # of rich, in help texts
 
@@ -47,7 +57,10 @@ def pages() -> dict[str, str]:
         "reference/keys.md": "\n".join(_keys()),
         "reference/python.md": "\n".join(_python()),
         "reference/files.md": "\n".join(_files()),
-        **{f"reference/{name}.schema.json": _schema(model) for name, model in RECORDS.items()},
+        **{
+            f"reference/{Path(name).name}.schema.json": _schema(model)
+            for name, model in RECORDS.items()
+        },
     }
 
 
@@ -110,12 +123,13 @@ def _python() -> Iterator[str]:
 def _files() -> Iterator[str]:
     """The records and tables of an export, field by field."""
     yield (
-        "# Files of an export\n\nRecords and tables of an export as the verification reads them. "
-        "Names end with their unit. Frames and directions: [conventions](../conventions.md). "
+        "# Files\n\nRecords and tables of builds, runs and calibrations, as they are written and "
+        "read. Names end with their unit. Frames and directions: [conventions](../conventions.md). "
         "Solids are STEP AP214 in mm; meshes are binary STL and 3MF."
     )
     for file, model in RECORDS.items():
-        yield f"\n## {file}\n\nJSON schema: [{file}.schema.json]({file}.schema.json)."
+        name = f"{Path(file).name}.schema.json"
+        yield f"\n## {file}\n\nJSON schema: [{name}]({name})."
         for part in _below(model):
             yield from _fields(part, "###")
     for file, table in TABLES.items():

@@ -74,7 +74,7 @@ def run(
         InputError: something was wrong before the first photograph of the run, also an exposure.
     """
     from tbcad.control.run import RunRequest, run_machine
-    from tbcad.runs.exposure import PhaseTimes
+    from tbcad.records.exposure import PhaseTimes
     from tbcad.screen import stages
 
     times = PhaseTimes(exposure_leds_s, exposure_lit_s)

@@ -6,32 +6,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Finite, Record, read_csv
 from tbcad.geometry.vectors import norm
 from tbcad.machine.photographed import machine_runs, stops_known
 from tbcad.machine.record import RECORD, read_machine
 from tbcad.optics.windows import cell_windows
+from tbcad.records.tables import RayRow
 from tbcad.results.tables import Table
 from tbcad.simulate.prototype.plan import Plan, read_plan
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.exported import read_export
 from tbcad.types import Bools, Floats
 
-RAYS = "rays.csv"
 CALIBRATE = "calibrate again with tbcad calibrate"
 AXES = 2  # of the plane at the object in which a ray may be off
 PERCENT = 95.0
-
-
-class _Ray(Record):
-    mirror: str = Field(pattern=r"^[ab]\d{4,8}$")
-    sigma_mm: Finite = Field(ge=0)
-    sigma_mrad: Finite = Field(ge=0)
-    pixel_mm: Finite = Field(gt=0)
 
 
 @dataclass(frozen=True)
@@ -80,13 +71,13 @@ def as_built_tolerance(
     plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)
     runs, known = machine_runs(export, plan, machine, frames), stops_known(plan, frames)
     names = [_names(run) for run in runs]
-    rays = {ray.mirror: ray for ray in read_csv(calibration / RAYS, _Ray, CALIBRATE)}
+    rays = {ray.mirror: ray for ray in RayRow.read(calibration)}
     covered = np.concatenate([*map(_coverage, runs)])
     coverage = dict(zip(chain(*names), covered.tolist(), strict=True))
     ids = [name for half in range(len(runs)) for name in _known(plan, known, half, names[half])]
     ids = [name for name in ids if name in rays]
     if not ids:
-        raise InputError(f"{calibration / RAYS} names no mirror of {exports}: {CALIBRATE}")
+        raise InputError(f"{calibration / RayRow.FILE} names no mirror of {exports}: {CALIBRATE}")
     shown = np.array([coverage[name] for name in ids])
     place = np.array([rays[name].sigma_mm for name in ids])
     random = np.random.default_rng(seed)

@@ -9,19 +9,21 @@ from tbcad.calibration.detection.detection import Detection
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.calibration.estimate.solve import Estimate, estimate
 from tbcad.calibration.intrinsics.lens import CalibratedLens
-from tbcad.calibration.priors import Measured, prototype_prior, read_zero_error, shell_prior
+from tbcad.calibration.priors import Measured, prototype_prior, shell_prior
 from tbcad.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
 from tbcad.errors import InputError
 from tbcad.machine.built import is_cap
 from tbcad.machine.designed import designed_prototype
 from tbcad.machine.machine import Highlights, Machine
 from tbcad.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
-from tbcad.runs.exposure import Frame
-from tbcad.runs.record import Geometry
-from tbcad.simulate.prototype.plan import RECORD, Plan
+from tbcad.records.exposure import Frame
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.run import Geometry
+from tbcad.records.tables import StopRow
+from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.draws import STOPS, read_wind_up
+from tbcad.tolerance.prototype.draws import read_wind_up
 from tbcad.types import Bools, Ints, Progress
 
 MIN_HIGHLIGHTS = 10  # of a half
@@ -46,8 +48,9 @@ class Setup:
 
     def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
         """Means and standard deviations by its process and by radii that are measured."""
+        home = Prototype.read(self.export.folder / NAME).home
         stop = np.array([frame.stop - 1 for frame in self.frames])
-        known = (self.export.folder / STOPS).is_file()  # not of exports by old versions
+        known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
         wind_up = read_wind_up(self.export, self.plan)[stop] if known else 0.0
         return prototype_prior(
             replace(self.designed, angle=self.designed.angle + wind_up),
@@ -55,7 +58,7 @@ class Setup:
             self.plan.body_centre,
             is_cap(self.plan),
             np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
-            read_zero_error(self.export.folder / RECORD),
+            math.radians(home.zero_error_deg),
             self.lens is not None,
             measured,
         )

@@ -7,18 +7,14 @@ process says is a judgement, below.
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from pydantic import Field
 
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Record, read_json
 from tbcad.geometry.vectors import norm
 from tbcad.machine.built import LED_MM
 from tbcad.machine.machine import Machine
-from tbcad.simulate.prototype.plan import MISSING, SCHEMA
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats, Ints
 
@@ -145,24 +141,6 @@ def _radii(
     for number, value, uncertainty in measured:
         radius[number], sigma[number] = value, uncertainty
     return radius, sigma
-
-
-class _Home(Record):
-    zero_error_deg: float = Field(ge=0, le=180)
-
-
-class _ZeroErrorFile(Record):
-    home: _Home | None = None
-
-
-def read_zero_error(path: Path) -> float:
-    """Half width of the base's angle zero by the record of a prototype, radians; 0 if not said.
-
-    Raises:
-        InputError: the record cannot be read.
-    """
-    home = read_json(path, _ZeroErrorFile, SCHEMA, MISSING).home
-    return 0.0 if home is None else math.radians(home.zero_error_deg)
 
 
 def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:

@@ -29,10 +29,10 @@ from tbcad.calibration.uncertainty import RayUncertainty, known_rays
 from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Machine
 from tbcad.prototype.stage.leds import hidden_by_object
+from tbcad.records.exposure import Frame
 from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Cell, Record, Table
-from tbcad.runs.exposure import Frame
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.process.process import load_process, process_errors

@@ -131,7 +131,7 @@ def run(
         from tbcad.control.outcome import dry_run_lines, dry_run_record
         from tbcad.control.run import RunRequest
         from tbcad.control.run import dry_run as planned
-        from tbcad.runs.exposure import PhaseTimes
+        from tbcad.records.exposure import PhaseTimes
 
         times = PhaseTimes(leds_s, lit_s)
         request = RunRequest(folder, out, phases, stops, runs, size_px, resume, times)

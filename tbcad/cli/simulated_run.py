@@ -88,7 +88,7 @@ def simulate_run(
     named = None if phases is None else tuple(part.strip() for part in phases.split(","))
     from tbcad.api import simulate_run as simulate
     from tbcad.machine.record import truth_file
-    from tbcad.runs.exposure import PhaseTimes
+    from tbcad.records.exposure import PhaseTimes
     from tbcad.simulated_run.options import RunOptions
 
     times = PhaseTimes(

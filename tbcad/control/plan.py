@@ -1,74 +1,39 @@
-"""What an export says of a run: stops, lights, times, the controller's settings.
-
-Names and schemas of files are written out here: the modules that write them load numerical
-libraries for a second, and a run needs none.
-"""
+"""What an export says of a run: stops, lights, times, the controller's settings."""
 
 import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from tbcad.control.program import PROGRAM, Program, read_program
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import REBUILD, Finite, Record, read_csv, read_json
-from tbcad.runs.exposure import Frame, PhaseName
+from tbcad.formats.checked_files import REBUILD
+from tbcad.records.design import NAME as DESIGN_FILE
+from tbcad.records.design import DesignRecord
+from tbcad.records.exposure import Frame
+from tbcad.records.prototype import NAME as RECORD
+from tbcad.records.prototype import Prototype
+from tbcad.records.prototype_drive import Phase
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
 from tbcad.spec.prototype import MotionSpec
 
-DESIGN_FILE, DESIGN_SCHEMA = "design.json", "tbcad-design/2"
-RECORD, SCHEMA = "prototype.json", "tbcad-prototype/2"
-MIRRORS_FILE, BALLS, PICTURES = "mirrors.csv", "balls.csv", "rotation_plan.csv"
-MISSING = "build the prototype too, tbcad build"
-STOPS, SETTINGS = "stops.csv", "grbl_settings.txt"
-FILES = (DESIGN_FILE, MIRRORS_FILE, RECORD, BALLS, PICTURES, STOPS, PROGRAM, SETTINGS)
+SETTINGS = "grbl_settings.txt"
+FILES = (
+    DESIGN_FILE,
+    MirrorRow.FILE,
+    RECORD,
+    BallRow.FILE,
+    PictureRow.FILE,
+    StopRow.FILE,
+    PROGRAM,
+    SETTINGS,
+)
 """What a run depends on."""
 TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
 DIRECTION = 3  # the setting that is changed where the base turns against its arrow
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
-
-
-class _CameraSize(Record):
-    width_px: int = Field(ge=16, le=65_536)
-    height_px: int = Field(ge=16, le=65_536)
-
-
-class _PrototypeSpec(Record):
-    motion: MotionSpec
-
-
-class _Spec(Record):
-    prototype: _PrototypeSpec
-
-
-class _Design(Record):
-    spec: _Spec
-    cameras: tuple[_CameraSize, _CameraSize]
-
-
-class LightPhase(Record):
-    """A light, and the digital output that switches it; None: no output is on."""
-
-    name: PhaseName
-    output: Annotated[int, Field(ge=0, le=99)] | None
-
-
-class _Controller(Record):
-    firmware: Literal["grblhal", "grbl"]
-    axis: Literal["X", "A"]
-    phases: tuple[LightPhase, ...] = Field(min_length=1)
-
-
-class _Prototype(Record):
-    controller: _Controller
-
-
-class _PlannedStop(Record):
-    stop: int = Field(ge=1)
-    base_angle_deg: Finite
 
 
 @dataclass(frozen=True)
@@ -88,7 +53,7 @@ class ControlPlan:
     size_px: tuple[int, int]
     firmware: Literal["grblhal", "grbl"]
     axis: str
-    phases: tuple[LightPhase, ...]
+    phases: tuple[Phase, ...]
     motion: MotionSpec
     settings: dict[int, float]
     program: Program
@@ -101,13 +66,15 @@ class ControlPlan:
 
 
 def read_control_plan(folder: Path) -> ControlPlan:
-    """Read what a run needs of a folder that `tbcad build` wrote with a prototype."""
-    design = read_json(
-        folder / DESIGN_FILE, _Design, DESIGN_SCHEMA, "name a folder that tbcad build wrote"
-    )
-    controller = read_json(folder / RECORD, _Prototype, SCHEMA, MISSING).controller
+    """Read what a run needs of a folder that `tbcad build` wrote with a prototype.
+
+    Raises:
+        InputError: something is missing or does not fit; it says what.
+    """
+    design = DesignRecord.read(folder / DESIGN_FILE)
+    controller = Prototype.read(folder / RECORD).controller
     program = read_program(folder)
-    angles = _angles(folder / STOPS, program)
+    angles = _angles(folder, program)
     return ControlPlan(
         sha256={name: _sha256(folder / name) for name in FILES},
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
@@ -139,9 +106,10 @@ def read_settings(path: Path) -> dict[int, float]:
     return settings
 
 
-def _angles(path: Path, program: Program) -> dict[int, float]:
+def _angles(folder: Path, program: Program) -> dict[int, float]:
     """Base angle of each stop, which the program must drive to."""
-    angles = {row.stop: row.base_angle_deg for row in read_csv(path, _PlannedStop, MISSING)}
+    path = folder / StopRow.FILE
+    angles = {row.stop: row.base_angle_deg for row in StopRow.read(folder)}
     for stop, angle in angles.items():
         move = program.stops.get(stop)
         if move is None or abs(move.angle_deg - angle) > ANGLE_DEG:
@@ -163,6 +131,6 @@ def _sha256(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError:
-        raise InputError(f"{path} is not there: {MISSING}") from None
+        raise InputError(f"{path} is not there: {Prototype.MISSING}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}: {REBUILD}") from None

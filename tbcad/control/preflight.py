@@ -14,7 +14,7 @@ from scipy.ndimage import label, maximum
 
 from tbcad.control.cameras.camera import Shot
 from tbcad.errors import InputError
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT
+from tbcad.records.exposure import DARK, DARK_LIT, LIT
 from tbcad.runs.images import Image16, decoded_image
 from tbcad.types import Bools, Floats, Progress
 

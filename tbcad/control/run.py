@@ -37,9 +37,9 @@ from tbcad.control.session import Ask, Session, Show
 from tbcad.errors import InputError
 from tbcad.output.content import refuse_inside
 from tbcad.output.inputs import refuse_inputs
-from tbcad.runs.exposure import DARK_LIT, PhaseTimes, exposure_name
+from tbcad.records.exposure import DARK_LIT, PhaseTimes, exposure_name
+from tbcad.records.run import RunRecord, read_record
 from tbcad.runs.photographs import read_run
-from tbcad.runs.record import RunRecord, read_record
 from tbcad.runs.writing import DiskFault, check_new
 from tbcad.types import Progress
 

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Literal
 
 from tbcad.control.base import travel_s
-from tbcad.control.plan import ControlPlan, LightPhase
+from tbcad.control.plan import ControlPlan
 from tbcad.errors import InputError
-from tbcad.runs.exposure import DARK_LIT, Frame, PhaseTimes
+from tbcad.records.exposure import DARK_LIT, Frame, PhaseTimes
+from tbcad.records.prototype_drive import Phase
 
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?$")
 RUNS = {"a": (0,), "b": (180,), "ab": (0, 180)}
@@ -38,7 +39,7 @@ class RunSelection:
     """
 
     frames: tuple[Frame, ...]
-    phases: tuple[LightPhase, ...]
+    phases: tuple[Phase, ...]
     size_px: tuple[int, int]
     times: PhaseTimes = field(default_factory=PhaseTimes)
 
@@ -50,7 +51,7 @@ class RunSelection:
 
 def chosen_phases(
     plan: ControlPlan, text: str | None, times: PhaseTimes | None = None
-) -> tuple[LightPhase, ...]:
+) -> tuple[Phase, ...]:
     """Phases by names with commas between, in the plan's order; `leds` for all LEDs, None for all.
 
     The dark one that exposure times ask for is added.
@@ -66,7 +67,7 @@ def chosen_phases(
             "these, or leds for all LEDs"
         )
     chosen = {phase.name: phase for phase in plan.phases if phase.name in named}
-    dark = LightPhase(name=DARK_LIT, output=None)
+    dark = Phase(name=DARK_LIT, output=None)
     return tuple(chosen.get(name, dark) for name in (times or PhaseTimes()).phases(tuple(chosen)))
 
 

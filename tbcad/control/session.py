@@ -31,7 +31,7 @@ from tbcad.control.shooting import (
     taken_twice,
 )
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Frame, exposure_name
+from tbcad.records.exposure import Frame, exposure_name
 from tbcad.runs.writing import DiskFault, RunWriter, new_run, resumed_run
 from tbcad.screen import Stages
 from tbcad.types import Progress

@@ -10,11 +10,12 @@ from time import monotonic
 from tbcad.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
 from tbcad.control.cameras.image_facts import ImageFacts, image_facts
 from tbcad.control.machine import CameraFault, DrivenMachine
-from tbcad.control.plan import ControlPlan, LightPhase
+from tbcad.control.plan import ControlPlan
 from tbcad.control.selection import RunSelection
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Exposure, Frame, Setting, exposure_name
-from tbcad.runs.record import PhaseExposure, RunRecord
+from tbcad.records.exposure import Exposure, Frame, Setting, exposure_name
+from tbcad.records.prototype_drive import Phase
+from tbcad.records.run import PhaseExposure, RunRecord
 
 SHUTTER = "shutterspeed"
 UNNAMED = "unnamed camera"
@@ -57,7 +58,7 @@ class Photograph:
 
 
 @contextmanager
-def light_on(base: DrivenMachine, phase: LightPhase, seconds: float) -> Iterator[None]:
+def light_on(base: DrivenMachine, phase: Phase, seconds: float) -> Iterator[None]:
     """Have the light of a phase on, and let it settle for some seconds."""
     outputs = () if phase.output is None else (phase.output,)
     for output in outputs:

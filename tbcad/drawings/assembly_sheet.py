@@ -68,8 +68,8 @@ def assembly_job(export: Export, machine: Machine) -> AssemblyJob:
     Raises:
         InputError: its file is missing, or not as it was written.
     """
-    path = export.file(machine.record["assembly"]["glb"])
-    fasteners = {one["name"]: one["part"] for one in machine.fasteners}
+    path = export.file(machine.record.assembly.glb)
+    fasteners = {one.name: one.part for one in machine.fasteners}
     return AssemblyJob(
         path, {**machine.bodies, **fasteners}, machine.items, machine.quantities, export.title
     )

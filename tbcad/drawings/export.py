@@ -3,20 +3,20 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import parse_json
 from tbcad.formats.csv_table import Row
-from tbcad.output.manifest import MANIFEST, Manifest, is_listed, read_manifest
+from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
+from tbcad.records.design import NAME as DESIGN
+from tbcad.records.design import DesignRecord
+from tbcad.records.manifest import Manifest
+from tbcad.records.prototype import NAME as PROTOTYPE
+from tbcad.records.prototype import PrintedPartRecord
 
-DESIGN, PROTOTYPE = "design.json", "prototype.json"
 SHELLS = ("shell_a", "shell_b")
 MANDRELS = ("mandrel_a", "mandrel_b")
 PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
-SCHEMA = "tbcad-design/2"
-Record = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Export:
 
     folder: Path
     manifest: Manifest
-    design: Record
+    design: DesignRecord
     machine: Machine | None
     shells: tuple[str, ...]
 
@@ -45,21 +45,20 @@ class Export:
     @property
     def title(self) -> str:
         """Name of the design and its subdivision."""
-        spec = self.design["spec"]
-        return f"{spec['name']}, n = {spec['optics']['n']}"
+        return f"{self.design.spec.name}, n = {self.design.spec.optics.n}"
 
     @property
-    def parts(self) -> Mapping[str, Record]:
+    def parts(self) -> Mapping[str, PrintedPartRecord]:
         """Records of printed parts by name."""
-        return {one["name"]: one for one in self.machine.record["parts"]} if self.machine else {}
+        return {one.name: one for one in self.machine.record.parts} if self.machine else {}
 
-    def row(self, part: Record) -> Row:
+    def row(self, part: PrintedPartRecord) -> Row:
         """A printed part's row in the parts list.
 
         Raises:
             InputError: it has none.
         """
-        name = f"cap {part['ball']}" if part["role"] == "cap" else part["name"]
+        name = part.listed_name
         rows = self.machine.rows if self.machine else ()
         row = next((one for one in rows if one["part"] == name), None)
         if row is None:
@@ -72,15 +71,7 @@ class Export:
         Raises:
             InputError: it is missing, or another.
         """
-        path = self.folder / name
-        if not path.is_file():
-            raise InputError(f"{path} is missing: build the export again")
-        if not is_listed(path, self.manifest.files.get(name)):
-            raise InputError(
-                f"{path} is not as tbcad wrote it (cut off, or changed since): build the export "
-                "again"
-            )
-        return path
+        return _written(self.folder, self.manifest, name)
 
     def digest(self, name: str) -> str:
         """The beginning of a file's SHA-256."""
@@ -99,20 +90,21 @@ def read_export(folder: Path) -> Export:
             f"{folder / MANIFEST} is missing or no manifest: name a folder that tbcad build wrote"
         )
     shells = tuple(name for name in SHELLS if f"{name}.step" in manifest.files)
-    export = Export(folder, manifest, {}, None, shells)
-    design = _design(export.file(DESIGN))
+    design = DesignRecord.read(_written(folder, manifest, DESIGN))
     if PROTOTYPE not in manifest.files:
         return Export(folder, manifest, design, None, shells)
     for name in PROTOTYPE_FILES:
-        export.file(name)
+        _written(folder, manifest, name)
     return Export(folder, manifest, design, read_machine(folder), shells)
 
 
-def _design(path: Path) -> Record:
-    try:
-        design = parse_json(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path} is no JSON ({error}): build again") from None
-    if not isinstance(design, dict) or design.get("schema") != SCHEMA:
-        raise InputError(f"{path} has another schema than {SCHEMA}: build again")
-    return design
+def _written(folder: Path, manifest: Manifest, name: str) -> Path:
+    """A file as its manifest has it."""
+    path = folder / name
+    if not path.is_file():
+        raise InputError(f"{path} is missing: build the export again")
+    if not is_listed(path, manifest.files.get(name)):
+        raise InputError(
+            f"{path} is not as tbcad wrote it (cut off, or changed since): build the export again"
+        )
+    return path

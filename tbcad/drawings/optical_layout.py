@@ -1,8 +1,7 @@
 """The optical layout: the section through both cameras, with the symbols of docs/glossary.md."""
 
-import csv
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -21,8 +20,12 @@ from tbcad.drafting.sheet import (
 )
 from tbcad.drafting.tables import table
 from tbcad.drafting.views import straight
-from tbcad.drawings.export import Export, Record
+from tbcad.drawings.export import Export
+from tbcad.formats.checked_files import columns
 from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
+from tbcad.records.design import DesignRecord
+from tbcad.records.tables import MirrorRow
+from tbcad.spec.sizes import OpticsSpec
 from tbcad.types import Floats
 
 NAME = "optical_layout"
@@ -76,7 +79,7 @@ class Mirrors:
         return np.asarray(ends[np.argmin(np.hypot(*(ends - middle).T))])
 
 
-def layout_sheet(design: Record, rows: Sequence[Mapping[str, str]], title: str) -> list[Sheet]:
+def layout_sheet(design: DesignRecord, rows: Sequence[MirrorRow], title: str) -> list[Sheet]:
     """The sheet of a design.
 
     Args:
@@ -84,12 +87,12 @@ def layout_sheet(design: Record, rows: Sequence[Mapping[str, str]], title: str) 
         rows: of mirrors.csv.
         title: the design's name for the title block.
     """
-    optics = design["spec"]["optics"]
-    pinhole = np.array(optics["camera_mm"])[[0, 2]]
-    mirrors, minor = _mirrors(rows), float(optics["semi_minor_mm"])
+    optics = design.spec.optics
+    pinhole = np.array(optics.camera_mm)[[0, 2]]
+    mirrors, minor = _mirrors(rows), optics.semi_minor_mm
     half_distance = _half(optics)
     major = math.hypot(minor, half_distance)
-    capture = float(optics["capture_diameter_mm"]) / 2
+    capture = optics.capture_diameter_mm / 2
     reach = 2 * major
     left, low, right, high = drawing_room(A3)
     column = right - sum(WIDTHS_MM)
@@ -119,24 +122,24 @@ def layout_sheet(design: Record, rows: Sequence[Mapping[str, str]], title: str) 
     return [Sheet(NAME, block.title, NAME, A3, scale, middle, tuple(entities))]
 
 
-def layout_rows(export: Export) -> list[dict[str, str]]:
+def layout_rows(export: Export) -> list[MirrorRow]:
     """Rows of the export's mirrors.csv.
 
     Raises:
         InputError: it is not as it was written.
     """
-    with export.file("mirrors.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    export.file(MirrorRow.FILE)
+    return MirrorRow.read(export.folder)
 
 
-def has_layout(design: Record) -> bool:
+def has_layout(design: DesignRecord) -> bool:
     """Whether the pinholes are in the plane y = 0, which the layout is drawn in."""
-    return abs(float(design["spec"]["optics"]["camera_mm"][1])) < IN_PLANE
+    return abs(design.spec.optics.camera_mm[1]) < IN_PLANE
 
 
-def _half(optics: Record) -> float:
+def _half(optics: OpticsSpec) -> float:
     """Half the distance of the foci, c, mm."""
-    return float(np.linalg.norm(optics["camera_mm"])) / 2
+    return float(np.linalg.norm(optics.camera_mm)) / 2
 
 
 def _text() -> tuple[str, ...]:
@@ -150,31 +153,19 @@ def _text() -> tuple[str, ...]:
     )
 
 
-def _mirrors(rows: Sequence[Mapping[str, str]]) -> Mirrors:
-    flat = [row for row in rows if row["camera"] == "a" and abs(float(row["uy"])) < IN_PLANE]
-    flat.sort(key=lambda row: math.atan2(float(row["ux"]), float(row["uz"])))
-
-    def columns(*names: str) -> Floats:
-        return np.array([[float(row[name]) for name in names] for row in flat]).reshape(
-            -1, len(names)
-        )
-
-    apex, normal = columns("px", "pz"), columns("nx", "nz")
-    radius = np.array([_radius(row) or PLANAR_MM for row in flat])
+def _mirrors(rows: Sequence[MirrorRow]) -> Mirrors:
+    flat = [row for row in rows if row.camera == "a" and abs(row.uy) < IN_PLANE]
+    flat.sort(key=lambda row: math.atan2(row.ux, row.uz))
+    apex, normal = columns(flat, "px pz"), columns(flat, "nx nz")
+    radius = np.array([row.radius_mm or PLANAR_MM for row in flat])
     return Mirrors(
         apex=apex,
         centre=apex - radius[:, np.newaxis] * normal,
         radius=radius,
-        direction=columns("ux", "uz"),
-        theta=columns("theta0_deg", "theta1_deg"),
-        ids=tuple(row["id"] for row in flat),
+        direction=columns(flat, "ux uz"),
+        theta=columns(flat, "theta0_deg theta1_deg"),
+        ids=tuple(row.id for row in flat),
     )
-
-
-def _radius(row: Mapping[str, str]) -> float:
-    """A mirror's radius, mm; 0 for a planar one."""
-    radius = float(row["radius_mm"] or 0.0)
-    return radius if math.isfinite(radius) else 0.0
 
 
 def _ellipses(pinhole: Floats, major: float, minor: float) -> Iterator[Entity]:
@@ -279,20 +270,18 @@ def _capture_length(
 
 
 def _values(
-    rows: Sequence[Mapping[str, str]], mirrors: Mirrors, optics: Record, major: float
+    rows: Sequence[MirrorRow], mirrors: Mirrors, optics: OpticsSpec, major: float
 ) -> list[tuple[str, ...]]:
     """Symbols, what they are, and their values."""
-    radii = [radius for row in rows if (radius := _radius(row))]
+    radii = [row.radius_mm for row in rows if row.radius_mm]
     span = f"{min(radii):.3f} to {max(radii):.3f}" if radii else "all planar"
-    x, y, z = optics["camera_mm"]
-    half, minor = _half(optics), float(optics["semi_minor_mm"])
-    counted = (
-        f"{sum(row['camera'] == 'a' for row in rows)} + {sum(row['camera'] == 'b' for row in rows)}"
-    )
+    x, y, z = optics.camera_mm
+    half, minor = _half(optics), optics.semi_minor_mm
+    counted = " + ".join(str(sum(row.camera == one for row in rows)) for one in "ab")
     values: list[tuple[str, ...]] = [
-        ("n", "subdivision", f"{optics['n']}"),
+        ("n", "subdivision", f"{optics.n}"),
         ("", "mirrors of camera a + b", counted),
-        ("2 R", "diameter of the capture sphere, mm", f"{optics['capture_diameter_mm']:g}"),
+        ("2 R", "diameter of the capture sphere, mm", f"{optics.capture_diameter_mm:g}"),
         ("A", "pinhole of camera a, mm", f"({x:g}, {y:g}, {z:g})"),
         ("B", "pinhole of camera b, mm", f"({-x:g}, {y:g}, {z:g})"),
         ("a", "semi-major axis of the ellipsoid, mm", f"{major:.4f}"),

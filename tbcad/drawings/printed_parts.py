@@ -1,6 +1,5 @@
 """Sheets of printed parts: their frames, fasteners and notes from the export's record."""
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,13 +10,15 @@ from tbcad.cad.features import Cylinder, bounds, cylinders
 from tbcad.cad.projection import Shape
 from tbcad.cad.solids import moved
 from tbcad.drafting.sheet import Sheet, TitleBlock
-from tbcad.drawings.export import Export, Record
+from tbcad.drawings.export import Export
 from tbcad.drawings.fits import Mate, purchased_mate, reamed_to
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
 from tbcad.drawings.seats import Seat, seats_table
 from tbcad.formats.step_named import read_named_solid
 from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.records.prototype import PrintedPartRecord, Prototype
+from tbcad.records.tables import BallRow
 from tbcad.tolerance.process.process import load_process
 from tbcad.types import Floats
 
@@ -56,23 +57,23 @@ class PartJob:
     seats: tuple[Seat, ...] = ()
 
 
-def part_job(export: Export, part: Record) -> PartJob:
+def part_job(export: Export, part: PrintedPartRecord) -> PartJob:
     """What is needed to draw a printed part.
 
     Raises:
         InputError: its file is missing or not as it was written; it is not in the parts list.
     """
     assert export.machine is not None
-    record, path = export.machine.record, export.file(part["step"])
-    frame = np.array([record["frame"][key] for key in ("zero", "third", "axis")])
-    if part["role"] == BASE:  # as the machine is seen along its axis
+    record, path = export.machine.record, export.file(part.step)
+    frame = np.array([record.frame.zero, record.frame.third, record.frame.axis])
+    if part.role == BASE:  # as the machine is seen along its axis
         axes, origin = frame.T, np.zeros(3)
     else:  # as it lies on the printer's bed: its main faces are across x, y and z
-        axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
+        axes, origin = np.array(part.axes), np.array(part.origin_mm)
     fasteners = tuple(
-        (one["part"], np.array(one["position_mm"]) @ axes + origin, np.array(one["along"]) @ axes)
-        for one in record["fasteners"]
-        if part["name"] in one["through"] and export.machine.kind(one["part"]) not in ON_TOP
+        (one.part, np.array(one.position_mm) @ axes + origin, np.array(one.along) @ axes)
+        for one in record.fasteners
+        if part.name in one.through and export.machine.kind(one.part) not in ON_TOP
     )
     directions = {"axis": frame[2], "vertical": np.array([0.0, 0.0, 1.0])}
     lines = tuple((name, origin, one @ axes) for name, one in directions.items())
@@ -80,7 +81,7 @@ def part_job(export: Export, part: Record) -> PartJob:
         *(purchased_mate(export.machine.listed(name), *at) for name, *at in fasteners),
         *_on_axis(export.machine, part, origin, frame[2] @ axes),
     ]
-    seats = list(_seats(export, axes, origin)) if part["role"] == BASE else []
+    seats = list(_seats(export, axes, origin)) if part.role == BASE else []
     mates += _spigots(record, seats)
     return PartJob(
         path,
@@ -94,12 +95,14 @@ def part_job(export: Export, part: Record) -> PartJob:
     )
 
 
-def _on_axis(machine: Machine, part: Record, place: Floats, along: Floats) -> Iterator[Mate | None]:
+def _on_axis(
+    machine: Machine, part: PrintedPartRecord, place: Floats, along: Floats
+) -> Iterator[Mate | None]:
     """Shaft and bearings, which are on the axis of rotation."""
-    if part["role"] not in ON_AXIS:
+    if part.role not in ON_AXIS:
         return
-    reamed = reamed_to(part["what"])
-    for name in sorted({one["part"] for one in machine.record["bought"] if one["part"]}):
+    reamed = reamed_to(part.what)
+    for name in sorted({one.part for one in machine.record.bought if one.part}):
         found = machine.listed(name)
         if found and found.kind in ("shafts", "bearings"):
             yield purchased_mate(found, place, along, reamed)
@@ -108,34 +111,34 @@ def _on_axis(machine: Machine, part: Record, place: Floats, along: Floats) -> It
 def _seats(export: Export, axes: Floats, origin: Floats) -> Iterator[Seat]:
     """All seats, by the balls' list and the record."""
     assert export.machine is not None
-    with export.file("balls.csv").open(encoding="utf-8", newline="") as file:
-        balls = {int(row["number"]): row for row in csv.DictReader(file)}
-    for one in export.machine.record["seats"]:
-        row = balls[one["ball"]]
-        takes = f"cap {one['ball']}" if row["kind"] == "cap" else f"ball {row['size']}"
-        centre = np.array([float(row[name]) for name in ("bx", "by", "bz")]) @ axes + origin
-        contacts = np.array(one["contacts_mm"]) @ axes + origin
-        radius, pad = float(row["body_radius_mm"]), one["pad_diameter_mm"]
-        axis = np.array(one["axis"]) @ axes
-        yield Seat(one["ball"], takes, radius, centre, axis, contacts, pad)
+    export.file(BallRow.FILE)
+    balls = {ball.number: ball for ball in BallRow.read(export.folder)}
+    for one in export.machine.record.seats:
+        row = balls[one.ball]
+        takes = f"cap {one.ball}" if row.kind == "cap" else f"ball {row.size}"
+        centre = np.array([row.bx, row.by, row.bz]) @ axes + origin
+        contacts = np.array(one.contacts_mm) @ axes + origin
+        radius, pad = row.body_radius_mm, one.pad_diameter_mm
+        axis = np.array(one.axis) @ axes
+        yield Seat(one.ball, takes, radius, centre, axis, contacts, pad)
 
 
-def _spigots(record: Record, seats: Sequence[Seat]) -> Iterator[Mate]:
+def _spigots(record: Prototype, seats: Sequence[Seat]) -> Iterator[Mate]:
     """Spigots of caps in the pockets of their seats, along the seats' axes."""
-    for cap in record["caps"]:
+    for cap in record.caps:
         for seat in seats:
-            if seat.number == cap["ball"]:
+            if seat.number == cap.ball:
                 yield Mate(
                     f"spigot of cap {seat.number}",
                     seat.centre,
                     seat.axis,
-                    cap["spigot_mm"],
-                    cap["socket_mm"],
+                    cap.spigot_mm,
+                    cap.socket_mm,
                 )
 
 
-def _text(export: Export, part: Record) -> PartText:
-    row, name = export.row(part), part["name"]
+def _text(export: Export, part: PrintedPartRecord) -> PartText:
+    row, name = export.row(part), part.name
     words = str(row["part"]).replace("_", " ")
     block = TitleBlock(
         title=words,
@@ -147,15 +150,15 @@ def _text(export: Export, part: Record) -> PartText:
     return PartText(name, block, tuple(_notes(export, part, block.material)))
 
 
-def _notes(export: Export, part: Record, material: str) -> Iterator[str]:
-    yield f"{part['what'][:1].upper()}{part['what'][1:]}."
+def _notes(export: Export, part: PrintedPartRecord, material: str) -> Iterator[str]:
+    yield f"{part.what[:1].upper()}{part.what[1:]}."
     process = load_process(RESIN_PROCESS if material == RESIN else FILAMENT_PROCESS)
     expected = MAKERS_SHARE * process.sphere_centre_um.magnitude / 1000
     yield f"Expected as printed ({process.name}): ±{mm(expected)} mm on short lengths."
-    finish = f"Finish: {part['finish']}. " if part["finish"] else ""
+    finish = f"Finish: {part.finish}. " if part.finish else ""
     yield f"{finish}Deburr; remove supports."
-    yield f"Shape and what has no size here: {part['step']},"
-    yield f"sha256 {export.digest(part['step'])}..."
+    yield f"Shape and what has no size here: {part.step},"
+    yield f"sha256 {export.digest(part.step)}..."
 
 
 def draw_part(job: PartJob) -> list[Sheet]:

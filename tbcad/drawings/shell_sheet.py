@@ -19,10 +19,11 @@ from tbcad.drafting.sheet import (
     sheet_frame,
 )
 from tbcad.drafting.views import FRONT, as_entities, straight
-from tbcad.drawings.export import Export, Record
+from tbcad.drawings.export import Export
 from tbcad.drawings.holes import mm
 from tbcad.formats.entities import Circle, Entity, Layer, Line, Point
 from tbcad.formats.step_named import read_named_solid
+from tbcad.records.design import MandrelRecord
 from tbcad.types import Floats
 
 SCALES = (5.0, 2.0, 1.0, 0.5, 0.4, 0.2, 0.1)
@@ -54,9 +55,9 @@ def shell_job(export: Export, name: str) -> ShellJob:
     Raises:
         InputError: its file is missing, or not as it was written.
     """
-    spec, camera = export.design["spec"], name[-1]
+    wall, camera = export.design.spec.shell.wall_mm, name[-1]
     text = (
-        f"Wall {spec['shell']['wall_mm']:g} mm behind the deepest valley of the mirrors.",
+        f"Wall {wall:g} mm behind the deepest valley of the mirrors.",
         f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
         f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad inspection.",
         "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
@@ -70,8 +71,8 @@ def mandrel_job(export: Export, name: str) -> ShellJob:
     Raises:
         InputError: its file is missing, or not as it was written.
     """
-    coat, camera = export.design["spec"]["mirrors"]["coating_um"], name[-1]
-    record = next(one for one in export.design["mandrels"] if one["name"] == name)
+    coat, camera = export.design.spec.mirrors.coating_um, name[-1]
+    record = next(one for one in export.design.mandrels if one.name == name)
     text = (
         f"Negative of shell_{camera}. Concave mirrors, of the same names: centres and radii, the",
         f"latter with the coat of {coat:g} um, in mirrors.csv (camera {camera}).",
@@ -81,11 +82,11 @@ def mandrel_job(export: Export, name: str) -> ShellJob:
     return _job(export, name, text)
 
 
-def _release(record: Record) -> str:
-    if record["draft_deg"] < 0:
+def _release(record: MandrelRecord) -> str:
+    if record.draft_deg < 0:
         return "Undercut: the shell cannot be drawn off; dissolve the mandrel, or melt it out."
-    pull = " ".join(f"{one + 0.0:.3f}" for one in record["pull"])
-    return f"The shell is drawn along ({pull}), draft {record['draft_deg']:.1f} degrees."
+    pull = " ".join(f"{one + 0.0:.3f}" for one in record.pull)
+    return f"The shell is drawn along ({pull}), draft {record.draft_deg:.1f} degrees."
 
 
 def _job(export: Export, name: str, notes: tuple[str, ...]) -> ShellJob:

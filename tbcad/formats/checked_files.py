@@ -30,7 +30,7 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
-Model = TypeVar("Model", bound=Record)
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_json(path: Path, model: type[Model], schema: str | None, missing: str) -> Model:
@@ -136,10 +136,11 @@ def columns(rows: Sequence[Record], names: str) -> Floats:
 def _refused(path: Path, error: ValidationError) -> InputError:
     """What is wrong first, in one line; rows are counted from 1."""
     first = error.errors(include_url=False, include_context=False)[0]
-    row, *keys = first["loc"]
+    row, *keys = first["loc"] or ("",)
     key = ".".join(str(part) for part in keys)
     where = f"row {row + 1} {key}" if isinstance(row, int) else ".".join(filter(None, (row, key)))
-    return InputError(f"{path}: {where}: {first['msg'].lower()}: {REBUILD}")
+    wrong = first["msg"].removeprefix("Value error, ").lower()
+    return InputError(": ".join(filter(None, (str(path), where, wrong, REBUILD))))
 
 
 def _text(path: Path, missing: str) -> str:

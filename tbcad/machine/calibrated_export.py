@@ -3,10 +3,8 @@
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import parse_json
 from tbcad.machine.shells import CAMERAS
-
-CALIBRATION = "calibration.json"
+from tbcad.records.calibration import NAME, CalibrationRecord
 
 
 def export_of(calibration: Path) -> Path:
@@ -15,12 +13,10 @@ def export_of(calibration: Path) -> Path:
     Raises:
         InputError: it names none.
     """
-    folders = [calibration, *(calibration / name for name in CAMERAS)]
-    path = next((one / CALIBRATION for one in folders if (one / CALIBRATION).is_file()), None)
+    files = [one / NAME for one in (calibration, *(calibration / name for name in CAMERAS))]
     try:
-        found = parse_json(path.read_text(encoding="utf-8"))["exports"] if path else None
-    except (OSError, ValueError, KeyError, TypeError):
-        found = None
-    if not isinstance(found, str):
-        raise InputError(f"{calibration} does not name its export: name it with --exports")
-    return Path(found)
+        return Path(CalibrationRecord.read(next(filter(Path.is_file, files), files[0])).exports)
+    except InputError:
+        raise InputError(
+            f"{calibration} does not name its export: name it with --exports"
+        ) from None

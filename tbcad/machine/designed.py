@@ -5,24 +5,16 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Record, Vector, read_json
 from tbcad.machine.machine import Machine
 from tbcad.optics.camera import without_distortion
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.simulate.prototype.plan import MISSING, RECORD, SCHEMA, Plan
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 RUNS = 2  # of the base through its stops, the object turned by 180 degrees between both
-
-
-class _Led(Record):
-    position_mm: Vector
-
-
-class _LedsFile(Record):
-    leds: list[_Led]
 
 
 def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
@@ -64,8 +56,8 @@ def read_leds(folder: Path) -> Floats:
     Raises:
         InputError: the record cannot be read, or names none.
     """
-    path = folder / RECORD
-    leds = read_json(path, _LedsFile, SCHEMA, MISSING).leds
+    path = folder / NAME
+    leds = Prototype.read(path).leds
     if not leds:
         raise InputError(
             f"{path} names no LEDs, which calibrate the machine: build it with the default of "

@@ -5,7 +5,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.geometry.rotations import rotated
 from tbcad.machine.machine import Machine
-from tbcad.runs.exposure import Frame
+from tbcad.records.exposure import Frame
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.prototype.run import PrototypeRun, balls_at_stops, prototype_run
 from tbcad.simulate.scene.exported import ExportedDesign

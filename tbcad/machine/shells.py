@@ -16,8 +16,8 @@ from tbcad.machine.designed import designed_shell
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS
 from tbcad.optics.pedestals.walls import GrooveWalls
-from tbcad.runs.exposure import Frame
-from tbcad.runs.record import Geometry
+from tbcad.records.exposure import Frame
+from tbcad.records.run import Geometry
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.draws import ShellDraws, draw

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.merged_run.merge import HalfMerge, Merge
-from tbcad.runs.exposure import LIT, exposure_name
+from tbcad.records.exposure import LIT, exposure_name
 from tbcad.simulate.capture.files import capture_record, write_cameras, write_record
 from tbcad.simulate.capture.light_field import RAY_SIGMAS
 from tbcad.types import Progress

@@ -21,7 +21,7 @@ from tbcad.merged_run.stop_photographs import (
     common_exposure,
     corrections,
 )
-from tbcad.runs.exposure import LIT, Frame
+from tbcad.records.exposure import LIT, Frame
 from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.simulate.prototype.merge import merge_photographs, merge_plan

@@ -4,18 +4,7 @@ from collections.abc import Iterable, Mapping
 from math import hypot
 from pathlib import Path
 
-from pydantic import Field
-
-from tbcad.formats.checked_files import Finite, Record, read_csv
-
-RAYS = "rays.csv"
-CALIBRATE = "calibrate again with tbcad calibrate"
-
-
-class _Ray(Record):
-    mirror: str = Field(pattern=r"^[ab]\d{4,8}$")
-    sigma_mm: Finite = Field(ge=0)
-    sigma_mrad: Finite = Field(ge=0)
+from tbcad.records.tables import RayRow
 
 
 def ray_sigmas(
@@ -34,12 +23,11 @@ def ray_sigmas(
     Raises:
         InputError: a table is damaged.
     """
-    files = [folder / RAYS for folder in folders]
     known = {
         ray.mirror: round(hypot(ray.sigma_mm, ray.sigma_mrad / 1000 * capture_mm / 4), 5)
-        for file in files
-        if file.is_file()
-        for ray in read_csv(file, _Ray, CALIBRATE)
+        for folder in folders
+        if (folder / RayRow.FILE).is_file()
+        for ray in RayRow.read(folder)
     }
     return {
         camera: [known.get(f"{camera}{number + 1:04d}") for number in range(count)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import LensCamera, vignetting
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16, read_image
 from tbcad.runs.photographs import Run, read_photograph
 from tbcad.simulate.prototype.ball_rays import between_pixels

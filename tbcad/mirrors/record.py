@@ -1,26 +1,18 @@
 """The record of a design: mirrors.csv, and design.json with the resolved spec and the cameras."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.spec.load import spec_dict
+from tbcad.records.design import NAME as DESIGN_FILE
+from tbcad.records.design import CameraRecord, DesignRecord, MandrelRecord, ShellFiles
+from tbcad.records.tables import MirrorRow
 
-Record: TypeAlias = dict[str, Any]
-
-SCHEMA = "tbcad-design/2"
-DESIGN_FILE, MIRRORS_FILE = "design.json", "mirrors.csv"
-COLUMNS = (
-    *("id", "camera"),
-    *("ux", "uy", "uz", "px", "py", "pz", "nx", "ny", "nz", "cx", "cy", "cz"),
-    *("radius_mm", "size_mm", "theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg"),
-    *("cell_area_mm2", "coverage_mm"),
-)
+COLUMNS = MirrorRow.columns()
 
 
 def mirror_rows(array: MirrorArray) -> list[Row]:
@@ -47,59 +39,58 @@ def mirror_rows(array: MirrorArray) -> list[Row]:
 
 
 def write_record(
-    folder: Path, design: MirrorDesign, shells: bool, mandrels: Sequence[Record] = ()
+    folder: Path, design: MirrorDesign, shells: bool, mandrels: Sequence[MandrelRecord] = ()
 ) -> None:
     """Write mirrors.csv and design.json, with shells and their negatives where they are there."""
     write_table(
-        folder / MIRRORS_FILE,
+        folder / MirrorRow.FILE,
         COLUMNS,
         (row for array in design.arrays for row in mirror_rows(array)),
     )
-    text = json.dumps(document(design, shells, mandrels), indent=1, allow_nan=False) + "\n"
-    (folder / DESIGN_FILE).write_text(text, encoding="utf-8")
+    design_record(design, shells, mandrels).write(folder / DESIGN_FILE)
 
 
-def document(design: MirrorDesign, shells: bool, mandrels: Sequence[Record] = ()) -> Record:
+def design_record(
+    design: MirrorDesign, shells: bool, mandrels: Sequence[MandrelRecord] = ()
+) -> DesignRecord:
     """What design.json holds; the mirrors are in the file that it names."""
-    spec = design.spec
-    return {
-        "schema": SCHEMA,
-        "spec": spec_dict(spec),
-        "target_mm": spec.optics.capture_diameter_mm,
-        "coating_mm": spec.mirrors.coating_um / 1000,
-        "foot_z_mm": design.arrays[0].foot,
-        "cameras": [camera_record(array) for array in design.arrays],
-        "parts": [shell_record(array) for array in design.arrays if shells],
-        **({"mandrels": list(mandrels)} if mandrels else {}),
-        "mirrors": MIRRORS_FILE,
-    }
+    spec, (a, b) = design.spec, design.arrays
+    return DesignRecord(
+        spec=spec,
+        target_mm=spec.optics.capture_diameter_mm,
+        coating_mm=spec.mirrors.coating_um / 1000,
+        foot_z_mm=a.foot,
+        cameras=(_camera(a), _camera(b)),
+        parts=tuple(ShellFiles(**shell_record(one)) for one in (a, b) if shells),
+        mandrels=tuple(mandrels),
+        mirrors=MirrorRow.FILE,
+    )
 
 
-def camera_record(array: MirrorArray) -> dict[str, Any]:
-    """Record of one camera."""
+def _camera(array: MirrorArray) -> CameraRecord:
     view = array.camera
-    return {
-        "id": array.camera_id,
-        "pinhole_mm": (view.pinhole + 0.0).tolist(),
-        "forward": (view.forward + 0.0).tolist(),
-        "right": (view.right + 0.0).tolist(),
-        "width_px": view.width_px,
-        "height_px": view.height_px,
-        "hfov_deg": round(float(np.degrees(view.hfov)), 12),
-    }
+    return CameraRecord(
+        id=array.camera_id,
+        pinhole_mm=(view.pinhole + 0.0).tolist(),
+        forward=(view.forward + 0.0).tolist(),
+        right=(view.right + 0.0).tolist(),
+        width_px=view.width_px,
+        height_px=view.height_px,
+        hfov_deg=round(float(np.degrees(view.hfov)), 12),
+    )
 
 
-def shell_record(array: MirrorArray) -> dict[str, str]:
-    """Record of one part and its files."""
+def shell_record(array: MirrorArray) -> dict[str, Any]:
+    """Name, camera and files of one shell."""
     return _part_files("shell", array)
 
 
-def mandrel_files(array: MirrorArray) -> dict[str, str]:
-    """Name and files of one shell's negative."""
+def mandrel_files(array: MirrorArray) -> dict[str, Any]:
+    """Name, camera and files of one shell's negative."""
     return _part_files("mandrel", array)
 
 
-def _part_files(part: str, array: MirrorArray) -> dict[str, str]:
+def _part_files(part: str, array: MirrorArray) -> dict[str, Any]:
     name = f"{part}_{array.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
     return {"name": name, "camera": array.camera_id, **files}

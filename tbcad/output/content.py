@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.errors import InputError
-from tbcad.output.manifest import Kind, fingerprint, is_file, read_manifest
+from tbcad.output.manifest import fingerprint, is_file, read_manifest
+from tbcad.records.manifest import Kind
 
 # The record of each kind, by which a folder is known whose manifest tells no kind.
 RECORDS: dict[Kind, str] = {

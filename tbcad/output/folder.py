@@ -19,8 +19,9 @@ from tbcad.errors import InputError
 from tbcad.output.content import refuse_other_content
 from tbcad.output.foreign_files import foreign_files, is_always_kept, keep_files
 from tbcad.output.inputs import Source, refuse_inputs
-from tbcad.output.manifest import Kind, is_file
+from tbcad.output.manifest import is_file
 from tbcad.output.writers import clear, discard, locked, new_folder
+from tbcad.records.manifest import Kind
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)

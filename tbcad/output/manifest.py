@@ -1,56 +1,24 @@
 """manifest.json: what was written, and by which versions."""
 
 import hashlib
-import json
 import platform
 import stat
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
+from tbcad.records.manifest import NAME, SCHEMA, Entry, Kind, Manifest
 from tbcad.version import __version__
 
-MANIFEST, VERDICT, REPORT = "manifest.json", "verify.json", "report.html"
+MANIFEST, VERDICT, REPORT = NAME, "verify.json", "report.html"
 # Written after the manifest, and not in it: verdict and page come when the files are verified.
 UNLISTED = (MANIFEST, VERDICT, REPORT)
 # How report.html begins, so that no page of the user is taken for it.
 REPORT_BEGIN = "<!doctype html>\n<!-- tbcad report -->"
-SCHEMA = "tbcad-manifest/1"
 LIBRARIES = ("cadquery-ocp", "numpy", "scipy", "manifold3d", "lib3mf", "trimesh")
 
-Kind = Literal[
-    "build", "capture", "merged run", "run", "calibration", "dataset", "inspection", "as-built"
-]
-"""What a folder holds that a command writes; a run has no manifest, since it grows."""
-
 _MAX_MANIFEST_BYTES = 4_000_000
-_MAX_FILES = 30_000  # three for each of 6578 mirrors at n = 36, and more
-
-
-def _plain_name(name: str) -> str:
-    parts = name.split("/")
-    if {"", ".", ".."} & {*parts} or {"\\", "\0"} & {*name}:
-        raise ValueError("not the name of a file in the folder")
-    return name
-
-
-class Entry(BaseModel):
-    """A file as it was written."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-    sha256: str = Field(pattern="^[0-9a-f]{64}$")
-    size: int = Field(ge=0)
-
-
-class Manifest(BaseModel):
-    """What is read of manifest.json: the kind of content, "" if it is not told, and the files."""
-
-    kind: str = ""
-    schema_name: str = Field(pattern="^tbcad-manifest/", alias="schema")
-    files: dict[Annotated[str, AfterValidator(_plain_name)], Entry] = Field(max_length=_MAX_FILES)
 
 
 def write_manifest(folder: Path, kind: Kind) -> None:
@@ -61,14 +29,12 @@ def write_manifest(folder: Path, kind: Kind) -> None:
     paths = (path.relative_to(folder).as_posix() for path in folder.rglob("*") if is_file(path))
     names = sorted(name for name in paths if name not in UNLISTED)
     versions = {"tbcad": __version__, **{name: version(name) for name in LIBRARIES}}
-    document = {
-        "schema": SCHEMA,
-        "kind": kind,
-        "files": {name: fingerprint(folder / name) for name in names},
-        "versions": {**versions, "python": platform.python_version()},
-    }
-    text = json.dumps(document, indent=1) + "\n"
-    (folder / MANIFEST).write_text(text, encoding="utf-8")
+    Manifest(
+        schema_name=SCHEMA,
+        kind=kind,
+        files={name: Entry.model_validate(fingerprint(folder / name)) for name in names},
+        versions={**versions, "python": platform.python_version()},
+    ).write(folder / MANIFEST)
 
 
 def fingerprint(path: Path) -> dict[str, str | int]:

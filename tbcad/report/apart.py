@@ -5,7 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from tbcad.geometry.vectors import unit
-from tbcad.prototype.assembly_steps.machine import Machine, Record
+from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.records.prototype import FastenerRecord
 from tbcad.types import Floats
 
 BODY_MM = 22.0  # between bodies that a screw holds together
@@ -32,33 +33,33 @@ def offsets(machine: Machine, new: frozenset[str]) -> dict[str, Floats]:
 
     Bodies are moved against the direction of the screws that hold them, and fasteners with them.
     """
-    fasteners = [one for one in machine.fasteners if one["name"] in new]
-    axis = np.array(machine.record["frame"]["axis"])
+    fasteners = [one for one in machine.fasteners if one.name in new]
+    axis = np.array(machine.record.frame.axis)
     moved = {
         name: _own(machine, name, axis) + _by_screws(name, new, fasteners)
         for name in new
         if name in machine.bodies
     }
-    return moved | {one["name"]: _fastener(machine, one, moved) for one in fasteners}
+    return moved | {one.name: _fastener(machine, one, moved) for one in fasteners}
 
 
 def _own(machine: Machine, name: str, axis: Floats) -> Floats:
     if name.startswith("ball_"):
-        seat = machine.record["seats"][int(name.removeprefix("ball_")) - 1]
-        return np.asarray(-BALL_MM * np.array(seat["axis"]))
+        seat = machine.record.seats[int(name.removeprefix("ball_")) - 1]
+        return np.asarray(-BALL_MM * np.array(seat.axis))
     if name.startswith("shroud_"):
         return PANELS.get(name, np.zeros(3))
     return np.asarray(ALONG_AXIS.get(name, 0.0) * axis + [0.0, 0.0, UP.get(name, 0.0)])
 
 
-def _by_screws(name: str, new: frozenset[str], fasteners: Iterable[Record]) -> Floats:
+def _by_screws(name: str, new: frozenset[str], fasteners: Iterable[FastenerRecord]) -> Floats:
     """The sum over all directions of screws of how far a body is from the last one."""
     ways: dict[tuple[float, ...], int] = {}
     for one in fasteners:
-        through = one["through"]
+        through = one.through
         if name not in through or len(through) == 1:
             continue
-        way: tuple[float, ...] = tuple(round(float(part), 3) for part in one["along"])
+        way: tuple[float, ...] = tuple(round(float(part), 3) for part in one.along)
         if name != through[-1]:
             ways[way] = max(ways.get(way, 0), len(through) - 1 - through.index(name))
         elif through[0] not in new:
@@ -69,12 +70,12 @@ def _by_screws(name: str, new: frozenset[str], fasteners: Iterable[Record]) -> F
     return total
 
 
-def _fastener(machine: Machine, one: Record, moved: dict[str, Floats]) -> Floats:
+def _fastener(machine: Machine, one: FastenerRecord, moved: dict[str, Floats]) -> Floats:
     """Out of the first body that it goes into, by its length and a gap."""
-    part = machine.listed(one["part"])
+    part = machine.listed(one.part)
     size = LENGTHS.get(part.kind, "") if part else ""
     away = part[size] + GAP_MM if part and size else FLAT_MM
     if part and part.kind == "screws":
         away += FLAT_MM
-    along = np.array(one["along"], dtype=np.float64)
-    return np.asarray(moved.get(one["through"][0], np.zeros(3)) - away * along)
+    along = np.array(one.along, dtype=np.float64)
+    return np.asarray(moved.get(one.through[0], np.zeros(3)) - away * along)

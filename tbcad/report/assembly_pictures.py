@@ -103,8 +103,8 @@ def _meshes(folder: Path, machine: Machine) -> dict[str, pyvista.PolyData]:
     """Bodies of the assembly, and the tools that are not in it."""
     drawn: list[Drawn] = assembly_bodies(folder, machine.record)
     meshes = {body.name: body.mesh for body in drawn}
-    tools = [part for part in machine.record["parts"] if part["role"] == "tool"]
-    return meshes | {part["name"]: placed_mesh(folder, part) for part in tools}
+    tools = machine.record.with_role("tool")
+    return meshes | {part.name: placed_mesh(folder, part) for part in tools}
 
 
 def _picture(
@@ -120,7 +120,7 @@ def _picture(
         new,
     )
     eye = _best_eye(scene, step)
-    fasteners = frozenset(one["name"] for one in machine.fasteners)
+    fasteners = frozenset(one.name for one in machine.fasteners)
     picture = Image.fromarray(_screenshot(scene, scene.shaded(fasteners), eye))
     numbers = _numbers(_screenshot(scene, scene.numbered(SIZE), eye))
     callouts = list(_callouts(step, scene, numbers))

@@ -3,21 +3,19 @@
 Run as a program, as `shell_pictures`: `python -m tbcad.report.prototype_pictures DIR SUBJECT FILE`.
 """
 
-import csv
-import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyvista
 import trimesh
 
+from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
+from tbcad.records.tables import BallRow
 from tbcad.srgb import shown_colour
 from tbcad.types import Floats
-
-Record = dict[str, Any]
 
 
 class Drawn(NamedTuple):
@@ -27,15 +25,6 @@ class Drawn(NamedTuple):
     group: str
     mesh: pyvista.PolyData
     colour: Floats
-
-
-class _Ball(NamedTuple):
-    """A body in a seat: its number, whether a cap is its front, its centre (3,) and radius, mm."""
-
-    number: int
-    cap: bool
-    centre: Floats
-    radius: float
 
 
 # From glTF's metres and y up to millimetres and z up.
@@ -71,7 +60,7 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
         subject: key of SUBJECTS.
         picture: file to write.
     """
-    record = json.loads((folder / "prototype.json").read_text(encoding="utf-8"))
+    record = Prototype.read(folder / NAME)
     rows = ROWS.get(subject, 1)
     size = (SIZE[0], rows * SIZE[1])
     plotter = pyvista.Plotter(off_screen=True, shape=(rows, 2), window_size=size, border=False)
@@ -80,7 +69,7 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
     plotter.close()
 
 
-def _whole(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+def _whole(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """The whole prototype with purchased parts, from two sides."""
     bodies = assembly_bodies(folder, record)
     for column, eye in enumerate(((-0.6, -2.8, 0.9), (2.5, -1.6, 1.0))):
@@ -91,7 +80,7 @@ def _whole(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
         _show_all(plotter, eye)
 
 
-def _sides(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+def _sides(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """The prototype without its shroud from four sides, all to one scale."""
     bodies = [
         body
@@ -114,40 +103,42 @@ def _sides(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
         view.camera.parallel_scale = SIDES_BORDER * longest / 2  # half the height of a picture
 
 
-def _base(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+def _base(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """The base with its balls, from the object and from behind."""
-    axis, zero, third = (np.array(record["frame"][key]) for key in ("axis", "zero", "third"))
+    axis, zero, third = map(np.array, (record.frame.axis, record.frame.zero, record.frame.third))
     for column, eye in enumerate((axis - zero - 0.4 * third, zero - 0.4 * axis + 0.3 * third)):
         plotter.subplot(0, column)
-        _parts(plotter, folder, record, ("base", "cap"))
+        _parts(plotter, folder, record, "base", "cap")
         _add_balls(plotter, folder)
         _show_all(plotter, eye)
 
 
-def _seat(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+def _seat(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """The seat of the largest purchased ball: empty, and with the ball in it."""
-    balls = _read_balls(folder)
-    ball = max([one for one in balls if not one.cap] or balls, key=lambda one: one.radius)
-    seat = record["seats"][ball.number - 1]
-    axis, radius, middle = np.array(seat["axis"]), ball.radius, ball.centre
+    balls = BallRow.read(folder)
+    ball = max(
+        [one for one in balls if one.kind == "ball"] or balls, key=lambda one: one.body_radius_mm
+    )
+    seat = record.seats[ball.number - 1]
+    axis, radius, middle = np.array(seat.axis), ball.body_radius_mm, _centre(ball)
     side = np.cross(axis, (0.0, 1.0, 0.3))
     eye = middle - 7 * radius * axis + 2.5 * radius * side / np.linalg.norm(side)
     for column in (0, 1):
         plotter.subplot(0, column)
-        _parts(plotter, folder, record, ("base",))
-        for contact in seat["contacts_mm"] if column == 0 else ():
-            mark = pyvista.Sphere(radius=seat["pad_diameter_mm"] / 5, center=contact)
+        _parts(plotter, folder, record, "base")
+        for contact in seat.contacts_mm if column == 0 else ():
+            mark = pyvista.Sphere(radius=seat.pad_diameter_mm / 5, center=contact)
             plotter.add_mesh(mark, color="red")
         if column:
             _add_balls(plotter, folder, only=ball.number)
         _look(plotter, eye, middle + 0.3 * radius * axis)
 
 
-def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
+def _exploded(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """All parts apart: balls and caps out of their seats, the rest away from the base."""
-    unit = record["target_mm"] / 2
-    seats = {f"ball_{seat['ball']}": np.array(seat["axis"]) for seat in record["seats"]}
-    seats |= {part["name"]: seats[f"ball_{part['ball']}"] for part in _with(record, ("cap",))}
+    unit = record.target_mm / 2
+    seats = {f"ball_{seat.ball}": np.array(seat.axis) for seat in record.seats}
+    seats |= {part.name: seats[f"ball_{part.ball}"] for part in record.with_role("cap")}
     bodies = [body for body in assembly_bodies(folder, record) if body.group != "views"]
     for column, eye in enumerate(((-0.5, -2.6, 0.8), (2.3, -1.5, 1.1))):
         plotter.subplot(0, column)
@@ -158,7 +149,7 @@ def _exploded(plotter: pyvista.Plotter, folder: Path, record: Record) -> None:
         _show_all(plotter, eye)
 
 
-SUBJECTS: dict[str, Callable[[pyvista.Plotter, Path, Record], None]] = {
+SUBJECTS: dict[str, Callable[[pyvista.Plotter, Path, Prototype], None]] = {
     "rig": _whole,
     "sides": _sides,
     "base": _base,
@@ -167,49 +158,40 @@ SUBJECTS: dict[str, Callable[[pyvista.Plotter, Path, Record], None]] = {
 }
 
 
-def _with(record: Record, roles: tuple[str, ...]) -> list[Record]:
-    return [part for part in record["parts"] if part["role"] in roles]
+def _parts(plotter: pyvista.Plotter, folder: Path, record: Prototype, *roles: str) -> None:
+    for part in record.with_role(*roles):
+        plotter.add_mesh(placed_mesh(folder, part), color=COLOURS[part.role], specular=0.2)
 
 
-def _parts(plotter: pyvista.Plotter, folder: Path, record: Record, roles: tuple[str, ...]) -> None:
-    for part in _with(record, roles):
-        plotter.add_mesh(placed_mesh(folder, part), color=COLOURS[part["role"]], specular=0.2)
-
-
-def placed_mesh(folder: Path, part: Record) -> pyvista.PolyData:
+def placed_mesh(folder: Path, part: PrintedPartRecord) -> pyvista.PolyData:
     """A part moved from the printer's bed back to its place in the prototype."""
-    mesh = pyvista.read(folder / part["stl"])
-    axes, origin = np.array(part["axes"]), np.array(part["origin_mm"])
+    mesh = pyvista.read(folder / part.stl)
+    axes, origin = np.array(part.axes), np.array(part.origin_mm)
     mesh.points = (np.asarray(mesh.points, dtype=np.float64) - origin) @ axes.T
     return mesh.compute_normals(split_vertices=True, feature_angle=30.0)
 
 
-def _read_balls(folder: Path) -> list[_Ball]:
-    with (folder / "balls.csv").open(newline="", encoding="utf-8") as file:
-        return [
-            _Ball(
-                int(row["number"]),
-                row["kind"] == "cap",
-                np.array([float(row[key]) for key in ("bx", "by", "bz")]),
-                float(row["body_radius_mm"]),
-            )
-            for row in csv.DictReader(file)
-        ]
+def _centre(ball: BallRow) -> Floats:
+    """Of the sphere in the seat, mm, (3,)."""
+    return np.array([ball.bx, ball.by, ball.bz])
 
 
 def _add_balls(plotter: pyvista.Plotter, folder: Path, only: int = 0) -> None:
     """Add the bought balls, or the one of this number."""
-    for ball in _read_balls(folder):
-        if not ball.cap and only in (0, ball.number):
+    for ball in BallRow.read(folder):
+        if ball.kind == "ball" and only in (0, ball.number):
             sphere = pyvista.Sphere(
-                radius=ball.radius, center=ball.centre, theta_resolution=48, phi_resolution=48
+                radius=ball.body_radius_mm,
+                center=_centre(ball),
+                theta_resolution=48,
+                phi_resolution=48,
             )
             plotter.add_mesh(sphere, color=COLOURS["ball"], smooth_shading=True, specular=0.9)
 
 
-def assembly_bodies(folder: Path, record: Record) -> list[Drawn]:
+def assembly_bodies(folder: Path, record: Prototype) -> list[Drawn]:
     """All bodies of prototype.glb, in millimetres and z up."""
-    scene = trimesh.load_scene(folder / record["assembly"]["glb"])
+    scene = trimesh.load_scene(folder / record.assembly.glb)
     drawn = []
     for name in sorted(scene.graph.nodes_geometry):
         place, geometry = scene.graph[name]

@@ -4,8 +4,6 @@ Run as a program, `python -m tbcad.report.shell_pictures DIR FILE`: drawing with
 crash the process, so the command starts it as a child.
 """
 
-import csv
-import json
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +12,10 @@ import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
+from tbcad.formats.checked_files import columns
 from tbcad.geometry.vectors import dot, unit
+from tbcad.records.design import NAME, DesignRecord
+from tbcad.records.tables import MirrorRow
 from tbcad.types import Bools, Floats, Ints
 
 SIZE = (1600, 800)
@@ -104,7 +105,7 @@ def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats
 def coloured(folder: Path, camera: str) -> pyvista.PolyData:
     """A shell with mirrors in the colour of their polar angle, alternating in brightness."""
     shell = pyvista.read(folder / f"shell_{camera}.stl")
-    mirrors = read_mirrors(folder, camera)
+    mirrors = read_modelled(folder, camera)
     corners = np.asarray(shell.points, dtype=np.float64)[shell.regular_faces]
     mirror, on_mirror = mirror_of_facets(corners, mirrors)
     share = (mirrors.polar - mirrors.polar.min()) / np.ptp(mirrors.polar)
@@ -144,16 +145,13 @@ def _outward(points: Floats, mirrors: ModelledMirrors) -> Floats:
     return unit(mirrors.normal + mirrors.curvature[:, None] * (points - mirrors.apex))
 
 
-def read_mirrors(folder: Path, camera: str) -> ModelledMirrors:
+def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
     """One camera's mirrors of an export."""
-    with (folder / "mirrors.csv").open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["camera"] == camera]
-    record = json.loads((folder / "design.json").read_text(encoding="utf-8"))
-    coat = record["coating_mm"]
-    columns = ("px", "py", "pz", "nx", "ny", "nz", "polar_deg")
-    values = np.array([[float(row[name]) for name in columns] for row in rows])
-    apex, normal, polar = values[:, :3], values[:, 3:6], values[:, 6]
-    radius = np.array([float(row["radius_mm"] or "inf") for row in rows])
+    coat = DesignRecord.read(folder / NAME).coating_mm
+    rows = [row for row in MirrorRow.read(folder) if row.camera == camera]
+    apex, normal = columns(rows, "px py pz"), columns(rows, "nx ny nz")
+    radius = np.array([row.radius_mm or np.inf for row in rows])
+    polar = columns(rows, "polar_deg")[:, 0]
     return ModelledMirrors(apex - coat * normal, normal, 1 / (radius - coat), polar)
 
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import read_json
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.records.run import RunRecord, read_record
 from tbcad.runs.images import Image16, decoded_image
-from tbcad.runs.record import RunRecord, read_record
 
-AGAIN = "photograph it again with tbcad run --resume"
+AGAIN = Exposure.MISSING
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ def read_photograph(run: Run, exposure: Exposure) -> Image16:
 def _exposure(folder: Path, record: RunRecord, frame: Frame, phase: str) -> Exposure:
     """The sidecar of one photograph, if it fits the record."""
     path = folder / PHOTOGRAPHS / f"{exposure_name(frame, phase)}.json"
-    found = read_json(path, Exposure, EXPOSURE_SCHEMA, AGAIN)
+    found = Exposure.read(path)
     if (found.frame, found.phase) != (frame, phase) or Path(found.file).stem != path.stem:
         raise InputError(f"{path} is of another photograph: {AGAIN}")
     if (found.width_px, found.height_px) != (record.width_px, record.height_px):

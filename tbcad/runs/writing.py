@@ -17,9 +17,9 @@ from typing import Any
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import parse_json
 from tbcad.formats.pictures import PICTURE_SUFFIXES
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, exposure_name
+from tbcad.records.exposure import PHOTOGRAPHS, Exposure, exposure_name
+from tbcad.records.run import JOURNAL, RECORD, RunRecord, read_record
 from tbcad.runs.photographs import read_run
-from tbcad.runs.record import JOURNAL, RECORD, RUN_SCHEMA, RunRecord, read_record
 
 PARTIAL = ".tbcad-"  # begin of the names of files that are not complete
 TAKEN = "taken"
@@ -50,11 +50,10 @@ class RunWriter:
         """
         photographs = self.folder / PHOTOGRAPHS
         name = exposure_name(exposure.frame, exposure.phase)
-        sidecar = {"schema": EXPOSURE_SCHEMA} | exposure.model_dump(mode="json")
         with _disk_faults(self.folder):
             photographs.mkdir(exist_ok=True)
             write_safely(photographs / exposure.file, data)
-            write_safely(photographs / f"{name}.json", json_bytes(sidecar))
+            write_safely(photographs / f"{name}.json", exposure.text().encode())
         self.log(TAKEN, name=name)
         self.taken.add(name)
 
@@ -94,8 +93,7 @@ def new_run(folder: Path, record: RunRecord) -> RunWriter:
     check_new(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        document = {"schema": RUN_SCHEMA} | record.model_dump(mode="json")
-        write_safely(folder / RECORD, json_bytes(document))
+        write_safely(folder / RECORD, record.text().encode())
     except OSError as error:
         raise InputError(
             f"{folder} cannot be written: {error.strerror}: choose another folder"
@@ -196,11 +194,6 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def json_bytes(value: dict[str, Any]) -> bytes:
-    """A JSON object as it is written to a run's folder."""
-    return (json.dumps(value, indent=1, allow_nan=False) + "\n").encode()
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """All files of both negatives, and what design.json says of them."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import mandrel_files
+from tbcad.records.design import MandrelRecord
 from tbcad.shell.files import shell_properties, wall_names, write_half_mesh
 from tbcad.shell.front import front_edges
 from tbcad.shell.mandrel import Mandrel, mandrel_of
@@ -82,12 +82,9 @@ def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) 
     return mandrel_mesh(design.spec, array.modelled_cells, mandrel, array.apex_distance)
 
 
-def mandrel_record(array: MirrorArray, mandrel: Mandrel) -> dict[str, Any]:
+def mandrel_record(array: MirrorArray, mandrel: Mandrel) -> MandrelRecord:
     """What design.json says of one negative: its files, and how the shell comes off."""
     draft = mandrel.draft
     pull = draft.pull * FLIP_X if array.camera_id == "b" else draft.pull
-    return {
-        **mandrel_files(array),
-        "pull": (pull + 0.0).tolist(),
-        "draft_deg": round(float(np.degrees(draft.angle)), DRAFT_DIGITS),
-    }
+    degrees = round(float(np.degrees(draft.angle)), DRAFT_DIGITS)
+    return MandrelRecord(**mandrel_files(array), pull=(pull + 0.0).tolist(), draft_deg=degrees)

@@ -7,40 +7,28 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Finite, Record, Vector, read_json
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.machine.built import BuiltPrototype
 from tbcad.optics.camera import LensCamera
 from tbcad.optics.led_dome import disc_images, dome_samples
 from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.optics.reflection import reflection_points
+from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.simulate.prototype.ball_rays import (
     ON_BALL_MM,
     ball_hits,
     balls_between,
     points_within_walls,
 )
-from tbcad.simulate.prototype.plan import HALF_TURN, MISSING, RECORD, SCHEMA
+from tbcad.simulate.prototype.plan import HALF_TURN
 from tbcad.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Floats, Ints
 
-STAGE = "stage"
 NEAR_MM = 0.05  # of the LED: its dome stands in its pocket
 DOME_MM = 1.5  # radius of a 3 mm LED
 ROUNDS = 5  # of the search for both points of a light that is reflected twice
 # Less light than this of an LED that fills a pixel is nothing: 0.1 of 255, spread over four pixels.
 FAINT_PX2 = 2e-3
-
-
-class _Part(Record):
-    role: str
-    stl: str
-    axes: tuple[Vector, Vector, Vector]
-    origin_mm: tuple[Finite, Finite, Finite]
-
-
-class _Document(Record):
-    parts: tuple[_Part, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,12 +66,12 @@ def stage_scene(folder: Path) -> Any | None:
     Raises:
         InputError: the record or a mesh cannot be read.
     """
-    parts = read_json(folder / RECORD, _Document, SCHEMA, MISSING).parts
-    facets = [_placed(folder, part) for part in parts if part.role == STAGE]
+    parts = Prototype.read(folder / NAME).with_role("stage")
+    facets = [_placed(folder, part) for part in parts]
     return embree_scene(np.concatenate(facets)) if facets else None
 
 
-def _placed(folder: Path, part: _Part) -> Floats:
+def _placed(folder: Path, part: PrintedPartRecord) -> Floats:
     """Facets of a part by their corners, mm, (f, 3, 3), back from the printer's bed."""
     import trimesh
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from scipy.ndimage import convolve1d
 from tbcad.compiled import compiled
 from tbcad.machine.built import BuiltPrototype
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.simulate.capture.photograph import row_bands
 from tbcad.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.simulate.prototype.plan import HALF_TURN

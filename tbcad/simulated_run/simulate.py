@@ -1,7 +1,6 @@
 """Simulate the run of a random build: all photographs, as files of a run's folder."""
 
 import hashlib
-import json
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -22,8 +21,8 @@ from tbcad.machine.record import truth_file, write_machine
 from tbcad.machine.shells import perfect_half, random_half, shell_frame
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, refuse_inputs
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
-from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
+from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.records.run import RECORD, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.prototype.lamps import lit_by, read_lamps
 from tbcad.simulate.prototype.plan import read_plan
@@ -167,7 +166,7 @@ def write_run(
     with replacing(out, "run", force=False, inputs=(export,)) as new:
         (new / PHOTOGRAPHS).mkdir()
         record = _record(runs, phases, export)
-        _write_json(new / RECORD, {"schema": RUN_SCHEMA, **record.model_dump(mode="json")})
+        record.write(new / RECORD)
         for name, run in zip(record.machines, runs, strict=True):
             write_machine(new / truth_file(name), run.built.machine, run.frames)
             _write_frames(run, phases, new / PHOTOGRAPHS, progress)
@@ -225,9 +224,7 @@ def _write_photograph(
         taken=BEGIN,
         settings={},
     )
-    _write_json(
-        folder / f"{name}.json", {"schema": EXPOSURE_SCHEMA, **sidecar.model_dump(mode="json")}
-    )
+    sidecar.write(folder / f"{name}.json")
 
 
 def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Path) -> RunRecord:
@@ -248,10 +245,6 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
         seconds=EXPOSURE_S * len(frames) * sum(map(runs[0].chain.exposure, phases)),
         geometry=geometry,
     )
-
-
-def _write_json(path: Path, value: dict[str, object]) -> None:
-    path.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
 
 
 def run_object(

@@ -26,7 +26,7 @@ from tbcad.errors import InputError
 from tbcad.machine.built import BuiltPrototype, random_build
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import TRUTH, read_machine, write_machine
-from tbcad.runs.exposure import DARK, exposure_name
+from tbcad.records.exposure import DARK, exposure_name
 from tbcad.runs.photographs import Run
 from tbcad.screen import WIDTH
 from tests.calibration.conftest import ERRORS, FAULT
@@ -153,11 +153,19 @@ def test_saturated_highlights_are_counted_and_ask_for_a_shorter_exposure(
     )
 
 
+BASIS = {
+    **{"run": "run", "exports": "exports", "export_sha256": {}, "source": "camera"},
+    **{"geometry": "prototype", "camera": "test", "lens": "estimated", "measured_radii": []},
+    "photographs": {"expected": 1, "usable": 1},
+    "process": {"name": "fdm", "title": "FDM", "given": False, "settings": []},
+}
+
+
 def test_files_are_the_same_each_time(calibrated: Calibration, tmp_path: Path) -> None:
     judged = verdict(calibrated)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write_calibration(tmp_path / name, calibrated, judged, {"exports": "exports"})
+        write_calibration(tmp_path / name, calibrated, judged, BASIS)
     assert {file.name for file in (tmp_path / "one").iterdir()} == FILES
     for name in FILES:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()

@@ -1,8 +1,6 @@
 """Priors follow the process, what was measured, and what is given."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,6 @@ from tbcad.calibration.priors import (
     MEASURED_MM,
     parse_measured,
     prototype_prior,
-    read_zero_error,
     shell_prior,
 )
 from tbcad.errors import InputError
@@ -80,11 +77,3 @@ def test_wrong_texts_are_refused(text: str) -> None:
 def test_wrong_values_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="allowed is ball 1 to 5"):
         parse_measured((text,), 5)
-
-
-def test_zero_error(tmp_path: Path) -> None:
-    file = tmp_path / "prototype.json"
-    file.write_text(json.dumps({"schema": "tbcad-prototype/2", "home": {"zero_error_deg": 90}}))
-    assert read_zero_error(file) == pytest.approx(np.pi / 2)
-    file.write_text(json.dumps({"schema": "tbcad-prototype/2"}))
-    assert read_zero_error(file) == 0

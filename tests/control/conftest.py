@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
@@ -22,7 +21,7 @@ from tbcad.spec.prototype import MotionSpec
 from tests.control.impatient import WAITS_S
 from tests.control.rig import Rig, connected_rig, klipper_rig_of
 from tests.exported_files import edit_json
-from tests.prototype_exports import write_export
+from tests.prototype_exports import write_export, write_stops
 
 LEDS = 4
 WIND_UP_DEG = 0.1  # at every stop
@@ -50,10 +49,8 @@ def export(
 ) -> Path:
     """What a run reads, by the export's own writers."""
     write_export(folder, design, layout)
-    angles = enumerate(np.degrees(layout.stops.angle).tolist(), 1)
-    columns = ("stop", "base_angle_deg", "wind_up_deg")
-    stops = [dict(zip(columns, (stop, angle, WIND_UP_DEG), strict=True)) for stop, angle in angles]
-    write_table(folder / "stops.csv", columns, stops)
+    angles = np.degrees(layout.stops.angle).tolist()
+    write_stops(folder, angles, [WIND_UP_DEG] * len(angles))
     write_program(folder / "rotation_plan.nc", gcode_program(layout, drive, motion, LEDS))
     if motion.controller == "grblhal":
         _write_klipper_files(folder, layout, drive, motion)

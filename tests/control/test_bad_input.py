@@ -181,7 +181,7 @@ def test_run_that_exists(rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture
     for more in (("--phases", "lit"), ("--stops", "2"), ("--runs", "b"), ("--size", "640x480")):
         assert "was begun with another" in refused([*rig.resume(), *more], capsys)
     rig.export = Path(shutil.copytree(rig.export, tmp_path / "other"))
-    edit_json(rig.export / "prototype.json", lambda value: value.update(note="another"))
+    edit_json(rig.export / "prototype.json", lambda value: value.update(target_pad_um=11.0))
     line = refused(rig.resume(), capsys)
     assert "is a run of another export: prototype.json" in line
     assert before == {path: path.read_bytes() for path in rig.out.rglob("*") if path.is_file()}

@@ -6,14 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.control import plan as names
 from tbcad.control.plan import read_control_plan
 from tbcad.control.selection import chosen_frames, chosen_phases
 from tbcad.errors import InputError
-from tbcad.mirrors.record import DESIGN_FILE, MIRRORS_FILE
-from tbcad.mirrors.record import SCHEMA as DESIGN_SCHEMA
-from tbcad.prototype.files import settings, write
-from tbcad.simulate.prototype import plan as simulated
 from tests.exported_files import edit_csv, edit_json
 
 
@@ -21,14 +16,6 @@ from tests.exported_files import edit_csv, edit_json
 def export(control_export: Path, tmp_path: Path) -> Path:
     """A copy to break."""
     return Path(shutil.copytree(control_export, tmp_path / "export"))
-
-
-def test_names_are_those_of_the_writers() -> None:
-    assert (names.DESIGN_FILE, names.DESIGN_SCHEMA) == (DESIGN_FILE, DESIGN_SCHEMA)
-    assert (names.MIRRORS_FILE, names.SETTINGS) == (MIRRORS_FILE, settings.NAME)
-    assert (names.RECORD, names.SCHEMA) == (write.NAME, write.SCHEMA)
-    read = (simulated.RECORD, simulated.BALLS, simulated.PLAN, simulated.SCHEMA)
-    assert read == (names.RECORD, names.BALLS, names.PICTURES, names.SCHEMA)
 
 
 def test_frames_are_both_runs_in_order(control_export: Path) -> None:

@@ -19,7 +19,7 @@ from tbcad.control.machine import CameraFault
 from tbcad.control.preflight import look, preflight
 from tbcad.control.shooting import Photograph, common_settings, take
 from tbcad.errors import InputError
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 from tbcad.runs.photographs import read_run
 from tests.control import exposing_camera
 from tests.control.exposing_camera import SIZE, radiance

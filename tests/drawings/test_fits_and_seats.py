@@ -1,6 +1,5 @@
 """Fits and seats on sheets: sizes of solids and lists, nothing that is not in the design."""
 
-import json
 import math
 from pathlib import Path
 
@@ -22,7 +21,12 @@ from tbcad.output.manifest import read_manifest, write_manifest
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.files.bom_csv import COLUMNS
 from tbcad.prototype.purchased.parts import load_parts
+from tbcad.records.design import DesignRecord
+from tbcad.records.prototype import CapRecord, Prototype
+from tbcad.records.tables import BallRow
+from tbcad.spec.load import load_spec
 from tbcad.types import Floats
+from tests.prototype_records import printed_part, prototype_document
 from tests.sheet_texts import check_texts, texts
 
 PARTS = load_parts()
@@ -153,33 +157,46 @@ def export(folder: Path, carrier: Solid) -> Export:
         "by": 10,
         "bz": 16,
     }
-    balls: list[Row] = [{"number": 1, **cap}, {"number": 2, **ball}]
-    write_table(folder / "balls.csv", tuple(balls[0]), balls)
+    rest = dict.fromkeys(BallRow.columns(), 1)
+    balls: list[Row] = [rest | {"number": 1} | cap, rest | {"number": 2} | ball]
+    write_table(folder / "balls.csv", tuple(rest), balls)
     write_manifest(folder, "build")
     pads = np.array([[4.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 4.5, 0.0]])
     seat = {"axis": [0.0, 0.0, -1.0], "pad_diameter_mm": 3.0}
-    magnet = {"along": [0, 0, 1], "through": ["carrier"]}
-    part = {"name": "carrier", "what": WHAT, "step": "carrier.step", "role": "base"}
-    record = {
-        "frame": {"zero": X.tolist(), "third": Y.tolist(), "axis": Z.tolist()},
-        "parts": [{**part, "finish": "", "ball": None}],
-        "bought": [{"name": "shaft", "part": "SHAFT-8x120"}, {"name": "camera", "part": None}],
-        "seats": [
-            {"ball": 1, "contacts_mm": (pads + np.array([25, 10, 10])).tolist(), **seat},
-            {"ball": 2, "contacts_mm": (pads + np.array([-25, 10, 10])).tolist(), **seat},
+    shown = {"turns": True, "finish": None}
+    magnet = {"name": "magnet", "along": [0, 0, 1], "through": ["carrier"], **shown}
+    cap_sizes = dict.fromkeys(CapRecord.model_fields, 1.0) | {"spigot_mm": 8.1, "socket_mm": 8.2}
+    words = ("material", "finish", "polarity", "pdf", "dxf")
+    record = prototype_document(
+        frame={"axis": Z.tolist(), "zero": X.tolist(), "third": Y.tolist()},
+        parts=[printed_part("carrier", "base", what=WHAT)],
+        bought=[
+            {"name": "shaft", "what": "", "part": "SHAFT-8x120", **shown},
+            {"name": "camera", "what": "", "part": None, **shown},
         ],
-        "caps": [{"ball": 1, "spigot_mm": 8.1, "socket_mm": 8.2}],
-        "fasteners": [
+        seats=[
+            {
+                "ball": ball,
+                "contacts_mm": (pads + np.array(place)).tolist(),
+                "normals": np.eye(3).tolist(),
+                **seat,
+            }
+            for ball, place in ((1, [25, 10, 10]), (2, [-25, 10, 10]))
+        ],
+        caps=[cap_sizes | {"ball": 1} | dict.fromkeys(words, "")],
+        fasteners=[
             {"part": "MAGNET-8x3", "position_mm": [25, 10, 7], **magnet},
             {"part": "MAGNET-6x3", "position_mm": [-25, 10, 7], **magnet},
         ],
-    }
+    )
     row = {"item": 65, "part": "carrier", "quantity": 1, "material": "PETG"}
-    machine = Machine((dict.fromkeys(COLUMNS, None) | row,), record, (), {}, PARTS)
-    design = {"spec": {"name": "some", "optics": {"n": 6}}}
+    machine = Machine(
+        (dict.fromkeys(COLUMNS, None) | row,), Prototype.model_validate(record), (), {}, PARTS
+    )
+    design = DesignRecord.model_construct(spec=load_spec(None, ["n=6"]))
     manifest = read_manifest(folder)
     assert manifest is not None
-    return Export(folder, manifest, json.loads(json.dumps(design)), machine, ())
+    return Export(folder, manifest, design, machine, ())
 
 
 def test_the_carriers_sheet_has_its_fits_and_seats(carrier: Solid, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import pytest
 from tbcad.cli.stage_times import N, look_at
 from tbcad.errors import InputError
 from tbcad.formats.checked_files import Record, parse_json, read_json
-from tbcad.output.manifest import Entry, is_listed
+from tbcad.output.manifest import is_listed
+from tbcad.records.manifest import Entry
 
 
 class Numbers(Record):

@@ -10,7 +10,7 @@ from tbcad.geometry.vectors import norm, unit
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import machine_runs, stops_known
 from tbcad.optics.camera import without_distortion
-from tbcad.runs.exposure import Frame
+from tbcad.records.exposure import Frame
 from tbcad.simulate.prototype.ball_rays import trace_balls
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.simulate.prototype.run import prototype_runs

@@ -12,7 +12,7 @@ from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import read_machine, write_machine
 from tbcad.optics.camera import Camera, without_distortion
-from tbcad.runs.exposure import Frame
+from tbcad.records.exposure import Frame
 
 FORWARD = unit(np.array([-0.2, 0.0, 1.0]))
 DESIGNED = Camera(

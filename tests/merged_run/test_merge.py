@@ -13,7 +13,7 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.merged_run.stop_photographs import MergeOptions
-from tbcad.runs.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.prototype.merge import merge_run
@@ -310,7 +310,8 @@ class TestIncomplete:
     ) -> None:
         first = frames[: len(plan.angle)]
         run = write_run(tmp_path / "half", export, first, perfect)
-        rays = "mirror,sigma_mm,sigma_mrad\na0001,0.04,2\nb0001,0.04,2\n"  # 2 mrad at 15 mm
+        head = "mirror,sigma_mm,sigma_mrad,pixel_mm"
+        rays = f"{head}\na0001,0.04,2,1\nb0001,0.04,2,1\n"  # 2 mrad at 15 mm
         (calibration / "rays.csv").write_text(rays, encoding="utf-8")
         record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
         assert list(record["based_on"]) == ["a"]

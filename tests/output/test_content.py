@@ -12,7 +12,8 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.output.content import COSTLY, RECORDS, kind_of
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.manifest import Kind, fingerprint, write_manifest
+from tbcad.output.manifest import fingerprint, write_manifest
+from tbcad.records.manifest import Kind
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ASKED = ("capture", "merged run", "calibration")

@@ -14,7 +14,7 @@ from tbcad.report.shell_pictures import (
     VIEWS,
     camera_that_shows,
     mirror_of_facets,
-    read_mirrors,
+    read_modelled,
 )
 from tbcad.shell.facets import mirror_facets
 from tbcad.shell.files import camera_a_mesh
@@ -43,7 +43,7 @@ def test_facets_belong_to_the_mirrors_that_they_were_made_for(
     mesh, array = camera_a_mesh(mirrors), mirrors.arrays[0]
     made = mirror_facets(mirrors.spec, array.modelled_cells, array.apex_distance).mirror
     corners = mesh.vertices.astype(np.float32).astype(np.float64)[mesh.triangles]
-    mirror, found = mirror_of_facets(corners, read_mirrors(tmp_path, "a"))
+    mirror, found = mirror_of_facets(corners, read_modelled(tmp_path, "a"))
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )

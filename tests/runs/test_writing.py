@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Exposure, Frame, exposure_name
+from tbcad.records.exposure import Exposure, Frame, exposure_name
+from tbcad.records.run import RunRecord
 from tbcad.runs.photographs import read_run
-from tbcad.runs.record import RunRecord
 from tbcad.runs.writing import RunWriter, check_new, new_run, resumed_run
 
 FRAMES = tuple(Frame(object_turn_deg=0, stop=stop, base_angle_deg=stop) for stop in (1, 2))

@@ -1,7 +1,6 @@
 """The folder of a simulated run, and what is refused."""
 
 import hashlib
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.machine.record import TRUTH, read_machine
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 from tbcad.runs.photographs import read_photograph, read_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
@@ -18,6 +17,7 @@ from tbcad.simulated_run import simulate
 from tbcad.simulated_run.options import RunOptions
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.prototype.draws import read_wind_up
+from tests.prototype_records import printed_part, write_prototype
 from tests.simulated_runs import Small, fdm_errors, small_run
 
 PHASES = ("dark", "led_1", "lit")
@@ -157,7 +157,7 @@ def test_refused(export_with_wind_up: Path, options: RunOptions, message: str) -
         simulate.prepare_run(export, fdm_errors(), simulate.run_object(export, None), options)
 
 
-def test_the_stage_hides_leds_as_it_stands(export_folder: Path, tmp_path: Path) -> None:
+def test_the_stage_hides_leds_as_it_stands(tmp_path: Path) -> None:
     import trimesh
 
     box = trimesh.creation.box((4.0, 6.0, 8.0))
@@ -166,10 +166,8 @@ def test_the_stage_hides_leds_as_it_stands(export_folder: Path, tmp_path: Path) 
     # A point x of the prototype is x @ axes + origin on the printer's bed.
     box.vertices = (box.vertices + middle) @ axes + origin
     box.export(tmp_path / "post.stl")
-    document = json.loads((export_folder / "prototype.json").read_text())
-    part = {"role": "stage", "stl": "post.stl", "axes": axes.tolist()}
-    document["parts"] = [{**part, "origin_mm": origin.tolist()}]
-    (tmp_path / "prototype.json").write_text(json.dumps(document))
+    place = {"axes": axes.tolist(), "origin_mm": origin.tolist()}
+    write_prototype(tmp_path, parts=[printed_part("post", "stage", **place)])
     stage = simulate.stage_scene(tmp_path)
     way = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     hits = stage.run(

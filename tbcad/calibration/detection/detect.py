@@ -36,7 +36,7 @@ from tbcad.calibration.detection.spots import (
 from tbcad.calibration.estimate.parameters import Prior
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
-from tbcad.runs.exposure import DARK, Frame, dark_factor, exposure_name
+from tbcad.records.exposure import DARK, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16
 from tbcad.runs.photographs import Run, read_photograph
 from tbcad.simulate.parallel import THREADS

@@ -1,6 +1,5 @@
 """The folder of a calibration."""
 
-import json
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ import numpy as np
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.report.plots import INCHES, draw_recovered, plots
-from tbcad.calibration.report.record import RECORD, calibration_record, covariance_bytes
+from tbcad.calibration.report.record import calibration_record, covariance_bytes
 from tbcad.calibration.report.recovered import (
     BESIDES,
     Kind,
@@ -34,6 +33,7 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.record import RECORD as MACHINE
 from tbcad.machine.record import write_machine
 from tbcad.output.manifest import write_manifest
+from tbcad.records.calibration import NAME as RECORD
 from tbcad.results.tables import csv_text
 from tbcad.screen import WIDTH
 
@@ -51,7 +51,7 @@ def write_calibration(
     known = covariance(result.found.prior, result.found.information)
     record = calibration_record(result, judged, known, basis)
     write_machine(folder / MACHINE, result.found.machine, result.setup.frames)
-    (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    record.write(folder / RECORD)
     tables = (
         spheres_table(result, known),
         angles_table(result, known),
@@ -64,7 +64,7 @@ def write_calibration(
     for name, data in plots(result, sphere_covariances(result, known), plot).items():
         (folder / name).write_bytes(data)
     write_manifest(folder, "calibration")
-    return record
+    return record.document()
 
 
 def write_recovered(

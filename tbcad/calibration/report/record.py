@@ -9,17 +9,24 @@ from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.report.tables import sphere_covariances
 from tbcad.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
+from tbcad.records.calibration import (
+    CalibrationRecord,
+    HalvesRecord,
+    HighlightFigures,
+    OutlierRecord,
+    ParameterBlock,
+    PulledParameter,
+    RayFigures,
+)
 from tbcad.types import Floats
 
-CALIBRATION_SCHEMA = "tbcad-calibration/1"
-RECORD = "calibration.json"
 DIGITS = 6
 
 
 def calibration_record(
     result: Calibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
-) -> dict[str, Any]:
-    """The object of calibration.json.
+) -> CalibrationRecord:
+    """What calibration.json says.
 
     Args:
         result: the calibration.
@@ -28,52 +35,51 @@ def calibration_record(
         basis: names of run, export, process and lens.
     """
     found = result.found
-    return {
-        "schema": CALIBRATION_SCHEMA,
+    return CalibrationRecord(
         **basis,
-        "verdict": judged.answer.value,
-        "rays": {
-            "mirrors": len(result.rays.ids),
-            "mirrors_without_frame": list(result.rays.absent),
-            "place_mm_median": _short(judged.place_mm[0]),
-            "place_mm_95": _short(judged.place_mm[1]),
-            "turn_mrad_median": _short(judged.turn_mrad[0]),
-            "turn_mrad_95": _short(judged.turn_mrad[1]),
-            "in_run_mm_median": _short(judged.in_run[0]),
-            "in_run_mrad_median": _short(judged.in_run[1]),
-            "in_design_mm_median": _short(judged.whole_mm[0]),
-            "in_design_mrad_median": _short(judged.whole_mrad[0]),
-            "needed_mm_median": _short(judged.needed_mm),
-            "share_short_of_need": _short(judged.short),
-        },
-        "highlights": {
-            "given": len(found.highlights),
-            "used": int(found.used.sum()),
-            "rejected_by_detection": _counts(result),
-            "noise_factor": _short(found.noise_factor),
-            "residual_px": _short(float(np.sqrt((found.residual[found.used] ** 2).mean()))),
-            "degrees_of_freedom": round(found.freedom),
-        },
-        "outliers": [
-            {"photograph": name, "ball": ball, "led": led, "sigmas": _short(sigma)}
+        verdict=judged.answer.value,
+        rays=RayFigures(
+            mirrors=len(result.rays.ids),
+            mirrors_without_frame=result.rays.absent,
+            place_mm_median=_short(judged.place_mm[0]),
+            place_mm_95=_short(judged.place_mm[1]),
+            turn_mrad_median=_short(judged.turn_mrad[0]),
+            turn_mrad_95=_short(judged.turn_mrad[1]),
+            in_run_mm_median=_short(judged.in_run[0]),
+            in_run_mrad_median=_short(judged.in_run[1]),
+            in_design_mm_median=_short(judged.whole_mm[0]),
+            in_design_mrad_median=_short(judged.whole_mrad[0]),
+            needed_mm_median=_short(judged.needed_mm),
+            share_short_of_need=_short(judged.short),
+        ),
+        highlights=HighlightFigures(
+            given=len(found.highlights),
+            used=int(found.used.sum()),
+            rejected_by_detection=_counts(result),
+            noise_factor=_short(found.noise_factor),
+            residual_px=_short(float(np.sqrt((found.residual[found.used] ** 2).mean()))),
+            degrees_of_freedom=round(found.freedom),
+        ),
+        outliers=tuple(
+            OutlierRecord(photograph=name, ball=ball, led=led, sigmas=_short(sigma))
             for name, ball, led, sigma in outliers(result)
-        ],
-        "halves": [
-            {
-                "apart": half.by,
-                "highlights": list(half.counts),
-                "found_mm": _short(half.found_mm),
-                "expected_mm": _short(half.expected_mm),
-            }
+        ),
+        halves=tuple(
+            HalvesRecord(
+                apart=half.by,
+                highlights=half.counts,
+                found_mm=_short(half.found_mm),
+                expected_mm=_short(half.expected_mm),
+            )
             for half in result.halves
-        ],
-        "faults": list(result.detection.faults),
-        "doubts": list(judged.doubts),
-        "unlike_the_process": [
-            {"parameter": name, "sigmas": _short(sigma)} for name, sigma in judged.pulled
-        ],
-        "parameters": _parameters(result, known),
-    }
+        ),
+        faults=result.detection.faults,
+        doubts=judged.doubts,
+        unlike_the_process=tuple(
+            PulledParameter(parameter=name, sigmas=_short(sigma)) for name, sigma in judged.pulled
+        ),
+        parameters=_parameters(result, known),
+    )
 
 
 def covariance_bytes(result: Calibration, known: Covariance) -> bytes:
@@ -104,18 +110,18 @@ def covariance_bytes(result: Calibration, known: Covariance) -> bytes:
     return file.getvalue()
 
 
-def _parameters(result: Calibration, known: Covariance) -> dict[str, Any]:
+def _parameters(result: Calibration, known: Covariance) -> dict[str, ParameterBlock]:
     """Each block's priors and results: deviations before and after, median of its parameters."""
     prior = result.found.prior
     after = np.zeros(len(prior.flat_sigma))
     after[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
     return {
-        block: {
-            "number": prior.sigma[block].size,
-            "free": int((prior.sigma[block] > 0).sum()),
-            "prior_sigma": _median(prior.sigma[block].ravel()),
-            "sigma": _median(after[start : start + prior.sigma[block].size]),
-        }
+        block: ParameterBlock(
+            number=prior.sigma[block].size,
+            free=int((prior.sigma[block] > 0).sum()),
+            prior_sigma=_median(prior.sigma[block].ravel()),
+            sigma=_median(after[start : start + prior.sigma[block].size]),
+        )
         for block, start in prior.first.items()
     }
 

@@ -8,8 +8,8 @@ from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.machine.built import is_cap
+from tbcad.records.exposure import exposure_name
 from tbcad.results.tables import Table
-from tbcad.runs.exposure import exposure_name
 from tbcad.types import Floats, Ints
 
 AXES = ("x", "y", "z")

@@ -10,7 +10,7 @@ import numpy as np
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.detection.detection import Detection, Rejection
 from tbcad.calibration.estimate.parameters import Block, Prior
-from tbcad.runs.exposure import exposure_name
+from tbcad.records.exposure import exposure_name
 from tbcad.screen import WIDTH
 from tbcad.types import Floats
 

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from typing import Protocol
 
-from tbcad.runs.exposure import Setting
+from tbcad.records.exposure import Setting
 
 NEAR = 1.5  # factor of exposure times: the coarsest cameras have steps of 2
 _TIME = re.compile(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?\s*s?$")

@@ -14,7 +14,7 @@ from tbcad.control.cameras.image_facts import image_facts, suffix_of
 from tbcad.control.machine import CameraFault
 from tbcad.errors import InputError
 from tbcad.formats.pictures import visible_files
-from tbcad.runs.exposure import PhaseTimes
+from tbcad.records.exposure import PhaseTimes
 
 PLACE = "{output}"
 EXPOSURES = ("{exposure_s}", "{exposure_ms}", "{exposure_us}")

@@ -13,7 +13,7 @@ from tbcad.control.cameras.image_facts import suffix_of
 from tbcad.control.machine import CameraFault
 from tbcad.control.port import INSTALL
 from tbcad.errors import InputError
-from tbcad.runs.exposure import Setting
+from tbcad.records.exposure import Setting
 
 # What must not change in a run; a camera has some of them.
 LOCKED = (

@@ -18,7 +18,7 @@ from tbcad.errors import InputError
 from tbcad.formats.camera_raw import RAW_SUFFIXES
 from tbcad.formats.pictures import PICTURE_SUFFIXES
 from tbcad.formats.tiff_pictures import TIFF_SIGNATURES
-from tbcad.runs.exposure import Setting
+from tbcad.records.exposure import Setting
 from tbcad.runs.images import decoded_image
 
 FORMATS = {"PNG": ".png", "TIFF": ".tif", "JPEG": ".jpg", "MPO": ".jpg"}

@@ -11,9 +11,10 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from tbcad.errors import InputError
-from tbcad.prototype.assembly_steps.machine import Machine, Record
+from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.plans import PLANS, Plan
 from tbcad.prototype.assembly_steps.tightening import tightening
+from tbcad.records.prototype import AssemblyStep, FastenerRecord
 
 # Fits of what is not screwed, by kind.
 FITS = {
@@ -80,7 +81,7 @@ def assembly_steps(machine: Machine) -> tuple[Step, ...]:
         InputError: a body or part belongs to no step, or the list has fewer than are mounted.
     """
     plans, mounting = mounting_steps(machine)
-    parts = machine.bodies | {one["name"]: one["part"] for one in machine.fasteners}
+    parts = machine.bodies | {one.name: one.part for one in machine.fasteners}
     loose = _loose(plans, machine, parts)
     return tuple(
         _step(machine, number, plan, _uses(machine, parts, mounting, plan, loose))
@@ -96,17 +97,19 @@ def mounting_steps(machine: Machine) -> tuple[list[Plan], dict[str, str]]:
     """
     plans = [plan for plan in PLANS if plan.needed(machine)]
     bodies = {body: _plan_of(plans, body) for body in machine.bodies}
-    mounted = {one["name"]: _latest(plans, bodies, machine, one) for one in machine.fasteners}
+    mounted = {one.name: _latest(plans, bodies, machine, one) for one in machine.fasteners}
     return plans, bodies | mounted
 
 
-def mounting_record(machine: Machine) -> list[dict[str, Any]]:
+def mounting_record(machine: Machine) -> tuple[AssemblyStep, ...]:
     """What each step mounts, for prototype.json."""
     plans, mounting = mounting_steps(machine)
-    return [
-        {"key": plan.key, "mounts": [body for body, key in mounting.items() if key == plan.key]}
+    return tuple(
+        AssemblyStep(
+            key=plan.key, mounts=tuple(body for body, key in mounting.items() if key == plan.key)
+        )
         for plan in plans
-    ]
+    )
 
 
 def record(steps: Iterable[Step]) -> list[dict[str, Any]]:
@@ -122,23 +125,23 @@ def _plan_of(plans: Sequence[Plan], body: str) -> str:
 
 
 def _latest(
-    plans: Sequence[Plan], bodies: dict[str, str], machine: Machine, fastener: Record
+    plans: Sequence[Plan], bodies: dict[str, str], machine: Machine, fastener: FastenerRecord
 ) -> str:
     """The last step that mounts a body that a fastener goes through, or what it holds."""
     order = [plan.key for plan in plans]
-    steps = [bodies[body] for body in fastener["through"] if body in bodies]
+    steps = [bodies[body] for body in fastener.through if body in bodies]
     if not steps:
-        raise InputError(f"{fastener['name']} goes through no body: build again")
+        raise InputError(f"{fastener.name} goes through no body: build again")
     if _locks_shaft(machine, fastener):
         steps += [bodies[body] for body in SHAFTS if body in bodies][:1]
     return max(steps, key=order.index)
 
 
-def _locks_shaft(machine: Machine, fastener: Record) -> bool:
+def _locks_shaft(machine: Machine, fastener: FastenerRecord) -> bool:
     """Whether it is a screw in one piece of the carrier alone: it holds the shaft."""
-    through = fastener["through"]
+    through = fastener.through
     alone = len(through) == 1 and through[0].startswith("carrier")
-    return alone and machine.kind(fastener["part"]) in SCREWED
+    return alone and machine.kind(fastener.part) in SCREWED
 
 
 def _loose(
@@ -187,18 +190,18 @@ def _uses(
 
 def _step(machine: Machine, number: int, plan: Plan, uses: tuple[Use, ...]) -> Step:
     names = {body for use in uses for body in use.bodies}
-    fasteners = [one for one in machine.fasteners if one["name"] in names]
-    through = {body for one in fasteners for body in one["through"]}
+    fasteners = [one for one in machine.fasteners if one.name in names]
+    through = {body for one in fasteners for body in one.through}
     near = tuple(sorted((through | set(plan.near)) & set(machine.bodies) - names))
     text = plan.text(machine)
     fits = (*_torques(machine, fasteners), *_fits(machine, uses), *text.fits)
     return Step(number, plan.key, plan.title, uses, text.does, fits, text.checks, near)
 
 
-def _torques(machine: Machine, fasteners: Iterable[Record]) -> list[str]:
+def _torques(machine: Machine, fasteners: Iterable[FastenerRecord]) -> list[str]:
     """A line for each kind of screw, torque, and what holds it."""
-    screws = [one for one in fasteners if machine.kind(one["part"]) in SCREWED]
-    counts = Counter((one["part"], *tightening(machine, one)) for one in screws)
+    screws = [one for one in fasteners if machine.kind(one.part) in SCREWED]
+    counts = Counter((one.part, *tightening(machine, one)) for one in screws)
     return [
         f"{count} x {machine.ref(part)}: {torque}, in {held_by.replace('_', ' ')}"
         for (part, torque, held_by), count in counts.items()

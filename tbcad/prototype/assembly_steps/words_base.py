@@ -2,9 +2,9 @@
 
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.text import Text, lines
+from tbcad.records.prototype import MATT_BLACK
 
 G_PER_KG = 1000.0
-BLACK = "matt black"
 
 
 def coupon(machine: Machine) -> Text:
@@ -29,7 +29,7 @@ def coupon(machine: Machine) -> Text:
 
 def _black_prints(machine: Machine) -> str:
     """How all other parts are printed."""
-    black = [part for part in machine.record["parts"] if part.get("finish") == BLACK]
+    black = [part for part in machine.record.parts if part.finish == MATT_BLACK]
     if not black:
         return ""
     return (
@@ -41,7 +41,7 @@ def _black_prints(machine: Machine) -> str:
 def carrier(machine: Machine) -> Text:
     """What is glued and pressed into the carrier, and its joints."""
     cut = machine.has("carrier_1")
-    magnets = [one for one in machine.record["holding"]["balls"] if one["by"] == "magnet"]
+    magnets = [one for one in machine.record.holding.balls if one.by == "magnet"]
     return Text(
         lines(
             "Remove supports. Pads are the three small flats in each cup: clean them, but do not "
@@ -64,7 +64,7 @@ def carrier(machine: Machine) -> Text:
         lines(
             "The shaft slides into the bore by hand." if machine.has("shaft") else "",
             "A screw turns by hand into each insert, and stands square.",
-            *(f"Seat {one['ball']}: {machine.ref(one['magnet'])}." for one in magnets),
+            *(f"Seat {one.ball}: {machine.ref(one.magnet or '')}." for one in magnets),
             "No magnet stands above the pads: a straight edge across the pads does not touch it."
             if magnets
             else "",
@@ -88,8 +88,8 @@ def _reamed(machine: Machine) -> str:
 
 def caps(machine: Machine) -> Text:
     """Mirrors that are printed or turned."""
-    caps = machine.record.get("caps") or []
-    drawings = ", ".join(str(one["pdf"]) for one in caps)
+    caps = machine.record.caps
+    drawings = ", ".join(str(one.pdf) for one in caps)
     return Text(
         lines(
             "Print the caps front up in resin, or have them turned; polish and coat them as "
@@ -101,8 +101,8 @@ def caps(machine: Machine) -> Text:
         ),
         lines(
             *(
-                f"Cap {one['ball']}: the spigot of {one['spigot_mm']:.1f} mm slides into seat "
-                f"{one['ball']} and tilts by at most {one['tilt_deg']:.1f} degrees."
+                f"Cap {one.ball}: the spigot of {one.spigot_mm:.1f} mm slides into seat "
+                f"{one.ball} and tilts by at most {one.tilt_deg:.1f} degrees."
                 for one in caps
             )
         ),
@@ -135,8 +135,7 @@ def hub(machine: Machine) -> Text:
 def _drilled(machine: Machine) -> str:
     if not machine.has("wheel"):
         return ""
-    drawings = {one["part"]: one["pdf"] for one in machine.record.get("drawings", [])}
-    sheet = drawings.get(machine.bodies["wheel"])
+    sheet = machine.record.drawing_of(machine.bodies["wheel"])
     drill = f"Drill the wheel as {sheet} shows. " if sheet else ""
     shaft = (
         f" The shaft {machine.body_ref('shaft')} through wheel, disc and hub centres them while "
@@ -154,31 +153,30 @@ def _wheel_words(machine: Machine) -> str:
 
 def balls(machine: Machine) -> Text:
     """Balls in their seats, by what holds them."""
-    held = machine.record["holding"]["balls"]
-    magnets = [one for one in held if one["by"] == "magnet" and one["ball"] in machine.sizes]
-    strongest = max(magnets, default=None, key=_force)
-    mass = machine.record["drive"]["mass_g"] / G_PER_KG
+    held = machine.record.holding.balls
+    magnets = [one for one in held if one.by == "magnet" and one.ball in machine.sizes]
+    strongest = max(magnets, default=None, key=lambda one: one.force_available_n)
+    mass = machine.record.drive.mass_g / G_PER_KG
     return Text(
         lines(
             "Clean the balls with alcohol. Touch them only with gloves from now on.",
-            "Push the caps into their seats, too." if machine.record.get("caps") else "",
+            "Push the caps into their seats, too." if machine.record.caps else "",
             "Put each into the seat with its number on the back, in any order. balls.csv lists "
             "the balls "
             "by number."
             if strongest
             else "Put a small drop of glue into the well of each seat, none on the pads, and the "
             "ball on it.",
-            f"The magnet of ball {strongest['ball']} pulls with {_force(strongest):.0f} N: let "
-            f"the ball "
-            "down by hand, and keep fingers off the edge of the cup."
+            f"The magnet of ball {strongest.ball} pulls with {strongest.force_available_n:.0f} N: "
+            "let the ball down by hand, and keep fingers off the edge of the cup."
             if strongest
             else "",
         ),
         lines(
             *(
-                f"{_ball(machine, one['ball'])} in seat {one['ball']}."
+                f"{_ball(machine, one.ball)} in seat {one.ball}."
                 for one in held
-                if one["ball"] in machine.sizes
+                if one.ball in machine.sizes
             ),
             "Each touches its three pads and does not rock. It stays in its seat when the base is "
             "turned "
@@ -189,7 +187,3 @@ def balls(machine: Machine) -> Text:
 
 def _ball(machine: Machine, number: int) -> str:
     return machine.ref(f"ball {machine.sizes[number]}").capitalize()
-
-
-def _force(one: dict[str, float]) -> float:
-    return float(one.get("force_available_n") or 0.0)

@@ -14,15 +14,13 @@ HOLES = "plate_holes.csv"
 
 def shop(machine: Machine) -> Text:
     """Plate and uprights as drawn."""
-    drawings = {one["part"]: one["pdf"] for one in machine.record.get("drawings", [])}
-    stock = machine.record["frame_stock"]
-    plate, upright = drawings.get(stock["plate"]), drawings.get(stock["upright"])
-    length = stock["uprights_cut_to_mm"]
+    stock = machine.record.frame_stock
+    plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
+    length = stock.uprights_cut_to_mm
     return Text(
         lines(
-            f"Drill the plate {machine.ref(stock['plate'])} by {plate or HOLES} and tap M5 "
-            f"through.",
-            f"Saw both uprights {machine.ref(stock['upright'])} to {length:.1f} mm"
+            f"Drill the plate {machine.ref(stock.plate)} by {plate or HOLES} and tap M5 through.",
+            f"Saw both uprights {machine.ref(stock.upright)} to {length:.1f} mm"
             + (f" ({upright})" if upright else "")
             + ": they are mounted later.",
             "Deburr all edges.",
@@ -37,7 +35,7 @@ def shop(machine: Machine) -> Text:
 
 def _blackened(machine: Machine) -> str:
     """Which purchased parts must be matt black; it is done before they are mounted."""
-    named = [one["name"] for one in machine.record["bought"] if one.get("finish")]
+    named = [one.name for one in machine.record.bought if one.finish]
     if not named:
         return ""
     words = ", ".join(name.replace("_", " ") for name in named)
@@ -70,9 +68,9 @@ def frame(machine: Machine) -> Text:
 def _nuts_by_slot(machine: Machine) -> str:
     """How many T-nuts each upright has in its front slot and in its back one."""
     nuts = [
-        np.array(one["along"]) @ machine.record["frame"]["axis"]
+        np.array(one.along) @ machine.record.frame.axis
         for one in machine.fasteners
-        if machine.kind(one["part"]) == "tnuts"
+        if machine.kind(one.part) == "tnuts"
     ]
     # Screws go in from the front against the axis, which leans from the uprights to the camera.
     front = sum(along < 0 for along in nuts)
@@ -141,7 +139,7 @@ def shaft(machine: Machine) -> Text:
 
 def motor(machine: Machine) -> Text:
     """The motor, with belt, or straight on the shaft."""
-    drive = machine.record["drive"]
+    drive = machine.record.drive
     pinion = machine.has("pinion")
     return Text(
         lines(
@@ -161,15 +159,15 @@ def motor(machine: Machine) -> Text:
             else "",
         ),
         lines(
-            f"The axes of motor and base are {drive['belt_centre_mm']:.1f} mm apart."
+            f"The axes of motor and base are {drive.belt_centre_mm:.1f} mm apart."
             if pinion
             else "",
             f"A free side of the belt, plucked like a string, sounds at "
-            f"{drive['belt_tone_hz']:.0f} Hz "
-            f"(a tuner app; a pull of {drive['belt_tension_n']:.0f} N)."
+            f"{drive.belt_tone_hz:.0f} Hz "
+            f"(a tuner app; a pull of {drive.belt_tension_n:.0f} N)."
             if pinion
             else "",
-            f"{drive['ratio']:g} turns of the motor turn the base once."
+            f"{drive.ratio:g} turns of the motor turn the base once."
             if pinion
             else "Turned by hand, the base takes the motor's shaft along and does not slip on it.",
         ),
@@ -194,14 +192,14 @@ def _pinion(machine: Machine) -> str:
 
 def homing(machine: Machine) -> Text:
     """Switch, bracket and the zero pin."""
-    home = machine.record["home"]
+    home = machine.record.home
     return Text(
         lines(
             "Screw the switch on its bracket, the roller toward the axis. Screw the bracket on "
             "the head's "
             "side.",
             "Turn the base by hand until the marks of disc and head are in line, and push the "
-            f"zero pin {machine.ref(home['pin'])} from behind through the head into the disc. That "
+            f"zero pin {machine.ref(home.pin)} from behind through the head into the disc. That "
             "is base angle zero.",
             "Leave the zero pin in until the motor holds the base: without both, the base turns "
             "down and its balls strike what stands below."
@@ -211,6 +209,6 @@ def homing(machine: Machine) -> Text:
         lines(
             f"The zero pin of {PIN_MM:g} mm goes through head and disc without force.",
             f"Turned by hand against the arrow, the base clicks the switch at about "
-            f"{abs(home['switch_deg']):.0f} degrees from zero.",
+            f"{abs(home.switch_deg):.0f} degrees from zero.",
         ),
     )

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from tbcad.prototype.assembly_steps.machine import Machine, Record
+from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.text import Text, lines
 from tbcad.prototype.frame.camera_mount import GAP_MM
+from tbcad.records.prototype_light import LampsRecord
 
 DIGITAL = "digital"
 MA_PER_A = 1000.0
@@ -13,26 +14,27 @@ OWN_WIRES = ("motor", "supply")  # lines whose way is told instead of an output
 
 def lamps(machine: Machine) -> Text:
     """Stands, holders and strips."""
-    light: Record = machine.record["lamps"]
+    light = machine.record.lamps
+    assert light is not None
     return Text(
         lines(
             _lamp_mounts(light),
-            f"Cut the strip {machine.ref(light['strip'])} at its marks: {light['strips']} pieces "
+            f"Cut the strip {machine.ref(light.strip)} at its marks: {light.strips} pieces "
             f"of "
-            f"{light['length_mm']:.0f} mm for each of the {len(light['places'])} lamps"
-            f"{_lamp_drawing(machine)}. Solder a cable to each piece, plus to plus.",
+            f"{light.length_mm:.0f} mm for each of the {len(light.places)} lamps"
+            f"{_lamp_drawing(machine, light.strip)}. Solder a cable to each piece, plus to plus.",
             "Stick them on the lamps' faces, toward the object.",
         ),
         lines(
-            f"At 24 V all of them light up and draw {light['current_ma']:.0f} mA together.",
+            f"At 24 V all of them light up and draw {light.current_ma:.0f} mA together.",
             "All of them shine at the object, and stand alike on both sides of it.",
         ),
     )
 
 
-def _lamp_mounts(light: Record) -> str:
+def _lamp_mounts(light: LampsRecord) -> str:
     """How stands and holders are screwed on."""
-    if light["level"]:
+    if light.level:
         return (
             "Screw the bridge's feet on the plate with washers, on both sides of the camera's "
             "place; the plate's drawing says which holes are theirs. Screw the bar on the fronts "
@@ -45,16 +47,15 @@ def _lamp_mounts(light: Record) -> str:
     )
 
 
-def _lamp_drawing(machine: Machine) -> str:
+def _lamp_drawing(machine: Machine, strip: str) -> str:
     """Name of the strips' drawing, in brackets."""
-    strip = machine.record["lamps"]["strip"]
-    names = [one["pdf"] for one in machine.record.get("drawings", []) if one["part"] == strip]
-    return f" ({names[0]})" if names else ""
+    drawing = machine.record.drawing_of(strip)
+    return f" ({drawing})" if drawing else ""
 
 
 def stage(machine: Machine) -> Text:
     """The object's stage with its LEDs."""
-    leds = machine.record["leds"]
+    leds = machine.record.leds
     return Text(
         lines(
             f"Solder two wires to each of the {len(leds)} LEDs, long one to anode, and mark the "
@@ -71,7 +72,7 @@ def stage(machine: Machine) -> Text:
         ),
         lines(
             "The disc lies flat, comes off by hand and fits turned by 180 degrees.",
-            *(_led_place(number, one["position_mm"]) for number, one in enumerate(leds, 1)),
+            *(_led_place(number, one.position_mm) for number, one in enumerate(leds, 1)),
             "The post does not turn in its clamp." + _plug(machine),
             "The base passes the stage without touching it, over its whole travel by hand; then "
             "the zero pin is in again.",
@@ -90,7 +91,7 @@ def _led_place(number: int, position: Sequence[float]) -> str:
 
 
 def _plug(machine: Machine) -> str:
-    return " A plug on the wires lets it be taken out." if machine.record["leds"] else ""
+    return " A plug on the wires lets it be taken out." if machine.record.leds else ""
 
 
 def camera(machine: Machine) -> Text:
@@ -152,7 +153,7 @@ def wiring(machine: Machine) -> Text:
 
 def _no_lamps(machine: Machine) -> str:
     """Where the light comes from in a design that has no place for lamps."""
-    if machine.record.get("lamps"):
+    if machine.record.lamps:
         return ""
     return (
         "This design has no place for lamps of its own, and none are in the list: buy two small "
@@ -182,9 +183,9 @@ def _line(machine: Machine, row: dict[str, str]) -> str:
 
 def zero(machine: Machine) -> Text:
     """Settings, homing and the trim."""
-    drive, home = machine.record["drive"], machine.record["home"]
-    current = drive["hold_current_a"]
-    homes = machine.record["controller"]["firmware"] == "grblhal"
+    drive, home = machine.record.drive, machine.record.home
+    current = drive.hold_current_a
+    homes = machine.record.controller.firmware == "grblhal"
     return Text(
         lines(
             f"Set the driver to the motor's rated current{_rated(machine)} while it turns, and "
@@ -220,11 +221,11 @@ def zero(machine: Machine) -> Text:
             "switch is pressed by hand, and only then."
             if homes
             else "",
-            f"Homed, the base stops at {home['homed_deg']:.1f} degrees, again and again."
+            f"Homed, the base stops at {home.homed_deg:.1f} degrees, again and again."
             if homes
             else "",
             "Sent to zero, the zero pin goes in: the error is at most "
-            f"{home['zero_error_deg']:.1f} "
+            f"{home.zero_error_deg:.1f} "
             f"degrees.",
         ),
     )
@@ -232,16 +233,16 @@ def zero(machine: Machine) -> Text:
 
 def _without_power(machine: Machine) -> str:
     """What happens when the supply fails with the pin out."""
-    off = machine.record.get("power_off")
-    if not off or not off["fall_energy_j"]:
+    off = machine.record.power_off
+    if not off.fall_energy_j:
         return ""
     return (
         "Nothing but the motor's current holds the base while the pin is out. If the supply fails, "
-        f"the base falls and strikes the end of its travel with up to {off['fall_energy_j']:.1f} J "
-        f"at {off['fall_speed_deg_s']:.0f} degrees a second: keep hands out of its way, and use an "
+        f"the base falls and strikes the end of its travel with up to {off.fall_energy_j:.1f} J "
+        f"at {off.fall_speed_deg_s:.0f} degrees a second: keep hands out of its way, and use an "
         "uninterruptible supply for controller and motor. The pin bears "
-        f"{off['pin_force_n']:.0f} N of gravity at most, {off['pin_pressure_mpa']:.1f} MPa in its "
-        f"printed hole ({off['pin_pressure_limit_mpa']:.0f} are allowed)."
+        f"{off.pin_force_n:.0f} N of gravity at most, {off.pin_pressure_mpa:.1f} MPa in its "
+        f"printed hole ({off.pin_pressure_limit_mpa:.0f} are allowed)."
     )
 
 
@@ -253,8 +254,9 @@ def _rated(machine: Machine) -> str:
 
 def gauge(machine: Machine) -> Text:
     """The camera's alignment by the gauge."""
-    place: Record = machine.record["camera_place"]
-    sizes, error, travel = place["lengths_mm"], place["error"], place["travel"]
+    place = machine.record.camera_place
+    assert place is not None
+    sizes, error, travel = place.lengths_mm, place.error, place.travel
     return Text(
         lines(
             "Take the stage's post out of its clamp. Measure the gauge: both widths between the "
@@ -283,39 +285,39 @@ def gauge(machine: Machine) -> Text:
             "off later: the fence brings it back.",
         ),
         lines(
-            f"Before sanding: near_width {sizes['near_width']:.2f}, far_width "
-            f"{sizes['far_width']:.2f}, "
-            f"hub_to_near {sizes['hub_to_near']:.2f}, hub_to_far {sizes['hub_to_far']:.2f}, "
+            f"Before sanding: near_width {sizes.near_width:.2f}, far_width "
+            f"{sizes.far_width:.2f}, "
+            f"hub_to_near {sizes.hub_to_near:.2f}, hub_to_far {sizes.hub_to_far:.2f}, "
             f"hub_to_pinhole "
-            f"{sizes['hub_to_pinhole']:.2f} mm.",
+            f"{sizes.hub_to_pinhole:.2f} mm.",
             *(
-                f"Base at {one['base_angle_deg']:.0f} degrees: the {one['side']} mark appears at "
+                f"Base at {one.base_angle_deg:.0f} degrees: the {one.side} mark appears at "
                 f"column "
-                f"{one['column_px']:.0f}, row {one['row_px']:.0f}."
-                for one in place["pictures"]
+                f"{one.column_px:.0f}, row {one.row_px:.0f}."
+                for one in place.pictures
             ),
-            f"The pinhole is then known to {error['along_mm']:.2f} mm along, "
-            f"{error['across_mm']:.2f} across "
-            f"and {error['out_mm']:.2f} out.",
+            f"The pinhole is then known to {error.along_mm:.2f} mm along, "
+            f"{error.across_mm:.2f} across "
+            f"and {error.out_mm:.2f} out.",
         ),
         lines(
-            f"Travel: along {travel['along_axis_mm']:g} mm, across {travel['across_mm']:g}, out "
-            f"{travel['out_mm']:g}, yaw {travel['yaw_deg']:.0f} degrees, roll "
-            f"{travel['roll_deg']:.0f}, pitch "
-            f"{travel['pitch_deg']:.0f}"
+            f"Travel: along {travel.along_axis_mm:g} mm, across {travel.across_mm:g}, out "
+            f"{travel.out_mm:g}, yaw {travel.yaw_deg:.0f} degrees, roll "
+            f"{travel.roll_deg:.0f}, pitch "
+            f"{travel.pitch_deg:.0f}"
         ),
     )
 
 
 def shroud(machine: Machine) -> Text:
     """The box of card."""
-    panels = machine.record["shroud"]["panels"]
+    box = machine.record.shroud
+    assert box is not None
     return Text(
         lines(
             *(
-                f"Cut {one['dxf']}: {one['what']}, {one['size_mm'][0]:.0f} x "
-                f"{one['size_mm'][1]:.0f} mm."
-                for one in panels
+                f"Cut {one.dxf}: {one.what}, {one.size_mm[0]:.0f} x {one.size_mm[1]:.0f} mm."
+                for one in box.panels
             ),
             "Lay the floor under the plate first; cables go out through the notch of the back.",
             "Score the dashed lines. Fold the flaps of front, back and right side "
@@ -332,9 +334,9 @@ def shroud(machine: Machine) -> Text:
 
 def first(machine: Machine) -> Text:
     """The program's first run."""
-    phases = machine.record["controller"]["phases"]
-    low, high = machine.record["swing_deg"]
-    names = ", ".join(one["name"].replace("_", " ") for one in phases)
+    phases = machine.record.controller.phases
+    low, high = machine.record.swing_deg
+    names = ", ".join(one.name.replace("_", " ") for one in phases)
     return Text(
         lines(
             "Object on the disc, shroud closed. tbcad run drives machine and camera and keeps the "

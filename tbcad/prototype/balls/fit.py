@@ -16,6 +16,7 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
     coverable,
 )
+from tbcad.records.prototype import Alternative
 from tbcad.spec.design import Spec
 from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Bools, Floats, Ints
@@ -86,8 +87,8 @@ def _pixels(array: MirrorArray, outline: Floats) -> Floats:
 
 def ball_alternatives(
     spec: Spec, array: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
-) -> list[dict[str, Any]]:
-    """What each rule costs, for groups of camera a's mirrors: records for prototype.json.
+) -> tuple[Alternative, ...]:
+    """What each rule costs, for groups of camera a's mirrors.
 
     pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
     within the moved cells, and mirrors_below_target counts those whose coverage is less.
@@ -109,16 +110,18 @@ def ball_alternatives(
         other = choose_balls(candidates, ruled, balls.catalogue)
         return other, ball_fit(candidates, other, ruled)
 
-    return [_record(name, *alternative(rule), target) for name, rule in SELECTION_RULES.items()]
+    return tuple(
+        _record(name, *alternative(rule), target) for name, rule in SELECTION_RULES.items()
+    )
 
 
-def _record(name: str, balls: Balls, fit: BallFit, target: float) -> dict[str, Any]:
-    return {
-        "name": name,
-        "pixels": float(fit.pixels.sum()),
-        "pixels_kept_share": fit.kept_share,
-        "coverage_mm": float(fit.coverage.min()),
-        "mirrors_below_target": int((fit.coverage < target - COVERAGE_ROUNDING_MM).sum()),
-        "balls_mass_g": float(balls.mass_g.sum()),
-        "caps": int(balls.cap.sum()),
-    }
+def _record(name: str, balls: Balls, fit: BallFit, target: float) -> Alternative:
+    return Alternative(
+        name=name,
+        pixels=float(fit.pixels.sum()),
+        pixels_kept_share=fit.kept_share,
+        coverage_mm=float(fit.coverage.min()),
+        mirrors_below_target=int((fit.coverage < target - COVERAGE_ROUNDING_MM).sum()),
+        balls_mass_g=float(balls.mass_g.sum()),
+        caps=int(balls.cap.sum()),
+    )

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from tbcad.prototype.balls.stops import (
     stop_requests,
 )
 from tbcad.prototype.suitable import check_suitable
+from tbcad.records.prototype import Alternative
 from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MOST_BALLS
 from tbcad.types import Floats, Ints
@@ -113,7 +113,7 @@ class PrototypeLayout:
         return float(np.ptp(self.placement.azimuth))
 
     @cached_property
-    def alternatives(self) -> list[dict[str, Any]]:
+    def alternatives(self) -> tuple[Alternative, ...]:
         """What each rule to choose the balls costs, as of `ball_alternatives`."""
         return ball_alternatives(self.spec, self.array, self.groups, self.balls, self.fit)
 

@@ -5,46 +5,18 @@ to where its centre of gravity is lowest, or strikes what stands in its way at a
 """
 
 import math
-from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from tbcad.prototype.base.hub import ZERO_DISC_MM
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.homing.sizes import PIN_MM, PIN_OUT_MM
+from tbcad.records.prototype_drive import PowerOff
 
 # Permitted of a printed hole round a pin, as below the heads of screws; of a rod of hardened steel
 # in shear: 0.4 of a proof stress of 580 MPa (8.8), which such a rod exceeds.
 PRESSURE_LIMIT_MPA, SHEAR_LIMIT_MPA = 20.0, 230.0
 MJ_PER_J, KG_M2 = 1e3, 1e-9  # KG_M2: of a gram millimetre squared
-
-
-@dataclass(frozen=True)
-class PowerOff:
-    """The base without power.
-
-    Attributes:
-        fall_energy_j: energy with which it reaches an end of its travel, at most; without
-            friction, zero where the drive holds it or it swings below both ends.
-        fall_speed_deg_s: its speed there.
-        pin_force_n: force on the zero pin under the largest torque of gravity at any angle.
-        pin_shear_mpa: shear in the pin.
-        pin_shear_limit_mpa: permitted.
-        pin_pressure_mpa: pressure of the pin on its hole in the zero disc.
-        pin_pressure_limit_mpa: permitted.
-    """
-
-    fall_energy_j: float
-    fall_speed_deg_s: float
-    pin_force_n: float
-    pin_shear_mpa: float
-    pin_shear_limit_mpa: float
-    pin_pressure_mpa: float
-    pin_pressure_limit_mpa: float
-
-    def record(self) -> dict[str, float]:
-        """Its section of prototype.json."""
-        return asdict(self)
 
 
 def power_off(balance: BaseBalance, low: float, high: float, *, holds_itself: bool) -> PowerOff:

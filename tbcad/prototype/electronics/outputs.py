@@ -8,25 +8,13 @@ Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
 
 from dataclasses import dataclass
 
+from tbcad.records.prototype_drive import Phase
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MotionSpec
 
 LAMP_OUTPUT, LAMP = 0, "lamp"
 MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most
 DARK, LIT = "dark", "lit"
-
-
-@dataclass(frozen=True)
-class Phase:
-    """One photograph of a stop.
-
-    Attributes:
-        name: "dark", the name of an LED, or "lit".
-        output: digital output that is on; None: no output is.
-    """
-
-    name: str
-    output: int | None
 
 
 @dataclass(frozen=True)
@@ -64,7 +52,7 @@ def phases(leds: int, motion: MotionSpec) -> tuple[Phase, ...]:
         SpecError: when no controller has so many outputs.
     """
     if not (switched := lights(leds, motion)):
-        return (Phase(LIT, None),)
+        return (Phase(name=LIT, output=None),)
     lamp, *others = switched
-    alone = [Phase(light.name, light.output) for light in others]
-    return (Phase(DARK, None), *alone, Phase(LIT, lamp.output))
+    alone = [Phase(name=light.name, output=light.output) for light in others]
+    return (Phase(name=DARK, output=None), *alone, Phase(name=LIT, output=lamp.output))

@@ -4,14 +4,10 @@ import numpy as np
 
 from tbcad.formats.csv_table import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.records.tables import BallRow
 from tbcad.types import Floats
 
-COLUMNS = (
-    *("number", "kind", "size", "diameter_mm", "grade", "standard", "mass_g"),
-    *("radius_mm", "body_radius_mm", "polar_deg", "azimuth_deg"),
-    *("px", "py", "pz", "nx", "ny", "nz", "cx", "cy", "cz", "bx", "by", "bz"),
-    *("mirrors", "pixels", "pixels_shell", "coverage_mm", "coverage_fixed_mm", "error_deg"),
-)
+COLUMNS = BallRow.columns()
 
 
 def ball_rows(layout: PrototypeLayout) -> list[Row]:

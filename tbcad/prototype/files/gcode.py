@@ -19,7 +19,8 @@ from pathlib import Path
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import StopSequence, home_angles, stop_sequence
-from tbcad.prototype.electronics.outputs import LIT, Phase, phases
+from tbcad.prototype.electronics.outputs import LIT, phases
+from tbcad.records.prototype_drive import Phase
 from tbcad.spec.prototype import MotionSpec
 
 MAX_LINE_LENGTH = 79

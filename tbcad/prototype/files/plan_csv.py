@@ -11,15 +11,9 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.loads import DriveLoads
 from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.records.tables import PictureRow, StopRow
 
-PICTURE_COLUMNS = (
-    *("order", "object_turn_deg", "stop", "base_angle_deg", "ball", "mirror"),
-    *("polar_error_deg", "azimuth_error_deg", "error_deg"),
-)
-STOP_COLUMNS = (
-    *("stop", "base_angle_deg", "mirrors", "balls", "azimuth_error_deg", "error_deg"),
-    *("torque_nmm", "wind_up_deg"),
-)
+PICTURE_COLUMNS, STOP_COLUMNS = PictureRow.columns(), StopRow.columns()
 HOLE_COLUMNS = ("hole", "x_mm", "y_mm", "thread", "holds")
 THREAD = "M5"
 

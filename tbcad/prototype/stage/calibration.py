@@ -8,6 +8,7 @@ from tbcad.geometry.vectors import unit
 from tbcad.mirrors.array import MirrorArray
 from tbcad.optics.reflection import reflection_points
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
+from tbcad.records.prototype import CentreEstimate
 from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats, Ints
 
@@ -29,15 +30,15 @@ class CalibrationEstimate:
     worst: Floats
     across: Floats
 
-    def record(self) -> dict[str, float]:
-        """Figures for prototype.json, micrometres."""
-        return {
-            "noise_px": NOISE_PX,
-            "leds_seen_min": int(self.seen.min()),
-            "centre_um_median": round(1000 * float(np.median(self.worst)), 3),
-            "centre_um_95": round(1000 * float(np.percentile(self.worst, 95)), 3),
-            "across_um_median": round(1000 * float(np.median(self.across)), 3),
-        }
+    def record(self) -> CentreEstimate:
+        """Figures for prototype.json."""
+        return CentreEstimate(
+            noise_px=NOISE_PX,
+            leds_seen_min=int(self.seen.min()),
+            centre_um_median=round(1000 * float(np.median(self.worst)), 3),
+            centre_um_95=round(1000 * float(np.percentile(self.worst, 95)), 3),
+            across_um_median=round(1000 * float(np.median(self.across)), 3),
+        )
 
 
 def calibration_estimate(

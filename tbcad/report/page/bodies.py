@@ -1,6 +1,5 @@
 """What the 3D view shows: the shells, drawn from the record, and the bodies of prototype.glb."""
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ from tbcad.cad.mesh import Mesh
 from tbcad.geometry.ellipsoid import Ellipsoid
 from tbcad.geometry.vectors import norm
 from tbcad.optics.surfaces import Surfaces
+from tbcad.records.prototype import NAME, Prototype
 from tbcad.report.page.packing import PackedArrays
 from tbcad.shell.cell_middles import means, middles
 from tbcad.shell.envelope import closing_envelope
@@ -148,8 +148,8 @@ def camera_distance(export: ExportedDesign) -> float:
 
 def prototype_bodies(folder: Path) -> Iterator[Body]:
     """All bodies of prototype.glb, in millimetres and z up."""
-    record = json.loads((folder / "prototype.json").read_text(encoding="utf-8"))
-    drawn = list(_drawn(folder / record["assembly"]["glb"]))
+    record = Prototype.read(folder / NAME)
+    drawn = list(_drawn(folder / record.assembly.glb))
     turning = _turning(record)
     apart = _apart(record, drawn)
     for name, group, points, faces, colour in drawn:
@@ -197,27 +197,25 @@ def _drawn(
         yield name, group, np.asarray(points), np.asarray(mesh.faces), colour
 
 
-def _turning(record: Record) -> set[str]:
+def _turning(record: Prototype) -> set[str]:
     """Names of the bodies that turn with the base."""
-    parts = {part["name"] for part in record["parts"] if part["role"] in ("base", "cap")}
-    balls = {f"ball_{seat['ball']}" for seat in record["seats"]}
-    others = [*record.get("bought", ()), *record.get("fasteners", ())]
-    return parts | balls | {one["name"] for one in others if one.get("turns")}
+    parts = {part.name for part in record.with_role("base", "cap")}
+    balls = {f"ball_{seat.ball}" for seat in record.seats}
+    bought = {one.name for one in record.bought if one.turns}
+    return parts | balls | bought | {one.name for one in record.fasteners if one.turns}
 
 
-def _apart(record: Record, drawn: list[Any]) -> Mapping[str, Floats]:
+def _apart(record: Prototype, drawn: list[Any]) -> Mapping[str, Floats]:
     """By how much each body is moved in the exploded view, mm, (3,)."""
-    radius = record["target_mm"] / 2
-    seats = {f"ball_{seat['ball']}": np.array(seat["axis"]) for seat in record["seats"]}
-    for part in record["parts"]:
-        if part["role"] == "cap":
-            seats[part["name"]] = seats[f"ball_{part['ball']}"]
+    radius = record.target_mm / 2
+    seats = {f"ball_{seat.ball}": np.array(seat.axis) for seat in record.seats}
+    seats |= {part.name: seats[f"ball_{part.ball}"] for part in record.with_role("cap")}
     moved = {}
     for name, group, points, *_ in drawn:
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         away = APART * middle if group in STATIC else np.zeros(3)
         moved[name] = away - LIFTED * radius * seats.get(name, np.zeros(3))
-    for one in record.get("fasteners", ()):
-        held = moved.get(one["through"][0] if one["through"] else "", np.zeros(3))
-        moved[one["name"]] = held - FASTENER_MM * np.array(one["along"])
+    for one in record.fasteners:
+        held = moved.get(one.through[0] if one.through else "", np.zeros(3))
+        moved[one.name] = held - FASTENER_MM * np.array(one.along)
     return moved

@@ -6,46 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tbcad.formats.checked_files import Finite, columns, read_csv
-from tbcad.formats.checked_files import Record as Row
+from tbcad.formats.checked_files import columns
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow
 from tbcad.report.page.packing import PackedArrays
 from tbcad.report.page.verdict import Verdict
-from tbcad.simulate.scene.exported import MISSING, MirrorColumns, PoseColumns
 from tbcad.types import Floats
 
 UM_PER_MM = 1000.0
-PLAN, BALLS = "rotation_plan.csv", "balls.csv"
-
-
-class MirrorRow(MirrorColumns):
-    """A row of mirrors.csv."""
-
-    id: str
-    size_mm: Finite
-    polar_deg: Finite
-    azimuth_deg: Finite
-    cell_area_mm2: Finite
-    coverage_mm: Finite
-
-
-class PlanRow(Row):
-    """A row of rotation_plan.csv."""
-
-    object_turn_deg: Finite
-    stop: int
-    base_angle_deg: Finite
-    ball: int
-    mirror: str
-    error_deg: Finite
-
-
-class BallRow(PoseColumns):
-    """A row of balls.csv."""
-
-    number: int
-    kind: str
-    size: str
-    radius_mm: Finite
 
 
 class Quantity(NamedTuple):
@@ -72,7 +39,7 @@ class Quantity(NamedTuple):
 
 def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) -> dict[str, Any]:
     """All mirrors of both cameras for the page, with the prototype's balls if there are any."""
-    rows = read_csv(folder / "mirrors.csv", MirrorRow, MISSING)
+    rows = MirrorRow.read(folder)
     plan = _plan(folder)
     quantities = [*_verified(rows, verdict), *_designed(rows), *_pointing(rows, plan)]
     known = [one for one in quantities if np.isfinite(one.values).any()]
@@ -126,7 +93,7 @@ def _designed(rows: Sequence[MirrorRow]) -> Iterator[Quantity]:
     yield Quantity("azimuth", "Azimuth about the axis", "°", 2, column("azimuth_deg"), False)
 
 
-def _pointing(rows: Sequence[MirrorRow], plan: Mapping[str, PlanRow]) -> Iterator[Quantity]:
+def _pointing(rows: Sequence[MirrorRow], plan: Mapping[str, PictureRow]) -> Iterator[Quantity]:
     found = (plan.get(row.id) for row in rows)
     values = np.array([np.nan if one is None else one.error_deg for one in found])
     yield Quantity("pointing", "Prototype: direction off by", "°", 2, values)
@@ -144,15 +111,14 @@ def _packed(quantity: Quantity, arrays: PackedArrays) -> dict[str, Any]:
     }
 
 
-def _plan(folder: Path) -> dict[str, PlanRow]:
+def _plan(folder: Path) -> dict[str, PictureRow]:
     """The photograph of each mirror by its ball; none without a prototype."""
-    if not (folder / PLAN).is_file():
+    if not (folder / PictureRow.FILE).is_file():
         return {}
-    rows = read_csv(folder / PLAN, PlanRow, MISSING)
-    return {row.mirror: row for row in rows}
+    return {row.mirror: row for row in PictureRow.read(folder)}
 
 
-def _photograph(row: PlanRow | None) -> list[float] | None:
+def _photograph(row: PictureRow | None) -> list[float] | None:
     """Ball, stop, angle of the base and turn of the object, degrees."""
     if row is None:
         return None
@@ -168,5 +134,5 @@ def _balls(folder: Path) -> list[dict[str, Any]]:
             "normal": [ball.nx, ball.ny, ball.nz],
             "radius": ball.radius_mm,
         }
-        for ball in read_csv(folder / BALLS, BallRow, MISSING)
+        for ball in BallRow.read(folder)
     ]

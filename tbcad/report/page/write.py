@@ -15,13 +15,14 @@ from tbcad.output.manifest import (
     MANIFEST,
     REPORT,
     REPORT_BEGIN,
-    Manifest,
     is_listed,
     is_report,
     read_manifest,
 )
 from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom_view import read_parts_list
+from tbcad.records.design import MISSING
+from tbcad.records.manifest import Manifest
 from tbcad.report.page import bodies, mirrors
 from tbcad.report.page.packing import PackedArrays
 from tbcad.report.page.parts_list import files_html, parts_html
@@ -33,7 +34,7 @@ from tbcad.report.page.verdict import (
     read_verdict,
     verdict_html,
 )
-from tbcad.simulate.scene.exported import MISSING, ExportedDesign, read_export
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.web_page import web_page
 
 MAX_BYTES = 6_000_000

@@ -8,34 +8,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field
 
-from tbcad.formats.checked_files import Record, Vector, read_json
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.prototype.plan import MISSING, RECORD, SCHEMA
+from tbcad.records.prototype import NAME, Prototype
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.types import Floats
 
 TILES = (2, 5)  # across and along a lamp's face
 EXPOSED = 99.0  # percentile of the light on the object that a photograph shows as white
 UP = np.array([0.0, 0.0, 1.0])
-
-
-class _Place(Record):
-    position_mm: Vector
-    direction: Vector
-
-
-class _Lamps(Record):
-    width_mm: float = Field(gt=0, le=1000)
-    length_mm: float = Field(gt=0, le=1000)
-    level: bool = False
-    lumen_each: float = Field(gt=0, le=1e6)
-    places: list[_Place] = Field(min_length=1, max_length=100)
-
-
-class _Document(Record):
-    lamps: _Lamps | None = None
 
 
 @dataclass(frozen=True)
@@ -74,7 +55,7 @@ def read_lamps(folder: Path) -> Lamps | None:
     Raises:
         InputError: the record cannot be read.
     """
-    found = read_json(folder / RECORD, _Document, SCHEMA, MISSING).lamps
+    found = Prototype.read(folder / NAME).lamps
     if found is None:
         return None
     places = np.array([place.position_mm for place in found.places])

@@ -2,71 +2,24 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import (
-    REBUILD,
-    Finite,
-    Record,
-    Vector,
-    columns,
-    read_csv,
-    read_json,
-)
+from tbcad.formats.checked_files import REBUILD, columns
 from tbcad.geometry.rotations import rotated
 from tbcad.geometry.vectors import norm
-from tbcad.simulate.scene.exported import ROUNDING, ExportedDesign, PoseColumns
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.tables import BallRow, PictureRow
+from tbcad.simulate.scene.exported import ROUNDING, ExportedDesign
 from tbcad.types import Floats, Ints
 
-SCHEMA = "tbcad-prototype/2"
-RECORD, BALLS, PLAN = "prototype.json", "balls.csv", "rotation_plan.csv"
-MISSING = "build the prototype too, tbcad build"
 # Of lengths in mm after rounding in a text file.
 ROUNDING_MM = 1e-6
 APEX, NORMAL = "px py pz", "nx ny nz"
 ERROR_DEG = 1e-6
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
 """Factors that turn points and vectors by 180 degrees about z."""
-
-Length = Annotated[float, Field(gt=0, le=1e6)]
-
-
-class _Frame(Record):
-    axis: Vector
-    zero: Vector
-    third: Vector
-
-
-class _Ball(PoseColumns):
-    number: int
-    radius_mm: Length
-    body_radius_mm: Length
-    cx: Finite
-    cy: Finite
-    cz: Finite
-    bx: Finite
-    by: Finite
-    bz: Finite
-
-
-class _Document(Record):
-    camera: Literal["a"]
-    picture: Literal["moved", "fixed"]
-    frame: _Frame
-    balls: Literal["balls.csv"]
-
-
-class _Picture(Record):
-    object_turn_deg: Finite
-    stop: int = Field(ge=1, le=1_000_000)
-    base_angle_deg: float = Field(ge=-360, le=360)
-    ball: int = Field(ge=1)
-    mirror: str = Field(pattern=r"^[ab]\d{4,8}$")
-    error_deg: Finite
 
 
 @dataclass(frozen=True)
@@ -118,10 +71,11 @@ def read_plan(exported: ExportedDesign) -> Plan:
     Raises:
         InputError: there is none, or what it says cannot be.
     """
-    record, table, plan_file = (exported.folder / name for name in (RECORD, BALLS, PLAN))
-    document = read_json(record, _Document, SCHEMA, MISSING)
-    balls = read_csv(table, _Ball, MISSING)
-    pictures = read_csv(plan_file, _Picture, MISSING)
+    record, table, plan_file = (
+        exported.folder / name for name in (NAME, BallRow.FILE, PictureRow.FILE)
+    )
+    document = Prototype.read(record)
+    balls, pictures = BallRow.read(exported.folder), PictureRow.read(exported.folder)
     frame = np.array([document.frame.axis, document.frame.zero, document.frame.third])
     _check_frame(record, exported, frame)
     _check_balls(table, balls)
@@ -159,7 +113,7 @@ def _check_frame(path: Path, exported: ExportedDesign, frame: Floats) -> None:
         )
 
 
-def _check_balls(path: Path, balls: list[_Ball]) -> None:
+def _check_balls(path: Path, balls: list[BallRow]) -> None:
     if not balls:
         raise InputError(f"{path}: no balls, at least one is needed: {REBUILD}")
     number, radius = columns(balls, "number radius_mm").T
@@ -177,7 +131,7 @@ def _check_balls(path: Path, balls: list[_Ball]) -> None:
             raise InputError(f"{path}: ball {int(np.argmax(wrong)) + 1} {what}: {REBUILD}")
 
 
-def _check_pictures(path: Path, pictures: list[_Picture], balls: int) -> None:
+def _check_pictures(path: Path, pictures: list[PictureRow], balls: int) -> None:
     for row, one in enumerate(pictures, 1):
         if one.object_turn_deg not in (0, 180):
             raise InputError(
@@ -190,7 +144,7 @@ def _check_pictures(path: Path, pictures: list[_Picture], balls: int) -> None:
             )
 
 
-def _angles(path: Path, pictures: list[_Picture]) -> Floats:
+def _angles(path: Path, pictures: list[PictureRow]) -> Floats:
     """Base angle at each stop, degrees, (s,)."""
     angles: dict[int, float] = {}
     for one in pictures:
@@ -205,7 +159,7 @@ def _angles(path: Path, pictures: list[_Picture]) -> Floats:
     return angle
 
 
-def _served(path: Path, pictures: list[_Picture], mirrors: int) -> tuple[Ints, Ints]:
+def _served(path: Path, pictures: list[PictureRow], mirrors: int) -> tuple[Ints, Ints]:
     """Ball and stop, from 0, of each mirror of camera a and of camera b, (2, m)."""
     ball_and_stop = np.full((2, 2, mirrors), -1, dtype=np.int64)
     for row, one in enumerate(pictures, 1):
@@ -230,7 +184,7 @@ def _name(camera: int, mirror: int) -> str:
 
 
 def _check_errors(
-    path: Path, pictures: list[_Picture], plan: Plan, exported: ExportedDesign
+    path: Path, pictures: list[PictureRow], plan: Plan, exported: ExportedDesign
 ) -> None:
     """The balls must stand where the plan says: as far from each mirror's direction as it says."""
     said = np.zeros(plan.ball.shape)

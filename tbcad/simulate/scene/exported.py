@@ -1,82 +1,29 @@
 """What an export says of its cameras and mirrors: design.json and mirrors.csv, checked."""
 
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import ConfigDict
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import (
-    REBUILD,
-    Finite,
-    Record,
-    Vector,
-    columns,
-    read_csv,
-    read_json,
-)
+from tbcad.formats.checked_files import REBUILD, Record, columns
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import numbered_directions
-from tbcad.mirrors.record import DESIGN_FILE, MIRRORS_FILE, SCHEMA
 from tbcad.optics.camera import Camera
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.pedestals.cells import pedestal_cells
 from tbcad.optics.pedestals.plan import pedestal_plan
 from tbcad.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.optics.surfaces import Surfaces, planes
+from tbcad.records.design import NAME as DESIGN_FILE
+from tbcad.records.design import CameraRecord, DesignRecord
+from tbcad.records.tables import MirrorRow
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.spec.design import Spec
 from tbcad.types import Floats
 
-MISSING = "name a folder that tbcad build wrote"
 # What is called a unit vector may be off by rounding in a text file.
 ROUNDING = 1e-9
-
-# None for a planar mirror, whose cell is empty.
-Radius = Annotated[
-    Annotated[float, Field(gt=0, allow_inf_nan=False)] | None,
-    BeforeValidator(lambda cell: None if cell == "" else cell),
-]
-
-
-class _Camera(Record):
-    id: Literal["a", "b"]
-    pinhole_mm: Vector
-    forward: Vector
-    right: Vector
-    width_px: int = Field(ge=16, le=32_768)
-    height_px: int = Field(ge=16, le=32_768)
-    hfov_deg: float = Field(ge=1, le=170)
-
-
-class PoseColumns(Record):
-    """Columns of mirrors.csv and balls.csv: a mirror's apex and its normal."""
-
-    px: Finite
-    py: Finite
-    pz: Finite
-    nx: Finite
-    ny: Finite
-    nz: Finite
-
-
-class MirrorColumns(PoseColumns):
-    """Columns of mirrors.csv: a mirror with its direction and its camera."""
-
-    camera: Literal["a", "b"]
-    ux: Finite
-    uy: Finite
-    uz: Finite
-    radius_mm: Radius
-
-
-class _Document(Record):
-    spec: Spec
-    target_mm: float = Field(gt=0, le=1000)
-    foot_z_mm: Finite
-    cameras: tuple[_Camera, _Camera]
-    mirrors: Literal["mirrors.csv"]
 
 
 class ExportedDesign(Record):
@@ -104,11 +51,10 @@ def read_export(folder: Path) -> ExportedDesign:
         InputError: it is none, or what it says cannot be.
     """
     path = folder / DESIGN_FILE
-    document = read_json(path, _Document, SCHEMA, MISSING)
+    document = DesignRecord.read(path)
     if tuple(camera.id for camera in document.cameras) != ("a", "b"):
         raise InputError(f"{path}: cameras are not a and b: {REBUILD}")
-    table = folder / MIRRORS_FILE
-    mirrors = read_csv(table, MirrorColumns, MISSING)
+    table, mirrors = folder / MirrorRow.FILE, MirrorRow.read(folder)
     a, b = (
         _reflector(table, document, camera, [one for one in mirrors if one.camera == camera.id])
         for camera in document.cameras
@@ -119,7 +65,7 @@ def read_export(folder: Path) -> ExportedDesign:
 
 
 def _reflector(
-    path: Path, document: _Document, camera: _Camera, mirrors: list[MirrorColumns]
+    path: Path, document: DesignRecord, camera: CameraRecord, mirrors: list[MirrorRow]
 ) -> Reflector:
     n = document.spec.optics.n
     every, faces = numbered_directions(n, document.spec.optics.stretch)
@@ -151,7 +97,7 @@ def _reflector(
     return Reflector(camera.id, _view(path.with_name(DESIGN_FILE), camera), u, cells)
 
 
-def _surfaces(path: Path, mirrors: list[MirrorColumns]) -> tuple[Floats, Surfaces]:
+def _surfaces(path: Path, mirrors: list[MirrorRow]) -> tuple[Floats, Surfaces]:
     names = "ux uy uz", "px py pz", "nx ny nz"
     u, apex, normal = (columns(mirrors, three) for three in names)
     curvature = np.array([1 / one.radius_mm if one.radius_mm else 0.0 for one in mirrors])
@@ -161,7 +107,7 @@ def _surfaces(path: Path, mirrors: list[MirrorColumns]) -> tuple[Floats, Surface
     return u, Surfaces(apex, normal, curvature)
 
 
-def _view(path: Path, camera: _Camera) -> Camera:
+def _view(path: Path, camera: CameraRecord) -> Camera:
     forward, right = np.array(camera.forward), np.array(camera.right)
     gram = np.array([forward @ forward - 1, right @ right - 1, forward @ right])
     if np.abs(gram).max() > ROUNDING:

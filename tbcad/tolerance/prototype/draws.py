@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import REBUILD, Record, read_csv
-from tbcad.simulate.prototype.plan import MISSING, Plan
+from tbcad.formats.checked_files import REBUILD
+from tbcad.records.tables import StopRow
+from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerance.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerance.montecarlo.error_kinds import Errors
@@ -17,8 +16,6 @@ from tbcad.types import Bools, Floats
 
 # Random streams of a build begin here, beyond those of its shells.
 FIRST_STREAM = 1000
-STOPS = "stops.csv"
-MAX_DEG = 10.0  # far beyond what a build permits
 
 
 @dataclass(frozen=True)
@@ -98,11 +95,6 @@ def _shapes(k: int, t: int) -> dict[str, Shape]:
     }
 
 
-class _WindUpStop(Record):
-    stop: int
-    wind_up_deg: Annotated[float, Field(ge=-MAX_DEG, le=MAX_DEG)]
-
-
 def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
     """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
 
@@ -111,8 +103,8 @@ def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
     Raises:
         InputError: the file is missing, malformed, or of another plan.
     """
-    path = export.folder / STOPS
-    rows = read_csv(path, _WindUpStop, MISSING)
+    path = export.folder / StopRow.FILE
+    rows = StopRow.read(export.folder)
     if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
         raise InputError(
             f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"

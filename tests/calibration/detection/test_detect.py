@@ -17,7 +17,7 @@ from tbcad.calibration.detection.expected import Room, expected_highlights
 from tbcad.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
-from tbcad.runs.exposure import PhaseTimes, exposure_name
+from tbcad.records.exposure import PhaseTimes, exposure_name
 from tbcad.runs.photographs import read_run
 from tbcad.simulated_run.photographs import Chain
 from tbcad.types import Floats

@@ -11,12 +11,21 @@ import pytest
 
 from tbcad.cli import run
 from tbcad.errors import InputError
-from tbcad.prototype.assembly_steps.machine import SCHEMA, Machine, read_machine
+from tbcad.formats.csv_table import write_table
+from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
 from tbcad.prototype.electronics.wiring import COLUMNS as WIRING
 from tbcad.prototype.electronics.wiring import HOME
 from tbcad.prototype.files.bom_csv import COLUMNS
+from tbcad.records.tables import BallRow
 from tbcad.report.assembly_page import page
+from tests.prototype_records import (
+    FRAME,
+    LAMP_SECTION,
+    drive_section,
+    printed_part,
+    prototype_document,
+)
 
 Record = dict[str, Any]
 PRINTED = ("carrier", "zero_disc", "bearing_head", "stage_foot", "coupon_1")
@@ -25,29 +34,24 @@ AXIS = [0.0, 0.0, 1.0]
 
 def fastener(part: str, number: int, *through: str, at: float = 0.0, x: float = 0.0) -> Record:
     name, place = f"{part.replace('-', '_')}_{number}", [x, 0.0, at]
-    return {"name": name, "part": part, "position_mm": place, "along": AXIS, "through": [*through]}
+    told = {"name": name, "part": part, "position_mm": place, "along": AXIS, "through": [*through]}
+    return {**told, "turns": False, "finish": None}
 
 
 def bought(name: str, part: str | None) -> Record:
-    return {"name": name, "part": part, "what": name}
+    return {"name": name, "part": part, "what": name, "turns": False, "finish": None}
 
 
 def belt_design() -> Record:
     """A machine of few parts, with one of each kind of joint."""
-    return {
-        "schema": SCHEMA,
-        "balls": "balls.csv",
-        "frame": {"axis": AXIS},
-        "parts": [
-            {"name": name, "role": "tool" if name == "coupon_1" else "frame", "ball": None}
-            for name in PRINTED
-        ],
-        "bought": [
+    return prototype_document(
+        parts=[printed_part(one, "tool" if one == "coupon_1" else "frame") for one in PRINTED],
+        bought=[
             *(bought("plate", "PLATE-400x150x8"), bought("shaft", "SHAFT-8x100")),
             *(bought("wheel", "GT2-60"), bought("pinion", "GT2-20")),
             *(bought("motor", "NEMA17-40"), bought("camera", None)),
         ],
-        "fasteners": [
+        fasteners=[
             fastener("INSERT-M3", 1, "carrier", at=20.0),
             fastener("SET-M3x12", 1, "carrier"),
             fastener("M3x16", 1, "wheel", "zero_disc", "carrier"),
@@ -55,26 +59,15 @@ def belt_design() -> Record:
             fastener("WASHER-5", 1, "stage_foot", x=50.0),
             fastener("M3x12", 1, "bearing_head", "motor"),
         ],
-        "holding": {"balls": [{"ball": 1, "by": "glue"}]},
-        "home": {
-            "pin": "ROD-4x40",
-            "switch_deg": -100.0,
-            "homed_deg": -98.0,
-            "zero_error_deg": 0.7,
-        },
-        "drive": {
-            **{"belt_centre_mm": 79.0, "belt_tone_hz": 165.0, "belt_tension_n": 5.0, "ratio": 3.0},
-            **{"mass_g": 500.0, "hold_current_a": 0.3},
-        },
-        "controller": {"firmware": "grblhal", "phases": [{"name": "dark", "output": None}]},
-        "frame_stock": {
-            "plate": "PLATE-400x150x8",
-            "upright": "2020-350",
-            "uprights_cut_to_mm": 310.0,
-        },
-        "leds": [],
-        "swing_deg": [-100.0, 90.0],
-    }
+        drive=drive_section(
+            belt_centre_mm=79.0,
+            belt_tone_hz=165.0,
+            belt_tension_n=5.0,
+            ratio=3.0,
+            mass_g=500.0,
+            hold_current_a=0.3,
+        ),
+    )
 
 
 LOOSE = {"GT2-240-6": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "CABLE-2x0.25": 3, "ball 10 mm": 1}
@@ -93,7 +86,8 @@ def write(folder: Path, design: Record, more: dict[str, int]) -> Path:
             source = "printed" if part in PRINTED else "bought"
             row = {"item": item, "quantity": count, "part": part, "what": part, "from": source}
             table.writerow(row)
-    (folder / "balls.csv").write_text("number,kind,size,diameter_mm\n1,ball,10 mm,10\n")
+    ball = dict.fromkeys(BallRow.columns(), 1) | {"kind": "ball", "size": "10 mm"}
+    write_table(folder / "balls.csv", BallRow.columns(), [ball])
     with (folder / "wiring.csv").open("w", newline="") as file:
         lines = csv.DictWriter(file, WIRING, lineterminator="\n")
         lines.writeheader()
@@ -127,18 +121,18 @@ def test_steps_take_exactly_the_parts_of_the_list(machine: Machine) -> None:
 
 def test_every_body_and_fastener_is_mounted_once_for_the_record(machine: Machine) -> None:
     steps = mounting_record(machine)
-    mounted = [name for step in steps for name in step["mounts"]]
-    fasteners = [one["name"] for one in machine.fasteners]
+    mounted = [name for step in steps for name in step.mounts]
+    fasteners = [one.name for one in machine.fasteners]
     assert sorted(mounted) == sorted([*machine.bodies, *fasteners])
-    assert [step["key"] for step in steps] == [step.key for step in assembly_steps(machine)]
+    assert [step.key for step in steps] == [step.key for step in assembly_steps(machine)]
 
 
 def test_a_fastener_waits_for_the_last_body_that_it_goes_through(machine: Machine) -> None:
     steps = assembly_steps(machine)
     bodies = {body: step.number for step in steps for use in step.parts for body in use.bodies}
     for one in machine.fasteners:
-        mounted = max(bodies[body] for body in one["through"])
-        assert bodies[one["name"]] == mounted or one["part"] == "SET-M3x12"
+        mounted = max(bodies[body] for body in one.through)
+        assert bodies[one.name] == mounted or one.part == "SET-M3x12"
     assert bodies["SET_M3x12_1"] == bodies["shaft"]
 
 
@@ -181,7 +175,7 @@ def test_where_the_pinion_is_on_the_motors_shaft(machine: Machine) -> None:
     assert "24 mm ends 3 mm beyond" in pinion
 
 
-@pytest.mark.parametrize("lamps", [None, {"strip": "STRIP-COB-24V"}])
+@pytest.mark.parametrize("lamps", [None, LAMP_SECTION])
 def test_a_design_without_lamps_says_where_its_light_comes_from(
     tmp_path: Path, lamps: Record | None
 ) -> None:
@@ -191,7 +185,7 @@ def test_a_design_without_lamps_says_where_its_light_comes_from(
 
 
 def test_nuts_are_counted_by_slot(tmp_path: Path) -> None:
-    design = belt_design() | {"frame": {"axis": [0.7, 0.0, -0.7]}}
+    design = belt_design() | {"frame": FRAME | {"axis": [0.7, 0.0, -0.7]}}
     design["bought"] += [bought("upright_left", "2020-350"), bought("upright_right", "2020-350")]
     for number, (upright, way) in enumerate(
         (upright, way) for upright in ("left", "right") for way in (-1.0, -1.0, 1.0)
@@ -250,7 +244,7 @@ def text_with(texts: tuple[str, ...], words: str) -> int:
 def test_the_page_says_why_parts_are_not_drawn(machine: Machine) -> None:
     text = page(machine, assembly_steps(machine), {})
     missing = text[text.index("Not drawn") :]
-    drawn = {*machine.bodies.values()} | {one["part"] for one in machine.fasteners}
+    drawn = {*machine.bodies.values()} | {one.part for one in machine.fasteners}
     for part in machine.items:
         assert (machine.ref(part) in missing) == (part not in drawn)
 
@@ -275,7 +269,7 @@ def direct(design: Record) -> None:
 def cut(design: Record) -> None:
     """A carrier of two pieces."""
     design["parts"][0]["name"] = "carrier_1"
-    design["parts"].append({"name": "carrier_2", "role": "base", "ball": None})
+    design["parts"].append(printed_part("carrier_2", "base"))
     for one in design["fasteners"]:
         one["through"] = ["carrier_1" if body == "carrier" else body for body in one["through"]]
     pieces = ("carrier_1", "carrier_2")
@@ -325,7 +319,7 @@ def unknown_part(design: Record, more: dict[str, int]) -> None:
 
 
 def unknown_body(design: Record, more: dict[str, int]) -> None:
-    design["parts"].append({"name": "wing", "role": "frame", "ball": None})
+    design["parts"].append(printed_part("wing"))
 
 
 def other_schema(design: Record, more: dict[str, int]) -> None:
@@ -338,7 +332,7 @@ def other_schema(design: Record, more: dict[str, int]) -> None:
         (fewer_listed, "the list has 0 GT2-60 for 1 bodies"),
         (unknown_part, "THING is in no step"),
         (unknown_body, "wing is in no step"),
-        (other_schema, "another schema"),
+        (other_schema, "this version of tbcad reads"),
     ],
 )
 def test_what_does_not_add_up_is_refused(
@@ -358,7 +352,7 @@ def test_an_export_of_an_earlier_version_is_refused(
     (folder / "prototype.json").write_text(json.dumps(design))
     assert run(["assembly", str(folder), "--out", str(tmp_path / "page")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "has no fasteners: build again" in line
+    assert "fasteners: field required: build it again" in line
     assert not (tmp_path / "page").exists()
 
 

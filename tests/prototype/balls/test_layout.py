@@ -153,16 +153,16 @@ class TestBalls:
         rows = ball_alternatives(
             spec, prototype.array, prototype.groups, prototype.balls, prototype.fit
         )
-        alternatives = {row["name"]: row for row in rows}
-        assert alternatives["cover, with caps"]["pixels_kept_share"] == pytest.approx(
+        alternatives = {row.name: row for row in rows}
+        assert alternatives["cover, with caps"].pixels_kept_share == pytest.approx(
             prototype.fit.kept_share
         )
-        assert alternatives["cover, with caps"]["mirrors_below_target"] == 0
+        assert alternatives["cover, with caps"].mirrors_below_target == 0
         assert (
-            alternatives["cover, balls only"]["pixels_kept_share"]
-            < alternatives["cover, with caps"]["pixels_kept_share"]
+            alternatives["cover, balls only"].pixels_kept_share
+            < alternatives["cover, with caps"].pixels_kept_share
         )
-        assert alternatives["nearest, with caps"]["mirrors_below_target"] > 10
+        assert alternatives["nearest, with caps"].mirrors_below_target > 10
 
     def test_costs_do_not_depend_on_which_was_chosen(self, small_design: MirrorDesign) -> None:
         spec, prototype = small_design.spec, small(small_design)

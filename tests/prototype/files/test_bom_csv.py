@@ -1,4 +1,3 @@
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from tbcad.prototype.files.bom_csv import (
     cap_item,
     totals,
 )
-from tbcad.prototype.files.drive_record import drive_record
+from tbcad.prototype.files.record import drive_record
 from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.purchased.prices import Prices, load_prices
@@ -173,10 +172,10 @@ def test_record_of_the_drive(layout: PrototypeLayout) -> None:
     summed = sum_masses(layout.array.ellipsoid.frame(), ball_masses(layout, 1.27))
     swing, motion = (float(layout.stops.angle[0]), float(layout.stops.angle[-1])), MotionSpec()
     drive = choose_drive("nema17-belt", base_torques(summed, swing, motion), DRIVES)
-    record = json.loads(json.dumps(drive_record(summed, drive, motion, swing)))
-    assert record["required_torque_nmm"] <= record["holding_torque_nmm"]
-    assert record["required_torque_nmm"] == pytest.approx(2 * record["peak_torque_nmm"])
-    assert record["peak_torque_nmm"] > record["worst_torque_nmm"]
-    assert record["mass_g"] == summed.mass_g
-    assert record["belt_pull_n"] <= record["belt_rating_n"]
-    assert record["motor"] == drive.motor.name
+    record = drive_record(summed, drive, motion, swing)
+    assert record.required_torque_nmm <= record.holding_torque_nmm
+    assert record.required_torque_nmm == pytest.approx(2 * record.peak_torque_nmm)
+    assert record.peak_torque_nmm > record.worst_torque_nmm
+    assert record.mass_g == summed.mass_g
+    assert record.belt_pull_n <= record.belt_rating_n
+    assert record.motor == drive.motor.name

@@ -54,4 +54,4 @@ def test_more_leds_tell_more() -> None:
     more = np.vstack([LEDS, [[0.0, -23.4, -6.0]]])
     few, many = (calibration_estimate(STAGE, array, leds, CAPTURE) for leds in (LEDS, more))
     assert (many.worst <= few.worst * (1 + 1e-9)).all()
-    assert many.record()["centre_um_median"] < few.record()["centre_um_median"]
+    assert many.record().centre_um_median < few.record().centre_um_median

@@ -1,6 +1,5 @@
 """Light of rectangular lamps, against the law of distant sources and the flux that they give."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,8 @@ from tbcad.simulate.capture.files import read_object, write_object
 from tbcad.simulate.prototype.lamps import Lamps, irradiance, lit_by, read_lamps
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
+from tests.exported_files import edit_json
+from tests.prototype_records import LAMP_SECTION, write_prototype
 
 PLACE = np.array([108.0, 52.0, -87.5])
 SIGNS = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])
@@ -58,18 +59,13 @@ def test_a_lit_object_keeps_its_light_in_a_capture(tmp_path: Path) -> None:
     assert np.array_equal(prepared_scene(again).shade, scene.shade)
 
 
-def record(folder: Path, lamps: object) -> Path:
-    document = {"schema": "tbcad-prototype/2", "lamps": lamps}
-    (folder / "prototype.json").write_text(json.dumps(document))
-    return folder
-
-
 def test_lamps_of_a_record(tmp_path: Path) -> None:
-    place = {"position_mm": PLACE.tolist(), "direction": [-1.0, 0.0, 0.0]}
-    sizes = {"width_mm": 16.0, "length_mm": 50.0, "lumen_each": 90.0}
-    found = read_lamps(record(tmp_path, {**sizes, "places": [place]}))
+    found = read_lamps(write_prototype(tmp_path, lamps=LAMP_SECTION))
     assert found is not None
-    assert found.places.tolist() == [PLACE.tolist()]
-    assert read_lamps(record(tmp_path, None)) is None
-    with pytest.raises(InputError, match="lumen_each"):
-        read_lamps(record(tmp_path, {**sizes, "lumen_each": -1, "places": [place]}))
+    assert found.places.tolist() == [LAMP_SECTION["places"][0]["position_mm"]]
+    edit_json(
+        tmp_path / "prototype.json", lambda value: value.update(lamps=LAMP_SECTION | {"watt": "x"})
+    )
+    with pytest.raises(InputError, match="watt"):
+        read_lamps(tmp_path)
+    assert read_lamps(write_prototype(tmp_path)) is None

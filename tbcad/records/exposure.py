@@ -14,14 +14,14 @@ phase. Photographs are never changed after they are written.
 import math
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Finite, Record
+from tbcad.formats.checked_files import Finite
+from tbcad.records.document import Document, RecordSection
 
-EXPOSURE_SCHEMA = "tbcad-exposure/1"
 PHOTOGRAPHS = "photographs"
 DARK, LIT, DARK_LIT = "dark", "lit", "dark_lit"
 """Phases beside those of the LEDs, which have the names of prototype.json: led_1, led_2 ...
@@ -91,7 +91,7 @@ def dark_factor(dark_s: float | None, exposure_s: float | None) -> float | None:
     return ratio if ratio <= MOST_SCALED else None
 
 
-class Frame(Record):
+class Frame(RecordSection):
     """A position in which the machine is photographed.
 
     Attributes:
@@ -105,7 +105,7 @@ class Frame(Record):
     base_angle_deg: Annotated[float, Field(ge=-360, le=360)]
 
 
-class Exposure(Record):
+class Exposure(Document):
     """The sidecar of a photograph.
 
     Attributes:
@@ -120,6 +120,8 @@ class Exposure(Record):
         settings: of the camera, as it reports them.
     """
 
+    MISSING: ClassVar[str] = "photograph it again with tbcad run --resume"
+    schema_name: Literal["tbcad-exposure/1"] = Field("tbcad-exposure/1", alias="schema")
     frame: Frame
     phase: PhaseName
     file: str = Field(pattern=r"^[ab]_\d{4,7}_[a-z]+(_[a-z\d]+)?\.[a-z0-9]+$")

@@ -1,19 +1,18 @@
 """run.json: what a run is to photograph, of which export and with which camera."""
 
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from tbcad.formats.checked_files import Record, read_json
-from tbcad.runs.exposure import DARK_LIT, LIT, Frame, PhaseName, PhaseTimes, Setting
+from tbcad.records.document import Document, RecordSection
+from tbcad.records.exposure import DARK_LIT, LIT, Frame, PhaseName, PhaseTimes, Setting
 
-RUN_SCHEMA = "tbcad-run/1"
 Geometry = Literal["prototype", "shell"]
 RECORD, JOURNAL = "run.json", "journal.jsonl"
 
 
-class PhaseExposure(Record):
+class PhaseExposure(RecordSection):
     """Exposure of a phase that has its own.
 
     Attributes:
@@ -25,7 +24,7 @@ class PhaseExposure(Record):
     settings: dict[str, Setting]
 
 
-class RunRecord(Record):
+class RunRecord(Document):
     """What a run is to photograph: every frame in every phase.
 
     Attributes:
@@ -43,6 +42,8 @@ class RunRecord(Record):
             object turned are camera b's, which has the object before it that way.
     """
 
+    MISSING: ClassVar[str] = "name a folder that tbcad run or simulate-run wrote"
+    schema_name: Literal["tbcad-run/1"] = Field("tbcad-run/1", alias="schema")
     export_sha256: dict[str, str]
     source: Literal["camera", "simulated"]
     camera: str
@@ -93,6 +94,4 @@ def read_record(folder: Path) -> RunRecord:
     Raises:
         InputError: there is none, or it does not fit.
     """
-    return read_json(
-        folder / RECORD, RunRecord, RUN_SCHEMA, "name a folder that tbcad run or simulate-run wrote"
-    )
+    return RunRecord.read(folder / RECORD)

@@ -1,0 +1,351 @@
+"""prototype.json of a prototype that is built: each section from what it describes."""
+
+import numpy as np
+
+from tbcad.drafting.sheet import Sheet
+from tbcad.formats.csv_table import Row
+from tbcad.geometry.vectors import norm
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.cap_limits import FINISH, MATERIAL, MIN_REFLECTANCE, POLARITY, cap_limits
+from tbcad.prototype.base.fasteners import seat_magnets
+from tbcad.prototype.base.held import held_balls
+from tbcad.prototype.base.holding import GLUE_MPA, MIN_RATIO, WIDER_GAP_MM, base_motion
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.base.magnetics import DERATING, REMANENCE_T
+from tbcad.prototype.drive.balance import BaseBalance
+from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.drive.loads import (
+    HOLD_MARGIN,
+    MAX_RISE_K,
+    MAX_WIND_UP_DEG,
+    SELF_LOCKING,
+    DriveLoads,
+    base_torques,
+)
+from tbcad.prototype.drive.power_off import power_off
+from tbcad.prototype.drive.travel import stop_sequence
+from tbcad.prototype.electronics.outputs import phases
+from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.files.bom_csv import totals
+from tbcad.prototype.frame.camera_gauge import marks_seen
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.light.shroud import ShroudLayout
+from tbcad.prototype.model import PrototypeModel
+from tbcad.prototype.printing.parts import PrintedPart
+from tbcad.prototype.purchased.parts import Parts
+from tbcad.prototype.stage.calibration import calibration_estimate
+from tbcad.prototype.stage.layout import led_poses
+from tbcad.records import prototype as records
+from tbcad.records.prototype import MATT_BLACK, Prototype
+from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
+from tbcad.records.prototype_light import CardPanel, LampPlace, LampsRecord, ShroudRecord
+from tbcad.spec.design import Spec
+from tbcad.spec.prototype import MotionSpec
+
+STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
+PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
+# Fasteners that are bought black, so that the camera does not see them shine.
+BLACK_KINDS = frozenset({"screws", "setscrews", "washers", "nuts", "tnuts"})
+# Purchased bodies that the camera sees between the balls: painted, blackened or taped.
+BLACKENED = frozenset(
+    {
+        *("plate", "upright_left", "upright_right", "home_switch", "motor"),
+        *("rotary_stage", "rotary_stage_top", "wheel", "pinion", "coupling", "shaft", "collar"),
+    }
+)
+
+
+def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> Prototype:
+    """What is known of the prototype, in numbers, but its steps of assembly.
+
+    Args:
+        built: the prototype.
+        bill: rows of the parts list.
+        drawings: of what is cut or drilled.
+    """
+    layout, spec, frame = built.layout, built.spec.prototype, built.frame
+    axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
+    return Prototype(
+        camera="a",
+        target_mm=built.spec.optics.capture_diameter_mm,
+        picture=spec.picture,
+        target_pad_um=PAD_UM,
+        frame=records.BaseFrame(axis=axis, zero=zero, third=third),
+        swing_deg=_swing(built, spec.motion),
+        balls=BALLS_FILE,
+        alternatives=layout.alternatives,
+        seats=_seats(built),
+        holding=_holding(built.spec, built.base, layout, built.parts),
+        parts=tuple(map(_part, built.printed)),
+        leds=tuple(
+            records.Led(name=name, position_mm=(place + 0.0).tolist(), direction=way.tolist())
+            for name, place, way in led_poses(built.stage)
+        ),
+        calibration=_calibration(built),
+        controller=Controller(
+            firmware=spec.motion.controller,
+            axis=spec.motion.axis,
+            phases=phases(len(built.stage.leds), spec.motion),
+        ),
+        caps=_caps(built),
+        camera_place=_camera_place(built),
+        home=Home(
+            switch_deg=frame.homing.angles.switch,
+            homed_deg=frame.homing.angles.homed,
+            travel_deg=frame.homing.angles.travel,
+            pin=frame.homing.pin,
+            zero_error_deg=frame.homing.error_deg,
+        ),
+        bought=tuple(
+            records.PurchasedBody(
+                name=item.name,
+                what=item.what,
+                part=item.part,
+                turns=item.rotates,
+                finish=MATT_BLACK if item.name in BLACKENED else None,
+            )
+            for item in frame.purchased
+        ),
+        lamps=_lamps(frame.lamps),
+        shroud=_shroud(built.shroud),
+        fasteners=tuple(map(_fastener, built.fasteners)),
+        frame_stock=records.FrameStock(
+            plate=frame.plate.name, upright=frame.upright.name, uprights_cut_to_mm=frame.length
+        ),
+        totals=records.ListTotals(**totals(bill)),
+        drawings=tuple(
+            records.DrawingFiles(part=one.part, pdf=f"{one.name}.pdf", dxf=f"{one.name}.dxf")
+            for one in drawings
+        ),
+        assembly=records.AssemblyFiles(step=STEP, glb=GLB),
+        drive=drive_record(built.balance, built.drive, spec.motion, layout.stops.range),
+        power_off=_power_off(built),
+    )
+
+
+def drive_record(
+    balance: BaseBalance, drive: Drive, motion: MotionSpec, swing: tuple[float, float]
+) -> DriveRecord:
+    """What the drive must bear and does, with its limits.
+
+    Args:
+        balance: masses on the base.
+        drive: chosen for them.
+        motion: of the base.
+        swing: smallest and largest base angle, radians.
+    """
+    torques = base_torques(balance, swing, motion)
+    loads = DriveLoads(drive, torques)
+    return DriveRecord(
+        mass_g=balance.mass_g,
+        centre_mm=(balance.centre + 0.0).tolist(),
+        moment_g_mm=balance.moment,
+        azimuth_deg=float(np.degrees(balance.azimuth)),
+        inertia_g_mm2=balance.inertia,
+        worst_torque_nmm=torques.gravity,
+        peak_torque_nmm=torques.peak,
+        safety=motion.safety,
+        required_torque_nmm=torques.required,
+        holding_torque_nmm=drive.holds_nmm,
+        drive=drive.name,
+        motor=drive.motor.name,
+        ratio=drive.ratio,
+        steps_per_deg=drive.steps_per_deg(motion.microsteps),
+        motor_wind_up_deg=float(np.degrees(loads.motor_wind_up)),
+        belt_wind_up_deg=float(np.degrees(loads.belt_wind_up)),
+        wind_up_limit_deg=MAX_WIND_UP_DEG,
+        belt_centre_mm=drive.centre_mm,
+        teeth_in_mesh=loads.teeth_in_mesh,
+        belt_pull_n=loads.belt_pull,
+        belt_rating_n=loads.belt_rating,
+        belt_tension_n=loads.belt_tension,
+        belt_tone_hz=loads.belt_tone,
+        motor_radial_n=loads.motor_radial,
+        motor_radial_limit_n=loads.motor_radial_limit,
+        hold_margin=0.0 if loads.self_locking else HOLD_MARGIN,
+        hold_current_a=loads.hold_current,
+        hold_loss_w=loads.hold_loss,
+        motor_rise_k=loads.motor_rise,
+        motor_rise_limit_k=MAX_RISE_K,
+    )
+
+
+def _power_off(built: PrototypeModel) -> PowerOff:
+    """The base without power, between the ends of its travel."""
+    angles, drive = built.frame.homing.angles, built.drive
+    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
+    return power_off(built.balance, low, high, holds_itself=drive.efficiency < SELF_LOCKING)
+
+
+def _swing(built: PrototypeModel, motion: MotionSpec) -> tuple[float, float]:
+    """Base angles that the program drives between: from the switch, or from the start."""
+    todo = stop_sequence(built.layout, motion)
+    angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
+    if motion.controller == "grblhal":
+        angles.append(built.frame.homing.angles.switch)
+    return min(angles), max(angles)
+
+
+def _seats(built: PrototypeModel) -> tuple[records.SeatRecord, ...]:
+    """Each seat: its axis, away from the light, and its three pads."""
+    seats = built.base.seats
+    return tuple(
+        records.SeatRecord(
+            ball=k + 1,
+            axis=(seats.axis[k] + 0.0).tolist(),
+            normals=(seats.pad_normals[k] + 0.0).tolist(),
+            contacts_mm=(seats.contacts[k] + 0.0).tolist(),
+            pad_diameter_mm=2 * float(seats.pad[k]),
+        )
+        for k in range(len(seats))
+    )
+
+
+def _holding(
+    spec: Spec, base: BaseLayout, layout: PrototypeLayout, parts: Parts
+) -> records.Holding:
+    """Assumptions, and a row for each ball in the order of their numbers."""
+    held, magnets = held_balls(base, layout, base_motion(spec)), seat_magnets(base, parts)
+    return records.Holding(
+        min_ratio=MIN_RATIO,
+        remanence_t=REMANENCE_T,
+        derating=DERATING,
+        glue_mpa=GLUE_MPA,
+        wider_gap_mm=WIDER_GAP_MM,
+        balls=tuple(
+            records.HeldBall(
+                ball=k + 1,
+                by="glue" if held.glued[k] else "magnet",
+                magnet=magnet.name if magnet else None,
+                force_needed_n=float(held.needed[k]),
+                force_available_n=float(held.available[k]),
+                ratio=float(held.available[k] / held.needed[k]),
+                wider_gap_n=float(held.wider[k]),
+            )
+            for k, magnet in enumerate(magnets)
+        ),
+    )
+
+
+def _part(part: PrintedPart) -> records.PrintedPartRecord:
+    """A printed part; y = x @ axes + origin is a point on the bed."""
+    return records.PrintedPartRecord(
+        name=part.name,
+        what=part.what,
+        step=f"{part.name}.step",
+        stl=f"{part.name}.stl",
+        threemf=f"{part.name}.3mf",
+        role=part.role,
+        finish="mirror" if part.role == "cap" else None if part.role == "tool" else MATT_BLACK,
+        ball=part.ball + 1 if part.ball >= 0 else None,
+        quantity=1,
+        axes=(part.solid.axes + 0.0).tolist(),
+        origin_mm=(part.solid.origin + 0.0).tolist(),
+    )
+
+
+def _calibration(built: PrototypeModel) -> records.CentreEstimate | None:
+    """What the LEDs will tell of the balls' centres; None without LEDs."""
+    if not len(built.stage.leds):
+        return None
+    capture, stage = built.spec.optics.capture_diameter_mm / 2, built.spec.prototype.stage
+    return calibration_estimate(stage, built.layout.array, built.stage.leds, capture).record()
+
+
+def _caps(built: PrototypeModel) -> tuple[records.CapRecord, ...]:
+    return tuple(
+        records.CapRecord(
+            ball=one.ball + 1,
+            spigot_mm=one.spigot,
+            socket_mm=one.socket,
+            spigot_end_mm=one.end,
+            tilt_deg=one.tilt_deg,
+            centre_shift_mm=one.centre_shift,
+            aperture_mm=one.aperture,
+            radius_tolerance_mm=one.radius_tolerance,
+            body_tolerance_mm=2 * one.body_tolerance,
+            irregularity_fringes=one.irregularity,
+            roughness_ra_um=one.roughness_um,
+            incidence_deg=one.incidence_deg,
+            reflectance_min=MIN_REFLECTANCE,
+            material=MATERIAL,
+            finish=FINISH,
+            polarity=POLARITY,
+            pdf=f"{one.drawing}.pdf",
+            dxf=f"{one.drawing}.dxf",
+        )
+        for one in cap_limits(built.spec, built.base, built.layout)
+    )
+
+
+def _camera_place(built: PrototypeModel) -> records.CameraPlace | None:
+    """The mount's travel, the gauge's marks, its pictures and errors; None without a camera."""
+    gauge, mount = built.gauge, built.frame.mount
+    if gauge is None or mount is None:
+        return None
+    sizes, camera = gauge.sizes, built.layout.array.camera
+    return records.CameraPlace(
+        gauge=gauge.component.name,
+        marks_mm=(gauge.marks + 0.0).tolist(),
+        lengths_mm=records.GaugeLengths(
+            hub_to_near=sizes.near - sizes.hub,
+            hub_to_far=sizes.far - sizes.hub,
+            near_width=2 * sizes.near_half,
+            far_width=2 * sizes.far_half,
+            hub_to_pinhole=float(norm(camera.pinhole)) - sizes.hub,
+        ),
+        pictures=tuple(records.MarkPicture(**one) for one in marks_seen(gauge, built.base, camera)),
+        error=records.PlaceError(**gauge.errors),
+        travel=records.CameraTravel(**mount.travel),
+    )
+
+
+def _lamps(lamps: LampLayout | None) -> LampsRecord | None:
+    if lamps is None:
+        return None
+    places, inward = (lamps.places + 0.0).tolist(), (lamps.inward + 0.0).tolist()
+    return LampsRecord(
+        strip=lamps.strip.name,
+        strips=lamps.strips,
+        length_mm=lamps.length,
+        width_mm=lamps.width,
+        level=lamps.level,
+        places=tuple(
+            LampPlace(name=body.name, position_mm=place, direction=direction)
+            for body, place, direction in zip(lamps.bodies, places, inward, strict=True)
+        ),
+        lumen_each=lamps.lumen,
+        watt=lamps.watt,
+        current_ma=lamps.current_ma,
+    )
+
+
+def _shroud(shroud: ShroudLayout | None) -> ShroudRecord | None:
+    if shroud is None:
+        return None
+    return ShroudRecord(
+        sheet=shroud.sheet.name,
+        sheets=shroud.sheets,
+        finish=MATT_BLACK,
+        panels=tuple(
+            CardPanel(
+                name=panel.name,
+                what=panel.component.what,
+                dxf=f"{panel.name}.dxf",
+                size_mm=panel.size,
+            )
+            for panel in shroud.panels
+        ),
+    )
+
+
+def _fastener(one: Fastener) -> records.FastenerRecord:
+    return records.FastenerRecord(
+        name=one.name,
+        part=one.part.name,
+        position_mm=(one.place + 0.0).tolist(),
+        along=(one.along + 0.0).tolist(),
+        through=one.through,
+        turns=one.rotates,
+        finish=MATT_BLACK if one.part.kind in BLACK_KINDS else None,
+    )

@@ -1,0 +1,1 @@
+"""One model for each file that tbcad writes and reads: fields, units, schema, reader, writer."""

@@ -1,0 +1,133 @@
+"""calibration.json: what a calibration is based on, its verdict, and its figures."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from tbcad.records.document import Document, RecordSection
+from tbcad.records.run import Geometry
+
+NAME = "calibration.json"
+
+
+class PhotographCounts(RecordSection):
+    """How many photographs the run should have, and how many are usable."""
+
+    expected: int
+    usable: int
+
+
+class ProcessChoice(RecordSection):
+    """The process of the priors; `given` where it was asked for, `settings` as KIND=VALUE."""
+
+    name: str
+    title: str
+    given: bool
+    settings: tuple[str, ...]
+
+
+class RayFigures(RecordSection):
+    """How well the rays are known at the object: standard deviations of place and direction.
+
+    Attributes:
+        mirrors: with rays.
+        mirrors_without_frame: by name.
+        place_mm_95: 95th percentile.
+        in_run_mm_median: among rays of one run.
+        in_design_mm_median: in the design's frame.
+        needed_mm_median: half a pixel.
+        share_short_of_need: of the rays that are known worse.
+    """
+
+    mirrors: int
+    mirrors_without_frame: tuple[str, ...]
+    place_mm_median: float
+    place_mm_95: float
+    turn_mrad_median: float
+    turn_mrad_95: float
+    in_run_mm_median: float
+    in_run_mrad_median: float
+    in_design_mm_median: float
+    in_design_mrad_median: float
+    needed_mm_median: float
+    share_short_of_need: float
+
+
+class HighlightFigures(RecordSection):
+    """Highlights that the estimate was given and used, and how well they fit."""
+
+    given: int
+    used: int
+    rejected_by_detection: dict[str, int]
+    noise_factor: float
+    residual_px: float
+    degrees_of_freedom: int
+
+
+class OutlierRecord(RecordSection):
+    """A highlight that does not fit, in standard deviations."""
+
+    photograph: str
+    ball: int
+    led: int
+    sigmas: float
+
+
+class HalvesRecord(RecordSection):
+    """Calibrations of both halves of the data: how far apart they are, and should be."""
+
+    apart: str
+    highlights: tuple[int, ...]
+    found_mm: float
+    expected_mm: float
+
+
+class PulledParameter(RecordSection):
+    """A parameter that is unlike the process, in its prior's standard deviations."""
+
+    parameter: str
+    sigmas: float
+
+
+class ParameterBlock(RecordSection):
+    """Parameters of a kind: medians of their standard deviations before and after; None: fixed."""
+
+    number: int
+    free: int
+    prior_sigma: float | None
+    sigma: float | None
+
+
+class CalibrationRecord(Document):
+    """calibration.json.
+
+    Attributes:
+        run: folder, as is exports.
+        lens: file of the intrinsics, or "estimated".
+        measured_radii: as BALL=MM.
+        faults: of photographs, one line each.
+        doubts: why it may not be trusted.
+        parameters: by the name of their block.
+    """
+
+    MISSING: ClassVar[str] = "name a folder that tbcad calibrate wrote"
+    schema_name: Literal["tbcad-calibration/1"] = Field("tbcad-calibration/1", alias="schema")
+    run: str
+    exports: str
+    export_sha256: dict[str, str]
+    source: Literal["camera", "simulated"]
+    geometry: Geometry
+    camera: str
+    photographs: PhotographCounts
+    process: ProcessChoice
+    lens: str
+    measured_radii: tuple[str, ...]
+    verdict: str
+    rays: RayFigures
+    highlights: HighlightFigures
+    outliers: tuple[OutlierRecord, ...]
+    halves: tuple[HalvesRecord, ...]
+    faults: tuple[str, ...]
+    doubts: tuple[str, ...]
+    unlike_the_process: tuple[PulledParameter, ...]
+    parameters: dict[str, ParameterBlock]

@@ -1,0 +1,103 @@
+"""Sections of prototype.json that are of the base's motion: controller, homing, drive, fall."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tbcad.formats.checked_files import Finite
+from tbcad.records.document import RecordSection
+from tbcad.records.exposure import PhaseName
+
+
+class Phase(RecordSection):
+    """A photograph of a stop, and the digital output that switches its light; None: none is on."""
+
+    name: PhaseName
+    output: Annotated[int, Field(ge=0, le=99)] | None
+
+
+class Controller(RecordSection):
+    """The controller of motion and lights, and the photographs of a stop in order."""
+
+    firmware: Literal["grblhal", "grbl"]
+    axis: Literal["X", "A"]
+    phases: tuple[Phase, ...] = Field(min_length=1)
+
+
+class Home(RecordSection):
+    """Base angles of homing, the rod that fixes angle zero, and half the width of its play."""
+
+    switch_deg: Finite
+    homed_deg: Finite
+    travel_deg: Finite
+    pin: str
+    zero_error_deg: Finite = Field(ge=0, le=180)
+
+
+class DriveRecord(RecordSection):
+    """Balance of the base, which has no counterweight, and what its drive bears and does.
+
+    Attributes:
+        centre_mm: centre of gravity of what turns, in the base's frame at angle zero.
+        azimuth_deg: base angle at which gravity turns it most.
+        worst_torque_nmm: of gravity.
+        peak_torque_nmm: with that of acceleration.
+        safety: factor from it to the required one.
+        motor_wind_up_deg: angle by which the motor yields under the peak torque.
+        hold_margin: factor of the torque at rest; 0 where the drive holds itself.
+        motor_rise_k: of its temperature above that of the room.
+    """
+
+    mass_g: Finite
+    centre_mm: tuple[Finite, Finite, Finite]
+    moment_g_mm: Finite
+    azimuth_deg: Finite
+    inertia_g_mm2: Finite
+    worst_torque_nmm: Finite
+    peak_torque_nmm: Finite
+    safety: Finite
+    required_torque_nmm: Finite
+    holding_torque_nmm: Finite
+    drive: str
+    motor: str
+    ratio: Finite
+    steps_per_deg: Finite
+    motor_wind_up_deg: Finite
+    belt_wind_up_deg: Finite
+    wind_up_limit_deg: Finite
+    belt_centre_mm: Finite
+    teeth_in_mesh: Finite
+    belt_pull_n: Finite
+    belt_rating_n: Finite
+    belt_tension_n: Finite
+    belt_tone_hz: Finite
+    motor_radial_n: Finite
+    motor_radial_limit_n: Finite
+    hold_margin: Finite
+    hold_current_a: Finite
+    hold_loss_w: Finite
+    motor_rise_k: Finite
+    motor_rise_limit_k: Finite
+
+
+class PowerOff(RecordSection):
+    """The base without power.
+
+    Attributes:
+        fall_energy_j: energy with which it reaches an end of its travel, at most; without
+            friction, zero where the drive holds it or it swings below both ends.
+        fall_speed_deg_s: its speed there.
+        pin_force_n: force on the zero pin under the largest torque of gravity at any angle.
+        pin_shear_mpa: shear in the pin.
+        pin_shear_limit_mpa: permitted.
+        pin_pressure_mpa: pressure of the pin on its hole in the zero disc.
+        pin_pressure_limit_mpa: permitted.
+    """
+
+    fall_energy_j: Finite
+    fall_speed_deg_s: Finite
+    pin_force_n: Finite
+    pin_shear_mpa: Finite
+    pin_shear_limit_mpa: Finite
+    pin_pressure_mpa: Finite
+    pin_pressure_limit_mpa: Finite
