@@ -8,7 +8,6 @@ import pytest
 
 from tbcad.api import build, calibrate, merge, simulate_run
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.corrections import Options
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import read_export
@@ -42,8 +41,13 @@ class Loop:
     def quality(self, run: str, calibration: str) -> float:
         """Mean SSIM of the views of a run merged by a machine."""
         out = self.folder / f"{run}-{calibration}"
-        options = Options(brightness=1 / OBJECT_LIGHT)
-        merge(self.folder / run, self.folder / calibration, self.export, options, out=out)
+        merge(
+            self.folder / run,
+            self.folder / calibration,
+            self.export,
+            out=out,
+            brightness=1 / OBJECT_LIGHT,
+        )
         return mean_ssim(MirrorTiles(LightField.read(out)), self.scene)
 
 

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from tbcad.api import calibrate, merge, simulate_run
-from tbcad.calibration.options import CalibrationOptions
 from tbcad.geometry.vectors import norm
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.corrections import Options
 from tbcad.mirrors.array import design
 from tbcad.mirrors.record import write_record
 from tbcad.simulate.capture.light_field import LightField
@@ -43,7 +41,7 @@ class ShellLoop:
         drawn = RunOptions(perfect=True, shell=True, phases=("dark",))
         simulate_run(self.export, folder / "drawn", options=drawn)
         self.written = calibrate(
-            folder / "run", self.export, CalibrationOptions(PROCESS), out=folder / "calibration"
+            folder / "run", self.export, process=PROCESS, out=folder / "calibration"
         )
         for name, run in (("truth", "run"), ("drawing", "drawn")):
             for camera in CAMERAS:
@@ -54,9 +52,9 @@ class ShellLoop:
 
     def quality(self, calibration: str) -> float:
         """Mean SSIM of views of the photographs merged by a machine."""
-        out, options = self.folder / f"by-{calibration}", Options(brightness=1 / OBJECT_LIGHT)
-        run = self.folder / "run"
-        record = merge(run, self.folder / calibration, self.export, options, out=out)
+        run, out = self.folder / "run", self.folder / f"by-{calibration}"
+        known, brightness = self.folder / calibration, 1 / OBJECT_LIGHT
+        record = merge(run, known, self.export, out=out, brightness=brightness)
         assert set(record["based_on"]) == {*CAMERAS}
         assert not any(half["mirrors_missing"] for half in record["based_on"].values())
         return mean_ssim(MirrorTiles(LightField.read(out)), self.scene)

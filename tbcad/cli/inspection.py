@@ -6,22 +6,22 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export
-from tbcad.cli.options import Exports, Force, JsonResult, OutReplaced
 from tbcad.cli.output_mode import print_json
+from tbcad.options.checks import check_is_export
+from tbcad.options.shared import Exports, Force, JsonResult, OutReplaced
 from tbcad.screen import stages
 
 
 @app.command()
 def inspection(
-    folder: Exports,
+    folder: Exports[Path],
     share: Annotated[
         float,
         typer.Option(
             "--yield", help="Share of the shells that must be good with the standard deviations."
         ),
     ] = 0.99,
-    out: OutReplaced = Path("inspection"),
+    out: OutReplaced[Path] = Path("inspection"),
     force: Force = False,
     json: JsonResult = False,
 ) -> int:

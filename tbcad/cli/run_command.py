@@ -10,9 +10,9 @@ import typer
 
 from tbcad.cli.app import app
 from tbcad.cli.exposure_options import ExposureLeds, ExposureLit, seconds
-from tbcad.cli.options import Exports
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
+from tbcad.options.shared import Exports
 
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16
@@ -20,7 +20,7 @@ LEAST_PX = 16
 
 @app.command()
 def run(
-    folder: Exports,
+    folder: Exports[Path],
     port: Annotated[
         str | None,
         typer.Option(

@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export, check_is_object
 from tbcad.cli.exposure_options import ExposureLeds, ExposureLit, seconds
-from tbcad.cli.options import Exports, ObjectFile, UnitOption, UpOption
 from tbcad.errors import InputError
+from tbcad.options.checks import check_is_export, check_is_object
+from tbcad.options.shared import Exports, ObjectFile, UnitOption, UpOption
 from tbcad.screen import stages
 
 MOST_NOISE = 100.0
@@ -19,7 +19,7 @@ MOST_BRIGHTNESS = 10_000.0
 
 @app.command(name="simulate-run")
 def simulate_run(
-    folder: Exports,
+    folder: Exports[Path],
     process: Annotated[
         str,
         typer.Option(
@@ -30,7 +30,7 @@ def simulate_run(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder for the run; it must not hold anything.")
     ] = Path("run"),
-    object_file: ObjectFile = None,
+    object_file: ObjectFile[Path] = None,
     up: UpOption = None,
     unit: UnitOption = None,
     stops: Annotated[

@@ -13,9 +13,10 @@ from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS, machine_run, stops_known
 from tbcad.machine.record import RECORD, read_machine
 from tbcad.machine.shells import NOT_SERVED, plan_of, tied
-from tbcad.merged_run.corrections import Corrections, Options, corrections
+from tbcad.merged_run.corrections import Corrections, corrections
 from tbcad.merged_run.ray_sigmas import ray_sigmas
 from tbcad.merged_run.stop_photographs import CorrectedPhotographs, common_exposure
+from tbcad.options.machines import MergeOptions
 from tbcad.runs.exposure import LIT, Frame
 from tbcad.runs.photographs import Run, read_run
 from tbcad.runs.same_export import check_same_export
@@ -96,7 +97,7 @@ class Merge:
         ]
 
 
-def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Options) -> Merge:
+def prepared_merge(folder: Path, calibration: Path, exports: Path, options: MergeOptions) -> Merge:
     """Read what a merge needs, but the photographs themselves.
 
     Args:
@@ -132,7 +133,7 @@ def _halves(
     export: ExportedDesign,
     calibration: Path,
     calibrated: tuple[Machine, tuple[Frame, ...]],
-    options: Options,
+    options: MergeOptions,
 ) -> list[HalfMerge]:
     """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
     machine, frames = calibrated
@@ -180,7 +181,9 @@ def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
         )
 
 
-def _facts(export: ExportedDesign, run: Run, calibration: Path, options: Options) -> dict[str, Any]:
+def _facts(
+    export: ExportedDesign, run: Run, calibration: Path, options: MergeOptions
+) -> dict[str, Any]:
     return {
         "object": f"photographs of {run.folder.name}",
         "design": export.spec.name,

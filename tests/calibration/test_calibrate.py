@@ -16,7 +16,6 @@ from tbcad.calibration.detection.detection import Detection, Reason, Rejected
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.calibration.options import CalibrationOptions
 from tbcad.calibration.report.files import write_calibration
 from tbcad.calibration.report.tables import rays_table, residuals_table
 from tbcad.calibration.report.verdict import Answer, verdict, verdict_text
@@ -278,8 +277,3 @@ def test_refused(
     assert message in error
     assert error.count("\n") == 1
     assert not out.exists()
-
-
-def test_options_say_the_default() -> None:
-    assert CalibrationOptions().process_words == "fdm (the default)"
-    assert CalibrationOptions(process="sla").process_words == "sla"
