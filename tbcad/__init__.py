@@ -35,7 +35,7 @@ if TYPE_CHECKING:
         reconstruct,
         relight,
         run,
-        simulate_run,
+        to_cadquery,
         verify,
         view,
     )
@@ -70,7 +70,7 @@ __all__ = [
     "reconstruct",
     "relight",
     "run",
-    "simulate_run",
+    "to_cadquery",
     "verify",
     "view",
 ]
