@@ -15,7 +15,6 @@ from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import OBJECT_LIGHT
 from tbcad.simulated_run.simulate import run_object
 from tbcad.spec.load import load_spec
@@ -37,9 +36,8 @@ class ShellLoop:
         self.export.mkdir()
         spec = load_spec(None, [*DESIGN, f"shell.edges={edges}"])
         write_record(self.export, design(spec), shells=False)
-        simulate_run(self.export, folder / "run", PROCESS, options=RunOptions(seed=3, shell=True))
-        drawn = RunOptions(perfect=True, shell=True, phases=("dark",))
-        simulate_run(self.export, folder / "drawn", options=drawn)
+        simulate_run(self.export, process=PROCESS, seed=3, shell=True, out=folder / "run")
+        simulate_run(self.export, perfect=True, shell=True, phases="dark", out=folder / "drawn")
         self.written = calibrate(
             folder / "run", self.export, process=PROCESS, out=folder / "calibration"
         )

@@ -14,6 +14,7 @@ from tbcad.options.checks import (
     check_is_any_calibration,
     check_is_calibration,
     check_is_export,
+    check_is_object,
     check_is_run,
 )
 from tbcad.options.machines import (
@@ -21,6 +22,7 @@ from tbcad.options.machines import (
     CalibrateOptions,
     IntrinsicsOptions,
     MergeOptions,
+    SimulateRunOptions,
 )
 
 if TYPE_CHECKING:
@@ -30,9 +32,6 @@ if TYPE_CHECKING:
     from tbcad.control.selection import Preflight
     from tbcad.control.session import Ask, Show
     from tbcad.runs.photographs import Run
-    from tbcad.simulate.object_files.contents import Up
-    from tbcad.simulate.scene.object_from_file import Unit
-    from tbcad.simulated_run.options import RunOptions
     from tbcad.types import Progress
 
 
@@ -105,32 +104,9 @@ def run(
     )
 
 
-def simulate_run(
-    exports: Path | str,
-    out: Path | str,
-    process: str = "fdm",
-    object_file: Path | str | None = None,
-    *,
-    up: Up | None = None,
-    unit: Unit | None = None,
-    options: RunOptions | None = None,
-    progress: Progress = silent,
-    detail: Progress = silent,
-    answer: Progress = silent,
-) -> Run:
+@keywords(SimulateRunOptions)
+def simulate_run(options: SimulateRunOptions) -> Run:
     """Simulate all photographs of a run by a random build of the prototype, or of the shell.
-
-    Args:
-        exports: folder that `build` wrote, with a prototype.
-        out: folder to write, which must not hold anything.
-        process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file.
-        object_file: triangle mesh about the origin; None for a built-in knot.
-        up: axis of that file that points up, "y" or "z"; None: y for glTF, else z.
-        unit: of that file, "mm", "cm", "m" or "in"; None: m for glTF, what a 3MF says, else mm.
-        options: seed, stops, phases, noise ...
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
-        answer: called with a line that says how the object's file was taken.
 
     Returns:
         The run as it is read back; the build is in its folder, as truth.json.
@@ -138,23 +114,28 @@ def simulate_run(
     Raises:
         InputError: export, process or object cannot be read, or the folder cannot be written.
     """
+    exports, folder, file = Path(options.exports), Path(options.out), options.object_file
+    check_is_export(exports)
+    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    if options.bits not in (8, 16):
+        raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
+    options.stop_numbers(), options.seconds()  # refused before what is heavy is loaded
     from tbcad.output.inputs import files_named
     from tbcad.runs.photographs import read_run
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object_from_file import ObjectOptions
-    from tbcad.simulated_run.options import RunOptions
     from tbcad.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerance.process.process import load_process, process_errors
 
-    folder = Path(out)
-    check_is_free(folder, (exports, object_file, *files_named(process)))
-    errors = process_errors(load_process(process))
-    progress("build and object")
-    export = read_export(Path(exports))
-    subject = run_object(export, object_file, ObjectOptions(up=up, unit=unit), answer)
-    runs, phases = prepare_run(export, errors, subject, options or RunOptions())
-    progress("photographs")
-    write_run(runs, phases, export.folder, folder, detail)
+    check_is_free(folder, (exports, file, *files_named(options.process)))
+    errors = process_errors(load_process(options.process))
+    options.progress("build and object")
+    export = read_export(exports)
+    taken = ObjectOptions(up=options.up, unit=options.unit)
+    subject = run_object(export, file, taken, options.answer)
+    runs, phases = prepare_run(export, errors, subject, options)
+    options.progress("photographs")
+    write_run(runs, phases, export.folder, folder, options.detail)
     return read_run(folder)
 
 

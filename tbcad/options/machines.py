@@ -8,16 +8,24 @@ from typing import Annotated, Literal
 import typer
 
 from tbcad.options.call import Call
+from tbcad.options.lists import ExposureLeds, ExposureLit, numbers, seconds
 from tbcad.options.shared import (
     AnyPath,
     CalibrationFolder,
+    Exports,
     ExportsOption,
     Force,
     ForceFile,
+    ObjectFile,
     OutReplaced,
     PlotFormatOption,
     RunFolder,
+    UnitOption,
+    UpOption,
 )
+
+MOST_NOISE = 100.0
+MOST_BRIGHTNESS = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -151,3 +159,90 @@ class AsBuiltOptions(Call):
     _: KW_ONLY
     out: OutReplaced[AnyPath] = Path("asbuilt")
     force: Force = False
+
+
+@dataclass(frozen=True)
+class SimulateRunOptions(Call):
+    """An export, how it is built and lit, and what is photographed of it."""
+
+    exports: Exports[AnyPath]
+    _: KW_ONLY
+    process: Annotated[
+        str,
+        typer.Option(
+            help="fdm, sls, sla, cnc, diamond, or a TOML file: how the prototype is built."
+        ),
+    ] = "fdm"
+    seed: Annotated[int, typer.Option(min=0, help="Of the build and of all noise.")] = 0
+    out: Annotated[
+        AnyPath, typer.Option("--out", "-o", help="Folder for the run; it must not hold anything.")
+    ] = Path("run")
+    object_file: ObjectFile[AnyPath] = None
+    up: UpOption = None
+    unit: UnitOption = None
+    stops: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Only these stops, as 1,5,20-30; by default all."),
+    ] = None
+    phases: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST", help="Only these phases, as dark,led_1,led_2; by default all."
+        ),
+    ] = None
+    noise: Annotated[
+        float, typer.Option(min=0, max=MOST_NOISE, help="Factor of all noise; 0 for none.")
+    ] = 1.0
+    bits: Annotated[
+        int, typer.Option(help="Of each pixel's number: 8 in colour, or 16 without.")
+    ] = 8
+    shell: Annotated[
+        bool,
+        typer.Option(
+            "--shell", help="Both cameras of the shell, one photograph each, not the prototype."
+        ),
+    ] = False
+    led_brightness: Annotated[
+        float,
+        typer.Option(
+            metavar="FACTOR",
+            min=0.001,
+            max=MOST_BRIGHTNESS,
+            help="Brightness of the LEDs. 1: at 1 s they fill 0.9 of a pixel, as the lit object's "
+            "white does; of a real LED some 100.",
+        ),
+    ] = 1.0
+    exposure_leds: ExposureLeds[str | float] = None
+    exposure_lit: ExposureLit[str | float] = None
+    perfect: Annotated[
+        bool,
+        typer.Option(
+            "--perfect",
+            help="A build without errors that gravity does not turn, before an ideal lens.",
+        ),
+    ] = False
+
+    def stop_numbers(self) -> tuple[int, ...] | None:
+        """The stops; None for all.
+
+        Raises:
+            InputError: they are no list of numbers.
+        """
+        return None if self.stops is None else numbers(self.stops)
+
+    def phase_names(self) -> tuple[str, ...] | None:
+        """The phases; None for all."""
+        if self.phases is None:
+            return None
+        return tuple(part.strip() for part in self.phases.split(","))
+
+    def seconds(self) -> tuple[float | None, float | None]:
+        """Exposure by LEDs and of the lit object, s; None where they are not said.
+
+        Raises:
+            InputError: one is no time of an exposure.
+        """
+        return (
+            seconds("--exposure-leds", self.exposure_leds),
+            seconds("--exposure-lit", self.exposure_lit),
+        )

@@ -20,9 +20,17 @@ from tbcad.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.machine.designed import designed_prototype, dome_radius
 from tbcad.machine.record import truth_file, write_machine
 from tbcad.machine.shells import perfect_half, random_half, shell_frame
+from tbcad.options.machines import SimulateRunOptions
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, refuse_inputs
-from tbcad.runs.exposure import EXPOSURE_SCHEMA, PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.runs.exposure import (
+    EXPOSURE_SCHEMA,
+    PHOTOGRAPHS,
+    Exposure,
+    Frame,
+    PhaseTimes,
+    exposure_name,
+)
 from tbcad.runs.record import RECORD, RUN_SCHEMA, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.prototype.plan import read_plan
@@ -32,7 +40,6 @@ from tbcad.simulate.scene.object import SceneObject, built_in_object
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.occluders import Occluders, stage_scene
-from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import (
     EXPOSURE_S,
     LED_LIGHT,
@@ -67,7 +74,7 @@ class _Subject:
 
 
 def prepare_run(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: RunOptions
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
     """A random build of an export before it is photographed, and the phases to photograph.
 
@@ -78,20 +85,21 @@ def prepare_run(
         InputError: the export has no prototype with LEDs, or a shell with planar mirrors, or has
             not the stops or phases asked for.
     """
+    times = PhaseTimes(*options.seconds())
     prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
     leds = len(prepared.builds[0][0].machine.leds)
-    phases = options.times.phases(_chosen_phases(options.phases, phases_of(leds)))
+    phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
     scene = prepared_scene(prepared.scene)
     occluders = Occluders(scene.embree, prepared.stage)
     chain = Chain(
         Sensor(bits=options.bits, noise=options.noise),
         dome=dome_radius(export),
         led_light=LED_LIGHT * options.led_brightness,
-        times=options.times,
+        times=times,
     )
     runs = []
     for whole, every in prepared.builds:
-        frames = _chosen_stops(options.stops, every)
+        frames = _chosen_stops(options.stop_numbers(), every)
         kept = np.array([every.index(frame) for frame in frames])
         built = replace(whole, machine=whole.machine.of_frames(kept))
         runs.append(SimulatedRun(built, frames, scene, occluders, chain, options.seed))
@@ -99,7 +107,7 @@ def prepare_run(
 
 
 def _prototype(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: RunOptions
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> _Subject:
     """All stops of both runs, the object lit by the prototype's lamps."""
     plan = read_plan(export)
@@ -115,7 +123,7 @@ def _prototype(
 
 
 def _shell(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: RunOptions
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> _Subject:
     """One frame of each camera, the object as bright from all sides."""
     builds = []

@@ -86,11 +86,11 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
     assert shown["exports"].annotation.__origin__ is Path
 
 
-@pytest.mark.parametrize("name", ["calibrate", "export", "intrinsics", "merge"])
+@pytest.mark.parametrize("name", ["calibrate", "export", "intrinsics", "merge", "simulate_run"])
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     from tests.cli.commands import leaves
 
-    command = {one.name for one in leaves()[(name,)].params}
+    command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
     python = set(inspect.signature(getattr(tbcad, name)).parameters)
     assert command - {"json"} == python - {"progress", "detail", "answer"}
 
