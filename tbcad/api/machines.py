@@ -6,10 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tbcad.api.arguments import silent
 from tbcad.errors import InputError
 from tbcad.loading import large_libraries
-from tbcad.options.call import keywords
+from tbcad.options.call import keywords, silent
 from tbcad.options.checks import (
     check_is_any_calibration,
     check_is_calibration,

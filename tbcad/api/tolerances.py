@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tbcad.api.arguments import Settings, silent
+from tbcad.api.arguments import Settings
 from tbcad.loading import large_libraries
-from tbcad.options.call import keywords
+from tbcad.options.call import keywords, silent
 from tbcad.options.checks import check_is_export
 from tbcad.options.tolerances import InspectionOptions
 from tbcad.spec.load import option_texts

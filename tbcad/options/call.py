@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache, wraps
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
@@ -89,8 +89,7 @@ def keywords(
                 return function(cast("Record", args[0]))
             return function(record(*args, **kwargs))
 
-        returned = signature(function).return_annotation
-        vars(called)["__signature__"] = signature(kind).replace(return_annotation=returned)
+        vars(called)["__signature__"] = _signature(kind, signature(function).return_annotation)
         called.__doc__ = _with_arguments(function.__doc__ or "", kind)
         return cast("Function[Keywords, Record, Result]", called)
 
@@ -115,6 +114,18 @@ def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
         if one.name in options:
             yield _typed(one.replace(annotation=options[one.name]))
     yield from map(_typed, own)
+
+
+def _signature(record: type[Call], returned: object) -> Signature:
+    """Keywords as a person reads them: options in the order of the command, then callbacks."""
+    options, every = declared(record), signature(record).parameters.values()
+    own = [
+        one.replace(annotation=get_args(options[one.name])[0])
+        for one in every
+        if one.name in options
+    ]
+    rest = [one for one in every if one.name not in options]
+    return Signature([*own, *rest], return_annotation=returned)
 
 
 def _typed(parameter: Parameter) -> Parameter:

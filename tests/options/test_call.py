@@ -43,6 +43,8 @@ def test_fields_are_keywords() -> None:
     shown = inspect.signature(polish)
     assert shown.parameters["passes"].default == 2
     assert shown.parameters["passes"].kind is inspect.Parameter.KEYWORD_ONLY
+    assert shown.parameters["passes"].annotation is int
+    assert [*shown.parameters] == ["mirror", "passes", "grits", "progress", "detail", "answer"]
     assert shown.return_annotation is str
     with pytest.raises(TypeError, match="passs"):
         polish("m.step", passs=3)  # type: ignore[call-overload]
