@@ -8,13 +8,11 @@ import pytest
 
 from tbcad.api import build, calibrate, merge, simulate_run
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.stop_photographs import MergeOptions
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import OBJECT_LIGHT
 from tbcad.simulated_run.simulate import run_object
 from tests.view_quality import mean_ssim
@@ -30,8 +28,8 @@ class Loop:
 
     def __init__(self, export: Path, folder: Path) -> None:
         self.export, self.folder = export, folder
-        simulate_run(export, folder / "run", "fdm", options=RunOptions(seed=3))
-        simulate_run(export, folder / "perfect", options=RunOptions(perfect=True))
+        simulate_run(export, seed=3, out=folder / "run")
+        simulate_run(export, perfect=True, out=folder / "perfect")
         calibrate(folder / "run", export, out=folder / "calibration")
         for name, run in (("truth", "run"), ("drawing", "perfect")):
             (folder / name).mkdir()
@@ -42,8 +40,13 @@ class Loop:
     def quality(self, run: str, calibration: str) -> float:
         """Mean SSIM of the views of a run merged by a machine."""
         out = self.folder / f"{run}-{calibration}"
-        options = MergeOptions(brightness=1 / OBJECT_LIGHT)
-        merge(self.folder / run, self.folder / calibration, self.export, options, out=out)
+        merge(
+            self.folder / run,
+            self.folder / calibration,
+            self.export,
+            out=out,
+            brightness=1 / OBJECT_LIGHT,
+        )
         return mean_ssim(MirrorTiles(LightField.read(out)), self.scene)
 
 

@@ -7,17 +7,14 @@ import numpy as np
 import pytest
 
 from tbcad.api import calibrate, merge, simulate_run
-from tbcad.calibration.options import CalibrationOptions
 from tbcad.geometry.vectors import norm
 from tbcad.machine.record import read_machine
-from tbcad.merged_run.stop_photographs import MergeOptions
 from tbcad.mirrors.array import design
 from tbcad.mirrors.record import write_record
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import OBJECT_LIGHT
 from tbcad.simulated_run.simulate import run_object
 from tbcad.spec.load import load_spec
@@ -39,11 +36,10 @@ class ShellLoop:
         self.export.mkdir()
         spec = load_spec(None, [*DESIGN, f"shell.edges={edges}"])
         write_record(self.export, design(spec), shells=False)
-        simulate_run(self.export, folder / "run", PROCESS, options=RunOptions(seed=3, shell=True))
-        drawn = RunOptions(perfect=True, shell=True, phases=("dark",))
-        simulate_run(self.export, folder / "drawn", options=drawn)
+        simulate_run(self.export, process=PROCESS, seed=3, shell=True, out=folder / "run")
+        simulate_run(self.export, perfect=True, shell=True, phases="dark", out=folder / "drawn")
         self.written = calibrate(
-            folder / "run", self.export, CalibrationOptions(PROCESS), out=folder / "calibration"
+            folder / "run", self.export, process=PROCESS, out=folder / "calibration"
         )
         for name, run in (("truth", "run"), ("drawing", "drawn")):
             for camera in CAMERAS:
@@ -54,9 +50,9 @@ class ShellLoop:
 
     def quality(self, calibration: str) -> float:
         """Mean SSIM of views of the photographs merged by a machine."""
-        out, options = self.folder / f"by-{calibration}", MergeOptions(brightness=1 / OBJECT_LIGHT)
-        run = self.folder / "run"
-        record = merge(run, self.folder / calibration, self.export, options, out=out)
+        run, out = self.folder / "run", self.folder / f"by-{calibration}"
+        known, brightness = self.folder / calibration, 1 / OBJECT_LIGHT
+        record = merge(run, known, self.export, out=out, brightness=brightness)
         assert set(record["based_on"]) == {*CAMERAS}
         assert not any(half["mirrors_missing"] for half in record["based_on"].values())
         return mean_ssim(MirrorTiles(LightField.read(out)), self.scene)

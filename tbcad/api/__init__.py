@@ -16,7 +16,7 @@ from tbcad.api.captures import (
 )
 from tbcad.api.datasets import export
 from tbcad.api.designs import design, to_cadquery
-from tbcad.api.machines import as_built, calibrate, merge, run, simulate_run, solve_intrinsics
+from tbcad.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.api.reconstructions import reconstruct
 from tbcad.api.tolerances import analyse, inspect
 from tbcad.api.verification import verify, verify_as_built
@@ -37,6 +37,7 @@ __all__ = [
     "design",
     "export",
     "inspect",
+    "intrinsics",
     "merge",
     "photograph",
     "reconstruct",
@@ -44,7 +45,6 @@ __all__ = [
     "report_page",
     "run",
     "simulate_run",
-    "solve_intrinsics",
     "to_cadquery",
     "verify",
     "verify_as_built",

@@ -12,10 +12,6 @@ from tbcad.spec.load import load_spec, option_texts
 Settings = Mapping[str, str] | Sequence[str]
 
 
-def silent(_: str) -> None:
-    """Ignore a report of progress."""
-
-
 def chosen_spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> Spec:
     """Return a spec as it is, or read a design file; None: the design of the paper.
 

@@ -8,9 +8,10 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from tbcad.api.arguments import chosen_spec, silent
+from tbcad.api.arguments import chosen_spec
 from tbcad.errors import InputError
 from tbcad.loading import large_libraries
+from tbcad.options.call import silent
 from tbcad.spec.design import Spec
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tbcad.api.arguments import silent
 from tbcad.errors import InputError
+from tbcad.options.call import silent
 
 if TYPE_CHECKING:
     from tbcad.reflectance.environment import LightFormat

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tbcad.api.arguments import Settings, chosen_spec, silent
+from tbcad.api.arguments import Settings, chosen_spec
+from tbcad.options.call import silent
 from tbcad.spec.design import Spec
 
 if TYPE_CHECKING:

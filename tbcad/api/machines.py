@@ -6,21 +6,31 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tbcad.api.arguments import silent
+from tbcad.errors import InputError
 from tbcad.loading import large_libraries
+from tbcad.options.call import keywords, silent
+from tbcad.options.checks import (
+    check_is_any_calibration,
+    check_is_calibration,
+    check_is_export,
+    check_is_object,
+    check_is_run,
+)
+from tbcad.options.machines import (
+    AsBuiltOptions,
+    CalibrateOptions,
+    IntrinsicsOptions,
+    MergeOptions,
+    SimulateRunOptions,
+)
 
 if TYPE_CHECKING:
     from tbcad.calibration.intrinsics.checkerboard import SolvedLens
-    from tbcad.calibration.options import CalibrationOptions
     from tbcad.calibration.run import WrittenCalibration
     from tbcad.control.outcome import Outcome
     from tbcad.control.selection import Preflight
     from tbcad.control.session import Ask, Show
-    from tbcad.merged_run.stop_photographs import MergeOptions
     from tbcad.runs.photographs import Run
-    from tbcad.simulate.object_files.contents import Up
-    from tbcad.simulate.scene.object_from_file import Unit
-    from tbcad.simulated_run.options import RunOptions
     from tbcad.types import Progress
 
 
@@ -93,32 +103,9 @@ def run(
     )
 
 
-def simulate_run(
-    exports: Path | str,
-    out: Path | str,
-    process: str = "fdm",
-    object_file: Path | str | None = None,
-    *,
-    up: Up | None = None,
-    unit: Unit | None = None,
-    options: RunOptions | None = None,
-    progress: Progress = silent,
-    detail: Progress = silent,
-    answer: Progress = silent,
-) -> Run:
+@keywords(SimulateRunOptions)
+def simulate_run(options: SimulateRunOptions) -> Run:
     """Simulate all photographs of a run by a random build of the prototype, or of the shell.
-
-    Args:
-        exports: folder that `build` wrote, with a prototype.
-        out: folder to write, which must not hold anything.
-        process: "fdm", "sls", "sla", "cnc", "diamond", or a TOML file.
-        object_file: triangle mesh about the origin; None for a built-in knot.
-        up: axis of that file that points up, "y" or "z"; None: y for glTF, else z.
-        unit: of that file, "mm", "cm", "m" or "in"; None: m for glTF, what a 3MF says, else mm.
-        options: seed, stops, phases, noise ...
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
-        answer: called with a line that says how the object's file was taken.
 
     Returns:
         The run as it is read back; the build is in its folder, as truth.json.
@@ -126,187 +113,141 @@ def simulate_run(
     Raises:
         InputError: export, process or object cannot be read, or the folder cannot be written.
     """
+    exports, folder, file = Path(options.exports), Path(options.out), options.object_file
+    check_is_export(exports)
+    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    if options.bits not in (8, 16):
+        raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
+    options.stop_numbers(), options.seconds()  # refused before what is heavy is loaded
     from tbcad.output.inputs import files_named
     from tbcad.runs.photographs import read_run
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object_from_file import ObjectOptions
-    from tbcad.simulated_run.options import RunOptions
     from tbcad.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerance.process.process import load_process, process_errors
 
-    folder = Path(out)
-    check_is_free(folder, (exports, object_file, *files_named(process)))
-    errors = process_errors(load_process(process))
-    progress("build and object")
-    export = read_export(Path(exports))
-    subject = run_object(export, object_file, ObjectOptions(up=up, unit=unit), answer)
-    runs, phases = prepare_run(export, errors, subject, options or RunOptions())
-    progress("photographs")
-    write_run(runs, phases, export.folder, folder, detail)
+    check_is_free(folder, (exports, file, *files_named(options.process)))
+    errors = process_errors(load_process(options.process))
+    options.progress("build and object")
+    export = read_export(exports)
+    taken = ObjectOptions(up=options.up, unit=options.unit)
+    subject = run_object(export, file, taken, options.answer)
+    runs, phases = prepare_run(export, errors, subject, options)
+    options.progress("photographs")
+    write_run(runs, phases, export.folder, folder, options.detail)
     return read_run(folder)
 
 
-def calibrate(
-    run: Path | str,
-    exports: Path | str,
-    options: CalibrationOptions | None = None,
-    *,
-    out: Path | str,
-    force: bool = False,
-    progress: Progress = silent,
-    detail: Progress = silent,
-) -> WrittenCalibration:
+@keywords(CalibrateOptions)
+def calibrate(options: CalibrateOptions) -> WrittenCalibration:
     """Find the machine that took the photographs of a run, and how well its rays are known.
-
-    Args:
-        run: folder that `tbcad run` or `tbcad simulate-run` wrote.
-        exports: folder that `build` wrote.
-        options: the process that made the machine, measured radii, the camera's lens.
-        out: folder to write the calibration to.
-        force: replace an earlier one, and keep files that tbcad did not write.
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
 
     Returns:
         The calibration, with its verdict.
 
     Raises:
-        InputError: one cannot be read, they do not belong together, there is nothing to calibrate
-            from, or out cannot be replaced.
+        InputError: a file cannot be read, they do not belong together, there is nothing to
+            calibrate from, or out cannot be replaced.
     """
-    from tbcad.calibration.options import CalibrationOptions
+    check_is_run(Path(options.run))
+    check_is_export(Path(options.exports))
+    if options.intrinsics is not None and not Path(options.intrinsics).is_file():
+        raise InputError(
+            f"{options.intrinsics}: no such file; give the one that `tbcad intrinsics` wrote"
+        )
+    from tbcad.tolerance.process.process import load_process
+
+    if options.process is not None:
+        load_process(options.process, options.settings)  # before what is heavy is loaded
     from tbcad.calibration.run import calibrate_run
 
-    asked = options or CalibrationOptions()
-    return calibrate_run(Path(run), Path(exports), Path(out), asked, force, progress, detail)
+    return calibrate_run(options)
 
 
-def solve_intrinsics(
-    folder: Path | str,
-    squares: tuple[int, int],
-    size_mm: float,
-    *,
-    charuco: str | None = None,
-    marker_mm: float | None = None,
-    out: Path | str | None = None,
-    force: bool = False,
-    detail: Progress = silent,
-) -> SolvedLens:
+@keywords(IntrinsicsOptions)
+def intrinsics(options: IntrinsicsOptions) -> SolvedLens:
     """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
-
-    Args:
-        folder: with the photographs.
-        squares: columns and rows of the board.
-        size_mm: width of a square.
-        charuco: dictionary of a ChArUco board's markers, such as "4x4_50".
-        marker_mm: width of its markers.
-        out: file to write, as OpenCV's YAML; None: none.
-        force: replace a file that exists.
-        detail: called with the name of each photograph.
 
     Raises:
         InputError: too few boards are found, or the file cannot be written or exists.
     """
     from tbcad.atomic_files import replace_files
-    from tbcad.calibration.intrinsics.boards import Board, parse_dictionary
+    from tbcad.calibration.intrinsics.boards import Board, parse_dictionary, parse_squares
     from tbcad.calibration.intrinsics.checkerboard import solve_lens
     from tbcad.calibration.intrinsics.lens import opencv_text
     from tbcad.output.single_files import check_file
 
-    if out is not None:
-        check_file(Path(out), force, Path(folder).glob("*"))
-    dictionary = None if charuco is None else parse_dictionary(charuco)
-    solved = solve_lens(Path(folder), Board(squares, size_mm, dictionary, marker_mm), detail)
-    if out is not None:
-        file = Path(out)
-        text = opencv_text(solved.lens, solved.facts())
-        replace_files(file.parent, {file.name: text.encode()})
+    folder, out = Path(options.folder), Path(options.out)
+    squares = parse_squares(options.squares)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; name one with photographs of a board")
+    check_file(out, options.force, folder.glob("*"))
+    options.progress("corners of boards")
+    dictionary = None if options.charuco is None else parse_dictionary(options.charuco)
+    board = Board(squares, options.size, dictionary, options.marker)
+    solved = solve_lens(folder, board, options.detail)
+    text = opencv_text(solved.lens, solved.facts())
+    replace_files(out.parent, {out.name: text.encode()})
     return solved
 
 
-def merge(
-    run: Path | str,
-    calibration: Path | str,
-    exports: Path | str | None = None,
-    options: MergeOptions | None = None,
-    *,
-    out: Path | str,
-    force: bool = False,
-    progress: Progress = silent,
-    detail: Progress = silent,
-) -> dict[str, Any]:
+@keywords(MergeOptions)
+def merge(options: MergeOptions) -> dict[str, Any]:
     """Merge the photographs of a run into the light field that the shell would have given.
-
-    Args:
-        run: folder that `tbcad run` or `tbcad simulate-run` wrote.
-        calibration: folder that `tbcad calibrate` wrote.
-        exports: folder that `build` wrote; by default the one that the calibration names.
-        options: how the photographs are corrected.
-        out: folder to write pictures and light field to, as of a capture.
-        force: replace an earlier one, and keep files that tbcad did not write.
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
 
     Returns:
         What is in capture.json: also which mirrors are missing, and why.
 
     Raises:
-        InputError: one cannot be read, they do not belong together, or out cannot be replaced.
+        InputError: a file cannot be read, they do not belong together, or out cannot be replaced.
     """
+    run, known = Path(options.run), Path(options.calibration)
+    check_is_run(run)
+    check_is_any_calibration(known)
+    if options.exports is not None:
+        check_is_export(Path(options.exports))
     from tbcad.machine.calibrated_export import export_of
     from tbcad.merged_run.files import write_merge
     from tbcad.merged_run.merge import prepared_merge
-    from tbcad.merged_run.stop_photographs import MergeOptions
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
-    known, chosen = Path(calibration), options or MergeOptions()
-    built = export_of(known) if exports is None else Path(exports)
-    inputs = (run, known, built, *chosen.flat)
-    check_replaceable(Path(out), "merged run", force, inputs)
-    progress("run and calibration")
-    prepared = prepared_merge(Path(run), known, built, chosen)
-    progress("photographs and light field")
-    with replacing(Path(out), "merged run", force, inputs) as folder:
-        record = write_merge(folder, prepared, detail)
+    built = export_of(known) if options.exports is None else Path(options.exports)
+    out, inputs = options.folder, (run, known, built, *options.flat)
+    check_replaceable(out, "merged run", options.force, inputs)
+    options.progress("run and calibration")
+    prepared = prepared_merge(run, known, built, options)
+    options.progress("photographs and light field")
+    with replacing(out, "merged run", options.force, inputs) as folder:
+        record = write_merge(folder, prepared, options.detail)
         write_manifest(folder, "merged run")
     return record
 
 
-def as_built(
-    calibration: Path | str,
-    exports: Path | str | None = None,
-    *,
-    out: Path | str,
-    force: bool = False,
-    progress: Progress = silent,
-) -> dict[str, Any]:
-    """Write the balls of a calibrated prototype as exact solids, coloured by what they are off.
-
-    Args:
-        calibration: folder that `tbcad calibrate` wrote.
-        exports: folder that `build` wrote; by default the one that the calibration names.
-        out: folder to write.
-        force: keep files in the folder that tbcad did not write.
-        progress: called with the name of each stage.
+@keywords(AsBuiltOptions)
+def as_built(options: AsBuiltOptions) -> dict[str, Any]:
+    """Write the balls of a calibrated prototype as exact solids, coloured by their errors.
 
     Returns:
         What is in as_built.json.
 
     Raises:
-        InputError: one cannot be read, they do not belong together, or out cannot be replaced.
+        InputError: a file cannot be read, they do not belong together, or out cannot be replaced.
     """
+    known, out = Path(options.calibration), Path(options.out)
+    check_is_calibration(known)
+    if options.exports is not None:
+        check_is_export(Path(options.exports))
     from tbcad.machine.calibrated_export import export_of
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
-    known = Path(calibration)
-    built = export_of(known) if exports is None else Path(exports)
-    check_replaceable(Path(out), "as-built", force, (known, built))
-    progress("solids")
+    built = export_of(known) if options.exports is None else Path(options.exports)
+    check_replaceable(out, "as-built", options.force, (known, built))
+    options.progress("solids")
     with large_libraries():
         from tbcad.as_built.files import as_built as write_files
-    with replacing(Path(out), "as-built", force, (known, built)) as folder:
+    with replacing(out, "as-built", options.force, (known, built)) as folder:
         record = write_files(known, built, folder)
         write_manifest(folder, "as-built")
     return record

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tbcad.api.arguments import silent
 from tbcad.errors import InputError
+from tbcad.options.call import silent
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

@@ -6,8 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tbcad.api.arguments import Settings, silent
+from tbcad.api.arguments import Settings
 from tbcad.loading import large_libraries
+from tbcad.options.call import keywords, silent
+from tbcad.options.checks import check_is_export
+from tbcad.options.tolerances import InspectionOptions
 from tbcad.spec.load import option_texts
 
 if TYPE_CHECKING:
@@ -67,22 +70,9 @@ def analyse(
     return analyse_export(export, made_by, subject, asked, progress, detail, answer)
 
 
-def inspect(
-    exports: Path | str,
-    *,
-    out: Path | str,
-    wanted: float = 0.99,
-    force: bool = False,
-    progress: Progress = silent,
-) -> dict[str, Any]:
+@keywords(InspectionOptions)
+def inspect(options: InspectionOptions) -> dict[str, Any]:
     """Write by how much each mirror of a shell may be off: tables, and STEP with tolerances.
-
-    Args:
-        exports: folder that `build` wrote, with the shells.
-        out: folder to write.
-        wanted: share of the shells that are good with the standard deviations of the tables.
-        force: keep files in the folder that tbcad did not write.
-        progress: called with the name of each stage.
 
     Returns:
         What is in inspection.json.
@@ -91,18 +81,20 @@ def inspect(
         InputError: the export has no shells, their mirrors are planar or may not be off at all,
             the share is not between 0 and 1, or out cannot be replaced.
     """
+    exports, out = Path(options.exports), Path(options.out)
+    check_is_export(exports)
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
     from tbcad.tolerance.options import check_yield
 
-    check_yield(wanted)
-    check_replaceable(Path(out), "inspection", force, (exports,))
+    check_yield(options.wanted)
+    check_replaceable(out, "inspection", options.force, (exports,))
     with large_libraries():
         from tbcad.inspection.inspect import checked_export
         from tbcad.inspection.inspect import inspect as write_files
 
-    export = checked_export(Path(exports))
-    with replacing(Path(out), "inspection", force, (exports,)) as folder:
-        record = write_files(export, wanted, folder, progress)
+    export = checked_export(exports)
+    with replacing(out, "inspection", options.force, (exports,)) as folder:
+        record = write_files(export, options.wanted, folder, options.progress)
         write_manifest(folder, "inspection")
     return record

@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tbcad.api.arguments import silent
 from tbcad.errors import InputError
+from tbcad.options.call import silent
 
 if TYPE_CHECKING:
     from tbcad_verify.as_built.report import AsBuiltReport

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
-from tbcad.api.arguments import silent
 from tbcad.errors import InputError
+from tbcad.options.call import silent
 
 if TYPE_CHECKING:
     from tbcad.depth.depth_map import DepthViews

@@ -10,7 +10,6 @@ from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_
 from tbcad.calibration.detection.detect import detect
 from tbcad.calibration.detection.expected import Room
 from tbcad.calibration.intrinsics.files import read_lens
-from tbcad.calibration.options import DEFAULT_PROCESS, CalibrationOptions
 from tbcad.calibration.priors import parse_measured
 from tbcad.calibration.report.files import write_calibration, write_recovered
 from tbcad.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
@@ -19,13 +18,15 @@ from tbcad.figure_files import PlotFormat
 from tbcad.machine.designed import dome_radius
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import TRUTH, read_machine
+from tbcad.options.machines import CalibrateOptions
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, files_named
 from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.tolerance.process.process import Process, load_process, process_errors
-from tbcad.types import Progress
 
+DEFAULT_PROCESS = "fdm"
+"""A prototype is printed; its design does not say how."""
 SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
 READING, DETECTING, ESTIMATING, WRITING = (
     "run and export",
@@ -56,23 +57,17 @@ class WrittenCalibration:
         return (self, *self.others)
 
 
-def calibrate_run(
-    folder: Path,
-    exports: Path,
-    out: Path,
-    options: CalibrationOptions,
-    force: bool,
-    progress: Progress,
-    detail: Progress,
-) -> WrittenCalibration:
+def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     """Calibrate the machines that took a run's photographs, and write all that is found.
 
-    A prototype's files are in `out`, those of a shell's cameras in its folders a and b.
+    A prototype's files are in `options.out`, those of a shell's cameras in its folders a and b.
 
     Raises:
         InputError: one cannot be read, they do not belong together, there is nothing to calibrate
             from, or out cannot be replaced.
     """
+    folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
+    progress, detail = options.progress, options.detail
     progress(READING)
     process = load_process(options.process or DEFAULT_PROCESS, options.settings)
     run = read_run(folder)
@@ -80,14 +75,14 @@ def calibrate_run(
     machines = {name: run.of_frames(frames) for name, frames in run.record.machines.items()}
     inputs = (folder, exports, options.intrinsics, *files_named(options.process))
     for name in machines:
-        check_replaceable(out / name, "calibration", force, inputs)
+        check_replaceable(out / name, "calibration", options.force, inputs)
     export = read_export(exports)
     setups = [_setup(one, export, options) for one in machines.values()]
     truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
     found = []
     for one, setup in zip(machines.values(), setups, strict=True):
         progress(DETECTING)
-        measured = parse_measured(options.measured, len(setup.plan))
+        measured = parse_measured(tuple(options.measured), len(setup.plan))
         prior = setup.prior(process_errors(process), measured)
         detection = detect(one, prior, _room(setup), dome_radius(export), detail)
         progress(ESTIMATING)
@@ -100,7 +95,7 @@ def calibrate_run(
             out / name,
             _basis(one, result.setup, options, process),
             inputs,
-            force,
+            options.force,
             options.plot,
         )
         for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
@@ -108,9 +103,9 @@ def calibrate_run(
     return replace(first, others=tuple(others))
 
 
-def _setup(run: Run, export: ExportedDesign, options: CalibrationOptions) -> Setup:
+def _setup(run: Run, export: ExportedDesign, options: CalibrateOptions) -> Setup:
     record = run.record
-    lens = None if options.intrinsics is None else read_lens(options.intrinsics)
+    lens = None if options.intrinsics is None else read_lens(Path(options.intrinsics))
     size = record.width_px, record.height_px
     return prepared_setup(export, record.frames, size, lens, record.geometry)
 
@@ -156,7 +151,7 @@ def _room(setup: Setup) -> Room:
     return Room(radius, stage.top_mm, math.sqrt((setup.export.capture_mm / 2) ** 2 - radius**2))
 
 
-def _basis(run: Run, setup: Setup, options: CalibrationOptions, process: Process) -> dict[str, Any]:
+def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) -> dict[str, Any]:
     """What the calibration is based on, for its record."""
     lens = "estimated" if options.intrinsics is None else str(options.intrinsics)
     return {

@@ -7,14 +7,14 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_folder
-from tbcad.cli.options import Exports, ForceFile, Out
+from tbcad.options.checks import check_is_folder
+from tbcad.options.shared import Exports, ForceFile, Out
 
 
 @app.command()
 def assembly(
-    folder: Exports,
-    out: Out = Path("assembly"),
+    folder: Exports[Path],
+    out: Out[Path] = Path("assembly"),
     pictures: Annotated[
         bool, typer.Option("--pictures/--no-pictures", help="Draw a picture for each step.")
     ] = True,

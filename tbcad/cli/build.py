@@ -8,11 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_are_printers, check_is_calibration, check_is_folder
 from tbcad.cli.for_process import DEFAULT_YIELD, asked_process, design_for
-from tbcad.cli.options import Design, Exports, Force, ForceFile, JsonResult, OutReplaced, Settings
 from tbcad.cli.output_mode import Full, Json, Quiet, output_mode, print_json
 from tbcad.errors import InputError
+from tbcad.options.checks import check_are_printers, check_is_calibration, check_is_folder
+from tbcad.options.shared import (
+    Design,
+    Exports,
+    Force,
+    ForceFile,
+    JsonResult,
+    OutReplaced,
+    Settings,
+)
 from tbcad.screen import report_console, stages
 
 if TYPE_CHECKING:
@@ -25,7 +33,7 @@ FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its na
 
 @app.command()
 def build(
-    design: Design = None,
+    design: Design[Path] = None,
     n: Annotated[
         str | None,
         typer.Option(
@@ -33,7 +41,7 @@ def build(
             help="Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared.",
         ),
     ] = None,
-    out: OutReplaced = Path("exports"),
+    out: OutReplaced[Path] = Path("exports"),
     radius_rule: Annotated[
         Literal["traced", "paper", "flat"] | None,
         typer.Option(
@@ -141,7 +149,7 @@ def build(
 
 @app.command("verify")
 def verify_command(
-    folder: Exports,
+    folder: Exports[Path],
     printers: Annotated[
         list[str] | None,
         typer.Option(
@@ -215,7 +223,7 @@ def _verify_as_built(folder: Path, calibration: Path, output: "Output") -> int:
 
 @app.command()
 def picture(
-    folder: Exports,
+    folder: Exports[Path],
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="PNG file to write; by default named after the subject."),

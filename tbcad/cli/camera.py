@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import Design, Settings
+from tbcad.options.shared import Design, Settings
 
 CameraList = Annotated[
     Path | None,
@@ -29,7 +29,7 @@ LensList = Annotated[
 
 @app.command()
 def camera(
-    design: Design = None,
+    design: Design[Path] = None,
     n: Annotated[
         int | None, typer.Option(help="Subdivision of the icosahedron, 2 to 60; the paper has 18.")
     ] = None,

@@ -7,15 +7,15 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export
-from tbcad.cli.options import Exports, ForceFile, Out
+from tbcad.options.checks import check_is_export
+from tbcad.options.shared import Exports, ForceFile, Out
 from tbcad.screen import stages
 
 
 @app.command()
 def drawings(
-    folder: Exports,
-    out: Out = Path("drawings"),
+    folder: Exports[Path],
+    out: Out[Path] = Path("drawings"),
     only: Annotated[
         list[str] | None,
         typer.Option(

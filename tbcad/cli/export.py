@@ -1,16 +1,13 @@
 """Write a light field as data that other programs read."""
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from dataclasses import replace
+from typing import Any
 
-import typer
-
-from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_capture
-from tbcad.cli.options import Capture, Force, JsonResult, OutReplaced
+from tbcad.cli.app import command
 from tbcad.cli.output_mode import print_result
-from tbcad.errors import InputError
+from tbcad.options.captures import ExportOptions
+from tbcad.options.shared import JsonResult
 from tbcad.screen import stages
 
 STAGES = 4
@@ -28,73 +25,20 @@ NOTES = {
 }
 
 
-@app.command()
-def export(
-    capture: Capture,
-    to: Annotated[
-        Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"] | None,
-        typer.Option(
-            help="nerfstudio, colmap: virtual cameras as pinholes, with masks; ngp-rays: crops "
-            "with the ray of every pixel for instant-ngp; rays: all rays as numpy arrays and HDF5; "
-            "mitsuba: the machine itself as scenes for Mitsuba and Blender."
-        ),
-    ] = None,
-    out: OutReplaced = Path("data"),
-    every: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="One virtual camera of N, spread evenly."),
-    ] = 1,
-    size: Annotated[
-        int | None,
-        typer.Option(
-            metavar="PIXELS",
-            help="Width and height of the pictures; by default as fine as the finest tenth of the "
-            "virtual cameras.",
-        ),
-    ] = None,
-    cameras: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="a, b, or mirrors by name, as a0001,b0007; by default all.",
-        ),
-    ] = None,
-    exports: Annotated[
-        Path | None,
-        typer.Option(
-            "--exports",
-            metavar="FOLDER",
-            help="Folder written by tbcad build, with the shells; for --to mitsuba.",
-        ),
-    ] = None,
-    force: Force = False,
-    json: JsonResult = False,
-) -> int:
+@command()
+def export(options: ExportOptions, json: JsonResult = False) -> int:
     """Write virtual cameras of a capture for nerfstudio, COLMAP or instant-ngp, rays, or a scene.
 
     Each mirror's crop is resampled to the picture of a pinhole at the point that its rays come
     nearest to, right way round, with a mask. Prints how far rays and pinholes are apart.
     """
-    if to is None:
-        raise InputError(f"--to is missing, allowed is one of {', '.join(WRITTEN)}: add it")
-    check_is_capture(capture)
+    to = options.check()
     from tbcad.api import export as exported
 
     with stages(STAGES) as screen:
-        record = exported(
-            capture,
-            to,
-            out=out,
-            every=every,
-            size=size,
-            cameras=cameras,
-            exports=exports,
-            force=force,
-            progress=screen.stage,
-            detail=screen.detail,
-        )
+        record = exported(replace(options, progress=screen.stage, detail=screen.detail))
     figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
-    files = f"{out}: {WRITTEN[to]}; {figures} with these figures"
+    files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
     lines = _scene_lines(record) if to == "mitsuba" else _lines(record)
     print_result(record, [*lines, files], json)
     return 0

@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.options import ForceFile
 from tbcad.errors import InputError
+from tbcad.options.shared import ForceFile
 
 PAPER = "turtleback"
 

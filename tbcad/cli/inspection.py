@@ -1,40 +1,29 @@
 """What a workshop is told of a shell: heavy libraries are imported inside the command."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export
-from tbcad.cli.options import Exports, Force, JsonResult, OutReplaced
+from tbcad.cli.app import command
 from tbcad.cli.output_mode import print_json
+from tbcad.options.shared import JsonResult
+from tbcad.options.tolerances import InspectionOptions
 from tbcad.screen import stages
 
 
-@app.command()
-def inspection(
-    folder: Exports,
-    share: Annotated[
-        float,
-        typer.Option(
-            "--yield", help="Share of the shells that must be good with the standard deviations."
-        ),
-    ] = 0.99,
-    out: OutReplaced = Path("inspection"),
-    force: Force = False,
-    json: JsonResult = False,
-) -> int:
+@command()
+def inspection(options: InspectionOptions, json: JsonResult = False) -> int:
     """Write what a workshop needs for the shells: limits of every mirror, tolerances in STEP.
 
     inspection_a.csv and inspection_b.csv have each mirror's sphere and by how much it may be off;
     shell_a_tolerances.step and shell_b_tolerances.step (AP242) the same with datums A, B, C.
     """
-    check_is_export(folder)
     from tbcad.api import inspect
 
+    out = Path(options.out)
     with stages(3) as screen:
-        record = inspect(folder, out=out, wanted=share, force=force, progress=screen.stage)
+        record = inspect(replace(options, progress=screen.stage))
     if json:
         print_json(record)
         return 0

@@ -7,9 +7,9 @@ import typer
 
 from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.cli.app import app
-from tbcad.cli.options import ForceFile, JsonResult, PlotFormatOption, Scheduler, Settings
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
+from tbcad.options.shared import ForceFile, JsonResult, PlotFormatOption, Scheduler, Settings
 from tbcad.screen import stages
 
 if TYPE_CHECKING:

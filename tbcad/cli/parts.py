@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_folder
-from tbcad.cli.options import Exports
+from tbcad.options.checks import check_is_folder
+from tbcad.options.shared import Exports
 
 PriceList = Annotated[
     Path | None,
@@ -23,7 +23,7 @@ PriceList = Annotated[
 
 @app.command()
 def parts(
-    folder: Exports,
+    folder: Exports[Path],
     prices: PriceList = None,
     full: Annotated[bool, typer.Option("--full", help="Show every row.")] = False,
     json: Annotated[

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_capture
-from tbcad.cli.options import ForceFile, JsonResult
 from tbcad.cli.output_mode import print_result
 from tbcad.cli.stopping import Stopped
 from tbcad.errors import InputError
+from tbcad.options.checks import check_is_capture
+from tbcad.options.shared import ForceFile, JsonResult
 from tbcad.screen import stages
 
 if TYPE_CHECKING:

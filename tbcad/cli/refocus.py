@@ -14,8 +14,9 @@ from tbcad.cli.compared_pictures import (
     viewpoint_of,
     write_compared,
 )
-from tbcad.cli.early_checks import check_is_capture
-from tbcad.cli.options import (
+from tbcad.errors import InputError
+from tbcad.options.checks import check_is_capture
+from tbcad.options.shared import (
     Azimuth,
     Capture,
     Distance,
@@ -26,7 +27,6 @@ from tbcad.cli.options import (
     OutPicture,
     Width,
 )
-from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def refocus(
-    capture_folder: Capture,
+    capture_folder: Capture[Path],
     azimuth: Azimuth = 0.0,
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
@@ -58,7 +58,7 @@ def refocus(
             "instead of at --focus.",
         ),
     ] = False,
-    out: OutPicture = Path("refocus.png"),
+    out: OutPicture[Path] = Path("refocus.png"),
     sweep: Annotated[
         Path | None,
         typer.Option(

@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_capture, check_is_export, check_is_folder
-from tbcad.cli.options import Exports
+from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
+from tbcad.options.shared import Exports
 from tbcad.screen import stages
 
 
 @app.command()
 def report(
-    folder: Exports,
+    folder: Exports[Path],
     out: Annotated[
         Path | None,
         typer.Option(

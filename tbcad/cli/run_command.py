@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.exposure_options import ExposureLeds, ExposureLit, seconds
-from tbcad.cli.options import Exports
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
+from tbcad.options.lists import ExposureLeds, ExposureLit, seconds
+from tbcad.options.shared import Exports
 
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16
@@ -20,7 +20,7 @@ LEAST_PX = 16
 
 @app.command()
 def run(
-    folder: Exports,
+    folder: Exports[Path],
     port: Annotated[
         str | None,
         typer.Option(
@@ -81,8 +81,8 @@ def run(
             help="Seconds that command: and folder: may take for one photograph.",
         ),
     ] = 30.0,
-    exposure_leds: ExposureLeds = None,
-    exposure_lit: ExposureLit = None,
+    exposure_leds: ExposureLeds[str] = None,
+    exposure_lit: ExposureLit[str] = None,
     no_preflight: Annotated[
         bool,
         typer.Option(

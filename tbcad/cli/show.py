@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import DESIGN_FILE, FIELD_FILE, LIGHT_FIELD_FILE
-from tbcad.cli.options import (
+from tbcad.cli.output_mode import print_json
+from tbcad.errors import InputError
+from tbcad.options.checks import DESIGN_FILE, FIELD_FILE, LIGHT_FIELD_FILE
+from tbcad.options.shared import (
     Azimuth,
     Distance,
     Elevation,
@@ -18,8 +20,6 @@ from tbcad.cli.options import (
     MethodOfView,
     Width,
 )
-from tbcad.cli.output_mode import print_json
-from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:

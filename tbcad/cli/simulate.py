@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_export, check_is_object
-from tbcad.cli.options import (
+from tbcad.cli.output_mode import print_json
+from tbcad.errors import InputError
+from tbcad.options.checks import check_is_export, check_is_object
+from tbcad.options.shared import (
     Exports,
     Force,
     JsonResult,
@@ -16,8 +18,6 @@ from tbcad.cli.options import (
     UnitOption,
     UpOption,
 )
-from tbcad.cli.output_mode import print_json
-from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ CAPTURES, BUILT_IN = Path("captures"), "knot"
 
 @app.command()
 def capture(
-    folder: Exports,
-    object_file: ObjectFile = None,
+    folder: Exports[Path],
+    object_file: ObjectFile[Path] = None,
     up: UpOption = None,
     unit: UnitOption = None,
     out: Annotated[

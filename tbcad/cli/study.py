@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_object
-from tbcad.cli.options import (
+from tbcad.cli.study_command import Work, of_design, of_export
+from tbcad.options.checks import check_is_object
+from tbcad.options.shared import (
     Distance,
     MethodOfStudy,
     ObjectFile,
@@ -17,7 +18,6 @@ from tbcad.cli.options import (
     UnitOption,
     UpOption,
 )
-from tbcad.cli.study_command import Work, of_design, of_export
 
 if TYPE_CHECKING:
     from tbcad.simulate.capture.pixel_counts import Sensor
@@ -116,7 +116,7 @@ def depth_command(
 @of_design
 def ssim_command(
     spec: "Spec",
-    object_file: ObjectFile = None,
+    object_file: ObjectFile[Path] = None,
     up: UpOption = None,
     unit: UnitOption = None,
     paint: PaintOption = "own",
@@ -161,7 +161,7 @@ def balance_command(
 @of_export
 def prototype_command(
     folder: Path,
-    object_file: ObjectFile = None,
+    object_file: ObjectFile[Path] = None,
     up: UpOption = None,
     unit: UnitOption = None,
     paint: PaintOption = "own",
@@ -188,7 +188,7 @@ def prototype_command(
 @of_export
 def low_pass_command(
     folder: Path,
-    object_file: ObjectFile = None,
+    object_file: ObjectFile[Path] = None,
     up: UpOption = None,
     unit: UnitOption = None,
     paint: PaintOption = "own",

@@ -5,9 +5,9 @@ from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from tbcad.cli.early_checks import check_is_export
-from tbcad.cli.options import Design, Exports, JsonResult, Out, PlotFormatOption, Settings
 from tbcad.cli.study_output import run_study
+from tbcad.options.checks import check_is_export
+from tbcad.options.shared import Design, Exports, JsonResult, Out, PlotFormatOption, Settings
 
 if TYPE_CHECKING:
     from tbcad.results.study import Study
@@ -37,13 +37,13 @@ def of_export(prepare: Callable[..., Work]) -> Callable[..., int]:
     return _command(prepare, _folder)
 
 
-def _spec(design: Design = None, settings: Settings = None) -> "Spec":
+def _spec(design: Design[Path] = None, settings: Settings = None) -> "Spec":
     from tbcad.spec.load import load_spec
 
     return load_spec(design, settings or ())
 
 
-def _folder(folder: Exports) -> Path:
+def _folder(folder: Exports[Path]) -> Path:
     check_is_export(folder)
     return folder
 
@@ -52,7 +52,7 @@ def _command(prepare: Callable[..., Work], subject: Callable[..., object]) -> Ca
     """The command: options of the subject, of all studies, and of this one, in this order."""
 
     def command(
-        out: Out = STUDIES,
+        out: Out[Path] = STUDIES,
         json: JsonResult = False,
         plot: PlotFormatOption = "png",
         **options: Any,

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.early_checks import check_is_calibration, check_is_export, check_is_object
-from tbcad.cli.options import (
+from tbcad.errors import InputError
+from tbcad.options.checks import check_is_calibration, check_is_export, check_is_object
+from tbcad.options.shared import (
     Exports,
     JsonResult,
     ObjectFile,
@@ -17,13 +18,12 @@ from tbcad.cli.options import (
     UnitOption,
     UpOption,
 )
-from tbcad.errors import InputError
 from tbcad.screen import paragraph, stages
 
 
 @app.command()
 def tolerance(
-    folder: Exports,
+    folder: Exports[Path],
     process: Annotated[
         str | None,
         typer.Option(
@@ -64,11 +64,11 @@ def tolerance(
             "that tbcad calibrate wrote) leaves unknown.",
         ),
     ] = None,
-    object_file: ObjectFile = None,
+    object_file: ObjectFile[Path] = None,
     up: UpOption = None,
     unit: UnitOption = None,
     scheduler: Scheduler = None,
-    out: Out = Path("tolerance"),
+    out: Out[Path] = Path("tolerance"),
     json: JsonResult = False,
     plot: PlotFormatOption = "png",
 ) -> int:

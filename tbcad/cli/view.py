@@ -15,8 +15,10 @@ from tbcad.cli.compared_pictures import (
     viewpoint_of,
     write_compared,
 )
-from tbcad.cli.early_checks import check_is_capture
-from tbcad.cli.options import (
+from tbcad.cli.view_files import ViewFiles, field_view, write_depth
+from tbcad.errors import InputError
+from tbcad.options.checks import check_is_capture
+from tbcad.options.shared import (
     Azimuth,
     Capture,
     Distance,
@@ -28,8 +30,6 @@ from tbcad.cli.options import (
     OutPicture,
     Width,
 )
-from tbcad.cli.view_files import ViewFiles, field_view, write_depth
-from tbcad.errors import InputError
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
@@ -62,11 +62,11 @@ BY_DEFAULT = _Choice("field", None, "its file is in the capture's folder")
 
 @app.command()
 def view(
-    capture_folder: Capture,
+    capture_folder: Capture[Path],
     azimuth: Azimuth = 0.0,
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
-    out: OutPicture = Path("view.png"),
+    out: OutPicture[Path] = Path("view.png"),
     method: MethodOfView = None,
     surface: Annotated[
         Surface | None,

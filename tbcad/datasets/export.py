@@ -11,7 +11,6 @@ from tbcad.datasets.crops import chosen_mirrors
 from tbcad.datasets.machine_scene import write_machine_scene
 from tbcad.datasets.nerfstudio import write_nerfstudio, write_pictures
 from tbcad.datasets.ngp_rays import write_ngp_rays
-from tbcad.datasets.options import ExportOptions
 from tbcad.datasets.pictures import Pictures, default_size, taken_pictures
 from tbcad.datasets.pinholes import pinhole_of
 from tbcad.datasets.ray_table import write_ray_table
@@ -20,6 +19,7 @@ from tbcad.datasets.virtual_cameras import VirtualCameras, virtual_cameras
 from tbcad.errors import InputError
 from tbcad.formats.colmap import SparseModel
 from tbcad.formats.csv_table import Row, write_table
+from tbcad.options.captures import ExportOptions
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.simulate.scene.ray_casting import Scene
@@ -39,8 +39,6 @@ def write_dataset(
     source: LightField,
     scene: Scene | None,
     options: ExportOptions,
-    progress: Progress,
-    detail: Progress,
 ) -> dict[str, Any]:
     """Write all files of an export into a folder, and return its record.
 
@@ -48,26 +46,24 @@ def write_dataset(
         folder: exists, is empty, and is the caller's to replace.
         source: the light field.
         scene: the object of a simulated capture; None where it is not known.
-        options: what is wanted.
-        progress: called with each stage.
-        detail: called with each step of a stage.
+        options: what is wanted, and what is told of it.
 
     Raises:
         InputError: a mirror is not in the capture, or none gives a camera.
     """
-    progress("virtual cameras")
+    options.progress("virtual cameras")
     mirrors = chosen_mirrors(source, options.cameras, options.every)
-    virtual = virtual_cameras(source, mirrors, detail)
+    virtual = virtual_cameras(source, mirrors, options.detail)
     if not len(virtual):
         raise InputError("no mirror of the capture gives a virtual camera: choose other --cameras")
     record = {
         "schema": SCHEMA,
-        "target": options.target,
+        "target": options.to,
         "capture": source.facts,
         "capture_mm": source.capture_mm,
         "virtual_cameras": len(virtual),
         "left_out": virtual.left_out,
-        **_written(folder, source, virtual, scene, options, progress, detail),
+        **_written(folder, source, virtual, scene, options),
         "fit": _fit(virtual),
     }
     write_table(folder / TABLE, COLUMNS, _rows(virtual))
@@ -129,24 +125,23 @@ def _written(
     virtual: VirtualCameras,
     scene: Scene | None,
     options: ExportOptions,
-    progress: Progress,
-    detail: Progress,
 ) -> dict[str, Any]:
     """Write what the target reads, and return what is in it."""
-    if options.target == "ngp-rays":
+    progress, detail = options.progress, options.detail
+    if options.to == "ngp-rays":
         progress("crops and rays")
         write_ngp_rays(folder, source, virtual, detail)
         return {"rays": int(virtual.rays.sum())}
-    if options.target == "rays":
+    if options.to == "rays":
         progress("rays")
         return {"rays": write_ray_table(folder, source, virtual, detail)}
     progress("pictures")
-    size = options.size_px or default_size(virtual, source.capture_mm)
+    size = options.size or default_size(virtual, source.capture_mm)
     pictures = taken_pictures(source, virtual, size, scene, detail)
     progress("seed points")
     seeds = seed_points(pictures.cameras, pictures.picture, pictures.mask, source.capture_mm)
     progress("files")
-    write = write_nerfstudio if options.target == "nerfstudio" else write_colmap
+    write = write_nerfstudio if options.to == "nerfstudio" else write_colmap
     write(folder, [one.name for one in virtual.mirrors], pictures, seeds)
     return _of_pictures(size, pictures, seeds)
 

@@ -17,10 +17,10 @@ from tbcad.merged_run.ray_sigmas import ray_sigmas
 from tbcad.merged_run.stop_photographs import (
     CorrectedPhotographs,
     Corrections,
-    MergeOptions,
     common_exposure,
     corrections,
 )
+from tbcad.options.machines import MergeOptions
 from tbcad.records.exposure import LIT, Frame
 from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.capture.photograph import CameraPhotographs, RowBand

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import LensCamera, vignetting
+from tbcad.options.machines import MergeOptions
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16, read_image
 from tbcad.runs.photographs import Run, read_photograph
@@ -17,30 +18,12 @@ from tbcad.simulate.prototype.ball_rays import between_pixels
 from tbcad.srgb import srgb, srgb_light
 from tbcad.types import Bytes, Floats, Ints
 
-Vignetting = Literal["off", "cos4"]
 Encoding = Literal["linear", "srgb"]
 Singles = NDArray[np.float32]
 
 WHITE = 255.0
 # Of a flat field: what counts as its full light, and the least light that can be corrected.
 FULL_LIGHT, LEAST_LIGHT = 0.99, 0.02
-
-
-@dataclass(frozen=True)
-class MergeOptions:
-    """How photographs are corrected.
-
-    Attributes:
-        vignetting: "cos4": a lens's natural loss of light toward the edge; "off": none.
-        flat: photographs of an even surface, whose mean replaces `vignetting`.
-        encoding: "linear": numbers are proportional to light; "srgb": as in a camera's JPEGs.
-        brightness: factor of the light of all pixels.
-    """
-
-    vignetting: Vignetting = "cos4"
-    flat: tuple[Path, ...] = ()
-    encoding: Encoding = "linear"
-    brightness: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -94,7 +77,7 @@ def cos4_gain(camera: LensCamera) -> Singles:
     return gain.astype(np.float32)
 
 
-def flat_field_gain(files: Sequence[Path], encoding: Encoding, camera: LensCamera) -> Singles:
+def flat_field_gain(files: Sequence[Path | str], encoding: Encoding, camera: LensCamera) -> Singles:
     """What makes the mean of photographs of an even surface even, (h, w, 3).
 
     Pixels with next to no light, beyond the lens's picture, show nothing.
@@ -105,7 +88,7 @@ def flat_field_gain(files: Sequence[Path], encoding: Encoding, camera: LensCamer
     size = camera.height_px, camera.width_px
     total = np.zeros((*size, 3), dtype=np.float32)
     for file in files:
-        image = read_image(file)
+        image = read_image(Path(file))
         if image.shape[:2] != size:
             raise InputError(
                 f"{file} is {image.shape[1]} x {image.shape[0]} pixels, the run's photographs are "

@@ -19,9 +19,10 @@ from tbcad.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.machine.designed import designed_prototype, dome_radius
 from tbcad.machine.record import truth_file, write_machine
 from tbcad.machine.shells import perfect_half, random_half, shell_frame
+from tbcad.options.machines import SimulateRunOptions
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, refuse_inputs
-from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, exposure_name
+from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
 from tbcad.records.run import RECORD, Geometry, RunRecord
 from tbcad.simulate.parallel import THREADS
 from tbcad.simulate.prototype.lamps import lit_by, read_lamps
@@ -31,7 +32,6 @@ from tbcad.simulate.scene.object import SceneObject, built_in_object
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.led_light import Occluders, stage_scene
-from tbcad.simulated_run.options import RunOptions
 from tbcad.simulated_run.photographs import (
     EXPOSURE_S,
     LED_LIGHT,
@@ -66,7 +66,7 @@ class _Subject:
 
 
 def prepare_run(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: RunOptions
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
     """A random build of an export before it is photographed, and the phases to photograph.
 
@@ -77,20 +77,21 @@ def prepare_run(
         InputError: the export has no prototype with LEDs, or a shell with planar mirrors, or has
             not the stops or phases asked for.
     """
+    times = PhaseTimes(*options.seconds())
     prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
     leds = len(prepared.builds[0][0].machine.leds)
-    phases = options.times.phases(_chosen_phases(options.phases, phases_of(leds)))
+    phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
     scene = prepared_scene(prepared.scene)
     occluders = Occluders(scene.embree, prepared.stage)
     chain = Chain(
         Sensor(bits=options.bits, noise=options.noise),
         dome=dome_radius(export),
         led_light=LED_LIGHT * options.led_brightness,
-        times=options.times,
+        times=times,
     )
     runs = []
     for whole, every in prepared.builds:
-        frames = _chosen_stops(options.stops, every)
+        frames = _chosen_stops(options.stop_numbers(), every)
         kept = np.array([every.index(frame) for frame in frames])
         built = replace(whole, machine=whole.machine.of_frames(kept))
         runs.append(SimulatedRun(built, frames, scene, occluders, chain, options.seed))
@@ -98,7 +99,7 @@ def prepare_run(
 
 
 def _prototype(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: RunOptions
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> _Subject:
     """All stops of both runs, the object lit by the prototype's lamps."""
     plan = read_plan(export)
@@ -114,7 +115,7 @@ def _prototype(
 
 
 def _shell(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: RunOptions
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> _Subject:
     """One frame of each camera, the object as bright from all sides."""
     builds = []

@@ -16,7 +16,6 @@ from tbcad.calibration.detection.detection import Detection, Rejected, Rejection
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
-from tbcad.calibration.options import CalibrationOptions
 from tbcad.calibration.report.files import write_calibration
 from tbcad.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.calibration.report.tables import rays_table, residuals_table
@@ -286,8 +285,3 @@ def test_refused(
     assert message in error
     assert error.count("\n") == 1
     assert not out.exists()
-
-
-def test_options_say_the_default() -> None:
-    assert CalibrationOptions().process_words == "fdm (the default)"
-    assert CalibrationOptions(process="sla").process_words == "sla"

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from tbcad.cli import run
-from tbcad.cli.simulated_run import numbers
 from tbcad.errors import InputError
+from tbcad.options.lists import numbers
 from tbcad.runs.photographs import read_run
 
 

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from tbcad.api import merge
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
-from tbcad.merged_run.stop_photographs import MergeOptions
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.simulate.capture.light_field import Frame as LightFrame
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
@@ -29,7 +29,7 @@ from tests.machine_states import frames_of, machine_of
 from tests.photographed_runs import photographs_of, write_exposure, write_run
 
 CAPTURE_MM = 60.0
-EVEN = MergeOptions("off")
+EVEN: dict[str, Any] = {"vignetting": "off"}
 """The photographs of these tests have no loss of light toward the edge, unless they say so."""
 Photographs = dict[str, np.ndarray]
 
@@ -109,7 +109,7 @@ class TestPerfectMachine:
             return image if factor == 1 else image.astype(np.uint16) * factor
 
         run = write_run(tmp_path / "run", export, frames, perfect, change=deeper, suffix=suffix)
-        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
         found = LightField.read(tmp_path / "merged")
         for camera, frame in simulated.frames.items():
             same = found.frames[camera]
@@ -152,8 +152,8 @@ class TestPerfectMachine:
         for frame in frames:
             for phase in (DARK, LIT):
                 set_exposure(run, frame, phase, exposure_of(frame))
-        options = MergeOptions("cos4", brightness=2.57)
-        merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        options = {"vignetting": "cos4", "brightness": 2.57}
+        merge(run, calibration, export.folder, out=tmp_path / "merged", **options)
         off = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
         assert off.max() <= 1
 
@@ -182,8 +182,8 @@ class TestPerfectMachine:
         flat = tmp_path / "a_0001_lit.png"
         white = np.full((310, 416, 3), 255, dtype=np.uint8)
         write_exposure(tmp_path, frames[0], LIT, taken(white, frames[0], LIT), flat.name)
-        options = MergeOptions(flat=(flat,), encoding="srgb")
-        merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        options = {"flat": (flat,), "encoding": "srgb"}
+        merge(run, calibration, export.folder, out=tmp_path / "merged", **options)
         dark = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
         # Between pixels light is interpolated instead of its code.
         assert np.median(dark) <= 1
@@ -211,7 +211,7 @@ class TestIncomplete:
         (images / f"a_{lost + 1:04d}_lit.png").unlink()
         (images / f"a_{lost + 1:04d}_lit.json").unlink()
         (images / f"a_{damaged + 1:04d}_lit.png").write_bytes(b"no picture")
-        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
         half = record["based_on"]["a"]
         expected = {f"a{m + 1:04d}" for m in np.flatnonzero(np.isin(plan.stop[0], [lost, damaged]))}
         named = {name for names in half["mirrors_missing"].values() for name in names}
@@ -241,7 +241,7 @@ class TestIncomplete:
         machine = Machine(**{**vars(designed), "angle": np.delete(designed.angle, stop)})
         few = tuple(frame for at, frame in enumerate(frames) if at != stop)
         calibration = calibrated(tmp_path / "few", machine, few)
-        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
         (reason,) = record["based_on"]["a"]["mirrors_missing"]
         assert reason == "the calibration has no angle of this stop"
 
@@ -255,7 +255,7 @@ class TestIncomplete:
     ) -> None:
         run = write_run(tmp_path / "dark", export, frames, perfect, (DARK, LIT))
         (run / PHOTOGRAPHS / "a_0003_dark.png").write_bytes(b"")
-        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
         assert record["based_on"]["a"]["without_dark"] == ["a_0003_lit"]
 
     @pytest.mark.parametrize(
@@ -291,8 +291,8 @@ class TestIncomplete:
             for name in phases:
                 own = seconds if (name, frame.stop) == (phase, 3) else 1.0
                 set_exposure(run, frame, name, own)
-        options = MergeOptions("off", brightness=2.57)
-        record = merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        options = {"vignetting": "off", "brightness": 2.57}
+        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **options)
         half = record["based_on"]["a"]
         assert half["without_dark"] == without
         assert half["dark_scaled"] == scaled
@@ -313,7 +313,7 @@ class TestIncomplete:
         head = "mirror,sigma_mm,sigma_mrad,pixel_mm"
         rays = f"{head}\na0001,0.04,2,1\nb0001,0.04,2,1\n"  # 2 mrad at 15 mm
         (calibration / "rays.csv").write_text(rays, encoding="utf-8")
-        record = merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
         assert list(record["based_on"]) == ["a"]
         field = LightField.read(tmp_path / "merged")
         assert list(field.frames) == ["a"]
@@ -326,7 +326,7 @@ class TestIncomplete:
         self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
     ) -> None:
         before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-        merge(run, calibration, export.folder, EVEN, out=tmp_path / "merged")
+        merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
         assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
@@ -372,7 +372,7 @@ class TestRefused:
         frame = Frame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
         image = np.full((100, 200, 3), 255, dtype=np.uint8)
         write_exposure(tmp_path, frame, LIT, image, "a_0001_lit.png")
-        options = MergeOptions(flat=(tmp_path / "a_0001_lit.png",))
+        options = {"flat": (tmp_path / "a_0001_lit.png",)}
         message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
         refused(run, calibration, export, tmp_path, message, options)
 
@@ -383,10 +383,10 @@ def refused(
     export: ExportedDesign,
     tmp_path: Path,
     message: str,
-    options: MergeOptions | None = None,
+    options: dict[str, Any] | None = None,
 ) -> None:
     with pytest.raises(InputError) as caught:
-        merge(run, calibration, export.folder, options, out=tmp_path / "merged")
+        merge(run, calibration, export.folder, out=tmp_path / "merged", **(options or {}))
     assert re.search(message, str(caught.value))
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "merged").exists()

@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,11 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.machine.record import TRUTH, read_machine
-from tbcad.records.exposure import PhaseTimes
+from tbcad.options.machines import SimulateRunOptions
 from tbcad.runs.photographs import read_photograph, read_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run import simulate
-from tbcad.simulated_run.options import RunOptions
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.prototype.draws import read_wind_up
 from tests.prototype_records import printed_part, write_prototype
@@ -86,10 +86,13 @@ def test_nothing_is_left_of_a_run_that_fails(
     assert not list(tmp_path.iterdir())
 
 
+options_of = partial(SimulateRunOptions, "exports")
+
+
 def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
     export = read_export(export_with_wind_up)
     subject = simulate.run_object(export, None)
-    options = RunOptions(seed=1, stops=(2, 3), phases=("led_2", "dark"), perfect=True)
+    options = options_of(seed=1, stops="2,3", phases="led_2,dark", perfect=True)
     (run,), phases = simulate.prepare_run(export, fdm_errors(), subject, options)
     assert phases == ("dark", "led_2")
     assert [(f.object_turn_deg, f.stop) for f in run.frames] == [(0, 2), (0, 3), (180, 2), (180, 3)]
@@ -101,8 +104,8 @@ def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> 
     """A dark photograph for each exposure; sidecars say it; a bright LED takes a short one."""
     export = read_export(export_with_wind_up)
     subject = simulate.run_object(export, None)
-    usual = RunOptions(stops=(20,), phases=("dark", "led_1", "lit"))
-    bright = replace(usual, led_brightness=100.0, times=PhaseTimes(leds_s=0.01, lit_s=0.5))
+    usual = options_of(stops="20", phases="dark,led_1,lit")
+    bright = replace(usual, led_brightness=100.0, exposure_leds=0.01, exposure_lit="1/2")
     folders = []
     for name, options in (("usual", usual), ("bright", bright)):
         runs, phases = simulate.prepare_run(export, fdm_errors(), subject, options)
@@ -127,7 +130,7 @@ def test_seeds_make_different_builds(export_with_wind_up: Path) -> None:
     export = read_export(export_with_wind_up)
     subject = simulate.run_object(export, None)
     one, two, again = (
-        simulate.prepare_run(export, fdm_errors(), subject, RunOptions(seed=seed, stops=(1,)))[0][0]
+        simulate.prepare_run(export, fdm_errors(), subject, options_of(seed=seed, stops="1"))[0][0]
         for seed in (1, 2, 1)
     )
     assert (one.built.machine.centre == again.built.machine.centre).all()
@@ -138,7 +141,7 @@ def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) ->
     export = read_export(export_with_wind_up)
     plan, subject = read_plan(export), simulate.run_object(export, None)
     whole = Errors(wind_up=Error(mean=1.0))
-    (run,), _ = simulate.prepare_run(export, whole, subject, RunOptions())
+    (run,), _ = simulate.prepare_run(export, whole, subject, options_of())
     wind_up = read_wind_up(export, plan)
     assert wind_up.max() > 0
     assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
@@ -147,11 +150,11 @@ def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) ->
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (RunOptions(stops=(500,)), "stop 500 is not in the plan: allowed is 1 to"),
-        (RunOptions(phases=("led_9",)), "phase led_9 is not photographed: allowed is dark, led_1"),
+        (options_of(stops="500"), "stop 500 is not in the plan: allowed is 1 to"),
+        (options_of(phases="led_9"), "phase led_9 is not photographed: allowed is dark, led_1"),
     ],
 )
-def test_refused(export_with_wind_up: Path, options: RunOptions, message: str) -> None:
+def test_refused(export_with_wind_up: Path, options: SimulateRunOptions, message: str) -> None:
     export = read_export(export_with_wind_up)
     with pytest.raises(InputError, match=message):
         simulate.prepare_run(export, fdm_errors(), simulate.run_object(export, None), options)

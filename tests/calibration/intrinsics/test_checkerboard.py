@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from tbcad.api import solve_intrinsics
+from tbcad.api import intrinsics
 from tbcad.calibration.intrinsics.boards import MIN_CORNERS, Board, BoardCorners, find_corners
 from tbcad.calibration.intrinsics.checkerboard import (
     EDGE_SHARE,
@@ -114,7 +114,7 @@ def is_near_truth(solved: SolvedLens) -> bool:
 
 def test_the_lens_is_found_with_its_uncertainty(boards: Path, tmp_path: Path) -> None:
     file = tmp_path / "camera.yml"
-    solved = solve_intrinsics(boards, SQUARES, SIZE_MM, out=file)
+    solved = intrinsics(boards, size=SIZE_MM, out=file)
     assert solved.boards >= 6
     assert "empty.png" in solved.unused
     assert solved.rms_px < 0.2
@@ -126,7 +126,9 @@ def test_the_lens_is_found_with_its_uncertainty(boards: Path, tmp_path: Path) ->
 @pytest.mark.parametrize("legacy", [False, True])
 def test_charuco_boards_partly_out_of_the_picture(tmp_path: Path, legacy: bool) -> None:
     folder = photograph_boards(tmp_path, 17.0, partial(charuco, legacy=legacy))
-    solved = solve_intrinsics(folder, SQUARES, SIZE_MM, charuco="4x4_50", marker_mm=3.75)
+    solved = intrinsics(
+        folder, size=SIZE_MM, charuco="4x4_50", marker=3.75, out=tmp_path / "camera.yml"
+    )
     inner = (SQUARES[0] - 1) * (SQUARES[1] - 1)
     assert solved.corners < 0.9 * inner * solved.boards  # not whole
     assert solved.reach > EDGE_SHARE
@@ -197,18 +199,18 @@ def test_a_corner_that_is_none_is_left_out() -> None:
     ("asked", "reason"),
     [
         ({"charuco": "4x4_50"}, "go together"),
-        ({"charuco": "4x4_50", "marker_mm": 5.0}, "narrower than the squares"),
-        ({"charuco": "8x8_50", "marker_mm": 3.0}, "allowed are 4x4"),
+        ({"charuco": "4x4_50", "marker": 5.0}, "narrower than the squares"),
+        ({"charuco": "8x8_50", "marker": 3.0}, "allowed are 4x4"),
     ],
 )
 def test_a_board_that_cannot_be_is_refused(
-    boards: Path, asked: dict[str, Any], reason: str
+    boards: Path, tmp_path: Path, asked: dict[str, Any], reason: str
 ) -> None:
     with pytest.raises(InputError, match=reason):
-        solve_intrinsics(boards, SQUARES, SIZE_MM, **asked)
+        intrinsics(boards, size=SIZE_MM, out=tmp_path / "camera.yml", **asked)
 
 
 def test_no_board_is_found(tmp_path: Path) -> None:
     Image.fromarray(np.full((HEIGHT, WIDTH), 128, np.uint8)).save(tmp_path / "empty.png")
     with pytest.raises(InputError, match=r"9 x 6 squares was found in 0 of 1 photographs"):
-        solve_intrinsics(tmp_path, SQUARES, SIZE_MM)
+        intrinsics(tmp_path, size=SIZE_MM, out=tmp_path / "camera.yml")

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tbcad.api import solve_intrinsics
+from tbcad.api import intrinsics
 
 SAMPLES = Path("/usr/share/doc/opencv-doc/examples/data")
 WINDOW = (5, 5)  # which no other corner of these boards comes into
@@ -33,7 +33,7 @@ def test_opencv_finds_the_same_lens(side: str, tmp_path: Path) -> None:
     files = sorted(SAMPLES.glob(f"{side}[01][0-9].jpg"))
     for file in files:
         (tmp_path / file.name).symlink_to(file)
-    solved = solve_intrinsics(tmp_path, (10, 7), 25.0)
+    solved = intrinsics(tmp_path, squares="10x7", size=25.0, out=tmp_path / "camera.yml")
     assert solved.boards >= len(files) - 1
     assert (np.abs(solved.lens.focal - opencv_focal(files)) < 3 * solved.sigma[:2]).all()
     assert solved.rms_px < 0.2

@@ -1,16 +1,18 @@
-"""Exposure times of the photographs of a run, as both commands that take them are told."""
+"""Numbers that are written as texts: exposure times as cameras show them, lists of stops."""
 
 import math
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
 from tbcad.errors import InputError
 
+Time = TypeVar("Time")
 SHORTEST_S, LONGEST_S = 1e-6, 3600.0
+MOST_STOPS = 1_000_000  # as a run's record may have
 
 ExposureLeds = Annotated[
-    str | None,
+    Time | None,
     typer.Option(
         metavar="S",
         help="Exposure of the photographs by LEDs and in the dark, s, such as 1/60; --exposure-lit "
@@ -18,7 +20,7 @@ ExposureLeds = Annotated[
     ),
 ]
 ExposureLit = Annotated[
-    str | None,
+    Time | None,
     typer.Option(
         metavar="S",
         help="Exposure of the photographs of the lit object, s, such as 0.5; --exposure-leds alone "
@@ -27,14 +29,15 @@ ExposureLit = Annotated[
 ]
 
 
-def seconds(option: str, text: str | None) -> float | None:
+def seconds(option: str, given: str | float | None) -> float | None:
     """An exposure time, s, of a number or a fraction as cameras show it.
 
     Raises:
         InputError: it is neither, or no time of an exposure.
     """
-    if text is None:
+    if given is None:
         return None
+    text = str(given)
     above, slash, below = text.partition("/")
     try:
         found = float(above) / (float(below) if slash else 1.0)
@@ -46,3 +49,25 @@ def seconds(option: str, text: str | None) -> float | None:
             "or 1/60: change it"
         )
     return found
+
+
+def numbers(text: str) -> tuple[int, ...]:
+    """Whole numbers of a list as 1,5,20-30.
+
+    Raises:
+        InputError: it is none.
+    """
+    found: set[int] = set()
+    for part in text.split(","):
+        first, _, last = part.partition("-")
+        try:
+            chosen = range(int(first), int(last or first) + 1)
+            if not 1 <= len(chosen) <= MOST_STOPS:
+                raise ValueError
+            found.update(chosen)
+        except ValueError:
+            raise InputError(
+                f"--stops {text!r:.60}: {part.strip()!r:.20} is no stop or range of stops: write "
+                "for instance 1,5,20-30"
+            ) from None
+    return tuple(sorted(found))

@@ -1,31 +1,34 @@
-"""Options that several commands share."""
+"""Options that several commands share; those of places by what the place may be."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import typer
 
+Place = TypeVar("Place")
+AnyPath = Path | str
+
 Design = Annotated[
-    Path | None,
+    Place | None,
     typer.Argument(
         metavar="DESIGN",
         help="Design file (TOML), or the name of a design that comes with tbcad (tbcad init "
         "--list); by default the design of the paper.",
     ),
 ]
-Exports = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder written by tbcad build.")]
+Exports = Annotated[Place, typer.Argument(metavar="FOLDER", help="Folder written by tbcad build.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."),
 ]
 Out = Annotated[
-    Path, typer.Option("--out", "-o", help="Folder for the files; other files in it stay.")
+    Place, typer.Option("--out", "-o", help="Folder for the files; other files in it stay.")
 ]
 OutReplaced = Annotated[
-    Path,
+    Place,
     typer.Option("--out", "-o", help="Folder for all files; replaced as a whole or not at all."),
 ]
-OutPicture = Annotated[Path, typer.Option("--out", "-o", help="PNG file to write.")]
+OutPicture = Annotated[Place, typer.Option("--out", "-o", help="PNG file to write.")]
 JsonResult = Annotated[
     bool, typer.Option("--json", help="Print what is found as JSON, for other programs.")
 ]
@@ -41,12 +44,14 @@ Force = Annotated[
 ForceFile = Annotated[
     bool, typer.Option("--force", help="Replace files that exist, instead of refusing.")
 ]
-Capture = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder written by tbcad capture.")]
+Capture = Annotated[
+    Place, typer.Argument(metavar="FOLDER", help="Folder written by tbcad capture.")
+]
 RunFolder = Annotated[
-    Path, typer.Argument(metavar="RUN", help="Folder written by tbcad run or simulate-run.")
+    Place, typer.Argument(metavar="RUN", help="Folder written by tbcad run or simulate-run.")
 ]
 ExportsOption = Annotated[
-    Path | None,
+    Place | None,
     typer.Option(
         "--exports",
         metavar="FOLDER",
@@ -54,7 +59,8 @@ ExportsOption = Annotated[
     ),
 ]
 CalibrationFolder = Annotated[
-    Path, typer.Option("--calibration", metavar="FOLDER", help="Folder written by tbcad calibrate.")
+    Place,
+    typer.Option("--calibration", metavar="FOLDER", help="Folder written by tbcad calibrate."),
 ]
 Azimuth = Annotated[float, typer.Option(help="Azimuth of the camera about z, from x, degrees.")]
 Elevation = Annotated[float, typer.Option(help="Elevation of the camera, 0 to 90 degrees.")]
@@ -77,7 +83,7 @@ PaintOption = Annotated[
     ),
 ]
 ObjectFile = Annotated[
-    Path | None,
+    Place | None,
     typer.Option(
         "--object",
         metavar="FILE",

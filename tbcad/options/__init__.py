@@ -1,0 +1,1 @@
+"""The declaration of each command: its fields are options, keywords of Python, and JSON."""

@@ -1,0 +1,197 @@
+"""Records of calls, and what follows from them: Python's keywords, the command's options, JSON."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cache, wraps
+from inspect import Parameter, Signature, signature
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import (
+    Annotated,
+    Any,
+    ParamSpec,
+    Protocol,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+    overload,
+)
+
+from typer.models import ParameterInfo
+
+from tbcad.errors import InputError
+
+Progress = Callable[[str], None]
+Keywords = ParamSpec("Keywords")
+Record = TypeVar("Record")
+Asked_contra = TypeVar("Asked_contra", contravariant=True)
+Result_co = TypeVar("Result_co", covariant=True)
+Result = TypeVar("Result")
+
+
+def silent(_: str) -> None:
+    """Ignore a report of progress."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call:
+    """What a public function is called with; its fields with a help text are a command's options.
+
+    Attributes:
+        progress: called with the name of each stage.
+        detail: called with the state of a stage.
+        answer: called with a line that says how a file was taken, or what is found so far.
+    """
+
+    progress: Progress = silent
+    detail: Progress = silent
+    answer: Progress = silent
+
+    def __post_init__(self) -> None:
+        """Refuse values of another type, or out of range.
+
+        Raises:
+            InputError: as said.
+        """
+        for name, option in declared(type(self)).items():
+            _check(name, getattr(self, name), *get_args(option))
+
+    def json(self) -> dict[str, Any]:
+        """The options by name, for a file of JSON."""
+        from pydantic_core import to_jsonable_python
+
+        record = {name: getattr(self, name) for name in declared(type(self))}
+        return cast("dict[str, Any]", to_jsonable_python(record))
+
+
+class Function(Protocol[Keywords, Asked_contra, Result_co]):
+    """A public function: called with keywords, or with their record."""
+
+    @overload
+    def __call__(self, options: Asked_contra, /) -> Result_co: ...
+    @overload
+    def __call__(self, *args: Keywords.args, **kwargs: Keywords.kwargs) -> Result_co: ...
+
+
+def keywords(
+    record: Callable[Keywords, Record],
+) -> Callable[[Callable[[Record], Result]], Function[Keywords, Record, Result]]:
+    """Make a function of a record one of the record's fields."""
+    kind = cast("type[Call]", record)
+
+    def decorated(function: Callable[[Record], Result]) -> Function[Keywords, Record, Result]:
+        @wraps(function)
+        def called(*args: Any, **kwargs: Any) -> Result:
+            if len(args) == 1 and not kwargs and isinstance(args[0], kind):
+                return function(cast("Record", args[0]))
+            return function(record(*args, **kwargs))
+
+        vars(called)["__signature__"] = _signature(kind, signature(function).return_annotation)
+        called.__doc__ = _with_arguments(function.__doc__ or "", kind)
+        return cast("Function[Keywords, Record, Result]", called)
+
+    return decorated
+
+
+def declared(record: type) -> dict[str, Any]:
+    """The options of a record by name: types with what typer makes an option of."""
+    kinds = get_type_hints(record, include_extras=True)
+    return {
+        one.name: kinds[one.name]
+        for one in fields(record)
+        if get_origin(kinds[one.name]) is Annotated
+    }
+
+
+def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
+    """What typer makes options of: a record's fields, then what else a command's function takes."""
+    first, *own = signature(function, eval_str=True).parameters.values()
+    options = declared(first.annotation)
+    for one in signature(first.annotation).parameters.values():
+        if one.name in options:
+            yield _typed(one.replace(annotation=options[one.name]))
+    yield from map(_typed, own)
+
+
+def _signature(record: type[Call], returned: object) -> Signature:
+    """Keywords as a person reads them: options in the order of the command, then callbacks."""
+    options, every = declared(record), signature(record).parameters.values()
+    own = [
+        one.replace(annotation=get_args(options[one.name])[0])
+        for one in every
+        if one.name in options
+    ]
+    rest = [one for one in every if one.name not in options]
+    return Signature([*own, *rest], return_annotation=returned)
+
+
+def _typed(parameter: Parameter) -> Parameter:
+    kind, *more = get_args(parameter.annotation)
+    default = None if parameter.default == () else parameter.default
+    kind = _written(kind) | None if default is None else _written(kind)
+    return parameter.replace(
+        kind=Parameter.KEYWORD_ONLY, annotation=Annotated[kind, *more], default=default
+    )
+
+
+def _written(kind: Any) -> Any:
+    """The type of what is written on a command line: a path, or a text, of several that fit."""
+    if get_origin(kind) is Sequence:
+        return list[_written(get_args(kind)[0])]  # type: ignore[misc]
+    if get_origin(kind) not in (Union, UnionType):
+        return kind
+    for word in (Path, str):
+        if word in get_args(kind):
+            return word | None if NoneType in get_args(kind) else word
+    return kind
+
+
+@cache
+def _reader(kind: Any) -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
+
+
+def _check(name: str, value: object, kind: Any, option: ParameterInfo) -> None:
+    from annotated_types import Ge, Le
+    from pydantic import ValidationError
+
+    from tbcad.spec.errors import short_text
+
+    low, high = option.min, option.max
+    try:
+        _reader(kind).validate_python(value, strict=True)
+        number = cast("float", value if value is not None else low or 0)
+        inside = (low is None or low <= number) and (high is None or number <= high)
+    except ValidationError:
+        inside = False
+    if not inside:
+        limits = [of(bound) for of, bound in ((Ge, low), (Le, high)) if bound is not None]
+        raise InputError(
+            f"{name} is {short_text(value)}, allowed is {_allowed(kind, limits)}: change it"
+        )
+
+
+def _allowed(kind: Any, limits: Sequence[object]) -> str:
+    from tbcad.spec.errors import allowed_text
+
+    kinds = [one for one in get_args(kind) if one is not NoneType]
+    if get_origin(kind) is Sequence:
+        return f"a list, each of them {_allowed(kinds[0], limits)}"
+    if get_origin(kind) not in (Union, UnionType):
+        return allowed_text(kind, limits)
+    if Path in kinds:
+        return "a path"
+    return " or ".join(_allowed(one, limits) for one in kinds)
+
+
+def _with_arguments(text: str, record: type[Call]) -> str:
+    """A docstring with the record's help texts as its arguments."""
+    options = declared(record)
+    told = [f"    {name}: {get_args(kind)[1].help}" for name, kind in options.items()]
+    summary, *sections = text.rstrip().split("\n\n    ")
+    return "\n\n    ".join([summary, "Args:\n    " + "\n    ".join(told), *sections]) + "\n    "

@@ -1,0 +1,104 @@
+"""One record a command: keywords of Python, options of the command, JSON, and one-line refusals."""
+
+import inspect
+import json
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Annotated
+
+import pytest
+import typer
+
+import tbcad
+from tbcad.errors import InputError
+from tbcad.options.call import Call, keywords, parameters
+from tbcad.options.machines import CalibrateOptions
+from tbcad.options.shared import AnyPath
+
+
+@dataclass(frozen=True)
+class Polish(Call):
+    """A mirror, and how it is polished."""
+
+    mirror: Annotated[AnyPath, typer.Argument(help="File of the mirror.")]
+    _: KW_ONLY
+    passes: Annotated[int, typer.Option(min=1, max=9, help="How often.")] = 2
+    grits: Annotated[tuple[float, ...], typer.Option(help="One after the other.")] = ()
+
+
+@keywords(Polish)
+def polish(options: Polish) -> str:
+    """Polish a mirror.
+
+    Returns:
+        What was done.
+    """
+    options.progress("polishing")
+    return f"{options.mirror} {options.passes}"
+
+
+def test_fields_are_keywords() -> None:
+    assert polish("m.step", passes=3) == polish(Path("m.step"), passes=3) == "m.step 3"
+    assert polish(Polish("m.step")) == "m.step 2"
+    shown = inspect.signature(polish)
+    assert shown.parameters["passes"].default == 2
+    assert shown.parameters["passes"].kind is inspect.Parameter.KEYWORD_ONLY
+    assert shown.parameters["passes"].annotation is int
+    assert [*shown.parameters] == ["mirror", "passes", "grits", "progress", "detail", "answer"]
+    assert shown.return_annotation is str
+    with pytest.raises(TypeError, match="passs"):
+        polish("m.step", passs=3)  # type: ignore[call-overload]
+
+
+def test_help_texts_are_the_arguments() -> None:
+    assert inspect.getdoc(polish) == (
+        "Polish a mirror.\n\nArgs:\n    mirror: File of the mirror.\n    passes: How often.\n"
+        "    grits: One after the other.\n\nReturns:\n    What was done."
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"passes": 10}, "passes is 10, allowed is a whole number from 1 to 9: change it"),
+        ({"passes": "2"}, "passes is '2', allowed is a whole number from 1 to 9: change it"),
+        ({"mirror": 3}, "mirror is 3, allowed is a path: change it"),
+    ],
+)
+def test_wrong_values_are_one_line(given: dict[str, object], message: str) -> None:
+    values: dict[str, object] = {"mirror": "m.step", **given}
+    with pytest.raises(InputError) as caught:
+        polish(**values)  # type: ignore[call-overload]
+    assert str(caught.value) == message
+
+
+def test_a_call_is_json() -> None:
+    record = json.loads(json.dumps(Polish(Path("m.step"), grits=(3.0, 1.0)).json()))
+    assert record == {"mirror": "m.step", "passes": 2, "grits": [3.0, 1.0]}
+
+
+def test_a_command_takes_paths_and_its_own_options() -> None:
+    def command(options: CalibrateOptions, loud: Annotated[bool, typer.Option()] = False) -> int:
+        return 0
+
+    shown = {one.name: one for one in parameters(command)}
+    assert next(iter(shown)) == "run"
+    assert [*shown][-1] == "loud"
+    assert "progress" not in shown
+    assert shown["exports"].annotation.__origin__ is Path
+
+
+@pytest.mark.parametrize("name", ["calibrate", "export", "intrinsics", "merge", "simulate_run"])
+def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
+    from tests.cli.commands import leaves
+
+    command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
+    python = set(inspect.signature(getattr(tbcad, name)).parameters)
+    assert command - {"json"} == python - {"progress", "detail", "answer"}
+
+
+def test_what_is_wanted_is_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"run\.json is not there: name a folder that tbcad run"):
+        tbcad.calibrate(tmp_path)
+    with pytest.raises(InputError, match=r"no such file; give a light field"):
+        tbcad.export(tmp_path, "rays")
