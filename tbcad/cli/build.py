@@ -178,6 +178,13 @@ def verify_command(
         float,
         typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
     ] = 600.0,
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict",
+            help="Fail also where a file was changed that only people read, such as a parts list.",
+        ),
+    ] = False,
     full: Full = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -191,8 +198,10 @@ def verify_command(
         raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
     check_is_folder(folder)
     if as_built is not None:
-        if printers or clients:
-            raise InputError("--as-built is about no files: leave out --printer and --clients")
+        if printers or clients or strict:
+            raise InputError(
+                "--as-built is about no files: leave out --printer, --clients and --strict"
+            )
         return _verify_as_built(folder, as_built, output)
     check_are_printers(printers or ())
     from tbcad_verify.run.verify import VerifyOptions
@@ -200,7 +209,9 @@ def verify_command(
     from tbcad.api import as_made, verify
     from tbcad.cli.stage_times import export_times
 
-    options = VerifyOptions(seconds=time_limit, printers=tuple(printers or ()), clients=clients)
+    options = VerifyOptions(
+        seconds=time_limit, printers=tuple(printers or ()), clients=clients, strict=strict
+    )
     started = monotonic()
     with stages(export_times(folder), silent=quiet) as screen:
         # Before the verification, which writes: a command that is stopped has changed nothing.

@@ -51,7 +51,7 @@ VERIFY_SHELLS: Seconds = {
 VERIFY_PROTOTYPE: Seconds = {
     "verification: prototype's record": 0.1,
     "verification: printed parts": 0.1,
-    "verification: parts and purchases": 0.1,
+    "verification: parts and fits": 0.1,
     "verification: seats": 0.1,
     "verification: light paths of the balls": 0.1,
     "verification: swing": 0.1,

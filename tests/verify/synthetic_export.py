@@ -397,36 +397,6 @@ def document(design: Design) -> dict[str, Any]:
     }
 
 
-def camera_sheet(design: Design, record: list[dict[str, Any]]) -> dict[str, Any]:
-    """What a camera must see, with the images of Coddington's equations on the principal rays."""
-    camera = document(design)["cameras"][0]
-    apex, normal = (np.array([row[key] for row in record]) for key in "pn")
-    ray = apex - camera["pinhole_mm"]
-    length, forward = np.linalg.norm(ray, axis=1), np.array(camera["forward"])
-    cosine = -(ray * normal).sum(1) / length
-    bulge = np.array([0.0 if design.flat else 2 / row["r"] for row in record])
-    depth = []
-    for reach in (-1, 1):
-        s = np.linalg.norm(apex, axis=1) + reach * design.target / 2
-        for power in (bulge / cosine, bulge * cosine):
-            depth.append((1 + 1 / (1 / s + power) / length) * (ray @ forward))
-    near, far = float(np.min(depth)), float(np.max(depth))
-    pitch = 2 * np.tan(np.radians(design.hfov) / 2) / design.width
-    pupil = float(np.sqrt(2 * 2.44 * 550e-6 / (1 / near - 1 / far)))
-    airy = float(2.44 * 550e-6 / pupil / pitch)
-    down = float(np.degrees(2 * np.arctan(pitch * design.height / 2)))
-    return {
-        "schema": "tbcad-camera/1",
-        "requirements": {
-            **{"hfov_deg": design.hfov, "vfov_deg": down},
-            **{"width_px": design.width, "height_px": design.height},
-            **{"near_mm": near, "far_mm": far, "focus_mm": 2 / (1 / near + 1 / far)},
-            **{"pupil_mm": pupil, "blur_px": airy, "airy_px": airy, "total_px": airy * 2**0.5},
-        },
-        "candidates": [],
-    }
-
-
 def spec(design: Design, sensor: dict[str, Any]) -> dict[str, Any]:
     """Every key, with the values of the committed sample where this design has none of its own."""
     value: dict[str, Any] = json.loads(SAMPLE.read_text(encoding="utf-8"))["spec"]
@@ -487,7 +457,7 @@ def export(folder: Path, design: Design) -> tuple[Path, Cells]:
     files = {
         "design.json": json.dumps(document(design), indent=1).encode(),
         "mirrors.csv": table(mirrors),
-        "camera.json": json.dumps(camera_sheet(design, record)).encode(),
+        "camera.json": b"for people",
         "shell_a.stl": stl(a),
         "shell_b.stl": stl(mirrored(a)),
     }

@@ -51,6 +51,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         f"{', '.join(built_in())}, or a TOML file; repeatable",
     )
     parser.add_argument(
+        "--strict", action="store_true", help="fail also where lists or other paper were changed"
+    )
+    parser.add_argument(
         "--clients", action="store_true", help="also ask FreeCAD, gmsh, PrusaSlicer and admesh"
     )
     parser.add_argument(
@@ -73,6 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         seconds=arguments.time_limit,
         printers=tuple(arguments.printer),
         clients=arguments.clients,
+        strict=arguments.strict,
     )
     outputs = dict.fromkeys(arguments.output or ["summary"])
     if len(outputs) > 1:

@@ -100,30 +100,6 @@ def longer_outline(space: Any) -> None:
             line.set_points([(1.001 * x, y, *rest) for x, y, *rest in line.get_points()])
 
 
-def other_words(space: Any) -> None:
-    space.query("TEXT")[0].dxf.text = "something else"
-
-
-def longer_dimension(space: Any) -> None:
-    """One that measures 10 % more than it says."""
-    one = next(one for one in space.query("DIMENSION") if one.dimtype == 0)
-    start, end = one.dxf.defpoint2, one.dxf.defpoint3
-    one.dxf.defpoint3 = start + 1.1 * (end - start)
-
-
-def other_size(space: Any) -> None:
-    """One whose picture has another number."""
-    one = next(iter(space.query("DIMENSION")))
-    (text,) = (part for part in one.doc.blocks.get(one.dxf.geometry) if part.dxftype() == "TEXT")
-    text.dxf.text = "12.5"
-
-
-def exploded_dimensions(space: Any) -> None:
-    """Lines and texts in place of dimensions."""
-    for one in list(space.query("DIMENSION")):
-        one.explode()
-
-
 def listed(part: str, **cells: object) -> Job:
     """Other cells in a part's row of the parts list."""
 
@@ -132,11 +108,6 @@ def listed(part: str, **cells: object) -> Job:
         found.update({key: str(value) for key, value in cells.items()})
 
     return table(BILL, how)
-
-
-def total(key: str, new: object) -> Job:
-    """Another sum of the parts list in the record."""
-    return record(lambda value: value["totals"].update({key: new}))
 
 
 def program(pattern: str, new: str, count: int = 0) -> Job:
@@ -158,34 +129,6 @@ def text_of(name: str, pattern: str, new: str, count: int = 0) -> Job:
 def together(*jobs: Job) -> Job:
     """Several changes, in order."""
     return lambda folder: [word for job in jobs for word in job(folder)]
-
-
-def without_part(name: str) -> Job:
-    """A part that is in no list, no assembly and no file; the manifest forgets its files too."""
-
-    def job(folder: Path) -> Sequence[str]:
-        for kind in ("stl", "step", "3mf"):
-            (folder / f"{name}.{kind}").unlink()
-        if not name.startswith("coupon"):
-            undrawn(name)(folder)
-        unlisted(name)(folder)
-        return ()
-
-    def forget(value: Record) -> None:
-        value["parts"] = [part for part in value["parts"] if part["name"] != name]
-
-    return together(record(forget), job)
-
-
-def unlisted(name: str) -> Job:
-    """A part that the parts list has not; items are numbered anew."""
-
-    def how(rows: Rows) -> None:
-        rows[:] = [one for one in rows if one["part"] != name]
-        for item, one in enumerate(rows, 1):
-            one["item"] = str(item)
-
-    return table(BILL, how)
 
 
 def undrawn(name: str) -> Job:
@@ -305,15 +248,6 @@ def led(by: float, *, spec: bool) -> Job:
 def stage_key(**values: object) -> Job:
     """Other keys of the stage in the spec."""
     return record(lambda _: None, lambda d: d["spec"]["prototype"]["stage"].update(values))
-
-
-def cap_record(key: str, by: float) -> Job:
-    """Scale a figure of the first cap."""
-
-    def how(value: Record) -> None:
-        value["caps"][0][key] *= by
-
-    return record(how)
 
 
 def spigot(cap: str, by: float) -> Job:
@@ -437,22 +371,6 @@ def no_led(value: Record) -> None:
 
 def no_spec_led(value: Record) -> None:
     value["spec"]["prototype"]["stage"]["leds_mm"].pop()
-
-
-def not_bought(name: str) -> Callable[[Record], None]:
-    def how(value: Record) -> None:
-        value["bought"] = [one for one in value["bought"] if one["name"] != name]
-
-    return how
-
-
-def not_printed(name: str) -> Callable[[Record], None]:
-    """Leave a printed part out of the record."""
-
-    def how(value: Record) -> None:
-        value["parts"] = [one for one in value["parts"] if one["name"] != name]
-
-    return how
 
 
 def empty_step(text: str) -> str:

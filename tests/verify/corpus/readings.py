@@ -83,7 +83,7 @@ PURE: dict[Any, tuple[str, ...]] = {
     calibration: ("joined_meshes", "build_scene", "highlights"),
     camera_gauge_checks: ("joined_meshes", "build_scene"),
     caps: ("fit_sphere",),
-    flat_drawing: ("_section",),
+    flat_drawing: ("dxf_entities",),
     fastener_checks: ("_hole_spans",),
     gcode_checks: ("run_program",),
     homing_checks: ("run_program",),

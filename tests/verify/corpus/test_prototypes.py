@@ -1,12 +1,15 @@
-"""Broken copies of a real prototype must be caught, each for its own reason."""
+"""Broken copies of a real prototype must be caught, each for its reason; edited paper is told."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+from tbcad_verify import main
+from tbcad_verify.shell.integrity import is_paper
 
 from tests.verify.corpus.broken_prototypes import GOOD, PROTOTYPES
+from tests.verify.corpus.copies import change, copy, load
 from tests.verify.corpus.mutation import Mutation
 from tests.verify.corpus.trial import HERE, attempt
 
@@ -17,3 +20,21 @@ pytestmark = pytest.mark.corpus
 def test_caught(mutation: Mutation, good_prototype: Path, tmp_path: Path) -> None:
     outcome = attempt(mutation, good_prototype, tmp_path, HERE)
     assert not outcome.wanting, outcome
+
+
+def test_edited_paper_is_told_and_refused_only_strictly(
+    good_prototype: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copy(good_prototype, tmp_path / "export")
+    paper = [name for name in load(folder, "manifest.json")["files"] if is_paper(name)]
+    assert {"bom.csv", "wiring.csv", "camera.json", "drawing_plate.pdf"} <= {*paper}
+    for name in paper:
+        change(folder, name, lambda data: data + b"18,1,TIES,cable ties,,,,,,,,,,,,,bought\n")
+    assert main([str(folder), "-q"]) == 0
+    verdict, line = capsys.readouterr().out.splitlines()
+    assert verdict.startswith("PASS")
+    assert line.startswith("changed since the build: bom.csv, camera.json, drawing_")
+    assert main([str(folder), "-q", "--strict"]) == 1
+    assert capsys.readouterr().out == "FAIL: failed: paper\n"
+    change(folder, "plate_holes.csv", lambda data: data + b"\n")
+    assert main([str(folder), "-q"]) in (1, 2)

@@ -14,15 +14,14 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify import BadExport
-from tbcad_verify.programs import ExpectedPart, ListedPrint, check_with_programs, is_skipped
+from tbcad_verify.programs import ExpectedPart, check_with_programs, is_skipped
 from tbcad_verify.programs.program_checks import QUERIES
 from tbcad_verify.report.checks import Check
 
 from tests.verify.programs.fake_programs import ADMESH, BAD, GOOD, INFO, SEEN, install, install_good
 
 FILES = {"step": "part.step", "stl": "part.stl", "3mf": "part.3mf"}
-LISTED = ListedPrint(filament_mm3=1111.0, hours=13.25)
-PART = ExpectedPart("part", FILES, spheres=7, volume=1000.0, volume_error=1.0, listed=LISTED)
+PART = ExpectedPart("part", FILES, spheres=7, volume=1000.0, volume_error=1.0)
 NAMES = [(name, PART.files[e.kind], unit) for e in QUERIES for name, unit in e.questions.items()]
 
 
@@ -66,23 +65,12 @@ def test_good_programs_pass(export: Path, programs: Path) -> None:
         "gmsh spheres",
         "prusa filament",
         "prusa time",
-        "prusa listed filament",
-        "prusa listed hours",
     ]
     assert figure(checks, "gmsh volume") == 0.5
     assert figure(checks, "admesh volume") == 0.25
     assert figure(checks, "prusa slices") == pytest.approx(42 * math.pi * 1.75**2 / 4 - 100)
     assert figure(checks, "prusa filament") == 0.42
     assert figure(checks, "prusa time") == 26.5
-    assert figure(checks, "prusa listed filament") == 10  # of 420 mm, 1010 mm^3
-    assert figure(checks, "prusa listed hours") == -50
-
-
-def test_a_part_without_an_estimate_is_not_asked_for_it(export: Path, programs: Path) -> None:
-    install_good(programs)
-    checks = ask(export, replace(PART, listed=None))
-    assert not [check for check in checks if "listed" in check.name]
-    assert all(check.passed for check in checks)
 
 
 @pytest.mark.parametrize("program", GOOD)

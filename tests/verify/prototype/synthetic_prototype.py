@@ -20,7 +20,6 @@ from tests.verify.synthetic_export import (
     PIN,
     B,
     Cells,
-    camera_sheet,
     csv_bytes,
     document,
     mirrored,
@@ -44,10 +43,10 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 # that are printed with their pads down;
 # and its only LED stands where the object is.
 NOT_MADE = {
-    *("inventory", "leds as designed", "assembly step", "parts list", "plate holes"),
-    *("list figures", "drawings", "fasteners", "fastener holes", "key access", "power off"),
-    *("wiring", "homing", "controller settings", "klipper"),
-    *("camera mount", "camera gauge", "camera place", "cap tilt", "cap drawings"),
+    *("inventory", "leds as designed", "assembly step", "plate holes"),
+    *("drawings", "fasteners", "fastener holes", "key access", "power off"),
+    *("homing", "controller settings", "klipper"),
+    *("camera mount", "camera gauge", "camera place", "cap tilt"),
     *("light past lamps and card", "lamps seen", "shroud"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     "light in the stage's shadow",
@@ -55,7 +54,7 @@ NOT_MADE = {
     *("object room", "leds seen", "calibration", "pads printed up"),
 }
 POWER_OFF = ("fall_energy_j", "fall_speed_deg_s", "pin_force_n", "pin_shear_mpa")
-POWER_OFF += ("pin_shear_limit_mpa", "pin_pressure_mpa", "pin_pressure_limit_mpa")
+POWER_OFF += ("pin_pressure_mpa",)
 STEPS = 200 * 16 * 3 / 360
 DRIVE = {
     "mass_g": 500.0,
@@ -64,7 +63,6 @@ DRIVE = {
     "azimuth_deg": 0.0,
     "inertia_g_mm2": 0.0,
     "worst_torque_nmm": 0.0,
-    "safety": 2.0,
     "required_torque_nmm": 0.0,
     "holding_torque_nmm": 450 * 3 * 0.95,
     "drive": "nema17-belt",
@@ -73,19 +71,15 @@ DRIVE = {
     "steps_per_deg": STEPS,
     "motor_wind_up_deg": 0.0,
     "belt_wind_up_deg": 0.0,
-    "wind_up_limit_deg": 1.0,
     "teeth_in_mesh": 9.0,
     "belt_pull_n": 0.0,
     "belt_rating_n": 26.22,
     "belt_tension_n": 0.0,
     "belt_tone_hz": 0.0,
     "motor_radial_n": 0.0,
-    "motor_radial_limit_n": 86.0,
-    "hold_margin": 1.4,
     "hold_current_a": 0.0,
     "hold_loss_w": 0.0,
     "motor_rise_k": 0.0,
-    "motor_rise_limit_k": 40.0,
     "peak_torque_nmm": 0.0,
     "belt_centre_mm": 78.97134949670655,
 }
@@ -399,12 +393,10 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         entries.append(
             {
                 "name": name,
-                "what": name,
                 "stl": f"{name}.stl",
                 "role": role,
                 "finish": None,
                 "ball": ball,
-                "quantity": 1,
                 "axes": TURN.tolist(),
                 "origin_mm": origin.tolist(),
             }
@@ -434,11 +426,6 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             for k, ball in enumerate(balls)
         ],
         "holding": {
-            "min_ratio": 2.0,
-            "remanence_t": 1.29,
-            "derating": 0.75,
-            "glue_mpa": 0.35,
-            "wider_gap_mm": 0.5,
             "balls": [
                 {
                     "ball": k + 1,
@@ -454,14 +441,6 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         },
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
-        "controller": {
-            "firmware": "grblhal",
-            "axis": "X",
-            "phases": [
-                {"name": name, "output": output}
-                for name, output in (("dark", None), ("led_1", 1), ("lit", 0))
-            ],
-        },
         "home": {
             "switch_deg": switch_angle(stops),
             "homed_deg": switch_angle(stops) + 2,
@@ -476,7 +455,6 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         "bought": [
             {
                 "name": "motor",
-                "what": "a box",
                 "part": "NEMA17-40",
                 "turns": False,
                 "finish": None,
@@ -484,13 +462,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         ],
         "lamps": None,
         "shroud": None,
-        "frame_stock": {"plate": "none", "upright": "none", "uprights_cut_to_mm": 0.0},
-        "caps": [],
         "drawings": [],
-        "totals": {
-            **{"mass_g": 0.0, "bought_price": {}, "without_price": 0},
-            **{"filament_g": 0.0, "filament_price": {}, "print_hours": 0.0},
-        },
         "assembly": {"glb": "whole.glb"},
     }
     return found, files
@@ -522,7 +494,7 @@ def export(folder: Path, spec: SyntheticPrototype) -> Path:
     found["spec"]["prototype"]["picture"] = "moved" if spec.moved else "fixed"
     files = {
         "mirrors.csv": table(mirrors),
-        "camera.json": json.dumps(camera_sheet(design, record)).encode(),
+        "camera.json": b"for people",
     }
     if spec.shell:
         a = solid(Cells(design, record))

@@ -7,10 +7,8 @@ from pathlib import Path
 import pytest
 from tbcad_verify import verify
 from tbcad_verify.prototype.drive_checks import EFFICIENCY, FULL_STEPS, MOTORS_NMM, STAGE_RATIO
-from tbcad_verify.prototype.purchases import HUB_INSERTS
 
 from tbcad.cli import run
-from tbcad.prototype.base.hub import PATTERNS
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.purchased.parts import load_parts
 
@@ -24,10 +22,6 @@ def test_torque_and_ratio_are_those_of_the_lists(drive: Drive) -> None:
     ratio = STAGE_RATIO if drive.name == "stage-60" else drive.ratio
     assert drive.holds_nmm == pytest.approx(holding * ratio * EFFICIENCY[drive.name])
     assert drive.steps_per_deg(8) == pytest.approx(FULL_STEPS * 8 * ratio / 360)
-
-
-def test_inserts_are_for_what_is_bolted_to_a_boss() -> None:
-    assert {name: 4 * pattern.boss for name, pattern in PATTERNS.items()} == HUB_INSERTS
 
 
 @pytest.mark.designs

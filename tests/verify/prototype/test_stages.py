@@ -440,7 +440,6 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
     "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
     "base of a ball": (in_record("parts", 0, "ball", to=1), "a cap's ball or null"),
-    "quantity": (in_record("parts", 0, "quantity", to=0), "a whole number from 1 to 1000"),
     "axes": (in_record("parts", 0, "axes", to=[1, 2, 3]), "three numbers"),
     "camera": (in_record("camera", to="z"), "camera 'z'"),
     "picture": (

@@ -6,11 +6,13 @@ import ast
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tbcad_verify
+from rich.console import Console
 from tbcad_verify import main, verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.mesh.stl import read_facets
@@ -24,6 +26,7 @@ from tbcad_verify.report.checks import (
     informative,
     worst_offenders,
 )
+from tbcad_verify.report.document import summary_json
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
@@ -175,7 +178,7 @@ def test_broken_export_fails_for_its_reason(
 def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
     """Consistent, watertight, and every mirror left sees enough: but one is not there."""
     design = Design()
-    from tests.verify.synthetic_export import camera_sheet, document, poses, write
+    from tests.verify.synthetic_export import document, poses, write
 
     record = [m for m in poses(design) if m["number"] != 10]
     facets = solid(Cells(Design(without=(10,)), poses(design)))
@@ -184,7 +187,7 @@ def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
         {
             "design.json": json.dumps(document(design)).encode(),
             "mirrors.csv": table(rows(design, record)),
-            "camera.json": json.dumps(camera_sheet(design, record)).encode(),
+            "camera.json": b"for people",
             "shell_a.stl": stl(facets),
             "shell_b.stl": stl(mirrored(facets)),
         },
@@ -212,12 +215,32 @@ def test_listed_but_missing_and_unlisted_files(export_folder: Path) -> None:
     (export_folder / "notes.csv").write_text("x", encoding="utf-8")
     assert all(check.passed for check in manifest_of(sign(export_folder)))
     (export_folder / "notes.csv").unlink()
-    missing, _ = manifest_of(export_folder)
+    missing, _, _ = manifest_of(export_folder)
     assert not missing.passed
     assert "notes.csv" in missing.detail
-    unlisted, _ = manifest_of(sign(export_folder, NAMES))
+    unlisted, _, _ = manifest_of(sign(export_folder, NAMES))
     assert not unlisted.passed
     assert "shell_b.stl" in unlisted.detail
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_changed_paper_is_told_and_fails_only_strictly(
+    export_folder: Path, capsys: pytest.CaptureFixture[str], lost: bool
+) -> None:
+    (export_folder / "camera.json").write_text("mine", encoding="utf-8")
+    if lost:
+        (export_folder / "camera.json").unlink()
+    report = verify(export_folder, options=IN_PROCESS)
+    assert failed(report) == set()
+    assert detail(report, "paper") == "changed since the build: camera.json"
+    assert json.loads(summary_json(report))["changed"] == ["camera.json"]
+    report.show(Console(width=80))
+    assert capsys.readouterr().out.splitlines()[1] == "changed since the build: camera.json"
+    strict = verify(export_folder, options=replace(IN_PROCESS, strict=True))
+    assert failed(strict) == {"paper"}
+    assert strict.verdict == "FAIL: failed: paper"
+    assert detail(strict, "paper") == "changed since the build: camera.json"
+    assert verify(sign(export_folder), options=replace(IN_PROCESS, strict=True)).passed
 
 
 def test_other_files_are_counted_and_do_no_harm(export_folder: Path) -> None:

@@ -29,8 +29,8 @@ from tests.verify.synthetic_export import Design, export
 
 LONG = ", ".join(f"a{k:04d} sees {k / 7:.2f} mm" for k in range(40))
 SUMMARY_KEYS = [
-    *("schema", "verdict", "target_mm", "figures", "failed", "as_made", "note", "folder"),
-    "seconds",
+    *("schema", "verdict", "target_mm", "figures", "failed", "changed", "as_made", "note"),
+    *("folder", "seconds"),
 ]
 FIGURE_KEYS = ["check", "file", "measured", "bound", "limit", "unit"]
 

@@ -9,6 +9,6 @@ from __future__ import annotations
 
 from tbcad_verify.programs.answers import is_skipped
 from tbcad_verify.programs.program_checks import check_with_programs
-from tbcad_verify.programs.program_query import ExpectedPart, ListedPrint
+from tbcad_verify.programs.program_query import ExpectedPart
 
-__all__ = ["ExpectedPart", "ListedPrint", "check_with_programs", "is_skipped"]
+__all__ = ["ExpectedPart", "check_with_programs", "is_skipped"]

@@ -16,10 +16,7 @@ from tbcad_verify.run.child import Limits
 from tbcad_verify.types import Progress
 
 PROCESSES = 2
-QUERIES = (
-    *(freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, prusa.PRINTS),
-    admesh.STL,
-)
+QUERIES = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
 
 
 def check_with_programs(
@@ -50,7 +47,6 @@ def check_with_programs(
         partial(_answers, root, part, query, limits, progress)
         for part in parts
         for query in queries
-        if part.listed or not query.of_prints
     ]
     return [check for checks in _two_at_a_time(jobs, limits) for check in checks]
 

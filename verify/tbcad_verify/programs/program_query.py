@@ -17,14 +17,6 @@ Command = tuple[str, ...]  # a program's absolute path and first arguments; empt
 
 
 @dataclass(frozen=True)
-class ListedPrint:
-    """What the parts list estimates of a print: filament in mm^3, and hours."""
-
-    filament_mm3: float
-    hours: float
-
-
-@dataclass(frozen=True)
 class ExpectedPart:
     """One part, and what the programs should find in its files.
 
@@ -34,7 +26,6 @@ class ExpectedPart:
         spheres: number of spherical faces of the solid; None: any number.
         volume: of the mesh, mm^3; NaN when it is unknown.
         volume_error: maximum difference of another file's volume from it, mm^3.
-        listed: estimate of its print; None: it has none.
     """
 
     name: str
@@ -42,7 +33,6 @@ class ExpectedPart:
     spheres: int | None
     volume: float
     volume_error: float
-    listed: ListedPrint | None = None
 
 
 @dataclass(frozen=True)
@@ -79,7 +69,6 @@ class ProgramQuery:
         questions: name -> unit of the checks it answers, in order.
         find: returns how to start it.
         ask: runs it and makes the checks of these names; raises Unknown without an answer.
-        of_prints: whether it is asked only of parts whose print is estimated.
     """
 
     program: str
@@ -88,7 +77,6 @@ class ProgramQuery:
     questions: Mapping[str, str]
     find: Callable[[], Command]
     ask: Callable[[Sandbox, ExpectedPart, list[CheckName]], Sequence[Check]]
-    of_prints: bool = False
 
     def names(self, part: ExpectedPart) -> list[CheckName]:
         """Name, file and unit of every check; a part without such a file by its own name."""

@@ -30,24 +30,12 @@ SOLID_PERCENT = 5.0  # a print's volume is that of its lines; 1.0 to 1.8 too muc
 TAIL = 1_000_000  # bytes of G-code that hold the figures at its end
 HOURS = {"d": 24.0, "h": 1.0, "m": 1 / 60, "s": 1 / 3600}
 
-# On a bed that is large enough; coordinates end at 2 m.
-MACHINE = (
+# A solid print on a bed that is large enough; coordinates end at 2 m.
+PROFILE = (
     *("--bed-shape", "0x0,1000x0,1000x1000,0x1000"),
     *("--filament-diameter", str(FILAMENT_MM), "--nozzle-diameter", "0.4", "--skirts", "0"),
-)
-# A solid print.
-PROFILE = (
-    *MACHINE,
     *("--layer-height", "0.3", "--first-layer-height", "0.3"),
     *("--fill-density", "100%", "--fill-pattern", "rectilinear"),
-)
-# As the parts list estimates prints.
-PRINT_PROFILE = (
-    *MACHINE,
-    *("--layer-height", "0.2", "--first-layer-height", "0.2", "--perimeters", "4"),
-    *("--top-solid-layers", "5", "--bottom-solid-layers", "5"),
-    *("--fill-density", "25%", "--fill-pattern", "gyroid"),
-    *("--support-material", "--support-material-threshold", "40"),
 )
 
 
@@ -76,7 +64,7 @@ def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName])
         Unknown: the program gives no answer.
     """
     slices, filament, time = names
-    length, hours = _sliced(sandbox, PROFILE)
+    length, hours = _sliced(sandbox)
     return [
         _slices(slices, length, expected.volume),
         informative(filament, length / 1e3),
@@ -84,36 +72,11 @@ def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName])
     ]
 
 
-def ask_prints(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
-    """By how much the list's estimate is off, of filament and hours; both inform.
-
-    Raises:
-        Unknown: the program gives no answer, or there is no estimate.
-    """
-    if expected.listed is None:
-        raise Unknown("the parts list has no estimate of it")
-    length, hours = _sliced(sandbox, PRINT_PROFILE)
-    cm3, listed_cm3 = _volume(length) / 1e3, expected.listed.filament_mm3 / 1e3
-    listed_hours = expected.listed.hours
-    return [
-        _deviation(names[0], listed_cm3, cm3, f"{cm3:.3g} cm^3, the list has {listed_cm3:.3g}"),
-        _deviation(
-            names[1], listed_hours, hours, f"{hours:.2g} h, the list has {listed_hours:.2g}"
-        ),
-    ]
-
-
-def _deviation(name: CheckName, listed: float, answer: float, detail: str) -> Check:
-    if answer <= 0:
-        return unknown(name, "a print of nothing")
-    return informative(name, round(100 * (listed / answer - 1)), detail)
-
-
-def _sliced(sandbox: Sandbox, profile: tuple[str, ...]) -> tuple[float, float]:
-    """Length of filament, mm, and time, h, of a print."""
+def _sliced(sandbox: Sandbox) -> tuple[float, float]:
+    """Length of filament, mm, and time, h, of a solid print."""
     code = sandbox.folder / "sliced.gcode"
     data = ("--datadir", sandbox.folder / "home")
-    text_of(sandbox.run(*data, "--export-gcode", *profile, "--output", code, sandbox.copy))
+    text_of(sandbox.run(*data, "--export-gcode", *PROFILE, "--output", code, sandbox.copy))
     return _print(_tail(code))
 
 
@@ -192,13 +155,4 @@ SLICES = ProgramQuery(
     questions={"prusa slices": "%", "prusa filament": "m", "prusa time": "h"},
     find=find,
     ask=ask_slices,
-)
-PRINTS = ProgramQuery(
-    program="prusa",
-    kind="stl",
-    install=INSTALL,
-    questions={"prusa listed filament": "%", "prusa listed hours": "%"},
-    find=find,
-    ask=ask_prints,
-    of_prints=True,
 )

@@ -18,7 +18,6 @@ from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
-from tbcad_verify.record.camera_sheet import Requirements, read_sheet
 from tbcad_verify.record.prototype_sections import CameraPlace, MarkPicture
 from tbcad_verify.report.checks import (
     Check,
@@ -29,6 +28,7 @@ from tbcad_verify.report.checks import (
     informative,
     short_list,
 )
+from tbcad_verify.shell.needed_lens import Lens, needed_lens
 from tbcad_verify.types import Floats
 
 GAUGE = "camera_gauge"
@@ -66,14 +66,14 @@ def checks(
     gauge = next((part for part in parts if part.part.name == GAUGE), None)
     if gauge is None:
         raise Unknown(f"there is no {GAUGE}")
-    sheet = read_sheet(context.export)
+    lens = needed_lens(context.export, camera)
     faults = [
         *_mark_faults(context, place, gauge),
-        *_picture_faults(context, place, sheet),
+        *_picture_faults(context, place),
         *_sight_faults(context, place, gauge, parts),
         *_room_faults(context, place, gauge, parts),
     ]
-    errors = place_errors(context, place, sheet)
+    errors = place_errors(context, place, lens)
     recorded = np.array([place.error.along_mm, place.error.across_mm, place.error.out_mm])
     if not np.allclose(recorded, errors, rtol=FIGURES):
         faults.append("other errors of the place are recorded")
@@ -128,20 +128,17 @@ def _hub(context: PrototypeContext, gauge: MeasuredPart) -> float:
     return float(places[1])
 
 
-def _picture_faults(
-    context: PrototypeContext, place: CameraPlace, sheet: Requirements
-) -> Iterator[str]:
-    """Marks appear where the record has them, within the view that is asked of the lens."""
+def _picture_faults(context: PrototypeContext, place: CameraPlace) -> Iterator[str]:
+    """Marks appear where the record has them, within the picture."""
     camera = context.camera
-    half = [math.tan(math.radians(angle) / 2) for angle in (sheet.hfov_deg, sheet.vfov_deg)]
+    size = np.array([camera.width, camera.height])
     for picture in place.pictures:
         mark = _turned(context, picture, _marks(place)[SIDES[picture.side], 1]) - camera.pinhole
         depth = camera.forward @ mark
         image = np.array([camera.right @ mark, camera.down @ mark]) / depth
-        if (np.abs(image) > half).any():
+        pixels = image / camera.pitch + (size - 1) / 2
+        if (np.abs(pixels - (size - 1) / 2) > size / 2).any():
             yield f"a mark at {picture.base_angle_deg:.0f} degrees is out of the picture"
-        middle = (np.array([camera.width, camera.height]) - 1) / 2
-        pixels = image / camera.pitch + middle
         if np.abs(pixels - [picture.column_px, picture.row_px]).max() > PIXEL:
             yield f"the mark at {picture.base_angle_deg:.0f} degrees appears elsewhere"
     seen = {(picture.side, np.sign(picture.base_angle_deg)) for picture in place.pictures}
@@ -283,7 +280,7 @@ class _Sight:
 
 
 def place_errors(
-    context: PrototypeContext, place: CameraPlace, sheet: Requirements
+    context: PrototypeContext, place: CameraPlace, lens: Lens
 ) -> tuple[float, float, float]:
     """Standard deviations of the pinhole's place along the base's axis, across and out, mm.
 
@@ -294,7 +291,7 @@ def place_errors(
     pinhole, marks = context.pinhole, _marks(place)[0]
     quarter = context.base_rotation(np.radians([-90.0]))[0].apply(marks)
     level, upright = _Sight(marks, axis), _Sight(quarter, axis)
-    noise = [_reading(context, sheet, one.marks) / math.sqrt(2) for one in (level, upright)]
+    noise = [_reading(context, lens, one.marks) / math.sqrt(2) for one in (level, upright)]
     along = level.slopes(pinhole, axis)[0]
     lengths = [
         level.slope_of(mark, pinhole, direction) * size / along
@@ -311,10 +308,10 @@ def place_errors(
     )
 
 
-def _reading(context: PrototypeContext, sheet: Requirements, marks: Floats) -> float:
+def _reading(context: PrototypeContext, lens: Lens, marks: Floats) -> float:
     """Error of the angle between two marks (2, 3) as they are read in the picture, rad."""
     near = marks[0] - context.pinhole
     depth = float(context.camera.forward @ near)
-    blur = sheet.pupil_mm * abs(1 / depth - 1 / sheet.focus_mm)
+    blur = lens.pupil * abs(1 / depth - 1 / lens.focus)
     pixel = min(READING_PX * context.camera.pitch, READING_RAD)
     return math.hypot(pixel, OF_BLUR * blur) * depth / float(np.linalg.norm(near))

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.prototype import PARTS_LIST
 from tbcad_verify.record.prototype_sections import CameraPlace
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, require, short_list
 from tbcad_verify.step.solids_text import TextSolid, holes
@@ -93,11 +92,10 @@ def _faults(
 
 def _axes(context: PrototypeContext) -> Floats:
     """(3, 3) rows: behind the pinhole, across, and out from the optical axis."""
-    w, back = context.frame[0], -context.camera.forward
-    level = np.array([w[0], w[1], 0.0]) / np.hypot(w[0], w[1])
+    back = -context.camera.forward
+    level, across, _ = context.level_axes
     out = level - (level @ back) * back
-    up = np.array([0.0, 0.0, 1.0])
-    return np.stack([back, np.cross(up, level), out / np.linalg.norm(out)])
+    return np.stack([back, across, out / np.linalg.norm(out)])
 
 
 def _places(context: PrototypeContext, solid: TextSolid, diameter: float, along: int) -> Floats:
@@ -124,11 +122,10 @@ def _least_reach(screws: Floats, ends: Floats, along: int) -> float:
 
 def _foot_travel(context: PrototypeContext, bracket: TextSolid) -> float:
     """Half of what the bracket's foot can be moved along the base plate, mm."""
-    up, w = np.array([0.0, 0.0, 1.0]), context.frame[0]
-    level = np.array([w[0], w[1], 0.0]) / np.hypot(w[0], w[1])
+    level, across, up = context.level_axes
     ends = np.array(
         [
-            [hole.point @ np.cross(up, level), hole.point @ level]
+            [hole.point @ across, hole.point @ level]
             for hole in holes(bracket.faces, M5_HOLE_MM / 2, SAME_MM)
             if abs(hole.axis @ up) > 1 - SAME_MM
         ]
@@ -167,6 +164,9 @@ def _travel_faults(
 
 
 def _longest_m5(context: PrototypeContext) -> float:
-    bill = require(context.prototype.parts_list, f"there is no {PARTS_LIST}")
-    found = [re.fullmatch(r"M5x([\d.]+)", name) for name in bill.part.tolist()]
+    found = [
+        re.fullmatch(r"M5x([\d.]+)", one.part)
+        for one in context.prototype.fasteners
+        if "camera_plate" in one.through
+    ]
     return max((float(one[1]) for one in found if one), default=0.0)

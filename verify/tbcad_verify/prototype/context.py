@@ -85,6 +85,29 @@ class PrototypeContext:
         return rows
 
     @property
+    def level_axes(self) -> Floats:
+        """(3, 3) rows: level under the base's axis, across it, up."""
+        w, up = self.frame[0], np.array([0.0, 0.0, 1.0])
+        level = np.array([w[0], w[1], 0.0]) / np.hypot(w[0], w[1])
+        return np.stack([level, np.cross(up, level), up])
+
+    @cached_property
+    def masses_g(self) -> Floats:
+        """(K,) of balls, and of caps without their magnets' pockets.
+
+        A cap is a ball whose front is replaced from a half angle of 45 degrees on by the flatter
+        sphere; where the front is not flatter, nothing is replaced. By revolution about the normal.
+        """
+        balls, density = self.prototype.balls, self.export.spec.printer.density_g_cm3
+        body, front = balls.body_radius_mm, balls.radius_mm
+        edge = np.minimum(np.where(body < front, body / np.sqrt(2), body), front)
+        height = np.sqrt(body**2 - edge**2)  # from the body's centre, of where both spheres meet
+        behind = np.pi * (2 * body**3 / 3 + body**2 * height - height**3 / 3)
+        rise = front - np.sqrt(front**2 - edge**2)
+        volume = behind + np.pi * rise * (3 * edge**2 + rise**2) / 6
+        return np.where(balls.cap, volume * density / 1000, balls.mass_g)
+
+    @property
     def ball(self) -> Ints:
         """(m,) ball that substitutes for each mirror, from 0."""
         return self.prototype.plan.ball[self.plan_rows] - 1

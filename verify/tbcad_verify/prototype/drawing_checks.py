@@ -1,51 +1,46 @@
-"""Drawings of what is cut or drilled: holes and outlines of the DXF are those of the assembly.
-
-The PDF must say the same in words, and every dimension what is measured between its points.
-"""
+"""What is cut or drilled: outlines and holes of DXF and drill table are those of the assembly."""
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.flat_drawing import SAME_MM, FlatDrawing, read_dxf
-from tbcad_verify.prototype.purchases import frame_axes
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
-from tbcad_verify.record.prototype_sections import Drawing
-from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
+from tbcad_verify.record.prototype import PLATE_HOLES
+from tbcad_verify.report.checks import Check, CheckName, at_most, require, short_list
 from tbcad_verify.step.solids_text import TextSolid, holes
 from tbcad_verify.types import Floats
 
-CHECKS = {"drawings": "faults"}
+CHECKS = {"drawings": "faults", "plate holes": "faults"}
 DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
-PDF_HEAD = b"%PDF-1."
-PDF_TEXT = re.compile(rb"\(((?:[^()\\]++|\\.)*+)\) Tj")
+TAPPED_M5_MM = 4.2
 CORNERS = 4  # of a strip
 
 
 def checks(
     names: list[CheckName], context: PrototypeContext, assembly: Mapping[str, TextSolid]
 ) -> list[Check]:
-    """The one check, over all drawings."""
-    (name,) = names
-    found = list(_faults(context, assembly))
-    return [at_most(name, len(found), 0, short_list(found))]
+    """All drawings, and the drill table of the plate."""
+    found = [list(faults(context, assembly)) for faults in (_faults, _table_faults)]
+    return [
+        at_most(name, len(faults), 0, short_list(faults))
+        for name, faults in zip(names, found, strict=True)
+    ]
 
 
 def _faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Iterator[str]:
     bought = {one.name: one.part for one in context.prototype.bought}
-    drawings = {one.part: one for one in context.prototype.drawings}
+    drawings = {one.part: one.dxf for one in context.prototype.drawings}
     needed = {name: str(bought[name]) for name in DRAWN if bought.get(name)}
     for part in drawings.keys() ^ set(needed.values()):
         yield f"{part}: drawn without need" if part in drawings else f"{part}: no drawing"
     for name, part in needed.items():
         if part not in drawings or name not in assembly:
             continue
-        flat = read_dxf(_text(context, drawings[part].dxf))
+        flat = read_dxf(_text(context, drawings[part]))
         solid = assembly[name]
         if name == "lamp_1":
             yield from _strip_faults(context, solid, flat)
@@ -53,9 +48,6 @@ def _faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Ite
             yield from _wheel_faults(context, solid, flat)
         else:
             yield from _board_faults(context, name, solid, flat)
-        yield from _words(context, drawings[part], flat)
-        for fault in flat.dimension_faults():
-            yield f"{drawings[part].dxf}: {fault}"
 
 
 def _text(context: PrototypeContext, file: str) -> str:
@@ -66,7 +58,7 @@ def _board_faults(
     context: PrototypeContext, name: str, solid: TextSolid, flat: FlatDrawing
 ) -> Iterator[str]:
     """A plate from above, or an upright that lies: outline and all its holes."""
-    axes = frame_axes(context)[[0, 1] if name == "plate" else [2, 1]]
+    axes = context.level_axes[[0, 1] if name == "plate" else [2, 1]]
     corners = solid.corners @ axes.T
     low, size = corners.min(axis=0), np.ptp(corners, axis=0)
     outline = flat.corners if len(flat.corners) else np.zeros((1, 2))
@@ -133,17 +125,17 @@ def _hole_faults(name: str, places: Mapping[float, Floats], circles: Floats) -> 
                 yield f"{name}: no circle of {radius:g} mm radius at {x:.2f}, {y:.2f}"
 
 
-def _words(context: PrototypeContext, drawing: Drawing, flat: FlatDrawing) -> Iterator[str]:
-    """The PDF has the texts of the DXF, the part's name among them."""
-    data = read(context.export.folder, drawing.pdf, MAX_TEXT_BYTES).data.tobytes()
-    if not data.startswith(PDF_HEAD):
-        yield f"{drawing.pdf} is no PDF"
-        return
-    words = Counter(
-        re.sub(rb"\\(.)", rb"\1", found).decode("cp1252", "replace")
-        for found in PDF_TEXT.findall(data)
-    )
-    if words != flat.texts:
-        yield f"{drawing.pdf} does not say what {drawing.dxf} does"
-    if not any(text.endswith(f": {drawing.part}") for text in words):
-        yield f"{drawing.pdf} does not name {drawing.part}"
+def _table_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Iterator[str]:
+    """The drill table against the tapped holes of the plate, from its corner."""
+    table = require(context.prototype.plate_holes, f"there is no {PLATE_HOLES}")
+    plate, axes = require(assembly.get("plate"), "the assembly has no plate"), context.level_axes
+    low, high = (end(plate.corners @ axes.T, axis=0) for end in (np.min, np.max))
+    drilled = holes(plate.faces, TAPPED_M5_MM / 2, SAME_MM)
+    places = np.array([hole.point @ axes.T for hole in drilled]).reshape(-1, 3)[:, :2] - low[:2]
+    if len(table) != len(places):
+        yield f"{len(table)} holes, the plate has {len(places)}"
+    if any(abs(hole.depth - (high - low)[2]) > SAME_MM for hole in drilled):
+        yield "a hole is not through the plate"
+    for k, place in enumerate(np.column_stack([table.x_mm, table.y_mm]), 1):
+        if (np.abs(places - place).max(axis=1) <= SAME_MM).sum() != 1:
+            yield f"hole {k} is elsewhere in the plate"

@@ -9,10 +9,8 @@ import numpy as np
 
 from tbcad_verify.prototype import drive_loads
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.drive_loads import FULL_STEPS, SHARE, TINY, Gear, unlike
+from tbcad_verify.prototype.drive_loads import FULL_STEPS, PITCH_MM, SHARE, TINY, Gear, unlike
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
-from tbcad_verify.prototype.purchases import cap_volume
-from tbcad_verify.record.prototype import PARTS_LIST
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, require, short_list
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line
 from tbcad_verify.types import Floats
@@ -20,10 +18,9 @@ from tbcad_verify.types import Floats
 GRAVITY = 9.80665  # m/s^2, standard
 MOTORS_NMM = {"NEMA17-40": 450.0, "NEMA17-48": 590.0, "NEMA17-60": 650.0, "STAGE-60": 300.0}
 NARROW_MM = 6.0  # of wheels whose names give no width
-MIN_BELT_MM = 150  # a longer one is no wheel
 STAGE_RATIO = 90.0
 EFFICIENCY = {"nema17-belt": 0.95, "nema17-direct": 1.0, "stage-60": 0.3}
-PITCH_MM, RIM_MM = 2.0, 1.5  # of GT2; of a wheel's rim over the pitch circle
+RIM_MM = 1.5  # of a wheel over its pitch circle
 MASS_SHARE = 2e-3  # by which meshes and STEP files may differ in mass
 INERTIA_SHARE = 2e-2
 CENTRE_MM = 0.1
@@ -40,8 +37,9 @@ def checks(
 ) -> list[Check]:
     """Compare the drive's record with masses, gears and motion."""
     faults = [*_balance(context, parts), *_torques(context), *_gears(context, solids)]
-    radial, limit, unlike_record = _shaft(context, solids)
-    faults += unlike_record
+    radial, limit = _shaft(context, solids), drive_loads.shaft_limit(context.prototype.drive)
+    recorded = context.prototype.drive.motor_radial_n
+    faults += unlike("motor_radial_n", recorded, radial, drive_loads.FIGURE_SHARE)
     lasts = f"the belt pulls with {radial:.0f} N, {limit:.0f} N are allowed"
     return [
         at_most(names[0], len(faults), 0, short_list(faults)),
@@ -49,22 +47,10 @@ def checks(
     ]
 
 
-def _shaft(
-    context: PrototypeContext, solids: Mapping[str, TextSolid]
-) -> tuple[float, float, list[str]]:
-    """Force on the motor's shaft, its limit, N, and where the record has others."""
-    drive = context.prototype.drive
+def _shaft(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> float:
+    """Force on the motor's shaft, N."""
     bought = {one.name: one.part for one in context.prototype.bought}
-    radial = drive_loads.shaft_load(drive, _gear(context, solids, bought))
-    limit = drive_loads.shaft_limit(drive)
-    return (
-        radial,
-        limit,
-        [
-            *unlike("motor_radial_n", drive.motor_radial_n, radial, drive_loads.FIGURE_SHARE),
-            *unlike("motor_radial_limit_n", drive.motor_radial_limit_n, limit),
-        ],
-    )
+    return drive_loads.shaft_load(context.prototype.drive, _gear(context, solids, bought))
 
 
 def _balance(context: PrototypeContext, parts: list[MeasuredPart]) -> Iterator[str]:
@@ -93,11 +79,9 @@ def _masses(context: PrototypeContext, parts: list[MeasuredPart]) -> tuple[Float
     density = context.export.spec.printer.density_g_cm3 / 1000
     balls = context.prototype.balls
     pieces = [require(part.placed_mass, part.reason) for part in of_roles(parts, "base")]
-    caps = cap_volume(context) * density
-    mass = np.where(balls.cap, caps, balls.mass_g)
     volumes = [piece.volume * density for piece in pieces]
     centres = [np.asarray(piece.centroid) for piece in pieces]
-    return np.append(volumes, mass), np.vstack([*centres, balls.columns("bx", 3).T])
+    return np.append(volumes, context.masses_g), np.vstack([*centres, balls.columns("bx", 3).T])
 
 
 def _torques(context: PrototypeContext) -> Iterator[str]:
@@ -109,7 +93,6 @@ def _torques(context: PrototypeContext) -> Iterator[str]:
     required = motion.safety * peak
     yield from unlike("worst_torque_nmm", drive.worst_torque_nmm, torque)
     yield from unlike("peak_torque_nmm", drive.peak_torque_nmm, peak)
-    yield from unlike("safety", drive.safety, motion.safety)
     yield from unlike("required_torque_nmm", drive.required_torque_nmm, required)
     if drive.holding_torque_nmm < drive.required_torque_nmm:
         yield "the drive does not hold the base"
@@ -171,7 +154,7 @@ def _stops(context: PrototypeContext, ratio: float) -> Iterator[str]:
 def _gear(
     context: PrototypeContext, solids: Mapping[str, TextSolid], bought: Mapping[str, str | None]
 ) -> Gear:
-    """Wheels of the assembly, and the belt of the parts list; their sizes are in their names.
+    """Wheels of the assembly, whose sizes are in their names.
 
     Raises:
         Unknown: wheels that are not known, or not as drawn.
@@ -192,20 +175,8 @@ def _gear(
             raise Unknown(f"the {name} of the assembly has not {teeth[name]} teeth")
     wheel, pinion = rims["wheel"], rims["pinion"]
     distance = distance_to_line(pinion.point, wheel.point, wheel.axis)
-    length, width = _belt(context)
-    if widths != {"wheel": width, "pinion": width}:
-        raise Unknown(
-            f"wheels of {widths['wheel']:g} and {widths['pinion']:g} mm, belt {width:g} mm"
-        )
+    width = widths["wheel"]
+    if width != widths["pinion"]:
+        raise Unknown(f"wheels of {width:g} and {widths['pinion']:g} mm for one belt")
     radii = wheel.radius - RIM_MM, pinion.radius - RIM_MM
-    return Gear(teeth["wheel"] / teeth["pinion"], *radii, distance, teeth["pinion"], length, width)
-
-
-def _belt(context: PrototypeContext) -> tuple[float, float]:
-    """Length and width of the belt in the parts list, mm."""
-    bill = require(context.prototype.parts_list, f"there is no {PARTS_LIST}")
-    found = [re.fullmatch(r"GT2-(\d+)-(\d+)", name) for name in bill.part.tolist()]
-    belts = [one for one in found if one and int(one[1]) >= MIN_BELT_MM]
-    if len(belts) != 1:
-        raise Unknown(f"{len(belts)} belts are in the parts list")
-    return float(belts[0][1]), float(belts[0][2])
+    return Gear(teeth["wheel"] / teeth["pinion"], *radii, distance, teeth["pinion"], width)

@@ -7,16 +7,14 @@ the STEP assembly. Threads are drawn at their core in screws, at their nominal d
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.prototype import PARTS_LIST
 from tbcad_verify.record.prototype_sections import PlacedFastener
-from tbcad_verify.report.checks import Check, CheckName, at_most, require, short_list
+from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
 from tbcad_verify.step.solids_text import RoundFace, TextSolid, cross_length, distance_to_line
 
 CHECKS = {"fasteners": "faults", "fastener holes": "faults"}
@@ -121,11 +119,6 @@ def _check(name: CheckName, faults: Iterator[str]) -> Check:
 
 def _fastener_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
     fasteners = context.prototype.fasteners
-    bill = require(context.prototype.parts_list, f"there is no {PARTS_LIST}")
-    listed = dict(zip(bill.part.tolist(), bill.quantity.tolist(), strict=True))
-    for part, count in Counter(one.part for one in fasteners).items():
-        if listed.get(part) != count:
-            yield f"{part}: {count} are drawn, {listed.get(part, 0)} listed"
     turning = {part.name for part in context.prototype.parts if part.role in ("base", "cap")}
     turning |= {body.name for body in context.prototype.bought if body.turns}
     for one in fasteners:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.magnets import DERATING, REMANENCE_T, pull_of_pair, pull_on_ball
-from tbcad_verify.prototype.purchases import Solids, cap_volume
+from tbcad_verify.prototype.magnets import pull_of_pair, pull_on_ball
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -54,12 +52,17 @@ class Hold:
     glued: bool
 
 
-def checks(names: list[CheckName], context: PrototypeContext, solids: Solids) -> list[Check]:
+def checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    carriers: list[TextSolid],
+    caps: list[TextSolid],
+) -> list[Check]:
     """The record of what holds each ball, and the least ratio of forces."""
     needed = forces_needed(context)
-    holds = [_hold(context, solids, k) for k in range(len(needed))]
+    holds = [_hold(context, carriers, caps, k) for k in range(len(needed))]
     ratio = np.array([hold.force for hold in holds]) / needed
-    faults = [*_faults(context, needed, holds), *_list_faults(context)]
+    faults = [*_faults(context, needed, holds)]
     weak = ratio < MIN_RATIO
     ids = context.prototype.balls.names(np.arange(ratio.size))
     return [
@@ -81,7 +84,7 @@ def forces_needed(context: PrototypeContext) -> Floats:
     angle = np.linspace(0, 2 * np.pi, STEPS, endpoint=False)
     gravity = context.base_rotation(-angle).apply([0.0, 0.0, -GRAVITY])
     speed, acceleration = np.radians([motion.feed_deg_min / 60, motion.acceleration_deg_s2])
-    centre, mass = balls.columns("bx", 3).T / 1000, _masses(context) / 1000
+    centre, mass = balls.columns("bx", 3).T / 1000, context.masses_g / 1000
     outward = centre - np.outer(centre @ axis, axis)
     around = np.cross(axis, outward)
     needed = np.zeros(len(mass))
@@ -97,16 +100,12 @@ def forces_needed(context: PrototypeContext) -> Floats:
     return needed
 
 
-def _masses(context: PrototypeContext) -> Floats:
-    """(K,) grams, of balls and caps."""
-    balls, density = context.prototype.balls, context.export.spec.printer.density_g_cm3
-    return np.where(balls.cap, cap_volume(context) * density / 1000, balls.mass_g)
-
-
-def _hold(context: PrototypeContext, solids: Solids, k: int) -> Hold:
+def _hold(
+    context: PrototypeContext, carriers: list[TextSolid], caps: list[TextSolid], k: int
+) -> Hold:
     """What holds a ball, by the pocket behind it."""
     balls, base = context.prototype.balls, context.export.spec.prototype.base
-    pocket = _pocket(context, solids.base, k)
+    pocket = _pocket(context, carriers, k)
     if pocket is None:
         raise Unknown(f"there is no pocket behind ball {k + 1}")
     glue = float(GLUE_MPA * np.pi * pocket.radius**2)
@@ -118,7 +117,7 @@ def _hold(context: PrototypeContext, solids: Solids, k: int) -> Hold:
     if not balls.cap[k]:
         force, wider = (pull_on_ball(radius, gap + w, magnet, height) for w in (0.0, WIDER_MM))
         return Hold(name, force, wider, False)
-    own = _pocket(context, [solids.caps[int(balls.cap[:k].sum())]], k)
+    own = _pocket(context, [caps[int(balls.cap[:k].sum())]], k)
     if own is None:
         return Hold(name, glue, glue, True)
     between = radius + gap - own.end
@@ -157,15 +156,6 @@ def _on_axis(face: RoundFace, centre: Floats, axis: Floats) -> bool:
 def _faults(context: PrototypeContext, needed: Floats, holds: list[Hold]) -> Iterator[str]:
     """The record against what was worked out."""
     record = context.prototype.holding
-    figures = {
-        "min_ratio": (record.min_ratio, MIN_RATIO),
-        "remanence_t": (record.remanence_t, REMANENCE_T),
-        "derating": (record.derating, DERATING),
-        "glue_mpa": (record.glue_mpa, GLUE_MPA),
-        "wider_gap_mm": (record.wider_gap_mm, WIDER_MM),
-    }
-    for name, (value, mine) in figures.items():
-        yield from _unlike(name, value, mine, SHARE)
     for k, (ball, hold) in enumerate(zip(record.balls, holds, strict=True)):
         where = f"ball {k + 1}: "
         if ball.magnet != hold.magnet:
@@ -176,18 +166,6 @@ def _faults(context: PrototypeContext, needed: Floats, holds: list[Hold]) -> Ite
         yield from _unlike(f"{where}force_available_n", ball.available, hold.force, PULL_SHARE)
         yield from _unlike(f"{where}wider_gap_n", ball.wider, hold.wider, PULL_SHARE)
         yield from _unlike(f"{where}ratio", ball.ratio, ball.available / ball.needed, SHARE)
-
-
-def _list_faults(context: PrototypeContext) -> Iterator[str]:
-    """Each magnet of the seats is in the parts list, as often as in the seats or more, for caps."""
-    bill = context.prototype.parts_list
-    if bill is None:
-        return
-    listed = dict(zip(bill.part.tolist(), bill.quantity.tolist(), strict=True))
-    seats = Counter(one.magnet for one in context.prototype.holding.balls if one.magnet)
-    for name, count in seats.items():
-        if listed.get(name, 0) < count:
-            yield f"{name}: {count} are in seats, {listed.get(name, 0)} in the list"
 
 
 def _unlike(name: str, recorded: float, expected: float, share: float) -> Iterator[str]:

@@ -1,12 +1,7 @@
-"""What there must be: worked out from the spec, and looked for in every file that lists parts.
-
-Record, assembly as STEP and as GLB, and parts list must agree on what there is. A part that is left
-out of all of them is missed too, since the spec asks for it.
-"""
+"""What there is: the bodies of the record are those of the assembly as STEP and as GLB."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
@@ -20,29 +15,9 @@ from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short
 from tbcad_verify.step.solids_text import TextSolid, holes, read_solids
 from tbcad_verify.types import Floats
 
-STAGE = frozenset({"stage_disc", "stage_crown", "stage_post"})
 ZERO_DISC = "zero_disc"  # of the base, beside its carrier
-FRAME = frozenset(
-    {"bearing_head", "home_bracket", "upright_foot_front", "upright_foot_back", "stage_foot"}
-)
-CAMERA = frozenset({"camera_bracket", "camera_plate", "camera_fence"})
-GAUGE = "camera_gauge"  # a tool, with a camera
-STOCK = frozenset({"plate", "upright_left", "upright_right", "home_switch"})
-# Bought bodies of each drive; those that turn with the base.
-DRIVES: dict[str, frozenset[str]] = {
-    "nema17-belt": frozenset(
-        {"motor", "wheel", "pinion", "shaft", "bearing_front", "bearing_rear", "collar"}
-    ),
-    "nema17-direct": frozenset({"motor", "coupling"}),
-    "stage-60": frozenset({"rotary_stage", "rotary_stage_top"}),
-}
-FOUR_STANDS = frozenset({"lamp_stand_1", "lamp_stand_2", "lamp_holder_3", "lamp_holder_4"})
-STANDS = {4: FOUR_STANDS, 2: frozenset({"lamp_stand_1", "lamp_holder_2"})}  # of so many lamps
-PANELS = frozenset(f"shroud_{name}" for name in ("floor", "lid", "front", "back", "left", "right"))
 TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})
-# Names of what the base, or a set of coupons, is cut into.
-NUMBERED = r"(_[1-9][0-9]*)?"
 TOOL = "tool"  # role of parts that are not in the assembly
 UP = np.array([0.0, 0.0, 1.0])
 LED_MM = 1e-9
@@ -63,47 +38,6 @@ class LedSize:
 LEDS = {"LED-3": LedSize(3.8 / 2 + 0.1, 5.4 - 1.5), "LED-5": LedSize(5.9 / 2 + 0.1, 8.7 - 2.5)}
 
 
-@dataclass(frozen=True)
-class Expected:
-    """Names that the spec and the balls ask for.
-
-    Attributes:
-        parts: printed, by role; of base and tools any number of pieces.
-        bought: bodies of purchased parts.
-        panels: of the shroud.
-        balls: bodies of balls.
-    """
-
-    parts: dict[str, frozenset[str]]
-    bought: frozenset[str]
-    panels: frozenset[str]
-    balls: frozenset[str]
-
-
-def expected(context: PrototypeContext) -> Expected:
-    """What the prototype must consist of."""
-    spec, cap = context.export.spec.prototype, context.prototype.balls.cap
-    lamps = context.prototype.lamps
-    count = 0 if spec.light.lamp_z_mm == 0 else 4 if lamps is None else len(lamps.places)
-    camera = spec.camera_diameter_mm > 0
-    numbers = 1 + np.arange(cap.size)
-    return Expected(
-        parts={
-            "cap": frozenset(f"cap_{k}" for k in numbers[cap]),
-            "stage": STAGE,
-            "frame": FRAME
-            | (CAMERA if camera else frozenset())
-            | (STANDS.get(count, FOUR_STANDS) if count else frozenset()),
-        },
-        bought=STOCK
-        | DRIVES[spec.base.drive]
-        | ({"camera"} if camera else set())
-        | {f"lamp_{k}" for k in range(1, count + 1)},
-        panels=PANELS if spec.light.shroud else frozenset(),
-        balls=frozenset(f"ball_{k}" for k in numbers[~cap]),
-    )
-
-
 def checks(
     names: list[CheckName],
     context: PrototypeContext,
@@ -121,7 +55,7 @@ def checks(
         own: solids of the parts' own STEP files, by name.
     """
     inventory, leds, same = names
-    faults = [*_record_faults(context), *_file_faults(context, drawn, solids)]
+    faults = list(_faults(context, drawn, solids))
     return [
         at_most(inventory, len(faults), 0, short_list(faults)),
         _led_check(leds, context, solids.get("stage_crown")),
@@ -160,51 +94,22 @@ def _solids(context: PrototypeContext, file: str) -> dict[str, TextSolid]:
     return read_solids(read(context.export.folder, file, MAX_TEXT_BYTES).text())
 
 
-def _record_faults(context: PrototypeContext) -> Iterable[str]:
-    """What prototype.json lists too little, too much, or with another role or count."""
-    prototype, spec, must = context.prototype, context.export.spec.prototype, expected(context)
-    by_role: dict[str, set[str]] = {}
-    for part in prototype.parts:
-        by_role.setdefault(part.role, set()).add(part.name)
-        if part.quantity != 1:
-            yield f"{part.name}: {part.quantity} of them"
-        if part.role == "cap" and part.name != f"cap_{part.number}":
-            yield f"{part.name} is the cap of ball {part.number}"
-    for role, names in must.parts.items():
-        yield from _differences(names, by_role.pop(role, set()), f"{role} part")
-    for role, stem in (("base", "carrier"), ("tool", "coupon")):
-        found = by_role.pop(role, set())
-        if role == "base":
-            yield from () if ZERO_DISC in found else [f"{role} part {ZERO_DISC} is missing"]
-            found -= {ZERO_DISC}
-        elif spec.camera_diameter_mm > 0:
-            yield from () if GAUGE in found else [f"{role} {GAUGE} is missing"]
-            found -= {GAUGE}
-        if not found or not all(re.fullmatch(stem + NUMBERED, name) for name in found):
-            yield f"{role} parts are {short_list(sorted(found)) or 'missing'}"
-        elif len(found) > 1 and found != {f"{stem}_{k}" for k in range(1, len(found) + 1)}:
-            yield f"{role} parts are not numbered from 1"
-    yield from _differences(must.bought, {one.name for one in prototype.bought}, "purchased part")
-    panels = prototype.shroud.panels if prototype.shroud else []
-    yield from _differences(must.panels, {one.name for one in panels}, "panel")
+def _faults(
+    context: PrototypeContext, drawn: Collection[str], solids: Collection[str]
+) -> Iterable[str]:
+    """What the assembly has too little or too much, and what turns without need."""
+    prototype = context.prototype
+    names = {part.name for part in prototype.parts if part.role != TOOL} | VIEWS
+    names |= {f"ball_{k + 1}" for k in np.flatnonzero(~prototype.balls.cap)}
+    names |= {one.name for one in prototype.bought} | {one.name for one in prototype.fasteners}
+    names |= {one.name for one in (prototype.shroud.panels if prototype.shroud else ())}
+    yield from _differences(names, set(drawn), f"body in {prototype.assembly.glb}")
+    yield from _differences(names, set(solids), f"solid in {prototype.assembly.step}")
     for one in prototype.bought:
         if one.turns != (one.name in TURNING):
             yield f"{one.name} turns" if one.turns else f"{one.name} does not turn"
-    if spec.k != len(prototype.balls):
-        yield f"{len(prototype.balls)} balls, the spec asks for {spec.k}"
-
-
-def _file_faults(
-    context: PrototypeContext, drawn: Collection[str], solids: Collection[str]
-) -> Iterable[str]:
-    """What assembly and parts list have too little or too much."""
-    must, prototype = expected(context), context.prototype
-    placed = {part.name for part in prototype.parts if part.role != TOOL}
-    names = placed | must.balls | must.bought | must.panels | VIEWS
-    names |= {*must.parts["stage"], *must.parts["frame"]}
-    names |= {one.name for one in prototype.fasteners}
-    yield from _differences(names, set(drawn), f"body in {prototype.assembly.glb}")
-    yield from _differences(names, set(solids), f"solid in {prototype.assembly.step}")
+    if context.export.spec.prototype.k != len(prototype.balls):
+        yield f"{len(prototype.balls)} balls, the spec asks for {context.export.spec.prototype.k}"
 
 
 def _differences(names: Iterable[str], found: set[str], what: str) -> Iterable[str]:

@@ -50,7 +50,5 @@ def _pin_faults(context: PrototypeContext) -> Iterator[str]:
     yield from unlike("pin_force_n", record.pin_force_n, force, SHARE)
     yield from unlike("pin_shear_mpa", record.pin_shear_mpa, shear, SHARE)
     yield from unlike("pin_pressure_mpa", record.pin_pressure_mpa, pressure, SHARE)
-    yield from unlike("pin_shear_limit_mpa", record.pin_shear_limit_mpa, SHEAR_MPA)
-    yield from unlike("pin_pressure_limit_mpa", record.pin_pressure_limit_mpa, PRESSURE_MPA)
     if shear > SHEAR_MPA or pressure > PRESSURE_MPA:
         yield "the zero pin does not hold the base"

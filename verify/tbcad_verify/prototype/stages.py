@@ -31,15 +31,12 @@ from tbcad_verify.prototype import (
     lamp_light,
     lamp_views,
     leds,
-    list_checks,
     pad_pose,
     plan_checks,
     power_checks,
-    purchases,
     seats,
     shroud_checks,
     swing,
-    wiring_checks,
 )
 from tbcad_verify.prototype import record_checks as records
 from tbcad_verify.prototype.assembly import Shape
@@ -56,7 +53,7 @@ from tbcad_verify.prototype.measured_parts import (
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype import KLIPPER, PARTS_LIST, SETTINGS, WIRING, Prototype
+from tbcad_verify.record.prototype import KLIPPER, SETTINGS, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE
 from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
@@ -72,18 +69,18 @@ from tbcad_verify.step.solids_text import TextSolid
 STAGES = (
     "prototype's record",
     "printed parts",
-    "parts and purchases",
+    "parts and fits",
     "seats",
     "light paths of the balls",
     "swing",
     "printability of the prototype",
 )
-RECORD, PARTS, PURCHASES, SEATS, LIGHT, SWING, PRINTING = STAGES
+RECORD, PARTS, FITS, SEATS, LIGHT, SWING, PRINTING = STAGES
 PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
 OWN = ("camera",)  # body that its own rays start in
 NO_SEATS = "the seats could not be measured"
 PATTERNS = "shroud_*.dxf"
-DRAWINGS = "drawing_*.dxf"
+DRAWINGS = "drawing_*.dxf, plate_holes.csv"
 DIGITS = 9
 
 Row = dict[str, Any]
@@ -114,10 +111,10 @@ def verify_prototype(
     for part in parts:
         masses = {} if part.placed_mass is None else {part.part.name: part.placed_mass}
         sink(Results(checks=part.checks, masses=masses))
-    sink(Results(stages=[PURCHASES]))
+    sink(Results(stages=[FITS]))
     drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
     solids, no_solids = attempt(lambda: inventory.assembly_solids(context))
-    _purchases(
+    _fits(
         context,
         parts,
         sink,
@@ -159,7 +156,7 @@ def _add(
     sink(Results(checks=guarded(names, lambda: module.checks(names, *arguments()))))
 
 
-def _purchases(
+def _fits(
     context: PrototypeContext,
     parts: list[MeasuredPart],
     sink: ResultSink,
@@ -168,44 +165,22 @@ def _purchases(
 ) -> None:
     """What there is, in all files that list it, and what follows from it."""
     part_files, no_part_files = attempt(lambda: inventory.part_solids(context))
-    counted, no_solids = attempt(
-        lambda: purchases.Solids(
-            _carriers(context, require(part_files, no_part_files)),
-            _of_role(context, "cap", require(part_files, no_part_files)),
-            solids(),
-        )
-    )
-    _add(
-        sink,
-        inventory,
-        RECORD_FILE,
-        lambda: (
-            context,
-            drawn(),
-            solids(),
-            require(part_files, no_part_files),
-        ),
-    )
+
+    def own() -> dict[str, TextSolid]:
+        return require(part_files, no_part_files)
+
+    def held() -> Sequence[object]:
+        return context, _carriers(context, own()), _of_role(context, "cap", own())
+
+    _add(sink, inventory, RECORD_FILE, lambda: (context, drawn(), solids(), own()))
     _add(sink, fastener_checks, RECORD_FILE, lambda: (context, solids()))
     _add(sink, key_access, RECORD_FILE, lambda: (context, drawn()))
-    _add(sink, purchases, PARTS_LIST, lambda: (context, parts, require(counted, no_solids)))
-    _add(sink, list_checks, PARTS_LIST, lambda: (context,))
-    _add(
-        sink,
-        homing_checks,
-        SETTINGS,
-        lambda: (
-            context,
-            solids(),
-            _carriers(context, require(part_files, no_part_files)),
-        ),
-    )
+    _add(sink, homing_checks, SETTINGS, lambda: (context, solids(), _carriers(context, own())))
     _add(sink, drawing_checks, DRAWINGS, lambda: (context, solids()))
     _add(sink, klipper_checks, KLIPPER, lambda: (context,))
-    _add(sink, wiring_checks, WIRING, lambda: (context, solids()))
-    _add(sink, holding_checks, RECORD_FILE, lambda: (context, require(counted, no_solids)))
+    _add(sink, holding_checks, RECORD_FILE, held)
     if context.prototype.balls.cap.any():
-        _add(sink, cap_checks, RECORD_FILE, lambda: (context, require(counted, no_solids)))
+        _add(sink, cap_checks, RECORD_FILE, held)
     _add(sink, camera_mount_checks, RECORD_FILE, lambda: (context, solids()))
     _add(sink, camera_gauge_checks, RECORD_FILE, lambda: (context, parts))
     _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, solids()))

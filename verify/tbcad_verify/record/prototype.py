@@ -19,17 +19,13 @@ from tbcad_verify.record.prototype_sections import (
     AssemblyStep,
     Calibration,
     CameraPlace,
-    CapRecord,
-    Controller,
     Drawing,
     DriveRecord,
     Frame,
-    FrameStock,
     Holding,
     Home,
     Lamps,
     Led,
-    ListTotals,
     PlacedFastener,
     PowerOff,
     PrintedPart,
@@ -40,11 +36,9 @@ from tbcad_verify.record.prototype_sections import (
 from tbcad_verify.record.prototype_tables import (
     MOST,
     Balls,
-    PartsList,
     Plan,
     PlateHoles,
     Stops,
-    Wiring,
 )
 from tbcad_verify.record.validation import (
     Name,
@@ -56,11 +50,11 @@ from tbcad_verify.record.validation import (
 
 SCHEMA = "tbcad-prototype/2"
 RECORD = "prototype.json"
-PARTS_LIST, PLATE_HOLES, WIRING = "bom.csv", "plate_holes.csv", "wiring.csv"
+PLATE_HOLES = "plate_holes.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"
 KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
-OPTIONAL = (PARTS_LIST, PLATE_HOLES, WIRING, KLIPPER, KLIPPER_CONFIG)
+OPTIONAL = (PLATE_HOLES, KLIPPER, KLIPPER_CONFIG)
 
 
 class Prototype(Strict):
@@ -78,8 +72,6 @@ class Prototype(Strict):
         parts: printed.
         leds: of the stage.
         calibration: by the LEDs; None without any.
-        controller: of motion and lights.
-        caps: key, limits and finish of each cap.
         camera_place: how the camera is put in its place; None without one.
         home: angles of homing.
         bought: purchased parts other than balls and fasteners.
@@ -87,8 +79,6 @@ class Prototype(Strict):
         assembly_steps: in their order.
         lamps: that light the object; None without any.
         shroud: round the rig; None without.
-        frame_stock: parts of the frame that are cut or drilled.
-        totals: of the parts list.
         drawings: of what is cut or drilled.
         assembly: files of the whole.
         drive: of the base.
@@ -96,8 +86,6 @@ class Prototype(Strict):
         balls: K of them.
         plan: every picture.
         stops: of the base.
-        wiring: lines of the controller; None without the file.
-        parts_list: what to buy and to print; None without the file.
         plate_holes: of the base plate; None without the file.
         program: text of the controller's program.
         settings: text of the controller's settings.
@@ -117,8 +105,6 @@ class Prototype(Strict):
     parts: list[PrintedPart] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
     calibration: Calibration | None = None
-    controller: Controller
-    caps: list[CapRecord] = Field(max_length=MOST)
     camera_place: CameraPlace | None = None
     home: Home
     bought: list[PurchasedBody] = Field(max_length=MOST)
@@ -126,8 +112,6 @@ class Prototype(Strict):
     assembly_steps: list[AssemblyStep] = Field(max_length=MOST)
     lamps: Lamps | None
     shroud: Shroud | None
-    frame_stock: FrameStock
-    totals: ListTotals
     drawings: list[Drawing] = Field(max_length=MOST)
     assembly: Assembly = Assembly()
     drive: DriveRecord
@@ -135,8 +119,6 @@ class Prototype(Strict):
     balls: Balls
     plan: Plan
     stops: Stops
-    wiring: Wiring | None
-    parts_list: PartsList | None
     plate_holes: PlateHoles | None
     program: str
     settings: str
@@ -190,9 +172,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "balls": Balls.read(texts[BALLS]),
         "plan": Plan.read(texts[PLAN]),
         "stops": Stops.read(texts[STOPS]),
-        "parts_list": PartsList.read(texts[PARTS_LIST]) if PARTS_LIST in texts else None,
         "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
-        "wiring": Wiring.read(texts[WIRING]) if WIRING in texts else None,
         "program": texts[PROGRAM].text(),
         "settings": texts[SETTINGS].text(),
         "klipper": texts[KLIPPER].text() if KLIPPER in texts else None,

@@ -77,13 +77,8 @@ class HeldBall(Strict):
 
 
 class Holding(Strict):
-    """What holds all balls, and what the forces assume."""
+    """What holds all balls."""
 
-    min_ratio: float = Field(ge=1, le=100)
-    remanence_t: float = Field(gt=0, le=2)
-    derating: float = Field(gt=0, le=1)
-    glue_mpa: float = Field(gt=0, le=100)
-    wider_gap_mm: float = Field(ge=0, le=10)
     balls: list[HeldBall] = Field(max_length=MOST)
 
 
@@ -94,19 +89,15 @@ class PrintedPart(PartFiles):
 
     Attributes:
         role: what it is.
-        what: it is for.
         finish: of its surface; None: any.
         number: of a cap, its ball's, from 1.
-        quantity: how many are made.
         axes: (3, 3).
         origin: (3,) mm.
     """
 
     role: Literal["base", "cap", "stage", "frame", "tool"]
-    what: str = Field(max_length=WIDEST)
     finish: str | None = Field(max_length=WIDEST)
     number: int | None = Field(alias="ball")
-    quantity: int = Field(ge=1, le=MOST)
     axes: Matrix
     origin: Vector = Field(alias="origin_mm")
 
@@ -147,14 +138,12 @@ class PurchasedBody(Strict):
 
     Attributes:
         name: of its body in the assembly.
-        what: description.
         part: name in the parts list; None for what the user has.
         turns: whether with the base.
         finish: of its surface; None: as it is bought.
     """
 
     name: Name
-    what: str
     part: str | None
     turns: bool
     finish: str | None = Field(max_length=WIDEST)
@@ -179,8 +168,6 @@ class Lamps(Strict):
         level: whether they lie level, else they are upright.
         places: of all lamps.
         lumen_each: light of one lamp.
-        watt: power of all.
-        current_ma: of all.
     """
 
     strip: str = Field(max_length=WIDEST)
@@ -190,15 +177,12 @@ class Lamps(Strict):
     level: bool
     places: list[Lamp] = Field(min_length=1, max_length=MOST)
     lumen_each: float = Field(gt=0, le=LARGEST)
-    watt: float = Field(gt=0, le=LARGEST)
-    current_ma: float = Field(gt=0, le=LARGEST)
 
 
 class Panel(Strict):
     """A piece of card: its pattern's file, its width and height without flaps, mm."""
 
     name: Name
-    what: str = Field(max_length=WIDEST)
     dxf: FileOrNone
     size: Annotated[list[float], Field(alias="size_mm", min_length=2, max_length=2)]
 
@@ -247,59 +231,14 @@ class AssemblyStep(Strict):
     mounts: list[Name] = Field(max_length=MOST)
 
 
-class FrameStock(Strict):
-    """Parts of the frame that are cut or drilled."""
-
-    plate: str
-    upright: str
-    uprights_cut_to_mm: float = Field(ge=0, le=LARGEST)
-
-
 Amount = Annotated[float, Field(ge=0, le=LARGEST)]
-Sums = Annotated[dict[str, Amount], Field(max_length=MOST)]
-
-
-class ListTotals(Strict):
-    """Sums of the parts list; prices by currency.
-
-    Attributes:
-        mass_g: of all parts, printed ones as solids.
-        bought_price: of what has a price.
-        without_price: kinds of parts that are bought and have none.
-        filament_g: of all prints.
-        filament_price: of it.
-        print_hours: of all prints.
-    """
-
-    mass_g: Amount
-    bought_price: Sums
-    without_price: int = Field(ge=0, le=MOST)
-    filament_g: Amount
-    filament_price: Sums
-    print_hours: Amount
 
 
 class Drawing(Strict):
-    """A drawing: the part that it shows, by its name in the parts list, and its files."""
+    """A drawing: the part that it shows, by its name in the parts list, and what is cut by."""
 
     part: str = Field(max_length=WIDEST)
-    pdf: PlainFile
     dxf: PlainFile
-
-
-class LightPhase(Strict):
-    """One photograph of a stop: its name, and the digital output that is on, if any."""
-
-    name: Name
-    output: int | None = Field(ge=0, le=99)
-
-
-class Controller(Strict):
-    """What the controller is, and the photographs of a stop in order."""
-
-    firmware: Literal["grblhal", "grbl"]
-    axis: Literal["X", "A"]
-    phases: list[LightPhase] = Field(min_length=1, max_length=99)
 
 
 class Home(Strict):
@@ -388,7 +327,6 @@ class DriveRecord(Strict):
     inertia_g_mm2: Annotated[float, Field(ge=0, le=1e15)]
     worst_torque_nmm: Amount
     peak_torque_nmm: Amount
-    safety: Amount
     required_torque_nmm: Amount
     holding_torque_nmm: Amount
     drive: str
@@ -397,7 +335,6 @@ class DriveRecord(Strict):
     steps_per_deg: Amount
     motor_wind_up_deg: Angle
     belt_wind_up_deg: Angle
-    wind_up_limit_deg: Angle
     belt_centre_mm: Amount
     teeth_in_mesh: Amount
     belt_pull_n: Amount
@@ -405,12 +342,9 @@ class DriveRecord(Strict):
     belt_tension_n: Amount
     belt_tone_hz: Amount
     motor_radial_n: Amount
-    motor_radial_limit_n: Amount
-    hold_margin: Amount
     hold_current_a: Amount
     hold_loss_w: Amount
     motor_rise_k: Amount
-    motor_rise_limit_k: Amount
 
 
 class PowerOff(Strict):
@@ -420,32 +354,7 @@ class PowerOff(Strict):
     fall_speed_deg_s: Amount
     pin_force_n: Amount
     pin_shear_mpa: Amount
-    pin_shear_limit_mpa: Amount
     pin_pressure_mpa: Amount
-    pin_pressure_limit_mpa: Amount
-
-
-class CapRecord(Strict):
-    """Key, limits and finish of one cap; diameters of spigot, socket and aperture in mm."""
-
-    ball: int = Field(ge=1, le=MOST)
-    spigot_mm: Amount
-    socket_mm: Amount
-    spigot_end_mm: Amount
-    tilt_deg: Amount
-    centre_shift_mm: Amount
-    aperture_mm: Amount
-    radius_tolerance_mm: Amount
-    body_tolerance_mm: Amount
-    irregularity_fringes: Amount
-    roughness_ra_um: Amount
-    incidence_deg: Amount
-    reflectance_min: float = Field(ge=0, le=1)
-    material: str = Field(max_length=WIDEST)
-    finish: str = Field(max_length=WIDEST)
-    polarity: str = Field(max_length=WIDEST)
-    pdf: PlainFile
-    dxf: PlainFile
 
 
 class Assembly(Strict):

@@ -75,32 +75,6 @@ class Balls(Columns):
         return [f"ball {k + 1}" for k in which.tolist()]
 
 
-class PartsList(Columns):
-    """bom.csv: one kind of part a row."""
-
-    most_rows: ClassVar[int] = MOST
-
-    item: Counts
-    quantity: Counts
-    part: Texts
-    what: Texts
-    standard: Texts
-    material: Texts
-    mass_g: Masses
-    total_mass_g: Masses
-    print_volume_mm3: Masses
-    filament_g: Masses
-    print_hours: Masses
-    unit_price: Masses
-    total_price: Masses
-    currency: Texts
-    price_date: Texts
-    price_source: Texts
-    origin: Annotated[
-        NDArray[np.str_], column(Literal["bought", "printed"], np.str_), Field(alias="from")
-    ]
-
-
 class PlateHoles(Columns):
     """plate_holes.csv: one tapped hole of the base plate a row."""
 
@@ -111,30 +85,6 @@ class PlateHoles(Columns):
     y_mm: Numbers
     thread: Texts
     holds: Texts
-
-
-class Wiring(Columns):
-    """wiring.csv: one line of the controller a row."""
-
-    most_rows: ClassVar[int] = MOST
-
-    line: Counts
-    signal: Texts
-    part: Texts
-    output: Texts
-    on: Texts
-    off: Texts
-    connector: Texts
-    pins: Texts
-    supply_v: Masses
-    forward_v: Masses
-    resistor: Texts
-    resistor_ohm: Masses
-    current_ma: Masses
-    dissipation_w: Masses
-    wire: Texts
-    length_mm: Masses
-    path: Texts
 
 
 class Plan(Columns):

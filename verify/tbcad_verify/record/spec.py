@@ -1,6 +1,6 @@
-"""The spec of an export: every key of the design that it was built from, with the allowed range.
+"""The keys of the design that the verification uses, with the allowed range.
 
-A key outside its range is refused: a build never writes one. Keys that are not listed are ignored.
+A key outside its range is refused: a build never writes one. All others are ignored.
 """
 
 from __future__ import annotations
@@ -90,7 +90,6 @@ class ShellSpec(Strict):
 class MeshSpec(Strict):
     """How fine the STL and 3MF are."""
 
-    ray_error_mm: float = Field(ge=0.01, le=10)
     chord_error_mm: float = Field(ge=0.0002, le=1)
     structure_error_mm: float = Field(ge=0.002, le=5)
 
@@ -98,12 +97,6 @@ class MeshSpec(Strict):
     def largest_mm(self) -> float:
         """Largest distance from mesh to exact surface, mm."""
         return max(self.chord_error_mm, self.structure_error_mm)
-
-
-class StepSpec(Strict):
-    """How the STEP is written."""
-
-    pcurves: bool
 
 
 class PrinterSpec(Strict):
@@ -115,47 +108,17 @@ class PrinterSpec(Strict):
 
 
 class BaseSpec(Strict):
-    """The carrier with its seats, its hub, and how it is printed."""
+    """The carrier: what its balls sit on, and what holds them and turns it."""
 
-    thickness_mm: float = Field(ge=1.2, le=30)
-    ribs: int = Field(ge=2, le=12)
-    rings: int = Field(ge=1, le=8)
-    rib_mm: float = Field(ge=1.2, le=30)
-    rib_height_mm: float = Field(ge=1, le=50)
-    light_clearance_mm: float = Field(ge=0, le=20)
-    clearance_mm: float = Field(ge=0.1, le=5)
-    pad_mm: float = Field(ge=0.5, le=20)
     pad_offset_mm: float = Field(ge=-0.05, le=0.3)
-    pad_angle_deg: Annotated[float, Field(ge=20, le=70), OR_AUTO]
-    cup_wall_mm: float = Field(ge=0.8, le=20)
-    floor_mm: float = Field(ge=0.6, le=20)
     hold: Annotated[Literal["magnet", "glue"], OR_AUTO]
-    magnets_mm: Annotated[
-        list[Annotated[float, Field(ge=1, le=50)]], Field(min_length=1, max_length=20)
-    ]
-    magnet_height_mm: float = Field(ge=0.5, le=20)
-    strong_magnet_height_mm: float = Field(ge=0.5, le=20)
     magnet_gap_mm: float = Field(ge=0.1, le=5)
     magnet_play_mm: float = Field(ge=0, le=1)
-    cap_play_mm: float = Field(ge=0.02, le=0.5)
-    digit_mm: float = Field(ge=3, le=30)
-    relief_mm: float = Field(ge=0.2, le=3)
     drive: Literal["nema17-belt", "nema17-direct", "stage-60"]
-    shaft_mm: float = Field(ge=3, le=25)
-    hub_boss_mm: Annotated[float, Field(ge=20, le=100), OR_AUTO]
-    lock: Literal["set-screws", "clamp"]
     insert_hole_mm: float = Field(ge=2, le=10)
-    insert_depth_mm: float = Field(ge=2, le=20)
-    joint_mm: float = Field(ge=4, le=30)
-    joint_height_mm: float = Field(ge=8, le=50)
-    screw_pitch_mm: float = Field(ge=12, le=500)
     dowel_mm: float = Field(ge=1, le=10)
     dowel_press_mm: float = Field(ge=-0.5, le=1)
     dowel_slip_mm: float = Field(ge=0, le=1)
-    coupon_offsets_mm: Annotated[
-        list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=1, max_length=9)
-    ]
-    coupon_sizes: int = Field(ge=1, le=99)
 
 
 class MotionSpec(Strict):
@@ -166,7 +129,6 @@ class MotionSpec(Strict):
     trigger: Literal["coolant", "pause"]
     home_deg: float = Field(ge=-180, le=180)
     home_trim_deg: float = Field(ge=-5, le=5)
-    approach_deg: float = Field(ge=0, le=30)
     feed_deg_min: float = Field(ge=1, le=100000)
     acceleration_deg_s2: float = Field(gt=0, le=10000)
     settle_s: float = Field(ge=0, le=60)
@@ -181,15 +143,9 @@ class StageSpec(Strict):
     """The stage that carries the object, with LEDs at known places for calibration."""
 
     top_mm: Annotated[float, Field(ge=-1000, le=1000), OR_AUTO]
-    disc_mm: Annotated[float, Field(ge=4, le=500), OR_AUTO]
     object_diameter_mm: Annotated[float, Field(ge=1, le=1000), OR_AUTO]
     led: Literal["LED-3", "LED-5"]
     leds_mm: Annotated[list[Place], Field(max_length=12), OR_AUTO]
-    led_ma: float = Field(ge=0.5, le=100)
-    led_supply_v: float = Field(ge=3, le=48)
-    led_wall_mm: float = Field(ge=0.8, le=20)
-    wire_mm: float = Field(ge=1, le=10)
-    wall_mm: float = Field(ge=1, le=20)
 
 
 class LightSpec(Strict):
@@ -203,44 +159,22 @@ class LightSpec(Strict):
 
 
 class FrameSpec(Strict):
-    """Base plate, uprights, and brackets for bearings, motor, camera and stage."""
+    """The brackets of the camera."""
 
-    floor_mm: Annotated[float, Field(ge=-3000, le=-10), OR_AUTO]
-    clearance_mm: float = Field(ge=0.5, le=50)
     flange_mm: float = Field(ge=3, le=30)
-    web_mm: float = Field(ge=3, le=30)
-    uprights_mm: float = Field(ge=70, le=300)
-    bearing_fit_mm: float = Field(ge=-0.5, le=0.5)
-    belt_travel_mm: float = Field(ge=0, le=40)
     camera_screw_mm: float = Field(ge=10, le=1000)
     camera_travel_mm: float = Field(ge=0, le=200)
-    post_play_mm: float = Field(ge=0, le=2)
 
 
 class PrototypeSpec(Strict):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
     k: Annotated[int, Field(ge=1, le=1000), OR_AUTO]
-    radius_weight_deg: float = Field(ge=0, le=100)
-    auto_direction_max_deg: Annotated[float, Field(gt=0, le=90), OR_AUTO]
-    auto_direction_median_deg: Annotated[float, Field(gt=0, le=90), OR_AUTO]
-    auto_lost_percent: float = Field(ge=0, le=100)
     catalogues: Annotated[list[str], Field(min_length=1)]
-    prices: Annotated[list[str], Field(min_length=1)]
     grade: Literal["G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"]
-    largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
-    snap: Literal["cover", "nearest"]
-    ball_margin_mm: float = Field(0.0, ge=0, le=20)
     picture: Literal["moved", "fixed"]
-    caps: bool
-    cap_rim_mm: float = Field(ge=0, le=50)
-    ball_wall_mm: Annotated[float, Field(ge=0, le=50), OR_AUTO]
-    light_margin_mm: float = Field(ge=0, le=20)
-    post_diameter_mm: Annotated[float, Field(ge=0, le=200), OR_AUTO]
     camera_diameter_mm: Annotated[float, Field(ge=0, le=500), OR_AUTO]
     camera_length_mm: float = Field(ge=0, le=1000)
-    max_swing_deg: float = Field(gt=0, le=360)
-    stop_error_deg: float = Field(gt=0, le=20)
     base: BaseSpec
     motion: MotionSpec
     stage: StageSpec
@@ -274,6 +208,5 @@ class Spec(Strict):
     mirrors: MirrorsSpec
     shell: ShellSpec
     mesh: MeshSpec
-    step: StepSpec
     printer: PrinterSpec
     prototype: PrototypeSpec

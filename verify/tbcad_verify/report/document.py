@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.key_figures import key_figures
+from tbcad_verify.report.paper import changed_files
 from tbcad_verify.report.remedies import remedy
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def summary_json(report: Report) -> str:
             for check in (*report.checks, *report.programs)
             if check.passed is not True
         ],
+        "changed": changed_files(report.checks),
         "as_made": _as_made(report),
         "note": report.note or None,
         "folder": None if report.folder is None else str(report.folder),

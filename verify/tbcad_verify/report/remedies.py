@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from tbcad_verify.report.checks import Check
 
 _DAMAGED = "a file was changed or damaged after the build: build again"
+_EDITED = "leave out --strict if the edit is meant, else build again"
 _RECORD = "the record is not what was built: build again"
 _MESH = "the mesh is not as it was written: build again, and do not repair it"
 _MIRROR = "the mesh is off the record: build again, with a smaller chord_error_mm"
@@ -26,6 +27,7 @@ _PROGRAM = "the program reads the file otherwise: see --full, try its newest ver
 REMEDIES = {
     "3MF": _DAMAGED,
     "manifest": _DAMAGED,
+    "paper": _EDITED,
     "requirements": _RECORD,
     "prototype requirements": _RECORD,
     "ids": _RECORD,
@@ -33,7 +35,6 @@ REMEDIES = {
     "figures": _RECORD,
     "directions": _RECORD,
     "radius rule": _RECORD,
-    "camera sheet": _RECORD,
     "camera mount": _RECORD,
     "camera gauge": _RECORD,
     "camera place": "more pixels: camera.width_px, or a wider picture: camera.hfov_deg fit",
@@ -42,11 +43,8 @@ REMEDIES = {
     "holding": _RECORD,
     "hold ratio": "a ball is held weakly: larger prototype.base.magnets_mm or a smaller gap",
     "inventory": _RECORD,
-    "parts list": _RECORD,
-    "list figures": _RECORD,
     "drawings": _RECORD,
     "plate holes": _RECORD,
-    "wiring": _RECORD,
     "homing": _RECORD,
     "klipper": _RECORD,
     "controller settings": _RECORD,
@@ -82,7 +80,6 @@ REMEDIES = {
     "pads printed up": "the carrier lies otherwise on the bed than it was built: build again",
     "cap": _MESH,
     "cap tilt": "prototype.base.cap_play_mm smaller",
-    "cap drawings": _RECORD,
     "cells": _BALLS,
     "coverage, balls": _BALLS,
     "light paths, balls": _SPACE,

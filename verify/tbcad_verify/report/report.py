@@ -16,6 +16,7 @@ from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.report.as_made import AsMade
 from tbcad_verify.report.checks import Check, finite
 from tbcad_verify.report.document import summary_json
+from tbcad_verify.report.paper import changed_lines
 from tbcad_verify.report.printers import printer_lines
 from tbcad_verify.report.summary import summary
 from tbcad_verify.report.table import table
@@ -119,7 +120,7 @@ class Report:
         Args:
             console: to print to.
             output: "summary" (at most thirteen lines), "full" (every check before it), "quiet" (the
-                verdict), or "json" (the summary for other programs).
+                verdict, and what was changed), or "json" (the summary for other programs).
         """
         if output == "full":
             self._show_all(console)
@@ -127,7 +128,8 @@ class Report:
             for line in summary(self):
                 console.print(line, highlight=False, soft_wrap=True)
         else:
-            text = self.verdict if output == "quiet" else summary_json(self)
+            lines = [self.verdict, *changed_lines(self.checks)]
+            text = "\n".join(lines) if output == "quiet" else summary_json(self)
             console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def _show_all(self, console: Console) -> None:

@@ -14,6 +14,7 @@ from tbcad_verify.programs import is_skipped
 from tbcad_verify.report.as_made import as_made_lines
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.key_figures import KEY_FIGURES, KeyFigure, checks_named, key_figures
+from tbcad_verify.report.paper import changed_lines
 from tbcad_verify.report.remedies import remedy
 from tbcad_verify.report.text import MORE, WIDTH, figure, limit_text, listed_names, shortened
 
@@ -31,14 +32,15 @@ DIGITS = 4  # of a figure; below 1, where zeros lead, one less
 
 
 def summary(report: Report) -> list[Text]:
-    """Verdict, what failed and what to do, key figures, what making leaves, time and folder."""
+    """Verdict, changed files, failures with remedies, key figures, what making leaves, folder."""
     failed = _failure_lines(report)
     as_made = as_made_lines(report.as_made)[: AS_MADE_LINES if failed else None]
     note = textwrap.wrap(report.note, WIDTH, max_lines=NOTE_LINES, placeholder=MORE)
     end = [*_skipped_line(report), *note, _end_line(report)]
-    room = MAX_LINES - 1 - len(failed) - len(as_made) - len(end)
+    changed = changed_lines(report.checks)
+    room = MAX_LINES - 1 - sum(map(len, (changed, failed, as_made, end)))
     figures = _figure_lines(report, room)
-    return [_coloured(report), *map(Text, (*failed, *figures, *as_made, *end))]
+    return [_coloured(report), *map(Text, (*changed, *failed, *figures, *as_made, *end))]
 
 
 def _coloured(report: Report) -> Text:

@@ -16,12 +16,13 @@ import numpy as np
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
-from tbcad_verify.programs import ExpectedPart, ListedPrint, check_with_programs
+from tbcad_verify.programs import ExpectedPart, check_with_programs
 from tbcad_verify.prototype.step_files import part_step_checks
 from tbcad_verify.record.export import TEXTS, Export, listed_names, read_export
 from tbcad_verify.record.files import open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, Unknown, short_list
+from tbcad_verify.report.paper import strictly
 from tbcad_verify.report.report import NAME, Report
 from tbcad_verify.run.child import Limits, kill_group
 from tbcad_verify.run.fork import ForkedResult
@@ -44,7 +45,6 @@ from tbcad_verify.step.step_file import StepFile, read_step_files
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
-MM3_PER_CM3 = 1e3
 Stamps = dict[str, tuple[int, ...]]
 Files = dict[str, StepFile | Unknown]
 Comparisons = dict[str, ShellComparison | Unknown]
@@ -64,6 +64,7 @@ class VerifyOptions:
         printers: profiles, by name or path, that every part must suit. Without any, the built-in
             ones are tried, and what they find informs only.
         clients: also ask the programs that users open the files with, where they are installed.
+        strict: fail also where a file was changed that only people read, such as a list of parts.
         fork: other processes are copies of this one, which has no threads: quicker where it has
             loaded the libraries.
     """
@@ -73,6 +74,7 @@ class VerifyOptions:
     seconds: float = STAGE_LIMIT_S
     printers: tuple[str, ...] = ()
     clients: bool = False
+    strict: bool = False
     fork: bool = False
 
 
@@ -104,7 +106,7 @@ def verify(
     blank = np.full(len(export.mirrors), np.nan)
     report = Report(
         export.target_mm,
-        tuple(results.checks),
+        tuple(strictly(results.checks) if options.strict else results.checks),
         export.mirrors,
         {name: results.mirrors.get(name, blank) for name in PER_MIRROR},
         tuple(programs),
@@ -222,17 +224,4 @@ def _expected(
         spheres,
         volume,
         max(area * export.mesh_error_mm, FLOAT32_SHARE * abs(volume)),
-        _listed_print(export, part),
     )
-
-
-def _listed_print(export: Export, part: PartFiles) -> ListedPrint | None:
-    """What the parts list estimates; None without a list, or where it has no such print."""
-    bill = export.prototype.parts_list if export.prototype else None
-    if bill is None:
-        return None
-    names = (part.name, part.name.replace("cap_", "cap "))
-    for row in np.flatnonzero(np.isin(bill.part, names) & (bill.print_hours > 0)):
-        filament = float(bill.filament_g[row]) / export.spec.printer.density_g_cm3 * MM3_PER_CM3
-        return ListedPrint(filament, float(bill.print_hours[row]))
-    return None

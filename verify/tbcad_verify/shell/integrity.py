@@ -6,6 +6,7 @@ The files are those of the manifest, the record is the design's, and the meshes 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -13,7 +14,6 @@ import numpy as np
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.mesh.mesh import Topology
-from tbcad_verify.record.camera_sheet import sheet_check
 from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.files import digest, listing
 from tbcad_verify.record.joining_planes import ends_check, has_joining_planes
@@ -38,13 +38,20 @@ from tbcad_verify.report.checks import (
     require,
     short_list,
 )
+from tbcad_verify.report.paper import CHANGED, PAPER
 from tbcad_verify.report.report import NAME
 
 LEAST_VOLUME_MM3 = 1e-6
 PART_KINDS = (".step", ".stl", ".3mf")  # of files that must be measured
 # Written after the manifest; report.html shows what a verification found, and is no part.
 OWN_FILES = frozenset({"manifest.json", NAME, "report.html"})
-MANIFEST = (("manifest", "manifest.json", "wrong files"), ("other files", "", "files"))
+# What a person reads, and no machine: its owner may edit it.
+PAPER_FILES = ("bom.csv", "wiring.csv", "camera.json", "*.pdf", "*.png")
+MANIFEST = (
+    ("manifest", "manifest.json", "wrong files"),
+    PAPER,
+    ("other files", "", "files"),
+)
 TOPOLOGY = {
     "watertight": "bad edges",
     "facets": "bad facets",
@@ -57,22 +64,24 @@ ENDS = {"mesh seam and foot": "mm"}
 
 
 def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> list[Check]:
-    """Every listed file is there with its size and sha256; other files are listed.
+    """Every listed file is there with its size and sha256; paper and other files are listed.
 
     Args:
         export: the record.
         parsed: size and sha256 of files as they were when they were parsed.
     """
-    wrong = [
+    changed = [
         name
         for name, listed in sorted(export.manifest.items())
         if parsed.get(name, _found(export, name)) != listed
     ]
+    edited = [name for name in changed if is_paper(name)]
+    wrong = [name for name in changed if not is_paper(name)]
     unlisted = sorted({*parsed} - {*export.manifest} - OWN_FILES)
     parts = {name for name in export.manifest if PurePosixPath(name).suffix.lower() in PART_KINDS}
     unread = sorted(parts - export.part_files)
     others = sorted(listing(export.folder) - {*export.manifest} - OWN_FILES)
-    manifest, other_files = MANIFEST
+    manifest, paper, other_files = MANIFEST
     return [
         at_most(
             manifest,
@@ -81,8 +90,14 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
             "missing, unlisted, not as written, or of no part: "
             + short_list(wrong + unlisted + unread),
         ),
+        informative(paper, len(edited), CHANGED + ", ".join(edited) if edited else ""),
         informative(other_files, len(others), short_list(others)),
     ]
+
+
+def is_paper(name: str) -> bool:
+    """Whether a file is only read by people."""
+    return any(fnmatchcase(name, pattern) for pattern in PAPER_FILES)
 
 
 RECORD = (
@@ -91,15 +106,12 @@ RECORD = (
     ("poses", "mirrors.csv", "mm off"),
     ("figures", "mirrors.csv", "mm off"),
     ("directions", "mirrors.csv", "misplaced or missing"),
-    ("camera sheet", "camera.json", "wrong figures"),
 )
 
 
 def record_checks(export: Export) -> list[Check]:
-    """Record and spec agree, mirrors are on their ellipsoids, and the camera sheet suits them."""
-    return guarded_each(
-        RECORD, (_requirements, _ids, _poses, _figures, _directions, sheet_check), export
-    )
+    """Record and spec agree, and mirrors are on their ellipsoids."""
+    return guarded_each(RECORD, (_requirements, _ids, _poses, _figures, _directions), export)
 
 
 def mesh_checks(file: str, topology: Topology) -> list[Check]:
