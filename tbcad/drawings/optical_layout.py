@@ -18,8 +18,8 @@ from tbcad.drafting.sheet import (
     notes_beside_title,
     placed,
     sheet_frame,
+    table,
 )
-from tbcad.drafting.tables import table
 from tbcad.drafting.views import straight
 from tbcad.drawings.export import Export, Record
 from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline

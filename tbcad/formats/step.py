@@ -1,5 +1,6 @@
 """STEP: the exact solid, its faces named, the same bytes for the same design."""
 
+import errno
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,7 +21,32 @@ from OCP.Transfer import Transfer_FinderProcess
 
 from tbcad.cad.brep import Solid
 from tbcad.cad.measures import SolidProperties, properties
-from tbcad.formats.native_files import check_complete, incomplete
+
+TAIL_BYTES = 64  # of a file, in which its last mark must be
+
+
+def incomplete(path: Path) -> OSError:
+    """The error of a file that could not be written in full."""
+    return OSError(errno.EIO, "a file could not be written in full; is the disk full?", str(path))
+
+
+def check_complete(path: Path, mark: bytes) -> None:
+    """Check that a file is there and ends as its format demands.
+
+    Args:
+        path: of the file.
+        mark: that is among its last bytes.
+
+    Raises:
+        OSError: it is missing or cut.
+    """
+    if not path.is_file():
+        raise incomplete(path)
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - TAIL_BYTES, 0))
+        if mark not in file.read():
+            raise incomplete(path)
+
 
 SURFACE_CURVES = "write.surfacecurve.mode"
 _SETTINGS = RLock()

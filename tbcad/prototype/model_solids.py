@@ -21,17 +21,15 @@ from tbcad.prototype.arrangement import (
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_solids import cap_parts
 from tbcad.prototype.base.coupon import coupon_plates
-from tbcad.prototype.base.coupon_pose import expected_downs, worst_pose
+from tbcad.prototype.base.coupon_seat import expected_downs, worst_pose
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.solid import carrier_parts
-from tbcad.prototype.drive.balance import BaseBalance, PointMasses
+from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.model import PrototypeModel
-from tbcad.prototype.printing.component_solids import placed_components
-from tbcad.prototype.printing.parts import PrintedPart, Role
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printing.placing import PlacedSolid, PrintedPart, Role, placed_components
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -110,31 +108,10 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
         *_components("tool", tools, on_tools),
     )
-    return _completed(arrangement, printed, gauge, balance)
-
-
-def _completed(
-    arrangement: Arrangement,
-    printed: tuple[PrintedPart, ...],
-    gauge: CameraGauge | None,
-    balance: BaseBalance,
-) -> PrototypeModel:
-    return PrototypeModel(
-        spec=arrangement.spec,
-        layout=arrangement.layout,
-        base=arrangement.base,
-        split=arrangement.split,
-        stage=arrangement.stage,
-        wiring=arrangement.wiring,
-        frame=arrangement.frame,
-        gauge=gauge,
-        shroud=arrangement.shroud,
-        printed=printed,
-        balance=balance,
-        drive=arrangement.drive,
-        parts=arrangement.parts | arrangement.wiring.parts,
-        capture_radius=arrangement.spec.optics.capture_diameter_mm / 2,
+    built = replace(
+        arrangement, balance=balance, parts=arrangement.parts | arrangement.wiring.parts
     )
+    return PrototypeModel(**vars(built), gauge=gauge, printed=printed)
 
 
 def _base_and_stage(

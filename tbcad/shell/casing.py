@@ -5,11 +5,16 @@ from itertools import chain
 import numpy as np
 from OCP.TopoDS import TopoDS_Face
 
-from tbcad.cad.bores import hole_faces
-from tbcad.cad.brep import Maker, Ring, Side
+from tbcad.cad.brep import Maker, Ring, Side, hole_faces
 from tbcad.geometry.conics import EllipseArc
-from tbcad.shell.boundary import boundary_chain, chain_ends
-from tbcad.shell.casing_edges import ARC_ENDS, casing_arcs, casing_lines, outline
+from tbcad.shell.casing_edges import (
+    ARC_ENDS,
+    boundary_chain,
+    casing_arcs,
+    casing_lines,
+    chain_ends,
+    outline,
+)
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.front import FrontEdges
 from tbcad.types import Floats

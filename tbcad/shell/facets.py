@@ -15,8 +15,7 @@ from tbcad.optics.cells import Cells
 from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.cell_middles import means, middles
 from tbcad.shell.cell_outlines import CellOutlines, cell_outlines
-from tbcad.shell.segments import segment_counts
-from tbcad.shell.strips import strip_points, strip_widths
+from tbcad.shell.segments import segment_counts, strip_points, strip_widths
 from tbcad.spec.design import Spec
 from tbcad.types import Bools, Floats, Ints
 

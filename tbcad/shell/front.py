@@ -11,7 +11,7 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.optics.cells import Arcs, Cells
 from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
-from tbcad.shell.boundary import boundary_chain
+from tbcad.shell.casing_edges import boundary_chain
 from tbcad.types import Floats, Ints
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.primitive_meshes import SIDES, primitive_mesh
+from tbcad.cad.meshing import SIDES, primitive_mesh
 from tbcad.geometry.primitives import (
     Cylinder,
     Primitive,

@@ -1,5 +1,6 @@
 """bom.csv: everything to buy and to print."""
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,8 +12,17 @@ from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.purchased.prices import Price, Prices
-from tbcad.prototype.purchased.standards import standard_in
 from tbcad.spec.errors import SpecError, short_text
+
+# A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
+STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
+
+
+def standard_in(what: str) -> str:
+    """The first standard that a description names; empty without any."""
+    found = STANDARD.search(what)
+    return found[0] if found else ""
+
 
 NAME = "bom.csv"
 PRICE_COLUMNS = ("unit_price", "total_price", "currency", "price_date", "price_source")

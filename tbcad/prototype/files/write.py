@@ -43,7 +43,7 @@ from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.model_solids import build_prototype_model
 from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
-from tbcad.prototype.printing.parts import PrintedPart, part_mesh
+from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.prototype.stage.calibration import calibration_estimate
 from tbcad.prototype.stage.layout import led_poses

@@ -34,8 +34,7 @@ from tbcad.prototype.frame.brackets import (
     level_prism,
     webs,
 )
-from tbcad.prototype.purchased.choice import choose_screw
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats

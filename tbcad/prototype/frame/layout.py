@@ -24,15 +24,14 @@ from tbcad.prototype.frame.brackets import (
     frame_axes,
 )
 from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
-from tbcad.prototype.frame.fasteners import plate_fasteners
 from tbcad.prototype.frame.feet import stage_foot, upright_foot
 from tbcad.prototype.frame.head import BearingHead, bearing_head
+from tbcad.prototype.frame.purchased import plate_fasteners
 from tbcad.prototype.homing.layout import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.lamps import lamp_layout
-from tbcad.prototype.purchased.choice import choose_part
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec

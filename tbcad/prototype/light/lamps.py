@@ -15,11 +15,10 @@ import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, enclosing_triangles
 from tbcad.optics.camera import Camera
-from tbcad.prototype.frame.fasteners import on_uprights
+from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.keepout import KeepOut, min_distance
-from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout
+from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout, hidden_by_base, in_view
 from tbcad.prototype.light.lamp_mounts import HOLDER_MM, OUT_MM, TAIL_MM, LampMounts
-from tbcad.prototype.light.lamp_sight import hidden_by_base, in_view
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import PrototypeSpec

@@ -16,7 +16,7 @@ from tbcad.prototype.base.holding import (
     force_needed,
 )
 from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.base.pads import pad_normals
+from tbcad.prototype.base.pockets import pad_normals
 from tbcad.prototype.drive.balance import GRAVITY
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec

@@ -7,7 +7,7 @@ from tbcad.cad.measures import properties
 from tbcad.cad.solids import faces, fused, one_solid
 from tbcad.geometry.primitives import Slot, slot_parts, volume
 from tbcad.geometry.vectors import unit
-from tbcad.prototype.printing.component_solids import primitive_solid
+from tbcad.prototype.printing.placing import primitive_solid
 
 TILTED = unit(np.array([0.3, -0.5, 0.8]))
 

@@ -5,7 +5,7 @@ import pytest
 
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.printing.pads_up import NO_PADS, downward_pads, opening_up
+from tbcad.prototype.printing.placing import NO_PADS, downward_pads, opening_up
 from tbcad.spec.prototype import BaseSpec
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from tbcad.prototype.purchased.standards import standard_in
+from tbcad.prototype.files.bom_csv import standard_in
 
 
 @pytest.mark.parametrize(
