@@ -15,7 +15,7 @@ from tbcad.drawings.export import Export, Record
 from tbcad.drawings.fits import Mate, Seat, purchased_mate, reamed_to, seats_table
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
-from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step import read_named_solid
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.tolerance.process.process import load_process
 from tbcad.types import Floats

@@ -8,8 +8,7 @@ import numpy as np
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
 from tbcad.cad.solids import pyramid, sphere
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.fasteners.bodies import fastener_axes, fastener_component
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.printing.placing import Role, component_solid
 

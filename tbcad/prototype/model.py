@@ -7,7 +7,7 @@ from functools import cached_property
 from tbcad.prototype.arrangement import Arrangement
 from tbcad.prototype.base.cap_solids import cap_magnets
 from tbcad.prototype.base.fasteners import base_fasteners
-from tbcad.prototype.fasteners.fastener import Fastener, numbered
+from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge
 from tbcad.prototype.frame.layout import frame_purchased_parts
 from tbcad.prototype.printing.placing import PrintedPart

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.camera.virtual_images import image_distances, virtual_images
+from tbcad.camera.requirements import image_distances, virtual_images
 from tbcad.mirrors.array import MirrorArray
 from tbcad.types import Floats
 from tests.mirror_arrays import mirror_array

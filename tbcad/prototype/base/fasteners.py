@@ -17,7 +17,7 @@ from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.screws import M3_MM, MIN_ENGAGEMENT_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.purchased.parts import (
     SAME_SIZE_MM,
     Parts,

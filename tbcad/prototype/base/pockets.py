@@ -6,8 +6,7 @@ import numpy as np
 
 from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.holding import MIN_RATIO, Motion, force_needed, glue_force
-from tbcad.prototype.base.magnetics import pull_on_ball
+from tbcad.prototype.base.holding import MIN_RATIO, Motion, force_needed, glue_force, pull_on_ball
 from tbcad.prototype.drive.balance import ball_masses
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec

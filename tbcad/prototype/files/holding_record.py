@@ -5,9 +5,15 @@ from typing import Any
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import seat_magnets
 from tbcad.prototype.base.held import held_balls
-from tbcad.prototype.base.holding import GLUE_MPA, MIN_RATIO, WIDER_GAP_MM, base_motion
+from tbcad.prototype.base.holding import (
+    DERATING,
+    GLUE_MPA,
+    MIN_RATIO,
+    REMANENCE_T,
+    WIDER_GAP_MM,
+    base_motion,
+)
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.magnetics import DERATING, REMANENCE_T
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.spec.design import Spec
 

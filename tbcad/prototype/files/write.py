@@ -32,7 +32,7 @@ from tbcad.prototype.drive.power_off import PowerOff, power_off
 from tbcad.prototype.drive.travel import stop_sequence
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.electronics.outputs import phases
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, klipper, plan_csv, settings
 from tbcad.prototype.files.camera_place import camera_place_record
 from tbcad.prototype.files.caps import cap_records

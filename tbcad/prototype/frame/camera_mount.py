@@ -25,7 +25,7 @@ from tbcad.geometry.primitives import (
 )
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,

@@ -10,7 +10,7 @@ from tbcad.geometry.primitives import (
     cylinder_between,
     rectangle,
 )
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,

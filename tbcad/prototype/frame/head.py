@@ -12,7 +12,7 @@ from tbcad.geometry.primitives import Component, Primitive, box, cylinder_betwee
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     HALF_FLANGE_MM,

@@ -11,7 +11,7 @@ from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import OVERLAP_MM, THROUGH_MM, Bracket
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.spec.prototype import FrameSpec

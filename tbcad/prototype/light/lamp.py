@@ -9,7 +9,7 @@ from tbcad.geometry.primitives import Component, Primitive, Prism
 from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import THROUGH_MM, Bracket
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.purchased.parts import PurchasedPart

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from tbcad.prototype.base.magnetics import (
+from tbcad.prototype.base.holding import (
     DERATING,
     MU_0,
     REMANENCE_T,
