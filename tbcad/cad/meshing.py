@@ -1,8 +1,7 @@
 """Meshes of solids by the kernel's mesher, and volumes by booleans of such meshes.
 
-Primitives as meshes of the same volume, without the CAD kernel.
-
-A circle becomes a regular polygon of the same area, so that round bodies keep their volume.
+Primitives are meshed without the CAD kernel: a circle becomes a regular polygon of the same area,
+so that round bodies keep their volume.
 """
 
 from collections.abc import Sequence

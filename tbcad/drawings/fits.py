@@ -1,5 +1,6 @@
-"""Fits: what goes into a part's holes with little play, or is pressed in, glued in or reamed for.
+"""Tables of a part's sheet: its fits, and on the carrier's the seats of balls and caps.
 
+Fits are what goes into holes with little play, or is pressed in, glued in or reamed for.
 Sizes are those of the solid and of tbcad's lists of purchased parts.
 """
 

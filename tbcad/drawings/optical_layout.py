@@ -26,7 +26,6 @@ from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Poly
 from tbcad.types import Floats
 
 NAME = "optical_layout"
-NOMINAL = "nominal sizes"
 PLANAR_MM = 1e6  # radius that stands for a plane: off by 1e-5 mm over a mirror of 10 mm
 IN_PLANE = 1e-9  # of a direction's y
 HEAD, WIDTHS_MM = ("symbol", "what", "value"), (16.0, 58.0, 30.0)

@@ -15,13 +15,12 @@ from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import mandrel_files
 from tbcad.optics.cells import Cells
-from tbcad.shell.casing import reversed_ring
 from tbcad.shell.casing_edges import boundary_chain, chain_ends
 from tbcad.shell.envelope import Holes
 from tbcad.shell.files import shell_properties, wall_names, write_half_mesh
-from tbcad.shell.front import FrontEdges, front_edges
 from tbcad.shell.mandrel import Mandrel, mandrel_of
 from tbcad.shell.mesh import FROM_X, FROM_Z, MeshBuilder, front_facets
+from tbcad.shell.solid import FrontEdges, front_edges, reversed_ring
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 

@@ -1,4 +1,4 @@
-"""Into how many segments each arc is cut, by what its facets do to rays."""
+"""Into how many segments each arc is cut, by what its facets do to rays, and its strips."""
 
 import numpy as np
 

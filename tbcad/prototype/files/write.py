@@ -40,8 +40,7 @@ from tbcad.prototype.files.drive_record import drive_record
 from tbcad.prototype.files.holding_record import holding_record
 from tbcad.prototype.light.record import BLACK, BLACK_KINDS, BLACKENED, record_of_light
 from tbcad.prototype.light.shroud import pattern
-from tbcad.prototype.model import PrototypeModel
-from tbcad.prototype.model_solids import build_prototype_model
+from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
 from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 from tbcad.prototype.purchased.prices import Prices, load_prices

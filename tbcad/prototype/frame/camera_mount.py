@@ -42,7 +42,7 @@ from tbcad.types import Floats
 M5_MM, M5_HOLE_MM = 5.0, CLEARANCE_HOLE_MM[5.0]
 TRIPOD_HOLE_MM = CLEARANCE_HOLE_MM[6.35]
 CAMERA_SCREW, NUT, WASHER, INSERT = "UNC1/4-20x12.7", "NUT-M5", "WASHER-5", "INSERT-M5"
-NUT_MM, WASHER_MM, WASHER_OUTER_MM = 4.7, 1.0, 10.0
+NUT_MM, WASHER_MM = 4.7, 1.0
 
 # Travel to either side. Printed brackets are off by 0.5 mm and a degree; the rest is for cameras.
 ALONG_PLATE_MM, ACROSS_MM, OUT_MM = 5.0, 5.0, 3.0

@@ -1,4 +1,4 @@
-"""Placing a part on the printer's bed: the orientation that fits and needs the least support."""
+"""Printed parts, and their place on the bed: what fits and needs the least support."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
