@@ -1,8 +1,8 @@
 """DXF (R2010): flat drawings in mm at full size, the same bytes every time.
 
-Dimensions are entities that measure, each with its picture as a block. It is drawn here and not by ezdxf, so that every viewer shows what the PDF shows, text
-by text. Programs that draw dimensions anew, as LibreCAD and FreeCAD do, find a style that gives
-nearly the same.
+Dimensions are entities that measure, each with its picture as a block. It is drawn here and not by
+ezdxf, so that every viewer shows what the PDF shows, text by text. Programs that draw dimensions
+anew, as LibreCAD and FreeCAD do, find a style that gives nearly the same.
 """
 
 import math

@@ -4,10 +4,11 @@ Pads push and do not pull. A magnet or glue must hold so strongly along the seat
 the three pads bears some load in every direction of gravity, with the base's acceleration, without
 friction: a ball that only stays in its cup would already have left a pad.
 
-Disc magnets pull a steel ball near one face, or another disc magnet. One that is magnetised along its axis acts as two discs of magnetic charge, of density Br / mu0,
-on its faces (charge model: Furlani, Permanent Magnet and Electromechanical Devices, 2001, 3.2). A
-steel ball is nearly an equipotential body without net charge, so its answer to a charge is that of
-an isolated conducting sphere to an electric one (Jackson, Classical Electrodynamics, 2.3).
+Disc magnets pull a steel ball near one face, or another disc magnet. One that is magnetised along
+its axis acts as two discs of magnetic charge, of density Br / mu0, on its faces (charge model:
+Furlani, Permanent Magnet and Electromechanical Devices, 2001, 3.2). A steel ball is nearly an
+equipotential body without net charge, so its answer to a charge is that of an isolated conducting
+sphere to an electric one (Jackson, Classical Electrodynamics, 2.3).
 """
 
 import math

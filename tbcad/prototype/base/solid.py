@@ -1,8 +1,8 @@
 """The carrier as a solid: wall, ribs, rings, hub and bosses in one fuse, all holes in one cut.
 
 Built about z with azimuth zero along x, then moved into the frame of the shell. The wall has plane
-facets round cones about the axis: a plane meets bosses, cups and paths in circles and ellipses; where a cone meets them the kernel
-fits splines, which took half of the time of the carrier.
+facets round cones about the axis: a plane meets bosses, cups and paths in circles and ellipses;
+where a cone meets them the kernel fits splines, which took half of the time of the carrier.
 """
 
 import numpy as np
