@@ -115,19 +115,20 @@ def frame_layout(
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
-    mount = _camera_mount(spec, prototype, axes, parts)
+    camera = _camera(spec, prototype)
+    mount = camera_mount(spec, axes, prototype.array.camera, parts) if camera else None
     brackets = _brackets(spec, axes, stage, head, mount, parts)
     beside = (
         *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
         *((mount.plate, mount.fence) if mount else ()),
-        *(*head.purchased, homing.switch, *_camera(spec, prototype)),
+        *(*head.purchased, homing.switch, *camera),
     )
     lamps = lamp_layout(spec, head.face, prototype.array.camera, keep_out, parts, beside)
     brackets += lamps.stands if lamps else ()
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
     plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
     purchased = (
-        *(plate_body, *bars, *head.purchased, homing.switch, *_camera(spec, prototype)),
+        *(plate_body, *bars, *head.purchased, homing.switch, *camera),
         *(lamps.bodies if lamps else ()),
     )
     printed = (
@@ -165,14 +166,6 @@ def frame_purchased_parts(frame: FrameLayout) -> dict[str, int]:
         counts[frame.lamps.strip.name] = math.ceil(frame.lamps.metres)
     counts.update([frame.homing.pin, str(frame.homing.switch.part)])
     return dict(sorted(counts.items()))
-
-
-def _camera_mount(
-    spec: PrototypeSpec, prototype: PrototypeLayout, axes: Floats, parts: Parts
-) -> CameraMount | None:
-    if spec.camera_diameter_mm == 0:
-        return None
-    return camera_mount(spec, axes, prototype.array.camera, parts)
 
 
 def _fasteners(
