@@ -26,6 +26,10 @@ from tbcad.geometry.vectors import perpendicular_axes, unit
 from tbcad.types import Floats, Ints
 
 SIDES = 48
+# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
+ANGLE = 0.2
+# The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
+MERGE_MM = 2e-5
 
 
 def growth(angle: float) -> float:
@@ -69,12 +73,6 @@ def _prism_mesh(body: Prism) -> Manifold:
 
 def _section(outline: Floats) -> CrossSection:
     return CrossSection([outline], FillRule.NonZero)
-
-
-# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
-ANGLE = 0.2
-# The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
-MERGE_MM = 2e-5
 
 
 def volume_by_meshes(bodies: Sequence[Manifold], tools: Sequence[Manifold]) -> float:

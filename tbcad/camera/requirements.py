@@ -12,6 +12,11 @@ from tbcad.types import Floats
 
 PLACES = ("nearest", "centre", "farthest")
 FANS = ("tangential", "sagittal")
+ROUNDING_PX = 1e-6
+WIDE_OPEN = 0.5  # F-number below any lens: no lens limits the requirement
+# Light on the object: ISO 2720's constant of incident and reflected metering, a mid-grey object,
+# and the light that a polished steel ball reflects (0.55 to 0.60 over the visible).
+METER_CONSTANT, OBJECT_REFLECTANCE, MIRROR_REFLECTANCE = 12.5, 0.18, 0.55
 
 
 @dataclass(frozen=True)
@@ -68,13 +73,6 @@ def virtual_images(array: MirrorArray, radius: float) -> VirtualImages:
     distance = to_mirror[:, None, None] + np.stack(image, axis=2)
     along = ray @ array.camera.forward
     return VirtualImages(array, to_mirror, incidence, distance, distance * along[:, None, None])
-
-
-ROUNDING_PX = 1e-6
-WIDE_OPEN = 0.5  # F-number below any lens: no lens limits the requirement
-# Light on the object: ISO 2720's constant of incident and reflected metering, a mid-grey object,
-# and the light that a polished steel ball reflects (0.55 to 0.60 over the visible).
-METER_CONSTANT, OBJECT_REFLECTANCE, MIRROR_REFLECTANCE = 12.5, 0.18, 0.55
 
 
 @dataclass(frozen=True)

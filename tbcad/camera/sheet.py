@@ -20,6 +20,11 @@ from tbcad.mirrors.array import MirrorArray
 ENOUGH = 0.999  # of an angle or of pixels: figures of makers are rounded
 MAX_CLOSE_UP_DPT = 10.0  # the strongest close-up lens on sale
 MAX_BLUR = 1.5  # times the least blur that a stop can reach
+SCHEMA = "tbcad-camera/1"
+CAMERA_FILE = "camera.json"
+LUX, ISO = 10_000.0, 400.0  # of the exposure that the sheet states
+DIGITS = 9
+SHOWN = 6  # candidates that the lines list
 
 
 @dataclass(frozen=True)
@@ -129,13 +134,6 @@ def _faults(needed: CameraRequirements, one: Candidate, image: float) -> Iterato
         yield f"focuses from {one.lens.min_focus_mm:g} mm"
     if one.total_px > MAX_BLUR * needed.total_px:
         yield f"F/{one.f_number:g} blurs by {one.total_px:.1f} pixels"
-
-
-SCHEMA = "tbcad-camera/1"
-CAMERA_FILE = "camera.json"
-LUX, ISO = 10_000.0, 400.0  # of the exposure that the sheet states
-DIGITS = 9
-SHOWN = 6  # candidates that the lines list
 
 
 def write_camera_sheet(folder: Path, array: MirrorArray, radius: float) -> None:

@@ -35,6 +35,8 @@ TOLERANCES = "ISO 2768-m"
 FIRST_ANGLE = "first angle (ISO 5456-2)"
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, bottom, right, top, mm."""
+TABLE_ROW_MM, TEXT_MM, CELL_MM = 5.0, 2.5, 1.5  # height of rows and texts, room before a text
+LEAST_MM = 1.6  # height of a text that is read without a lens
 
 
 @dataclass(frozen=True)
@@ -238,10 +240,6 @@ def _(entity: Circle | Arc, new: Callable[[Point], Point], scale: float) -> Simp
 @_moved.register
 def _(entity: Text, new: Callable[[Point], Point], scale: float) -> Simple:
     return replace(entity, place=new(entity.place), height=entity.height * scale)
-
-
-TABLE_ROW_MM, TEXT_MM, CELL_MM = 5.0, 2.5, 1.5  # height of rows and texts, room before a text
-LEAST_MM = 1.6  # height of a text that is read without a lens
 
 
 def table(

@@ -33,6 +33,20 @@ from tbcad.types import Bools, Floats, Ints
 SHARP_RAD = 0.6  # angle between faces that is drawn
 OFF_MM = 0.05  # of a ray's start from its edge
 DIGITS = 3
+NAME = "assembly"
+# Toward the eye: from the camera's side, from behind the uprights, from below to the balls.
+EYES = ((1.0, -1.0, 0.6), (-1.0, -1.0, 0.6), (0.6, -1.0, -0.35))
+VIEWS = (
+    "from the camera's side, without shroud",
+    "from behind, without shroud",
+    "from below, without shroud",
+)
+LEFT_OUT = ("shroud_", "capture_sphere", "camera_view")  # would hide the rest, or are no parts
+BALLOON_MM, TEXT_MM, DOT_MM = 2.8, 2.5, 0.5
+PIXELS = RADIUS / BALLOON_MM  # of the call-outs' own unit, 1/mm
+SCALES = (0.5, 0.4, 0.2, 0.1)
+PIECE_MM = 2.0  # edges are tested in pieces as long
+HEAD, WIDTHS_MM = ("no.", "qty", "part"), (9.0, 9.0, 42.0)
 
 
 @dataclass(frozen=True)
@@ -118,22 +132,6 @@ def _anchor(
     best = np.argmin(np.linalg.norm(flat - np.median(flat, axis=0), axis=1))
     x, y = np.round(flat[best], DIGITS).tolist()
     return x, y
-
-
-NAME = "assembly"
-# Toward the eye: from the camera's side, from behind the uprights, from below to the balls.
-EYES = ((1.0, -1.0, 0.6), (-1.0, -1.0, 0.6), (0.6, -1.0, -0.35))
-VIEWS = (
-    "from the camera's side, without shroud",
-    "from behind, without shroud",
-    "from below, without shroud",
-)
-LEFT_OUT = ("shroud_", "capture_sphere", "camera_view")  # would hide the rest, or are no parts
-BALLOON_MM, TEXT_MM, DOT_MM = 2.8, 2.5, 0.5
-PIXELS = RADIUS / BALLOON_MM  # of the call-outs' own unit, 1/mm
-SCALES = (0.5, 0.4, 0.2, 0.1)
-PIECE_MM = 2.0  # edges are tested in pieces as long
-HEAD, WIDTHS_MM = ("no.", "qty", "part"), (9.0, 9.0, 42.0)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,24 @@ from tbcad.types import Floats
 BETWEEN_ROWS, LEAST_ROWS = 1, 2  # empty ones between tables; of a table that is cut, with its head
 
 Row = tuple[str, ...]
+HEAD = ("fits", "Ø", "takes", "its Ø", "play", "how")
+WIDTHS_MM = (30.0, 12.0, 29.0, 12.0, 10.0, 22.0)
+NUMBERS = 5  # of holes in a row
+# Size of each kind of part that fits, the hole it is made for, and how it is held.
+KINDS = {
+    "magnets": ("diameter_mm", "diameter_mm", "glue in"),
+    "dowels": ("diameter_mm", "diameter_mm", ""),
+    "leds": ("flange_mm", "flange_mm", ""),
+    "inserts": ("outer_mm", "hole_mm", "press in hot"),
+    "shafts": ("diameter_mm", "diameter_mm", ""),
+    "bearings": ("outer_mm", "outer_mm", "press in"),
+}
+NEAR_MM = 0.55  # of a hole's diameter from what the part is made for; others have play for screws
+REAMED, REAM = re.compile(r"\bream its bore [0-9.]+ (H[0-9]+)\b"), "ream "
+TOLERANCE = re.compile(r"\b[0-9.]+ ([a-z][0-9]+) x ")  # such as 8 h6 x 120
+SEATS_HEAD = ("seat", "is for", "R", "x", "y", "z", "3 pads")
+SEATS_WIDTHS_MM = (9.0, 28.0, 15.0, 17.0, 17.0, 17.0, 12.0)
+ON_PART_MM = 0.5  # of a pad's place from the part, offset as the coupon asks
 
 
 @dataclass(frozen=True)
@@ -68,23 +86,6 @@ def drawn(corner: Point, tables: Sequence[Table]) -> Iterator[Entity]:
     for one in tables:
         yield from table((x, y), one.widths, (one.head, *one.rows))
         y -= (1 + len(one.rows) + BETWEEN_ROWS) * TABLE_ROW_MM
-
-
-HEAD = ("fits", "Ø", "takes", "its Ø", "play", "how")
-WIDTHS_MM = (30.0, 12.0, 29.0, 12.0, 10.0, 22.0)
-NUMBERS = 5  # of holes in a row
-# Size of each kind of part that fits, the hole it is made for, and how it is held.
-KINDS = {
-    "magnets": ("diameter_mm", "diameter_mm", "glue in"),
-    "dowels": ("diameter_mm", "diameter_mm", ""),
-    "leds": ("flange_mm", "flange_mm", ""),
-    "inserts": ("outer_mm", "hole_mm", "press in hot"),
-    "shafts": ("diameter_mm", "diameter_mm", ""),
-    "bearings": ("outer_mm", "outer_mm", "press in"),
-}
-NEAR_MM = 0.55  # of a hole's diameter from what the part is made for; others have play for screws
-REAMED, REAM = re.compile(r"\bream its bore [0-9.]+ (H[0-9]+)\b"), "ream "
-TOLERANCE = re.compile(r"\b[0-9.]+ ([a-z][0-9]+) x ")  # such as 8 h6 x 120
 
 
 @dataclass(frozen=True)
@@ -161,11 +162,6 @@ def _cells(hole: Hole, mate: Mate) -> Row:
     own = f"{mm(mate.size)} {mate.tolerance}".strip()
     how = f"{REAM}{mate.reamed}" if reamed else mate.how
     return size, mate.name, own, mm(diameter - mate.size), how
-
-
-SEATS_HEAD = ("seat", "is for", "R", "x", "y", "z", "3 pads")
-SEATS_WIDTHS_MM = (9.0, 28.0, 15.0, 17.0, 17.0, 17.0, 12.0)
-ON_PART_MM = 0.5  # of a pad's place from the part, offset as the coupon asks
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,28 @@ ALONG_LINE = {"dimtih": 0, "dimtoh": 0}  # texts are turned as their line is
 AT_END, ABOVE_LINE = 0, 1  # of $DIMTAD
 BACK = {"left": 0.0, "centre": 0.5, "right": 1.0}
 DIGITS = 9  # of a style's lengths: full size is paper divided by a scale
+VERSION = "R2010"
+MILLIMETRES = 4  # of $INSUNITS
+COLOURS = {  # AutoCAD's numbers; 7 is black on paper and white on a black screen
+    Layer.CUT: 7,
+    Layer.FOLD: 5,
+    Layer.ENGRAVE: 1,
+    Layer.HIDDEN: 8,
+    Layer.HATCH: 9,
+    Layer.RAYS: 3,
+    Layer.CENTRE: 4,
+    Layer.DIMENSIONS: 8,
+    Layer.FRAME: 9,
+}
+DASHED, CHAIN = "DASHED", "CENTER"  # the names that every program knows
+PATTERNS = {  # total length, then dashes and, below zero, gaps, mm
+    DASHED: [4.5, 3.0, -1.5],
+    CHAIN: [13.0, 8.0, -2.0, 1.0, -2.0],
+}
+LINETYPES = {Layer.FOLD: DASHED, Layer.HIDDEN: DASHED, Layer.CENTRE: CHAIN}
+CLASSES = ("ACDBPLACEHOLDER", "LAYOUT")  # of every drawing; ezdxf orders them by their hashes
+_OPTION = RLock()
+ALIGNMENTS = {"left": "LEFT", "centre": "CENTER", "right": "RIGHT"}  # in ezdxf
 
 
 def add_dimension(entity: Dimension, space: "BaseLayout") -> "BlockLayout":
@@ -132,29 +154,6 @@ def _middle(text: Text) -> Point:
 
 if TYPE_CHECKING:
     from ezdxf.layouts import BaseLayout
-
-VERSION = "R2010"
-MILLIMETRES = 4  # of $INSUNITS
-COLOURS = {  # AutoCAD's numbers; 7 is black on paper and white on a black screen
-    Layer.CUT: 7,
-    Layer.FOLD: 5,
-    Layer.ENGRAVE: 1,
-    Layer.HIDDEN: 8,
-    Layer.HATCH: 9,
-    Layer.RAYS: 3,
-    Layer.CENTRE: 4,
-    Layer.DIMENSIONS: 8,
-    Layer.FRAME: 9,
-}
-DASHED, CHAIN = "DASHED", "CENTER"  # the names that every program knows
-PATTERNS = {  # total length, then dashes and, below zero, gaps, mm
-    DASHED: [4.5, 3.0, -1.5],
-    CHAIN: [13.0, 8.0, -2.0, 1.0, -2.0],
-}
-LINETYPES = {Layer.FOLD: DASHED, Layer.HIDDEN: DASHED, Layer.CENTRE: CHAIN}
-CLASSES = ("ACDBPLACEHOLDER", "LAYOUT")  # of every drawing; ezdxf orders them by their hashes
-_OPTION = RLock()
-ALIGNMENTS = {"left": "LEFT", "centre": "CENTER", "right": "RIGHT"}  # in ezdxf
 
 
 def write_dxf(path: Path, entities: Iterable[Entity]) -> None:

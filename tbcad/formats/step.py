@@ -38,6 +38,17 @@ from tbcad.errors import InputError
 from tbcad.types import Floats, Ints
 
 TAIL_BYTES = 64  # of a file, in which its last mark must be
+SURFACE_CURVES = "write.surfacecurve.mode"
+_SETTINGS = RLock()
+END = b"END-ISO-10303-21;"  # of every STEP file
+# A fixed time stamp: the file's bytes then depend on the design alone.
+TIME_STAMP = "2022-11-01T00:00:00"
+Place: TypeAlias = tuple[float, ...]
+"""Kind, location (mm) and axis of a surface."""
+PLANE, SPHERE = 1.0, 2.0
+OTHER: Place = (0.0,) * 7
+# Below any distance of surfaces, above what is left of a direction that is made a unit vector.
+SAME = 1e-6
 
 
 def incomplete(path: Path) -> OSError:
@@ -61,13 +72,6 @@ def check_complete(path: Path, mark: bytes) -> None:
         file.seek(max(path.stat().st_size - TAIL_BYTES, 0))
         if mark not in file.read():
             raise incomplete(path)
-
-
-SURFACE_CURVES = "write.surfacecurve.mode"
-_SETTINGS = RLock()
-END = b"END-ISO-10303-21;"  # of every STEP file
-# A fixed time stamp: the file's bytes then depend on the design alone.
-TIME_STAMP = "2022-11-01T00:00:00"
 
 
 class StepError(RuntimeError):
@@ -188,14 +192,6 @@ def write_header(writer: STEPControl_Writer, name: str) -> None:
     header.SetOriginatingSystem(TCollection_HAsciiString("tbcad"))
     header.SetAuthorValue(1, TCollection_HAsciiString(""))
     header.SetOrganizationValue(1, TCollection_HAsciiString(""))
-
-
-Place: TypeAlias = tuple[float, ...]
-"""Kind, location (mm) and axis of a surface."""
-PLANE, SPHERE = 1.0, 2.0
-OTHER: Place = (0.0,) * 7
-# Below any distance of surfaces, above what is left of a direction that is made a unit vector.
-SAME = 1e-6
 
 
 @kernel_settings()

@@ -26,6 +26,18 @@ from tbcad.geometry.vectors import perpendicular_axes
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 
+# Pitch by nominal diameter: coarse threads of ISO 261; 1/4-20 UNC.
+PITCH_MM = {2.0: 0.4, 3.0: 0.5, 4.0: 0.7, 5.0: 0.8, 6.0: 1.0, 6.35: 1.27}
+CORE = 1.226869  # pitches by which the core of a screw is smaller than its thread (ISO 68-1)
+WASHER_PLAY_MM = 0.3  # of a washer's hole (ISO 7089, M3 to M5)
+# T-nuts; no list gives these.
+TNUT_LENGTH_MM, TNUT_HEIGHT_MM, TNUT_DEPTH_MM, TNUT_PLAY_MM = 10.0, 4.0, 0.5, 0.4
+THROUGH_MM = 1.0  # by which a hole extends beyond the part
+FLANGE_MM = 1.0  # height of an LED's flange; no list gives it
+DOME = np.radians([0.0, 30.0, 60.0, 90.0])  # corners of an LED's dome
+UP = np.array([0.0, 0.0, 1.0])
+LEVEL = 1e-9  # upward part of a direction that is level
+
 
 @dataclass(frozen=True)
 class Fastener:
@@ -57,19 +69,6 @@ def numbered(fasteners: Iterable[Fastener]) -> tuple[Fastener, ...]:
         number = counts[one.part.name] = counts.get(one.part.name, 0) + 1
         named.append(replace(one, name=re.sub(r"\W", "_", f"{one.part.name}_{number}")))
     return tuple(named)
-
-
-# Pitch by nominal diameter: coarse threads of ISO 261; 1/4-20 UNC.
-PITCH_MM = {2.0: 0.4, 3.0: 0.5, 4.0: 0.7, 5.0: 0.8, 6.0: 1.0, 6.35: 1.27}
-CORE = 1.226869  # pitches by which the core of a screw is smaller than its thread (ISO 68-1)
-WASHER_PLAY_MM = 0.3  # of a washer's hole (ISO 7089, M3 to M5)
-# T-nuts; no list gives these.
-TNUT_LENGTH_MM, TNUT_HEIGHT_MM, TNUT_DEPTH_MM, TNUT_PLAY_MM = 10.0, 4.0, 0.5, 0.4
-THROUGH_MM = 1.0  # by which a hole extends beyond the part
-FLANGE_MM = 1.0  # height of an LED's flange; no list gives it
-DOME = np.radians([0.0, 30.0, 60.0, 90.0])  # corners of an LED's dome
-UP = np.array([0.0, 0.0, 1.0])
-LEVEL = 1e-9  # upward part of a direction that is level
 
 
 def core_radius(thread: float) -> float:

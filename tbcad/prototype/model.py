@@ -38,6 +38,15 @@ from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
+# Arrangements whose solids are tried, and how many of them with the same number of balls.
+MAX_MODELS, MAX_PADS = 6, 2
+KERNEL_ERRORS = (Standard_Failure, StdFail_NotDone)
+KERNEL_FAILS = "the CAD kernel fails: {}"
+CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
+COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
+PartsOrError: TypeAlias = list[PlacedSolid] | SpecError | InvalidSolidError
+FutureParts: TypeAlias = "Future[PartsOrError]"
+
 
 @dataclass(frozen=True)
 class PrototypeModel(Arrangement):
@@ -73,17 +82,6 @@ class PrototypeModel(Arrangement):
         if self.shroud:
             counts[self.shroud.sheet.name] += self.shroud.sheets
         return counts
-
-
-# Arrangements whose solids are tried, and how many of them with the same number of balls.
-MAX_MODELS, MAX_PADS = 6, 2
-KERNEL_ERRORS = (Standard_Failure, StdFail_NotDone)
-KERNEL_FAILS = "the CAD kernel fails: {}"
-CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
-COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
-
-PartsOrError: TypeAlias = list[PlacedSolid] | SpecError | InvalidSolidError
-FutureParts: TypeAlias = "Future[PartsOrError]"
 
 
 def build_prototype_model(

@@ -28,6 +28,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SAMPLES = 401
+INCHES = (13.0, 5.2)
+VIEW_PX = (900, 720)
+SHOWN_MM, SHOWN_APEXES = 9.0, 1.6  # about a mirror: this, or so many distances of its neighbours
+ASIDE = 0.9  # of the sight from the camera, so that light rakes over the edges
+ELEVATION_Z = 0.7  # z of the direction of the mirror whose edges are shown
+FILL = 0.45  # brightness of the light from straight above
+STRETCH = 4.0  # of heights in the section of three mirrors
+INSET_MM = 0.9  # half width of the edge in its own scale
 
 
 def seam_mirror(export: ExportedDesign) -> int:
@@ -103,15 +111,6 @@ def edge_of_field(cells: Cells, reflector: Reflector, mirror: int, along: Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-INCHES = (13.0, 5.2)
-VIEW_PX = (900, 720)
-SHOWN_MM, SHOWN_APEXES = 9.0, 1.6  # about a mirror: this, or so many distances of its neighbours
-ASIDE = 0.9  # of the sight from the camera, so that light rakes over the edges
-ELEVATION_Z = 0.7  # z of the direction of the mirror whose edges are shown
-FILL = 0.45  # brightness of the light from straight above
-STRETCH = 4.0  # of heights in the section of three mirrors
-INSET_MM = 0.9  # half width of the edge in its own scale
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:

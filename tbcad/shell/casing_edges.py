@@ -20,6 +20,36 @@ from tbcad.types import Bools, Ints
 
 Chain = list[tuple[int, bool]]
 """Arcs that follow each other, and whether each runs forward."""
+Edge = TypeVar("Edge")
+ARC_ENDS = {
+    "seam_back": "back",
+    "foot_back": "back",
+    "seam_rim": "seam",
+    "seam_rim_back": "seam_back",
+    "foot_rim": "foot",
+    "foot_rim_top": "foot_top",
+}
+"""Edges along arcs, from low to high y, and the point at their ends."""
+LINE_ENDS = {
+    "seam_end": ("seam", "seam_back"),
+    "foot_end": ("foot", "foot_top"),
+    "seam_step": ("seam_back", "back"),
+    "foot_step": ("seam", "foot_top"),
+    "wall": ("foot", "front"),
+}
+"""Straight edges, each at the low and the high end: their first and last points."""
+OUTLINES = {
+    "seam": "wall_low seam_front -wall_high foot_end_high -foot_step_high -seam_rim foot_step_low"
+    " -foot_end_low",
+    "foot": "foot_rim wall_high -foot_front -wall_low",
+    "seam_flange": "seam_step_low seam_back -seam_step_high -seam_rim_back",
+    "foot_flange": "foot_rim_top -foot_step_high seam_end_high seam_step_high -foot_back"
+    " -seam_step_low -seam_end_low foot_step_low",
+}
+"""Edges round the planar faces, counter-clockwise from +x or +z; "-": followed backward.
+
+seam_front and foot_front are the chains of the mirrors' arcs.
+"""
 
 
 def boundary_chain(cells: Cells, plane: int) -> Chain:
@@ -57,41 +87,6 @@ def _linked(arc: Ints, forward: Bools, tails: Ints, heads: Ints) -> Chain:
         chain.append((int(arc[k]), bool(forward[k])))
         corner = int(heads[k])
     return chain
-
-
-Edge = TypeVar("Edge")
-
-ARC_ENDS = {
-    "seam_back": "back",
-    "foot_back": "back",
-    "seam_rim": "seam",
-    "seam_rim_back": "seam_back",
-    "foot_rim": "foot",
-    "foot_rim_top": "foot_top",
-}
-"""Edges along arcs, from low to high y, and the point at their ends."""
-
-LINE_ENDS = {
-    "seam_end": ("seam", "seam_back"),
-    "foot_end": ("foot", "foot_top"),
-    "seam_step": ("seam_back", "back"),
-    "foot_step": ("seam", "foot_top"),
-    "wall": ("foot", "front"),
-}
-"""Straight edges, each at the low and the high end: their first and last points."""
-
-OUTLINES = {
-    "seam": "wall_low seam_front -wall_high foot_end_high -foot_step_high -seam_rim foot_step_low"
-    " -foot_end_low",
-    "foot": "foot_rim wall_high -foot_front -wall_low",
-    "seam_flange": "seam_step_low seam_back -seam_step_high -seam_rim_back",
-    "foot_flange": "foot_rim_top -foot_step_high seam_end_high seam_step_high -foot_back"
-    " -seam_step_low -seam_end_low foot_step_low",
-}
-"""Edges round the planar faces, counter-clockwise from +x or +z; "-": followed backward.
-
-seam_front and foot_front are the chains of the mirrors' arcs.
-"""
 
 
 def casing_arcs(envelope: Envelope) -> dict[str, EllipseArc]:

@@ -30,6 +30,14 @@ ARC_SAMPLES = 9
 # Below any length of the shortest vector among averages of unit vectors that have a direction.
 NO_DIRECTION = 1e-9
 PULL_DIGITS = 9
+X, _, Z = np.eye(3)
+# Depth of a blind hole in its diameter: a thread in aluminium holds as much as its screw.
+DEPTH_DIAMETERS = 2.0
+INSET_STEP_MM = 1.0
+# Where the distance of a hole from the mirrors is looked at: round it, and along it.
+ROUND, ALONG = 24, 5
+# Sizes of holes that are tried for a remedy, as shares of those that do not fit.
+REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)
 
 
 @dataclass(frozen=True)
@@ -101,16 +109,6 @@ def _wall_normals(cells: Cells) -> Floats:
     if not isinstance(cells, PedestalCells):
         return np.zeros((0, 3))
     return np.asarray(-cells.surfaces.normal[cells.mirrors + PLANES :])
-
-
-X, _, Z = np.eye(3)
-# Depth of a blind hole in its diameter: a thread in aluminium holds as much as its screw.
-DEPTH_DIAMETERS = 2.0
-INSET_STEP_MM = 1.0
-# Where the distance of a hole from the mirrors is looked at: round it, and along it.
-ROUND, ALONG = 24, 5
-# Sizes of holes that are tried for a remedy, as shares of those that do not fit.
-REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)
 
 
 @dataclass(frozen=True)

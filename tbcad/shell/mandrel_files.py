@@ -25,6 +25,7 @@ from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
 X, Y, Z = np.eye(3)
+DRAFT_DIGITS = 6
 
 
 def mandrel_mesh(spec: Spec, cells: Cells, mandrel: Mandrel, distance: Floats) -> Mesh:
@@ -92,9 +93,6 @@ def _plane_with_holes(
         for k, (wall, bottom) in enumerate(zip(walls, bottoms, strict=True), start=1)
     )
     return [(name, plane), *chain.from_iterable(inner)]
-
-
-DRAFT_DIGITS = 6
 
 
 def design_mandrel(design: MirrorDesign) -> Mandrel:

@@ -16,6 +16,13 @@ from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
+MIN_HOLE_SEGMENTS = 24
+# Rounding noise of 1e-15 mm on the joining faces is no geometry: they are flat to the last bit.
+ROUNDED_DIGITS = 12
+X, Y, Z = np.eye(3)
+# Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
+FROM_X, FROM_Z = [1, 2], [0, 1]
+
 
 def wall_facets(cells: PedestalCells, outlines: CellOutlines) -> Ints:
     """Triangles (t, 3) over the outlines' vertices, counter-clockwise seen from the light.
@@ -34,15 +41,6 @@ def wall_facets(cells: PedestalCells, outlines: CellOutlines) -> Ints:
     middle = outlines.at(arc, half)
     fans = np.column_stack([here, after, tip])
     return np.concatenate([fans, np.column_stack([middle, far, near])])
-
-
-MIN_HOLE_SEGMENTS = 24
-# Rounding noise of 1e-15 mm on the joining faces is no geometry: they are flat to the last bit.
-ROUNDED_DIGITS = 12
-
-X, Y, Z = np.eye(3)
-# Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
-FROM_X, FROM_Z = [1, 2], [0, 1]
 
 
 def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:

@@ -17,6 +17,11 @@ MAX_MITRE = 4.0
 MAX_STRIP_SHARE = 0.1
 # A segment's inner side is at least this share of it: mitres may be longer than a short segment.
 MIN_INNER_SHARE = 0.5
+MIN_SEGMENTS = 3
+# Rays off the ends of a segment may cost its mirror this many ray errors of coverage's radius.
+END_RAY_ERRORS = 2.0
+# Start, middle and end of a segment.
+PLACES = np.array([[0.0], [0.5], [1.0]])
 
 
 def strip_widths(ray_error: float, radius: Floats, distance: Floats, points: Floats) -> Floats:
@@ -94,13 +99,6 @@ def _cramped(outlines: CellOutlines, strip: Floats, middle: Floats, outside: Flo
     at_end = np.zeros_like(at_start)
     at_end[following] = at_start
     return np.asarray(at_start | at_end)
-
-
-MIN_SEGMENTS = 3
-# Rays off the ends of a segment may cost its mirror this many ray errors of coverage's radius.
-END_RAY_ERRORS = 2.0
-# Start, middle and end of a segment.
-PLACES = np.array([[0.0], [0.5], [1.0]])
 
 
 def segment_counts(spec: Spec, cells: Cells, distance: Floats) -> Ints:

@@ -26,6 +26,11 @@ from tbcad.shell.casing_edges import (
 from tbcad.shell.envelope import Envelope
 from tbcad.types import Floats, Ints
 
+Edges = dict[str, list[Side]]
+"""Edges of the casing by the names of casing_edges, arcs from low to high y."""
+X, Y, Z = np.eye(3)
+FAR_RIMS = {"seam": "seam_rim_back", "foot": "foot_rim_top"}
+
 
 @dataclass(frozen=True)
 class FrontEdges:
@@ -116,13 +121,6 @@ def _circles(arcs: Arcs) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     x = arcs.weight[:, None] * outward - sine[:, None] * chord
     angle = np.where(straight, 0.0, 2 * np.arcsin(np.minimum(sine, 1)))
     return start - radius[:, None] * x, x, along, radius, angle
-
-
-Edges = dict[str, list[Side]]
-"""Edges of the casing by the names of casing_edges, arcs from low to high y."""
-
-X, Y, Z = np.eye(3)
-FAR_RIMS = {"seam": "seam_rim_back", "foot": "foot_rim_top"}
 
 
 def casing_faces(front: FrontEdges, envelope: Envelope) -> list[tuple[str, TopoDS_Face]]:

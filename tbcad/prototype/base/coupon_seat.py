@@ -37,6 +37,13 @@ from tbcad.types import Floats
 UPRIGHT = 1e-9  # of an axis's level part: a seat without a lean
 DECIMALS = 6  # to which seats face up alike
 SAME_POSE = np.sin(np.radians(1))  # between the axes of two poses that are taken for the same
+KEEL_MM = 3.0  # thickness of the plate below a seat
+INSIDE_MM = 0.3  # from the wall's faces to the upper edges of that plate
+# Of the core beyond the foot: with the same radius, faces would lie on each other.
+BEYOND_FOOT_MM = 0.5
+BEYOND_MM = 1.0  # of what is cut away beyond the seat
+ROUNDING_MM = 1e-6
+UP = np.eye(3)[2]
 
 
 @dataclass(frozen=True)
@@ -114,15 +121,6 @@ def _bed(axis: Floats, down: Floats) -> Floats:
         level = np.cross(down, np.eye(3)[int(np.abs(down).argmin())])
     y = unit(level)
     return np.column_stack([np.cross(y, -down), y, -down])
-
-
-KEEL_MM = 3.0  # thickness of the plate below a seat
-INSIDE_MM = 0.3  # from the wall's faces to the upper edges of that plate
-# Of the core beyond the foot: with the same radius, faces would lie on each other.
-BEYOND_FOOT_MM = 0.5
-BEYOND_MM = 1.0  # of what is cut away beyond the seat
-ROUNDING_MM = 1e-6
-UP = np.eye(3)[2]
 
 
 def seat_body(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose, to_bar: float) -> TopoDS_Shape:

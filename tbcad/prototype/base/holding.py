@@ -33,6 +33,11 @@ LAST_TERM = 1e-7  # of the series over the first
 MAX_TERMS = 20_000
 LAST_WAVE = 200.0  # exponent at which the integral over wave numbers ends
 PASCAL_MM2 = 1e-6  # N
+MIN_RATIO = 2.0  # of the force there is over the force needed
+WIDER_GAP_MM = 0.5  # by which a printed gap may be wider than drawn
+# Of glue: a quarter of what the weakest glue bears on many plastics in a test, silicone with
+# 1.4 N/mm^2 (The Loctite Design Guide for Bonding Plastics).
+GLUE_MPA = 0.35
 
 
 @cache
@@ -100,13 +105,6 @@ def pull_of_pair(one: float, two: float, gap: float, heights: tuple[float, float
 def pull_on_plate(gap: float, magnet: float, height: float) -> float:
     """Pull on a thick steel plate, N, derated: on the magnet's own mirror image."""
     return pull_of_pair(magnet, magnet, 2 * gap, (height, height))
-
-
-MIN_RATIO = 2.0  # of the force there is over the force needed
-WIDER_GAP_MM = 0.5  # by which a printed gap may be wider than drawn
-# Of glue: a quarter of what the weakest glue bears on many plastics in a test, silicone with
-# 1.4 N/mm^2 (The Loctite Design Guide for Bonding Plastics).
-GLUE_MPA = 0.35
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Bools, Floats
 
 PAD_AZIMUTHS = np.radians(np.arange(0, 120, 5))  # tried for the first pad
+WEB_MM = 0.8  # between pocket and pads
 
 
 def pad_normals(tilt: float, azimuth: Floats) -> Floats:
@@ -25,9 +26,6 @@ def pad_normals(tilt: float, azimuth: Floats) -> Floats:
     around = azimuth[:, None] + np.arange(3) * 2 * np.pi / 3
     along = np.full((*around.shape, 1), np.cos(tilt))
     return -np.concatenate([np.sin(tilt) * unit_circle(around), along], axis=-1)
-
-
-WEB_MM = 0.8  # between pocket and pads
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,14 @@ from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
 THROUGH_MM = 1.0  # tools stick out this far, so that no faces coincide
+SUNK_MM = 0.4  # of numbers into their face
+# Distances (mm) within which points are the same to the kernel, tried in turn; at 1e-6 meshes have
+# gaps of some nanometres more often than not.
+SAME_MM = (1e-5, 1e-6, 1e-4)
+COLUMN_MM = 80.0  # length of the space that is kept free behind a boss
+RIB_ROOT = 0.6  # of the hub's radius, to where ribs go in it
+LABEL_ROOM = 0.85  # of a boss's end
+RIB_MIDDLE = -0.5  # of a rib beside its azimuth, in its thicknesses
 
 
 def hub_bodies(hub: Hub) -> list[TopoDS_Shape]:
@@ -133,16 +141,6 @@ def wall_section(base: BaseLayout) -> Floats:
 def facet_count(radius: float, angle: float) -> int:
     """How many facets about a circle (mm) over an angle (radians) leave it by FACETS_OUT_MM."""
     return int(np.ceil(angle / (2 * np.arccos(radius / (radius + FACETS_OUT_MM)))))
-
-
-SUNK_MM = 0.4  # of numbers into their face
-# Distances (mm) within which points are the same to the kernel, tried in turn; at 1e-6 meshes have
-# gaps of some nanometres more often than not.
-SAME_MM = (1e-5, 1e-6, 1e-4)
-COLUMN_MM = 80.0  # length of the space that is kept free behind a boss
-RIB_ROOT = 0.6  # of the hub's radius, to where ribs go in it
-LABEL_ROOM = 0.85  # of a boss's end
-RIB_MIDDLE = -0.5  # of a rib beside its azimuth, in its thicknesses
 
 
 def carrier_parts(

@@ -25,6 +25,9 @@ PULLEY_RIM_MM = 1.5
 SHAFT_END_MM = 2.0  # of the collar's bore beyond the shaft
 # A stage of the 60 mm class; assumed: its height, its top's, and the gap below the top.
 STAGE_HEIGHT_MM, STAGE_TOP_MM, STAGE_GAP_MM = 40.0, 12.0, 0.5
+ENGAGEMENT_MM = 4.0  # smallest length of a screw beyond what it holds
+MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
+TNUT, WASHER = "TNUT-M5-6", "WASHER-5"
 
 
 @dataclass(frozen=True)
@@ -182,11 +185,6 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
         axial_cylinder(base, plate.back, tip, motor["shaft_mm"] / 2, out),
     )
     return Component("motor", motor.what, added, part=motor.name)
-
-
-ENGAGEMENT_MM = 4.0  # smallest length of a screw beyond what it holds
-MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
-TNUT, WASHER = "TNUT-M5-6", "WASHER-5"
 
 
 def on_uprights(

@@ -19,6 +19,9 @@ from tbcad.types import Floats
 STRIP, SHORT_STRIP = "STRIP-COB-24V", "STRIP-240-24V"
 EDGE_MM = 2.0  # of a plate beyond the strips
 ACROSS, UP = np.eye(3)[1:]
+ROOM_SIDES = 12
+EDGE_POINTS = 9
+MARCHES, NEAR_MM = 48, 0.5  # steps along a line of light, and how near to the base it may come
 
 
 @dataclass(frozen=True)
@@ -86,11 +89,6 @@ class LampLayout:
         y, z = np.array(self.sides) / 2
         around = [side * y * ACROSS + high * UP for side in (-1, 1) for high in (-z, 0.0, z)]
         return np.asarray(self.places[:, None] + np.array(around))
-
-
-ROOM_SIDES = 12
-EDGE_POINTS = 9
-MARCHES, NEAR_MM = 48, 0.5  # steps along a line of light, and how near to the base it may come
 
 
 def in_view(bodies: list[Primitive], camera: Camera) -> bool:

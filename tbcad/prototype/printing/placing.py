@@ -38,6 +38,11 @@ LEVEL = 1e-6  # of a normal's downward part
 STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
 EXACT = 1e3  # weight of the sum of shares, which is one
 NO_PADS = np.zeros((0, 3))
+MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
+TOUCHING_MM = 0.05  # a facet no higher lies on the bed
+# Base and caps turn, stage and frame are static; a tool is not in the assembly.
+Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
+VOLUME_ERROR = 1e-4
 
 
 def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
@@ -71,10 +76,6 @@ def opening_up(normals: Floats) -> Floats | None:
     if length < LEVEL or float((normals @ up).min()) < LEVEL * length:
         return None
     return np.asarray(-up / length)
-
-
-MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
-TOUCHING_MM = 0.05  # a facet no higher lies on the bed
 
 
 @dataclass(frozen=True)
@@ -183,10 +184,6 @@ def _overhang(mesh: Mesh, orientation: Floats) -> float:
     return float(area[overhangs].sum())
 
 
-# Base and caps turn, stage and frame are static; a tool is not in the assembly.
-Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
-
-
 @dataclass(frozen=True)
 class PrintedPart:
     """One printed part.
@@ -219,9 +216,6 @@ def rounded(mesh: Mesh) -> Mesh:
     single = mesh.vertices.astype(np.float32).astype(np.float64) + 0.0
     corners, group = np.unique(single, axis=0, return_inverse=True)
     return without_degenerate(corners, group.reshape(-1)[mesh.triangles])
-
-
-VOLUME_ERROR = 1e-4
 
 
 def primitive_solid(body: Primitive) -> TopoDS_Shape:

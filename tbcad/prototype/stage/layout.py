@@ -46,6 +46,8 @@ WALL_OF_POST = 0.3  # largest share of the post's radius
 SHELF_MM = 1.0  # smallest width of the crown's plate beyond the neck
 # Light may be taken from the sphere's bottom within this: its hulls are up to 2.5 mm too large.
 GRAZING_MM = 0.15
+THREAD_MM = 3.0
+BEYOND_POST_MM = 0.5  # that the set screw may stand out of the post
 
 
 @dataclass(frozen=True)
@@ -201,10 +203,6 @@ def _check_clearances(
             "or prototype.ball_wall_mm larger"
         )
     return light, swept
-
-
-THREAD_MM = 3.0
-BEYOND_POST_MM = 0.5  # that the set screw may stand out of the post
 
 
 def stage_fasteners(stage: StageLayout, parts: Parts) -> Iterator[Fastener]:
