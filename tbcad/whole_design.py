@@ -82,7 +82,7 @@ class Design(MirrorDesign):
         """
         from tbcad.cad.part import as_part
         from tbcad.prototype.arrangement import arrangements
-        from tbcad.prototype.model_solids import build_prototype_model
+        from tbcad.prototype.model import build_prototype_model
 
         return {
             printed.name: as_part(printed.name, printed.solid.shape)

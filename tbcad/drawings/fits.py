@@ -1,19 +1,26 @@
-"""Fits: what goes into a part's holes with little play, or is pressed in, glued in or reamed for.
+"""Tables of a part's sheet: its fits, and on the carrier's the seats of balls and caps.
 
+Fits are what goes into holes with little play, or is pressed in, glued in or reamed for.
 Sizes are those of the solid and of tbcad's lists of purchased parts.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.drawings.columns import Row, Table
+from tbcad.cad.features import distance
+from tbcad.cad.projection import Shape
+from tbcad.drafting.sheet import TABLE_ROW_MM, table
 from tbcad.drawings.holes import Hole, is_coaxial, mm
+from tbcad.formats.entities import Entity, Point
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 
+BETWEEN_ROWS, LEAST_ROWS = 1, 2  # empty ones between tables; of a table that is cut, with its head
+
+Row = tuple[str, ...]
 HEAD = ("fits", "Ø", "takes", "its Ø", "play", "how")
 WIDTHS_MM = (30.0, 12.0, 29.0, 12.0, 10.0, 22.0)
 NUMBERS = 5  # of holes in a row
@@ -29,6 +36,56 @@ KINDS = {
 NEAR_MM = 0.55  # of a hole's diameter from what the part is made for; others have play for screws
 REAMED, REAM = re.compile(r"\bream its bore [0-9.]+ (H[0-9]+)\b"), "ream "
 TOLERANCE = re.compile(r"\b[0-9.]+ ([a-z][0-9]+) x ")  # such as 8 h6 x 120
+SEATS_HEAD = ("seat", "is for", "R", "x", "y", "z", "3 pads")
+SEATS_WIDTHS_MM = (9.0, 28.0, 15.0, 17.0, 17.0, 17.0, 12.0)
+ON_PART_MM = 0.5  # of a pad's place from the part, offset as the coupon asks
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a column.
+
+    Attributes:
+        head: what the columns are.
+        widths: of the columns, mm.
+        rows: below the head.
+    """
+
+    head: Row
+    widths: tuple[float, ...]
+    rows: tuple[Row, ...]
+
+
+def in_columns(tables: Sequence[Table], first: int, others: int) -> list[list[Table]]:
+    """Tables in the first column and those that follow; one longer than a column is cut.
+
+    Args:
+        tables: in their order.
+        first: rows that the first column has room for, heads too.
+        others: rows of each other column.
+    """
+    columns: list[list[Table]] = [[]]
+    room = first
+    for one in tables:
+        rest = one
+        while rest.rows:
+            whole = 1 + len(rest.rows)
+            if room < LEAST_ROWS or (room < whole <= others and columns[-1]):
+                columns.append([])
+                room = others
+            taken = rest.rows[: room - 1]
+            columns[-1].append(replace(rest, rows=taken))
+            rest = replace(rest, rows=rest.rows[len(taken) :])
+            room -= 1 + len(taken) + BETWEEN_ROWS
+    return columns
+
+
+def drawn(corner: Point, tables: Sequence[Table]) -> Iterator[Entity]:
+    """A column of tables below and right of a corner."""
+    x, y = corner
+    for one in tables:
+        yield from table((x, y), one.widths, (one.head, *one.rows))
+        y -= (1 + len(one.rows) + BETWEEN_ROWS) * TABLE_ROW_MM
 
 
 @dataclass(frozen=True)
@@ -105,3 +162,42 @@ def _cells(hole: Hole, mate: Mate) -> Row:
     own = f"{mm(mate.size)} {mate.tolerance}".strip()
     how = f"{REAM}{mate.reamed}" if reamed else mate.how
     return size, mate.name, own, mm(diameter - mate.size), how
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A seat.
+
+    Attributes:
+        number: of its ball.
+        takes: what lies in it.
+        radius: of the body's sphere, mm.
+        centre: of that, mm, (3,).
+        axis: of the seat, a unit vector, (3,).
+        contacts: with the pads, mm, (3, 3).
+        pad: diameter of the pads, mm.
+    """
+
+    number: int
+    takes: str
+    radius: float
+    centre: Floats
+    axis: Floats
+    contacts: Floats
+    pad: float
+
+
+def seats_table(shape: Shape, seats: Sequence[Seat]) -> Table:
+    """The seats whose pads are on a part, places in the part's frame."""
+    rows = [
+        (
+            str(one.number),
+            one.takes,
+            f"{one.radius:.3f}",
+            *(f"{value + 0.0:.2f}" for value in np.round(one.centre, 2).tolist()),
+            f"Ø{mm(one.pad)}",
+        )
+        for one in seats
+        if all(distance(shape, contact) < ON_PART_MM for contact in one.contacts)
+    ]
+    return Table(SEATS_HEAD, SEATS_WIDTHS_MM, tuple(rows))

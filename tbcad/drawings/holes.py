@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.cad.features import HOLE_DEG, SLOT_DEG, Cylinder
-from tbcad.drafting.tables import is_legible
+from tbcad.drafting.sheet import is_legible
 from tbcad.drafting.views import ABOVE, FRONT, LEFT
 from tbcad.types import Floats
 

@@ -17,8 +17,8 @@ from tbcad.drafting.sheet import (
     notes_beside_title,
     placed,
     sheet_frame,
+    table,
 )
-from tbcad.drafting.tables import table
 from tbcad.drafting.views import straight
 from tbcad.drawings.export import Export
 from tbcad.formats.checked_files import columns
@@ -29,7 +29,6 @@ from tbcad.spec.sizes import OpticsSpec
 from tbcad.types import Floats
 
 NAME = "optical_layout"
-NOMINAL = "nominal sizes"
 PLANAR_MM = 1e6  # radius that stands for a plane: off by 1e-5 mm over a mirror of 10 mm
 IN_PLANE = 1e-9  # of a direction's y
 HEAD, WIDTHS_MM = ("symbol", "what", "value"), (16.0, 58.0, 30.0)

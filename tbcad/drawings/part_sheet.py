@@ -19,16 +19,15 @@ from tbcad.drafting.sheet import (
     A3,
     A4,
     BESIDE_MM,
+    TABLE_ROW_MM,
     Sheet,
     TitleBlock,
     drawing_room,
     notes_beside_title,
     sheet_frame,
 )
-from tbcad.drafting.tables import ROW_MM
 from tbcad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
-from tbcad.drawings.columns import Table, drawn, in_columns
-from tbcad.drawings.fits import Mate, fits_table
+from tbcad.drawings.fits import Mate, Table, drawn, fits_table, in_columns
 from tbcad.drawings.holes import (
     HEAD,
     VIEWS,
@@ -279,7 +278,7 @@ def _pages(tables: Sequence[Table], paper: Point) -> tuple[list[Table], list[lis
 def _rows(paper: Point) -> int:
     """Rows that a column has room for."""
     _, low, _, high = drawing_room(paper)
-    return int((high - low - BESIDE_MM) / ROW_MM)
+    return int((high - low - BESIDE_MM) / TABLE_ROW_MM)
 
 
 def _column(paper: Point, tables: Sequence[Table]) -> Iterator[Entity]:

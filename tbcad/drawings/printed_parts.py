@@ -11,11 +11,10 @@ from tbcad.cad.projection import Shape
 from tbcad.cad.solids import moved
 from tbcad.drafting.sheet import Sheet, TitleBlock
 from tbcad.drawings.export import Export
-from tbcad.drawings.fits import Mate, purchased_mate, reamed_to
+from tbcad.drawings.fits import Mate, Seat, purchased_mate, reamed_to, seats_table
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
-from tbcad.drawings.seats import Seat, seats_table
-from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step import read_named_solid
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.records.prototype import PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow

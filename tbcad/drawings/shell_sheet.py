@@ -22,7 +22,7 @@ from tbcad.drafting.views import FRONT, as_entities, straight
 from tbcad.drawings.export import Export
 from tbcad.drawings.holes import mm
 from tbcad.formats.entities import Circle, Entity, Layer, Line, Point
-from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step import read_named_solid
 from tbcad.records.design import MandrelRecord
 from tbcad.types import Floats
 

@@ -20,9 +20,8 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup
-from tbcad.formats.native_files import check_complete, incomplete
 from tbcad.formats.step import END as STEP_END
-from tbcad.formats.step import StepError, kernel_settings, write_header
+from tbcad.formats.step import StepError, check_complete, incomplete, kernel_settings, write_header
 
 END = "ENDSEC;\nEND-ISO-10303-21;"
 

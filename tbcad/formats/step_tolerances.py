@@ -41,9 +41,8 @@ from OCP.XCAFDoc import (
 from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.brep import Solid
-from tbcad.formats.native_files import check_complete, incomplete
 from tbcad.formats.step import END as STEP_END
-from tbcad.formats.step import StepError, kernel_settings, write_header
+from tbcad.formats.step import StepError, check_complete, incomplete, kernel_settings, write_header
 from tbcad.formats.step_assembly import END
 
 Triple: TypeAlias = tuple[float, float, float]

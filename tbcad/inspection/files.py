@@ -12,7 +12,7 @@ from tbcad.cad.brep import Solid
 from tbcad.cad.solids import cylinder_radius
 from tbcad.errors import InputError
 from tbcad.formats.csv_table import Row, write_table
-from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step import read_named_solid
 from tbcad.formats.step_tolerances import FaceTolerances, write_tolerances
 from tbcad.inspection.limits import MirrorLimits
 from tbcad.inspection.read_back import check_read_back

@@ -8,11 +8,9 @@ import numpy as np
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
 from tbcad.cad.solids import pyramid, sphere
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.fasteners.bodies import fastener_axes, fastener_component
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.model import PrototypeModel
-from tbcad.prototype.printing.component_solids import component_solid
-from tbcad.prototype.printing.parts import Role
+from tbcad.prototype.printing.placing import Role, component_solid
 
 METAL: Colour = (0.55, 0.56, 0.58, 1.0)
 FASTENER: Colour = (0.25, 0.26, 0.28, 1.0)
@@ -85,7 +83,8 @@ def _shroud(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
 
 def _views(prototype: PrototypeModel) -> SolidGroup:
     """The capture sphere, and what the camera sees up to the sphere's far end."""
-    camera, radius = prototype.layout.array.camera, prototype.capture_radius
+    camera = prototype.layout.array.camera
+    radius = prototype.spec.optics.capture_diameter_mm / 2
     length = float(norm(camera.pinhole)) + radius
     width = length * np.tan(camera.hfov / 2)
     height = width * camera.height_px / camera.width_px

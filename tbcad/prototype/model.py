@@ -1,63 +1,64 @@
-"""The whole prototype: its layouts, its printed parts as solids, and the drive that turns them."""
+"""The whole prototype: the first arrangement that has the solids of all its printed parts."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeAlias
 
+import numpy as np
+from OCP.Standard import Standard_Failure
+from OCP.StdFail import StdFail_NotDone
+
+from tbcad.background import Submit, at_once
+from tbcad.cad.brep import InvalidSolidError
+from tbcad.camera.requirements import camera_requirements
+from tbcad.geometry.primitives import Component
+from tbcad.prototype.arrangement import (
+    Arrangement,
+    balance_and_drive,
+    shroud_round,
+)
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_solids import cap_magnets
+from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
+from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.coupon_seat import expected_downs, worst_pose
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.split import BaseSplit
-from tbcad.prototype.drive.balance import BaseBalance
+from tbcad.prototype.base.solid import carrier_parts
+from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.electronics.wiring import Wiring
-from tbcad.prototype.fasteners.fastener import Fastener, numbered
-from tbcad.prototype.frame.camera_gauge import CameraGauge
-from tbcad.prototype.frame.layout import FrameLayout, frame_purchased_parts
-from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.printing.parts import PrintedPart
-from tbcad.prototype.purchased.parts import Parts
-from tbcad.prototype.stage.fasteners import stage_fasteners
-from tbcad.prototype.stage.layout import StageLayout
+from tbcad.prototype.fasteners import Fastener, numbered
+from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
+from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
+from tbcad.prototype.printing.placing import PlacedSolid, PrintedPart, Role, placed_components
+from tbcad.prototype.stage.layout import stage_fasteners
 from tbcad.spec.design import Spec
+from tbcad.spec.errors import SpecError
+from tbcad.types import Progress
+
+# Arrangements whose solids are tried, and how many of them with the same number of balls.
+MAX_MODELS, MAX_PADS = 6, 2
+KERNEL_ERRORS = (Standard_Failure, StdFail_NotDone)
+KERNEL_FAILS = "the CAD kernel fails: {}"
+CARRIER_PURPOSE = "carrier of the balls, turns about the axis"
+COUPON_PURPOSE = "seats to try the fit of the balls before the base is printed"
+PartsOrError: TypeAlias = list[PlacedSolid] | SpecError | InvalidSolidError
+FutureParts: TypeAlias = "Future[PartsOrError]"
 
 
 @dataclass(frozen=True)
-class PrototypeModel:
-    """All of the prototype.
+class PrototypeModel(Arrangement):
+    """All of the prototype; the balance has the masses of its solids.
 
     Attributes:
-        spec: of the design, with a value for every key.
-        layout: balls, their places, the plan of the stops.
-        base: layout of the carrier.
-        split: how the carrier is cut to fit the bed.
-        stage: layout of the object stage.
-        wiring: of lamp and LEDs.
-        frame: layout of what holds stage, base and camera.
         gauge: that shows where the camera's pinhole is; None without a camera.
-        shroud: round the rig, None without.
         printed: all printed parts.
-        balance: of what turns with the base.
-        drive: that turns it.
-        parts: lists of purchased parts.
-        capture_radius: of the capture sphere, mm.
     """
 
-    spec: Spec
-    layout: PrototypeLayout
-    base: BaseLayout
-    split: BaseSplit
-    stage: StageLayout
-    wiring: Wiring
-    frame: FrameLayout
     gauge: CameraGauge | None
-    shroud: ShroudLayout | None
     printed: tuple[PrintedPart, ...]
-    balance: BaseBalance
-    drive: Drive
-    parts: Parts
-    capture_radius: float
 
     @cached_property
     def fasteners(self) -> tuple[Fastener, ...]:
@@ -81,3 +82,167 @@ class PrototypeModel:
         if self.shroud:
             counts[self.shroud.sheet.name] += self.shroud.sheets
         return counts
+
+
+def build_prototype_model(
+    arranged: Iterable[Arrangement],
+    progress: Progress = lambda _: None,
+    submit: Submit = at_once,
+) -> PrototypeModel:
+    """Build the solids of a prototype.
+
+    Where the kernel fails with the preferred arrangement, other pads and numbers of balls are
+    tried: another hub's boss would leave the same faces grazing each other.
+
+    Args:
+        arranged: its arrangements, the preferred first.
+        progress: called with each stage.
+        submit: takes what can be done meanwhile.
+
+    Raises:
+        SpecError: when something does not fit; it says what to change.
+        InvalidSolidError: when the kernel fails.
+    """
+    progress("prototype: balls, their places, stops")
+    errors: dict[tuple[int, float], Exception] = {}
+    for arrangement in arranged:
+        balls, tilt = len(arrangement.layout), arrangement.base.seats.tilt
+        if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
+            continue
+        try:
+            return _model(arrangement, progress, submit)
+        except (SpecError, InvalidSolidError) as error:
+            errors[balls, tilt] = error
+        except KERNEL_ERRORS as error:
+            errors[balls, tilt] = InvalidSolidError(KERNEL_FAILS.format(error))
+        if len(errors) == MAX_MODELS:
+            break
+    raise next(iter(errors.values()))
+
+
+def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> PrototypeModel:
+    spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
+    progress("prototype: base")
+    carrier, coupons, on_stage = _base_and_stage(arrangement, submit)
+    disc = _disc(arrangement)
+    masses = _masses([*carrier, disc], spec.printer.density_g_cm3)
+    balance, drive = balance_and_drive(layout, base, masses, spec, arrangement.parts)
+    progress("prototype: stage and frame")
+    if drive != arrangement.drive:  # the mass of the solids asks for another
+        arrangement = _with_drive(arrangement, drive)
+        disc = _disc(arrangement)
+    frame, gauge = arrangement.frame, _gauge(spec, layout, base, arrangement.frame)
+    half = len(frame.printed) // 2  # the other process is idle: coupons and stage are built
+    rest = submit(parts_or_error, _placed, frame.printed[half:], spec)
+    on_frame = _placed(frame.printed[:half], spec)
+    tools = [gauge.component] if gauge else []
+    on_tools = _placed(tools, spec)
+    progress("prototype: caps and coupon")
+    printed = (
+        *_carrier(base, carrier),
+        PrintedPart(disc, "base", frame.homing.disc.what),
+        *_caps(base, layout, spec.mesh.structure_error_mm),
+        *_components("stage", arrangement.stage.components, parts_of(on_stage)),
+        *_components("frame", frame.printed, [*on_frame, *parts_of(rest)]),
+        *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
+        *_components("tool", tools, on_tools),
+    )
+    built = replace(
+        arrangement, balance=balance, parts=arrangement.parts | arrangement.wiring.parts
+    )
+    return PrototypeModel(**vars(built), gauge=gauge, printed=printed)
+
+
+def _base_and_stage(
+    arrangement: Arrangement, submit: Submit
+) -> tuple[list[PlacedSolid], FutureParts, FutureParts]:
+    """The carrier, and what is built meanwhile: coupons in the carrier's worst pose, and stage."""
+    base, split, printer = arrangement.base, arrangement.split, arrangement.spec.printer
+    mesh_mm = arrangement.spec.mesh.structure_error_mm
+    pose = worst_pose(base, split, expected_downs(base, split))
+    coupons = submit(parts_or_error, coupon_plates, base, printer, pose, mesh_mm)
+    on_stage = submit(
+        parts_or_error, placed_components, arrangement.stage.components, printer, mesh_mm
+    )
+    carrier = carrier_parts(base, split, printer, mesh_mm)
+    printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
+    if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
+        coupons = submit(parts_or_error, coupon_plates, base, printer, printed_pose, mesh_mm)
+    return carrier, coupons, on_stage
+
+
+def _with_drive(arrangement: Arrangement, drive: Drive) -> Arrangement:
+    """The arrangement with another drive, and the frame and shroud that it asks for."""
+    spec, parts, stage = arrangement.spec, arrangement.parts, arrangement.stage
+    keep_out, layout, base = arrangement.keep_out, arrangement.layout, arrangement.base
+    frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
+    shroud = shroud_round(spec, stage, frame, keep_out, parts)
+    return replace(arrangement, drive=drive, frame=frame, shroud=shroud)
+
+
+def _disc(arrangement: Arrangement) -> PlacedSolid:
+    return _placed([arrangement.frame.homing.disc], arrangement.spec)[0]
+
+
+def _placed(components: Sequence[Component], spec: Spec) -> list[PlacedSolid]:
+    return placed_components(components, spec.printer, spec.mesh.structure_error_mm)
+
+
+def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> PartsOrError:
+    """Parts, or why there are none: another arrangement may have them."""
+    try:
+        return build(*arguments)
+    except (SpecError, InvalidSolidError) as error:
+        return error
+    except KERNEL_ERRORS as error:
+        return InvalidSolidError(KERNEL_FAILS.format(error))
+
+
+def parts_of(outcome: FutureParts) -> list[PlacedSolid]:
+    """The parts that were built meanwhile.
+
+    Raises:
+        SpecError: when something does not fit.
+        InvalidSolidError: when the kernel fails.
+    """
+    parts = outcome.result()
+    if isinstance(parts, Exception):
+        raise parts
+    return parts
+
+
+def _gauge(
+    spec: Spec, layout: PrototypeLayout, base: BaseLayout, frame: FrameLayout
+) -> CameraGauge | None:
+    if frame.mount is None:
+        return None
+    camera, diameter = layout.array.camera, spec.prototype.camera_diameter_mm
+    needed = camera_requirements(layout.array, spec.optics.capture_diameter_mm / 2)
+    return camera_gauge(base, camera, diameter, needed, layout.stops.range)
+
+
+def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:
+    mass = [part.mass_g(density) for part in parts]
+    return PointMasses(np.array(mass), np.array([part.properties.centroid for part in parts]))
+
+
+def _carrier(base: BaseLayout, pieces: list[PlacedSolid]) -> Iterator[PrintedPart]:
+    """The carrier's pieces, that with the hub first; a printed bore is too narrow for a shaft."""
+    reamed = f"{CARRIER_PURPOSE}; ream its bore {base.spec.shaft_mm:g} H7"
+    first = reamed if base.hub.boss else CARRIER_PURPOSE
+    for number, piece in enumerate(pieces):
+        yield PrintedPart(piece, "base", CARRIER_PURPOSE if number else first)
+
+
+def _caps(base: BaseLayout, layout: PrototypeLayout, mesh_mm: float) -> Iterator[PrintedPart]:
+    balls = np.flatnonzero(layout.balls.cap).tolist()
+    for ball, part in zip(balls, cap_parts(base, layout, mesh_mm), strict=True):
+        purpose = f"stands in for ball {ball + 1}, which is too large to buy"
+        yield PrintedPart(part, "cap", purpose, ball)
+
+
+def _components(
+    role: Role, components: Sequence[Component], placed: Sequence[PlacedSolid]
+) -> Iterator[PrintedPart]:
+    for component, part in zip(components, placed, strict=True):
+        yield PrintedPart(part, role, component.what)

@@ -23,10 +23,9 @@ from tbcad.optics.cell_moments import cell_moments
 from tbcad.optics.cells import Cells
 from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.pedestals.walls import wall_moments
-from tbcad.shell.casing import casing_faces
 from tbcad.shell.envelope import Envelope, closing_envelope
-from tbcad.shell.front import front_edges
 from tbcad.shell.mesh import shell_mesh
+from tbcad.shell.solid import casing_faces, front_edges
 from tbcad.types import Progress
 
 

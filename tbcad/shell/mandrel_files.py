@@ -1,24 +1,98 @@
 """All files of both negatives, and what design.json says of them."""
 
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from OCP.TopoDS import TopoDS_Face
 
-from tbcad.cad.brep import Maker, Solid
+from tbcad.cad.brep import Maker, Ring, Solid, hole_faces
 from tbcad.cad.mesh import Mesh
 from tbcad.cad.solids import one_solid, reversed_faces
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import FLIP_X
 from tbcad.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.mirrors.record import mandrel_files
+from tbcad.optics.cells import Cells
 from tbcad.records.design import MandrelRecord
+from tbcad.shell.casing_edges import boundary_chain, chain_ends
+from tbcad.shell.envelope import Holes
 from tbcad.shell.files import shell_properties, wall_names, write_half_mesh
-from tbcad.shell.front import front_edges
 from tbcad.shell.mandrel import Mandrel, mandrel_of
-from tbcad.shell.mandrel_mesh import mandrel_mesh
-from tbcad.shell.mandrel_solid import closing_faces
+from tbcad.shell.mesh import FROM_X, FROM_Z, MeshBuilder, front_facets
+from tbcad.shell.solid import FrontEdges, front_edges, reversed_ring
+from tbcad.spec.design import Spec
+from tbcad.types import Floats, Ints
 
+X, Y, Z = np.eye(3)
 DRAFT_DIGITS = 6
+
+
+def mandrel_mesh(spec: Spec, cells: Cells, mandrel: Mandrel, distance: Floats) -> Mesh:
+    """Mesh of the negative of camera a's half; its mirrors' facets are those of `shell_mesh`.
+
+    Args:
+        spec: design with the mesh tolerances.
+        cells: camera a's cells of the modelled surfaces.
+        mandrel: what closes them.
+        distance: from each mirror to the object, mm, (m,).
+    """
+    builder, outlines = front_facets(spec, cells, distance)
+    builder.triangles = [triangles[:, ::-1] for triangles in builder.triangles]
+    seam, foot = (
+        outlines.along(boundary_chain(cells, plane)) for plane in (cells.seam, cells.foot)
+    )
+    # Low y to high y: over the top from +x that turns right, round the front from +z left.
+    _meshed_plane(builder, seam[::-1], mandrel.seam_holes, np.stack([Y, Z]), FROM_X)
+    _meshed_plane(builder, foot, mandrel.foot_holes, np.stack([X, Y]), FROM_Z)
+    return builder.mesh()
+
+
+def _meshed_plane(
+    builder: MeshBuilder, ring: Ints, holes: Holes, axes: Floats, view: list[int]
+) -> None:
+    near, far = builder.holes(holes, axes)
+    builder.plane(view, ring, near, away=True)
+    for rim in far:
+        builder.plane(view, rim[::-1], [], away=True)
+
+
+def closing_faces(front: FrontEdges, mandrel: Mandrel) -> list[tuple[str, TopoDS_Face]]:
+    """Names and faces of everything but the mirrors and the walls of their pedestals."""
+    maker, cells = front.maker, front.cells
+    low, high = chain_ends(cells, boundary_chain(cells, cells.seam))
+    ends = cells.corners[low], cells.corners[high], front.vertices[low], front.vertices[high]
+    back = (maker.line(*ends), False)
+    seam = [*front.chain(cells.seam), back]
+    foot = reversed_ring([*front.chain(cells.foot), back])
+    base = mandrel.foot * Z
+    return [
+        *_plane_with_holes(front, "seam", 0 * X, seam, mandrel.seam_holes, (Y, Z)),
+        *_plane_with_holes(front, "foot", base, foot, mandrel.foot_holes, (X, Y)),
+    ]
+
+
+def _plane_with_holes(
+    front: FrontEdges,
+    name: str,
+    point: Floats,
+    ring: Ring,
+    holes: Holes,
+    axes: tuple[Floats, Floats],
+) -> list[tuple[str, TopoDS_Face]]:
+    """A joining plane, which looks against the holes' direction, their walls and bottoms."""
+    maker, outward = front.maker, -np.cross(*axes)
+    near, far, walls = hole_faces(maker, *holes.sizes, *axes)
+    bottoms = [
+        maker.face(maker.plane(centre + holes.direction, outward), [rim], natural=True)
+        for centre, rim in zip(holes.centre, far, strict=True)
+    ]
+    plane = maker.face(maker.plane(point, outward), [ring, *near], natural=True)
+    inner = (
+        ((f"{name}_hole_{k:02d}", wall), (f"{name}_bottom_{k:02d}", bottom))
+        for k, (wall, bottom) in enumerate(zip(walls, bottoms, strict=True), start=1)
+    )
+    return [(name, plane), *chain.from_iterable(inner)]
 
 
 def design_mandrel(design: MirrorDesign) -> Mandrel:

@@ -9,22 +9,38 @@ from tbcad.geometry.rotations import even_angles, unit_circle
 from tbcad.geometry.vectors import dot
 from tbcad.optics.cells import Cells
 from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.shell.boundary import boundary_chain
-from tbcad.shell.casing_edges import ARC_ENDS, casing_lines, outline
-from tbcad.shell.cell_outlines import CellOutlines
+from tbcad.shell.casing_edges import ARC_ENDS, boundary_chain, casing_lines, outline
+from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
 from tbcad.shell.envelope import Envelope, Holes
 from tbcad.shell.facets import Facets, mirror_facets
-from tbcad.shell.walls import wall_facets
 from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
 MIN_HOLE_SEGMENTS = 24
 # Rounding noise of 1e-15 mm on the joining faces is no geometry: they are flat to the last bit.
 ROUNDED_DIGITS = 12
-
 X, Y, Z = np.eye(3)
 # Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
 FROM_X, FROM_Z = [1, 2], [0, 1]
+
+
+def wall_facets(cells: PedestalCells, outlines: CellOutlines) -> Ints:
+    """Triangles (t, 3) over the outlines' vertices, counter-clockwise seen from the light.
+
+    Below the first half of its arc a wall fans out from the near end of the groove's bottom, below
+    the second half from the far end.
+    """
+    arc, bottom = cells.wall_rings[:, 0] // 2, cells.wall_rings[:, 2]
+    forward = bottom % 2 == 0
+    ends = outlines.start[bottom // 2], outlines.end[bottom // 2]
+    near, far = np.where(forward, ends, ends[::-1])
+    half = outlines.segments[arc] // 2
+    wall, k = rows_and_columns(outlines.segments[arc])
+    tip = np.where(k < half[wall], near[wall], far[wall])
+    here, after = (outlines.at(arc[wall], step) for step in (k, k + 1))
+    middle = outlines.at(arc, half)
+    fans = np.column_stack([here, after, tip])
+    return np.concatenate([fans, np.column_stack([middle, far, near])])
 
 
 def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:

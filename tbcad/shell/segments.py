@@ -1,20 +1,104 @@
-"""Into how many segments each arc is cut, by what its facets do to rays."""
+"""Into how many segments each arc is cut, by what its facets do to rays, and its strips."""
 
 import numpy as np
 
+from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import mirror_margins
 from tbcad.optics.cells import Cells
 from tbcad.optics.reflection import miss_distances
 from tbcad.optics.windows import limiting_sides, minima_by_mirror
-from tbcad.shell.cell_outlines import rows_and_columns
+from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
 from tbcad.spec.design import Spec
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Floats, Ints
 
+# A corner's inner point is at most this many strip widths away, where arcs meet at a sharp angle.
+MAX_MITRE = 4.0
+# Share of the distance from outline to middle that the strip takes at most.
+MAX_STRIP_SHARE = 0.1
+# A segment's inner side is at least this share of it: mitres may be longer than a short segment.
+MIN_INNER_SHARE = 0.5
 MIN_SEGMENTS = 3
 # Rays off the ends of a segment may cost its mirror this many ray errors of coverage's radius.
 END_RAY_ERRORS = 2.0
 # Start, middle and end of a segment.
 PLACES = np.array([[0.0], [0.5], [1.0]])
+
+
+def strip_widths(ray_error: float, radius: Floats, distance: Floats, points: Floats) -> Floats:
+    """Width of the strip in each cell by the ray error, mm, (m,).
+
+    The normal errs by (w / 2) / r, the reflected ray by twice that, over the distance. A strip
+    narrower than sqrt(2 r q) gains nothing: the tilt q / w that a rounding error q gives its facets
+    when points (m, 3) are written as 32-bit floats is then more than w / (2 r), the tilt of an
+    exact strip.
+    """
+    largest = np.abs(points).max(axis=1).astype(np.float32)
+    rounding = np.spacing(largest).astype(np.float64) / 2
+    return np.asarray(np.maximum(ray_error * radius / distance, np.sqrt(2 * radius * rounding)))
+
+
+def strip_points(
+    outlines: CellOutlines, middle: Floats, outside: Floats, cell_width: Floats
+) -> Floats:
+    """Points (b, 3), one for each place of the outlines, on the strips' inner sides.
+
+    They are square to the outline, but for places about segments so short that the strip would
+    fold there: these have points toward the cell's middle, which never fold. Such points skew
+    the facets on their outline, which costs rays their aim on long segments and not on short ones.
+
+    Args:
+        outlines: of m cells, b places.
+        middle: middle of each cell, mm, (m, 3).
+        outside: unit normals at the places, away from the light, (b, 3).
+        cell_width: of the strip in each cell, mm, (m,).
+    """
+    cell, edge = outlines.cell, outlines.points
+    to_middle = middle[cell] - edge
+    nearest, farthest = _extremes(norm(to_middle), cell)
+    width = np.minimum(cell_width, MAX_STRIP_SHARE * nearest)
+    strip = edge + width[cell, None] * _inward(outlines, outside)
+    straight = edge + (width / farthest)[cell, None] * to_middle
+    leaning = np.zeros(len(edge), dtype=bool)
+    while np.any(added := ~leaning & _cramped(outlines, strip, middle, outside)):
+        leaning |= added
+        strip = np.where(leaning[:, None], straight, strip)
+    return strip
+
+
+def _extremes(values: Floats, cell: Ints) -> tuple[Floats, Floats]:
+    """Smallest and largest of the values (b,) in each cell, two of (m,)."""
+    first = np.unique(cell, return_index=True)[1]
+    return np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+
+
+def _inward(outlines: CellOutlines, outside: Floats) -> Floats:
+    """Vectors (b, 3) from the outlines to their strips' inner sides, for a width of one.
+
+    Square to the segment before, so that its facet on the outline has a right angle there; where
+    arcs meet, mitred. An arc has one such point less than segments: its last one, where rays
+    are farthest from the object's centre, makes do with a skew.
+    """
+    edge = outlines.points
+    across = unit(np.cross(outside, edge[outlines.following] - edge))
+    before = np.empty_like(across)
+    before[outlines.following] = across
+    mitre = (across + before) / (1 + dot(across, before))[:, None]
+    length = norm(mitre)
+    mitre *= (np.minimum(length, MAX_MITRE) / length)[:, None]
+    return np.where(outlines.corner[:, None], mitre, before)
+
+
+def _cramped(outlines: CellOutlines, strip: Floats, middle: Floats, outside: Floats) -> Bools:
+    """Places (b,) at the ends of segments where the strip folds or its inner side is too short."""
+    edge, following = outlines.points, outlines.following
+    a, b, c, d = edge, edge[following], strip[following], strip
+    triangles = ((a, b, c), (a, c, d), (a, b, d), (b, c, d), (d, c, middle[outlines.cell]))
+    folds = [dot(np.cross(q - p, r - p), outside) <= 0 for p, q, r in triangles]
+    short = dot(c - d, b - a) < MIN_INNER_SHARE * dot(b - a, b - a)
+    at_start = np.any([*folds, short], axis=0)
+    at_end = np.zeros_like(at_start)
+    at_end[following] = at_start
+    return np.asarray(at_start | at_end)
 
 
 def segment_counts(spec: Spec, cells: Cells, distance: Floats) -> Ints:

@@ -12,7 +12,7 @@ from tbcad.camera.lens import (
     focal_length,
     lens_for,
 )
-from tbcad.camera.virtual_images import FANS, PLACES, VirtualImages, virtual_images
+from tbcad.camera.requirements import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.errors import InputError
 from tbcad.results.plots import Panel, Series
 from tbcad.results.study import Figure, Study

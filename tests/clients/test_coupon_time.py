@@ -15,8 +15,8 @@ import tbcad
 from tbcad.mirrors.array import design
 from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.base.coupon import coupon_plates
-from tbcad.prototype.base.coupon_pose import expected_downs, worst_pose
-from tbcad.prototype.printing.parts import PrintedPart, part_mesh
+from tbcad.prototype.base.coupon_seat import expected_downs, worst_pose
+from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 

@@ -8,8 +8,7 @@ import trimesh
 
 from tbcad.cad.projection import Segment
 from tbcad.drafting.views import FRONT
-from tbcad.drawings.assembly_sheet import EYES, AssemblyJob, draw_assembly
-from tbcad.drawings.line_picture import line_picture
+from tbcad.drawings.assembly_sheet import EYES, AssemblyJob, draw_assembly, line_picture
 from tbcad.formats.entities import Circle, Text
 
 BOX, POST = (40.0, 20.0, 10.0), (5.0, 5.0, 30.0)

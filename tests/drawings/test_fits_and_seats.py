@@ -9,12 +9,19 @@ import pytest
 from tbcad.cad.brep import Solid
 from tbcad.cad.features import Cylinder, distance
 from tbcad.cad.solids import cut, cylinder, faces, one_solid, polygon, prism
-from tbcad.drawings.columns import Table, in_columns
 from tbcad.drawings.export import Export
-from tbcad.drawings.fits import Mate, fits_table, purchased_mate, reamed_to
+from tbcad.drawings.fits import (
+    Mate,
+    Seat,
+    Table,
+    fits_table,
+    in_columns,
+    purchased_mate,
+    reamed_to,
+    seats_table,
+)
 from tbcad.drawings.holes import Hole, numbered_holes, table_rows
 from tbcad.drawings.printed_parts import draw_part, part_job
-from tbcad.drawings.seats import Seat, seats_table
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.formats.step import write_step
 from tbcad.output.manifest import read_manifest, write_manifest

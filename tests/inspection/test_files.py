@@ -10,8 +10,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 
 from tbcad.api import inspect
 from tbcad.cli import run
-from tbcad.formats.step import StepError
-from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step import StepError, read_named_solid
 from tbcad.formats.step_tolerances import read_tolerances
 from tbcad.inspection.read_back import check_read_back
 from tbcad.mirrors.array import MirrorDesign, design

@@ -11,8 +11,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.TopoDS import TopoDS_Face
 
 from tbcad.api import inspect
-from tbcad.formats.step import StepError
-from tbcad.formats.step_named import read_named_solid
+from tbcad.formats.step import StepError, read_named_solid
 from tbcad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
 from tbcad.inspection.files import Half, dowel_face, halves, tolerances
 from tbcad.inspection.inspect import found_limits, minimum_at_limits

@@ -10,7 +10,7 @@ from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.output.overview import Overview, overview
 from tbcad.output.parts import SHELL
 from tbcad.prototype.arrangement import arrangements
-from tbcad.prototype.model_solids import build_prototype_model
+from tbcad.prototype.model import build_prototype_model
 from tbcad.shell.files import camera_a_mesh
 from tbcad.spec.load import load_spec
 

@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from tbcad.mirrors.seam import seam_gaps
-from tbcad.report import close_ups, seam_fields
+from tbcad.report import close_ups
+from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
 from tbcad.report.section import section_of
 from tbcad.simulate.scene.exported import ExportedDesign
 from tests.mirror_arrays import mirror_design
@@ -72,14 +73,14 @@ def test_halves_aimed_at_the_origin_leave_a_gap_and_built_ones_none(
     edges: str, request: pytest.FixtureRequest
 ) -> None:
     export = request.getfixturevalue(edges)
-    reflector, mirror = export.reflectors[0], seam_fields.seam_mirror(export)
+    reflector, mirror = export.reflectors[0], seam_mirror(export)
     assert reflector.mirrors.apex[mirror, 0] == pytest.approx(0, abs=1e-9)
     along = np.linspace(-RADIUS, RADIUS, 2001)
-    before = seam_fields.cells_aimed_at_origin(reflector)
+    before = cells_aimed_at_origin(reflector)
     gap = seam_gaps(before, reflector.camera.pinhole, RADIUS)
     assert gap[mirror] == gap.max() > 1
     for cells, expected in ((before, gap[mirror]), (reflector.cells, 0.0)):
-        edge = seam_fields.edge_of_field(cells, reflector, mirror, along)
+        edge = edge_of_field(cells, reflector, mirror, along)
         assert max(0, 2 * edge.max()) == pytest.approx(expected, abs=1e-2)
 
 

@@ -9,9 +9,8 @@ from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 
 from tbcad.cad.measures import properties
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.shell.draft import best_pull, draft_of
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
-from tbcad.shell.mandrel import Mandrel, distances
+from tbcad.shell.mandrel import Mandrel, best_pull, distances, draft_of
 from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, design_mandrel, mandrel_solid
 from tbcad.shell.mesh import front_facets
 from tbcad.spec.errors import SpecError

@@ -14,7 +14,7 @@ import numpy as np
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.assembly_steps.machine import Machine
-from tbcad.prototype.fasteners.bodies import core_radius
+from tbcad.prototype.fasteners import core_radius
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.records.prototype import FastenerRecord
 

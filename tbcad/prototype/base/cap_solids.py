@@ -16,7 +16,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import Point, arc_about_axis, lines, section_face
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.prototype.purchased.parts import Parts
 

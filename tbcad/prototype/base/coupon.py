@@ -17,8 +17,7 @@ from tbcad.cad.glyphs import ROWS, relief, text_width
 from tbcad.cad.measures import properties
 from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
 from tbcad.geometry.primitives import rectangle
-from tbcad.prototype.base.coupon_pose import SeatPose
-from tbcad.prototype.base.coupon_seat import height, outline, seat_body, with_pads
+from tbcad.prototype.base.coupon_seat import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import usable_size

@@ -17,9 +17,14 @@ from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.screws import M3_MM, MIN_ENGAGEMENT_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.fasteners.fastener import Fastener
-from tbcad.prototype.purchased.choice import choose_screw
-from tbcad.prototype.purchased.parts import SAME_SIZE_MM, Parts, PurchasedPart, of_kind
+from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.purchased.parts import (
+    SAME_SIZE_MM,
+    Parts,
+    PurchasedPart,
+    choose_screw,
+    of_kind,
+)
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats

@@ -6,9 +6,15 @@ import numpy as np
 
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_solids import cap_pocket, cap_spigot
-from tbcad.prototype.base.holding import WIDER_GAP_MM, Motion, force_needed, glue_force
+from tbcad.prototype.base.holding import (
+    WIDER_GAP_MM,
+    Motion,
+    force_needed,
+    glue_force,
+    pull_of_pair,
+    pull_on_ball,
+)
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.magnetics import pull_of_pair, pull_on_ball
 from tbcad.prototype.drive.balance import ball_masses
 from tbcad.types import Bools, Floats
 

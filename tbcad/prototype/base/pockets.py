@@ -4,16 +4,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.holding import MIN_RATIO, Motion, force_needed, glue_force
-from tbcad.prototype.base.magnetics import pull_on_ball
-from tbcad.prototype.base.pads import PAD_AZIMUTHS, pad_normals
+from tbcad.prototype.base.holding import MIN_RATIO, Motion, force_needed, glue_force, pull_on_ball
 from tbcad.prototype.drive.balance import ball_masses
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Bools, Floats
 
+PAD_AZIMUTHS = np.radians(np.arange(0, 120, 5))  # tried for the first pad
 WEB_MM = 0.8  # between pocket and pads
+
+
+def pad_normals(tilt: float, azimuth: Floats) -> Floats:
+    """Unit normals toward the ball's centre of the pads of k seats, (k, 3, 3).
+
+    Args:
+        tilt: angle to the seat's axis, which is z and away from the ball's pads, radians.
+        azimuth: of each seat's first pad about the axis, radians, (k,).
+    """
+    around = azimuth[:, None] + np.arange(3) * 2 * np.pi / 3
+    along = np.full((*around.shape, 1), np.cos(tilt))
+    return -np.concatenate([np.sin(tilt) * unit_circle(around), along], axis=-1)
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ from OCP.BRepBuilderAPI import (
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.bores import hole_faces
-from tbcad.cad.brep import Maker, Ring
-from tbcad.cad.primitive_meshes import growth, primitive_mesh
+from tbcad.cad.brep import Maker, Ring, hole_faces
+from tbcad.cad.meshing import growth, primitive_mesh
 from tbcad.cad.solids import cylinder, faces, moved, on_sphere, revolved, wires
 from tbcad.geometry.primitives import Cylinder, Revolved
 from tbcad.geometry.vectors import perpendicular_axes

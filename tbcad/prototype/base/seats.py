@@ -12,13 +12,14 @@ from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import dot, norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
-from tbcad.prototype.base.pads import PAD_AZIMUTHS, pad_normals
 from tbcad.prototype.base.pockets import (
+    PAD_AZIMUTHS,
     WEB_MM,
     Pockets,
     first_ball,
     glue_wells,
     magnet_pockets,
+    pad_normals,
     worst_force_needed,
 )
 from tbcad.spec.errors import SpecError

@@ -1,6 +1,8 @@
 """The carrier as a solid: wall, ribs, rings, hub and bosses in one fuse, all holes in one cut.
 
-Built about z with azimuth zero along x, then moved into the frame of the shell.
+Built about z with azimuth zero along x, then moved into the frame of the shell. The wall has plane
+facets round cones about the axis: a plane meets bosses, cups and paths in circles and ellipses;
+where a cone meets them the kernel fits splines, which took half of the time of the carrier.
 """
 
 import numpy as np
@@ -12,12 +14,20 @@ from tbcad.cad.checks import COARSE_MM, checked
 from tbcad.cad.glyphs import fitting_height, relief
 from tbcad.cad.measures import SolidProperties
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import as_manifold, volume_by_meshes
-from tbcad.cad.primitive_meshes import moved_mesh
-from tbcad.cad.solids import cut, fused, polygon, polyhedron, prism, revolved_polygon
-from tbcad.prototype.base import hub_solids, seat_solids
+from tbcad.cad.meshing import as_manifold, moved_mesh, volume_by_meshes
+from tbcad.cad.solids import cut, cylinder, fused, polygon, polyhedron, prism, revolved_polygon
+from tbcad.geometry.rotations import unit_circle
+from tbcad.prototype.base import seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
-from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.base.hub import (
+    KEY_DEPTH_MM,
+    KEY_HOLE_MM,
+    SCREW_MM,
+    SET_SCREW_AZIMUTHS,
+    SLIT_MM,
+    Hub,
+)
+from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.base.split import UNCUT, BaseSplit, downward_directions
@@ -27,11 +37,13 @@ from tbcad.prototype.base.split_solids import (
     label_windows,
     number_solids,
 )
-from tbcad.prototype.base.wall import wall_facets
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.spec.printer import PrinterSpec
+from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
+UP = np.array([0.0, 0.0, 1.0])
+THROUGH_MM = 1.0  # tools stick out this far, so that no faces coincide
 SUNK_MM = 0.4  # of numbers into their face
 # Distances (mm) within which points are the same to the kernel, tried in turn; at 1e-6 meshes have
 # gaps of some nanometres more often than not.
@@ -40,6 +52,95 @@ COLUMN_MM = 80.0  # length of the space that is kept free behind a boss
 RIB_ROOT = 0.6  # of the hub's radius, to where ribs go in it
 LABEL_ROOM = 0.85  # of a boss's end
 RIB_MIDDLE = -0.5  # of a rib beside its azimuth, in its thicknesses
+
+
+def hub_bodies(hub: Hub) -> list[TopoDS_Shape]:
+    """Disc and boss."""
+    disc = cylinder(hub.back * UP, UP, hub.disc, hub.front - hub.back)
+    if not hub.boss:
+        return [disc]
+    return [disc, cylinder(hub.face * UP, UP, hub.boss, hub.back - hub.face + THROUGH_MM)]
+
+
+def hub_holes(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
+    """Bore, the drive's holes, the key's, and those of the lock."""
+    start, through = hub.face - THROUGH_MM, hub.front - hub.face + 2 * THROUGH_MM
+    blind = hub.depth < hub.front - hub.face
+    holes = [cylinder(start * UP, UP, hub.bore, through)]
+    key = np.array([*hub.key, start])
+    holes.append(cylinder(key, UP, KEY_HOLE_MM / 2, KEY_DEPTH_MM + THROUGH_MM))
+    for place in hub.holes:
+        length = hub.depth + THROUGH_MM if blind else through
+        holes.append(cylinder(np.array([*place, start]), UP, hub.hole / 2, length))
+        if hub.head[0]:
+            top = np.array([*place, hub.front + THROUGH_MM])
+            holes.append(cylinder(top, -UP, hub.head[0] / 2, hub.head[1] + THROUGH_MM))
+    locks = {"set-screws": _set_screw_holes, "clamp": _clamp_cuts}
+    return holes + (locks[hub.lock](hub, spec) if hub.lock else [])
+
+
+def _set_screw_holes(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
+    return [
+        hole
+        for azimuth in SET_SCREW_AZIMUTHS.tolist()
+        for hole in _screw_with_insert(hub.lock_z * UP, meridian(azimuth)[0], hub.boss, spec)
+    ]
+
+
+def _screw_with_insert(
+    start: Floats, out: Floats, length: float, spec: BaseSpec
+) -> list[TopoDS_Shape]:
+    """A screw's hole from a point outward, and the insert's hole at its end."""
+    end = start + (length + THROUGH_MM) * out
+    return [
+        cylinder(start, out, SCREW_MM / 2, length + THROUGH_MM),
+        cylinder(end, -out, spec.insert_hole_mm / 2, spec.insert_depth_mm + THROUGH_MM),
+    ]
+
+
+def _clamp_cuts(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
+    """A slit away from the ribs, and a screw across it."""
+    far, bottom, top = -hub.boss - THROUGH_MM, hub.face - THROUGH_MM, hub.back - SLIT_MM
+    slit = _block(far, SLIT_MM / 2, bottom, top)
+    # Above the slit a cut half round the bore, or the disc would hold the jaws apart.
+    relief = _block(far, hub.boss + THROUGH_MM, top - SLIT_MM, top)
+    across = np.array([0.0, 1.0, 0.0])
+    middle = np.array([-(hub.bore + hub.boss) / 2, 0.0, hub.lock_z])
+    half = float(np.sqrt(hub.boss**2 - middle[0] ** 2))
+    head_side = cylinder(middle, -across, SCREW_MM / 2, half + THROUGH_MM)
+    return [slit, relief, head_side, *_screw_with_insert(middle, across, half, spec)]
+
+
+def _block(far: float, half: float, low: float, high: float) -> TopoDS_Shape:
+    """A block from the axis to x = far, to half a width on both sides, between two z."""
+    corners = [[0, half, low], [far, half, low], [far, -half, low], [0, -half, low]]
+    return prism(polygon(np.array(corners)), (high - low) * UP)
+
+
+def wall_facets(base: BaseLayout) -> list[Floats]:
+    """All facets (n, 3) of the wall about z, azimuth zero along x, between its sector's azimuths.
+
+    Their middles are on the cones of the meridian section, their edges outside by FACETS_OUT_MM at
+    most.
+    """
+    low, high = base.sector
+    z, r = wall_section(base).T
+    count = facet_count(float(r.max()), high - low)
+    out = unit_circle(np.linspace(low, high, count + 1)) / np.cos((high - low) / (2 * count))
+    corners = np.stack(np.broadcast_arrays(*(r * out[:, :1], r * out[:, 1:], z)), axis=-1)
+    after = np.roll(corners, -1, axis=1)
+    facets = np.stack([corners[:-1], corners[1:], after[1:], after[:-1]], axis=2)
+    return [*facets.reshape(-1, 4, 3), corners[0], corners[-1]]
+
+
+def wall_section(base: BaseLayout) -> Floats:
+    """The meridian section of the cones (z, r), mm, (n, 2)."""
+    return np.vstack([base.inner, base.outer[::-1]])
+
+
+def facet_count(radius: float, angle: float) -> int:
+    """How many facets about a circle (mm) over an angle (radians) leave it by FACETS_OUT_MM."""
+    return int(np.ceil(angle / (2 * np.arccos(radius / (radius + FACETS_OUT_MM)))))
 
 
 def carrier_parts(
@@ -99,7 +200,7 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
     return [
         polyhedron(wall_facets(base)),
         *_struts(base, split),
-        *hub_solids.hub_bodies(base.hub),
+        *hub_bodies(base.hub),
         *bosses,
         *labels,
     ]
@@ -109,7 +210,7 @@ def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """What is cut out of that union: first the hollows of all seats, then paths and holes."""
     cups = [seat_solids.seat_hollow(seats, k, seats.pad_offset) for k in range(len(seats))]
     paths = [seat_solids.insertion_path(seats, k) for k in range(len(seats))]
-    holes = hub_solids.hub_holes(base.hub, base.spec)
+    holes = hub_holes(base.hub, base.spec)
     return [*_at_seats(seats, cups), *_at_seats(seats, paths), *holes]
 
 

@@ -17,6 +17,7 @@ from tbcad.drafting.sheet import (
     A3,
     A4,
     BESIDE_MM,
+    TEXT_MM,
     Sheet,
     TitleBlock,
     choose_scale,
@@ -26,8 +27,8 @@ from tbcad.drafting.sheet import (
     placed,
     rectangle,
     sheet_frame,
+    table,
 )
-from tbcad.drafting.tables import TEXT_MM, table
 from tbcad.formats.csv_table import Row
 from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM

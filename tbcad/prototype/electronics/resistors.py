@@ -12,7 +12,6 @@ E24 = (
     *(33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91),
 )
 DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
-LARGEST_OHM = 1e6
 ROUNDING = 1e-9
 
 

@@ -17,8 +17,7 @@ from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.electronics.outputs import LAMP, Light, lights
 from tbcad.prototype.electronics.resistors import SeriesResistor, series_resistor
 from tbcad.prototype.light.lamp import LampLayout
-from tbcad.prototype.purchased.choice import choose_part
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage import arms, crown
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError

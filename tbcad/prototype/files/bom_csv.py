@@ -1,5 +1,6 @@
 """bom.csv: everything to buy and to print."""
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,9 +12,10 @@ from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.purchased.prices import Price, Prices
-from tbcad.prototype.purchased.standards import standard_in
 from tbcad.spec.errors import SpecError, short_text
 
+# A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
+STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
 NAME = "bom.csv"
 PRICE_COLUMNS = ("unit_price", "total_price", "currency", "price_date", "price_source")
 COLUMNS = (
@@ -31,6 +33,12 @@ ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 
 LIGHT_G = 0.1
 KINDS = BOUGHT, PRINTED = "bought", "printed"
 MM3_PER_CM3 = 1000.0
+
+
+def standard_in(what: str) -> str:
+    """The first standard that a description names; empty without any."""
+    found = STANDARD.search(what)
+    return found[0] if found else ""
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,15 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.cap_limits import FINISH, MATERIAL, MIN_REFLECTANCE, POLARITY, cap_limits
 from tbcad.prototype.base.fasteners import seat_magnets
 from tbcad.prototype.base.held import held_balls
-from tbcad.prototype.base.holding import GLUE_MPA, MIN_RATIO, WIDER_GAP_MM, base_motion
+from tbcad.prototype.base.holding import (
+    DERATING,
+    GLUE_MPA,
+    MIN_RATIO,
+    REMANENCE_T,
+    WIDER_GAP_MM,
+    base_motion,
+)
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.magnetics import DERATING, REMANENCE_T
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.loads import (
@@ -25,13 +31,13 @@ from tbcad.prototype.drive.loads import (
 from tbcad.prototype.drive.power_off import power_off
 from tbcad.prototype.drive.travel import stop_sequence
 from tbcad.prototype.electronics.outputs import phases
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom_csv import totals
 from tbcad.prototype.frame.camera_gauge import marks_seen
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
 from tbcad.prototype.model import PrototypeModel
-from tbcad.prototype.printing.parts import PrintedPart
+from tbcad.prototype.printing.placing import PrintedPart
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.prototype.stage.calibration import calibration_estimate
 from tbcad.prototype.stage.layout import led_poses

@@ -28,10 +28,9 @@ from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, klipper, plan_csv, settings
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.light.shroud import pattern
-from tbcad.prototype.model import PrototypeModel
-from tbcad.prototype.model_solids import build_prototype_model
+from tbcad.prototype.model import PrototypeModel, build_prototype_model
 from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
-from tbcad.prototype.printing.parts import PrintedPart, part_mesh
+from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.spec.design import Spec

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, Prism, cylinder_between
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.types import Floats
 
 # Diameters of clearance holes by ISO 273, medium, by thread (1/4 inch: 6.35).

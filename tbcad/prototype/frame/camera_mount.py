@@ -25,7 +25,7 @@ from tbcad.geometry.primitives import (
 )
 from tbcad.geometry.vectors import unit
 from tbcad.optics.camera import Camera
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,
@@ -34,8 +34,7 @@ from tbcad.prototype.frame.brackets import (
     level_prism,
     webs,
 )
-from tbcad.prototype.purchased.choice import choose_screw
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats
@@ -43,7 +42,7 @@ from tbcad.types import Floats
 M5_MM, M5_HOLE_MM = 5.0, CLEARANCE_HOLE_MM[5.0]
 TRIPOD_HOLE_MM = CLEARANCE_HOLE_MM[6.35]
 CAMERA_SCREW, NUT, WASHER, INSERT = "UNC1/4-20x12.7", "NUT-M5", "WASHER-5", "INSERT-M5"
-NUT_MM, WASHER_MM, WASHER_OUTER_MM = 4.7, 1.0, 10.0
+NUT_MM, WASHER_MM = 4.7, 1.0
 
 # Travel to either side. Printed brackets are off by 0.5 mm and a degree; the rest is for cameras.
 ALONG_PLATE_MM, ACROSS_MM, OUT_MM = 5.0, 5.0, 3.0

@@ -10,7 +10,7 @@ from tbcad.geometry.primitives import (
     cylinder_between,
     rectangle,
 )
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
@@ -22,9 +22,8 @@ from tbcad.prototype.frame.brackets import (
     level_prism,
     webs,
 )
-from tbcad.prototype.frame.fasteners import on_uprights
-from tbcad.prototype.purchased.choice import choose_screw
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.frame.purchased import on_uprights
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats

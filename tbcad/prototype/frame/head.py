@@ -12,7 +12,7 @@ from tbcad.geometry.primitives import Component, Primitive, box, cylinder_betwee
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     HALF_FLANGE_MM,
@@ -22,7 +22,6 @@ from tbcad.prototype.frame.brackets import (
     level_prism,
     webs,
 )
-from tbcad.prototype.frame.fasteners import motor_fasteners, motor_screw_places, on_uprights
 from tbcad.prototype.frame.purchased import (
     COUPLING_MM,
     PLATE_MM,
@@ -31,6 +30,9 @@ from tbcad.prototype.frame.purchased import (
     ShaftParts,
     axial_cylinder,
     hub_point,
+    motor_fasteners,
+    motor_screw_places,
+    on_uprights,
     purchased_components,
     wheel_radius,
 )
@@ -44,8 +46,7 @@ from tbcad.prototype.homing.sizes import (
     bracket_screws,
     tab_radius,
 )
-from tbcad.prototype.purchased.choice import choose_part
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats

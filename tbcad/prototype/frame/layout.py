@@ -14,7 +14,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import home_angles
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
@@ -24,15 +24,14 @@ from tbcad.prototype.frame.brackets import (
     frame_axes,
 )
 from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
-from tbcad.prototype.frame.fasteners import plate_fasteners
 from tbcad.prototype.frame.feet import stage_foot, upright_foot
 from tbcad.prototype.frame.head import BearingHead, bearing_head
+from tbcad.prototype.frame.purchased import plate_fasteners
 from tbcad.prototype.homing.layout import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.lamps import lamp_layout
-from tbcad.prototype.purchased.choice import choose_part
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec
@@ -116,19 +115,20 @@ def frame_layout(
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
-    mount = _camera_mount(spec, prototype, axes, parts)
+    camera = _camera(spec, prototype)
+    mount = camera_mount(spec, axes, prototype.array.camera, parts) if camera else None
     brackets = _brackets(spec, axes, stage, head, mount, parts)
     beside = (
         *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
         *((mount.plate, mount.fence) if mount else ()),
-        *(*head.purchased, homing.switch, *_camera(spec, prototype)),
+        *(*head.purchased, homing.switch, *camera),
     )
     lamps = lamp_layout(spec, head.face, prototype.array.camera, keep_out, parts, beside)
     brackets += lamps.stands if lamps else ()
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
     plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
     purchased = (
-        *(plate_body, *bars, *head.purchased, homing.switch, *_camera(spec, prototype)),
+        *(plate_body, *bars, *head.purchased, homing.switch, *camera),
         *(lamps.bodies if lamps else ()),
     )
     printed = (
@@ -166,14 +166,6 @@ def frame_purchased_parts(frame: FrameLayout) -> dict[str, int]:
         counts[frame.lamps.strip.name] = math.ceil(frame.lamps.metres)
     counts.update([frame.homing.pin, str(frame.homing.switch.part)])
     return dict(sorted(counts.items()))
-
-
-def _camera_mount(
-    spec: PrototypeSpec, prototype: PrototypeLayout, axes: Floats, parts: Parts
-) -> CameraMount | None:
-    if spec.camera_diameter_mm == 0:
-        return None
-    return camera_mount(spec, axes, prototype.array.camera, parts)
 
 
 def _fasteners(

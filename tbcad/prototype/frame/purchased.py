@@ -1,16 +1,20 @@
 """Purchased parts in the head of the frame, in their places: bearings, shaft, wheels, motor."""
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Cylinder, box, cylinder_between
+from tbcad.geometry.rotations import bolt_circle
 from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
-from tbcad.prototype.frame.brackets import OVERLAP_MM, THROUGH_MM
-from tbcad.prototype.purchased.parts import PurchasedPart
+from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.frame.brackets import OVERLAP_MM, THROUGH_MM, Bracket
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
+from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 PLATE_MM = 9.0  # so that M3x12 screws go 3 mm into a motor
@@ -21,6 +25,9 @@ PULLEY_RIM_MM = 1.5
 SHAFT_END_MM = 2.0  # of the collar's bore beyond the shaft
 # A stage of the 60 mm class; assumed: its height, its top's, and the gap below the top.
 STAGE_HEIGHT_MM, STAGE_TOP_MM, STAGE_GAP_MM = 40.0, 12.0, 0.5
+ENGAGEMENT_MM = 4.0  # smallest length of a screw beyond what it holds
+MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
+TNUT, WASHER = "TNUT-M5-6", "WASHER-5"
 
 
 @dataclass(frozen=True)
@@ -178,3 +185,61 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
         axial_cylinder(base, plate.back, tip, motor["shaft_mm"] / 2, out),
     )
     return Component("motor", motor.what, added, part=motor.name)
+
+
+def on_uprights(
+    name: str, places: Sequence[Floats], along: Floats, flange: float, parts: Parts
+) -> tuple[Fastener, ...]:
+    """Screws through a flange into T-nuts of the uprights.
+
+    Args:
+        name: of the body with the flange.
+        places: on a face of the uprights, mm, (3,).
+        along: unit vector into the uprights, (3,).
+        flange: its thickness, mm.
+        parts: lists of purchased parts.
+    """
+    screw, fasteners = choose_screw(parts, 5.0, flange + ENGAGEMENT_MM), list[Fastener]()
+    for place in places:
+        upright = "upright_left" if place[1] > 0 else "upright_right"
+        fasteners.append(Fastener(screw, place - flange * along, along, (name, upright)))
+        fasteners.append(Fastener(parts[TNUT], place, along, (upright,)))
+    return tuple(fasteners)
+
+
+def plate_fasteners(
+    spec: FrameSpec, brackets: Iterable[Bracket], axes: Floats, parts: Parts
+) -> Iterator[Fastener]:
+    """Screws with washers through the brackets' feet into the base plate's threads."""
+    screw = choose_screw(parts, 5.0, spec.flange_mm + 2 * ENGAGEMENT_MM)
+    washer, down = parts[WASHER], -axes[2]
+    for bracket in brackets:
+        through = (bracket.component.name, "plate")
+        for x, y in bracket.holes.tolist():
+            place = np.array([x, y, spec.floor_mm + spec.flange_mm]) @ axes
+            yield Fastener(washer, place, down, through[:1])
+            yield Fastener(screw, place - washer["thickness_mm"] * down, down, through)
+
+
+def motor_screw_places(drive: Drive) -> list[tuple[float, float]]:
+    """Places (out, side) of the motor's screws on the head's plate, mm."""
+    motor, centre = drive.motor, drive.centre_mm
+    if motor.kind == "stages":
+        return [(out, side) for out, side in bolt_circle(motor["hole_circle_mm"] / 2).tolist()]
+    half = motor["hole_square_mm"] / 2
+    return [(out, side) for out in (centre - half, centre + half) for side in (-half, half)]
+
+
+def motor_fasteners(
+    base: BaseLayout, drive: Drive, plate: HeadPlate, parts: Parts
+) -> Iterator[Fastener]:
+    """Screws through the head's plate into the motor behind it, or into the stage before it."""
+    w = base.frame[0]
+    if drive.motor.kind == "motors":
+        screw = choose_screw(parts, 3.0, PLATE_MM + MOTOR_THREAD_MM)
+        start, along, body = plate.front, -w, "motor"
+    else:
+        screw = choose_screw(parts, 6.0, PLATE_MM + 2 * MOTOR_THREAD_MM)
+        start, along, body = plate.back, w, "rotary_stage"
+    for out, side in motor_screw_places(drive):
+        yield Fastener(screw, hub_point(base, start, out, side), along, ("bearing_head", body))

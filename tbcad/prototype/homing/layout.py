@@ -22,10 +22,9 @@ from tbcad.geometry.rotations import unit_circle
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import HomeAngles
-from tbcad.prototype.fasteners.fastener import Fastener
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import THROUGH_MM
-from tbcad.prototype.frame.fasteners import ENGAGEMENT_MM
-from tbcad.prototype.frame.purchased import HeadPlate, axial_cylinder, hub_point
+from tbcad.prototype.frame.purchased import ENGAGEMENT_MM, HeadPlate, axial_cylinder, hub_point
 from tbcad.prototype.homing.sizes import (
     BRACKET_HIGH_MM,
     BRACKET_LOW_MM,
@@ -40,8 +39,7 @@ from tbcad.prototype.homing.sizes import (
     switch_place,
     tab_radius,
 )
-from tbcad.prototype.purchased.choice import choose_part, choose_screw
-from tbcad.prototype.purchased.parts import Parts
+from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
 from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 

@@ -8,18 +8,17 @@ is in the light of the mirrors.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from tbcad.geometry.primitives import Component, Primitive, enclosing_triangles
 from tbcad.optics.camera import Camera
-from tbcad.prototype.frame.fasteners import on_uprights
+from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.keepout import KeepOut, min_distance
-from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout
+from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout, hidden_by_base, in_view
 from tbcad.prototype.light.lamp_mounts import HOLDER_MM, OUT_MM, TAIL_MM, LampMounts
-from tbcad.prototype.light.lamp_sight import hidden_by_base, in_view
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import PrototypeSpec
@@ -61,12 +60,10 @@ def lamp_layout(
             what to change.
     """
     section = spec.light
-    around = _Surroundings(spec, face, camera, keep_out, beside)
     strip, short = parts[STRIP], parts[SHORT_STRIP]
-    found = [
-        _Places(around, parts, strip, None),
-        *(_Places(around, parts, one, aside) for one in (strip, short) for aside in ASIDE_MM),
-    ]
+    upright = _Places(spec, face, camera, keep_out, beside, parts, strip, aside=None)
+    level = [replace(upright, strip=one, aside=at) for one in (strip, short) for at in ASIDE_MM]
+    found = [upright, *level]
     if (current := found[0].layout(-1.0).current_ma) > MAX_MA:
         raise SpecError(
             f"the lamps take {current:.0f} mA, more than the {MAX_MA:.0f} that the supply has "
@@ -88,21 +85,17 @@ def lamp_layout(
 
 
 @dataclass(frozen=True)
-class _Surroundings:
-    """What decides where lamps can be, as the arguments of `lamp_layout`."""
+class _Places:
+    """Places of four upright lamps, or of two level ones beside the plane y = 0 (mm).
+
+    What decides where lamps can be has the names of the arguments of `lamp_layout`.
+    """
 
     spec: PrototypeSpec
     face: float
     camera: Camera
     keep_out: KeepOut
     beside: Sequence[Component]
-
-
-@dataclass(frozen=True)
-class _Places:
-    """Places of four upright lamps, or of two level ones beside the plane y = 0 (mm)."""
-
-    around: _Surroundings
     parts: Parts
     strip: PurchasedPart
     aside: float | None
@@ -110,10 +103,6 @@ class _Places:
     @property
     def level(self) -> bool:
         return self.aside is not None
-
-    @property
-    def spec(self) -> PrototypeSpec:
-        return self.around.spec
 
     @property
     def length(self) -> float:
@@ -124,11 +113,11 @@ class _Places:
     def mounts(self) -> LampMounts:
         width = self.spec.light.strips * self.strip["width_mm"]
         sides = (self.length, width) if self.level else (width, self.length)
-        return LampMounts(self.spec.frame, self.strip, self.around.face, sides)
+        return LampMounts(self.spec.frame, self.strip, self.face, sides)
 
     def places(self, z: float) -> Floats:
         """Middles of the shining faces (l, 3), at a height."""
-        x = -self.around.face - HOLDER_MM - self.strip["thickness_mm"]
+        x = -self.face - HOLDER_MM - self.strip["thickness_mm"]
         if self.aside is not None:
             return np.asarray(HALF_TURN * [x, self.aside, z]) + 0.0
         return np.asarray(SIGNS * [x, self.mounts.across + OUT_MM, z])
@@ -161,22 +150,22 @@ class _Places:
         layout = self.layout(z)
         if fault := self._static_fault(layout) or self._moving_fault(layout):
             return fault
-        if hidden_by_base(layout, self.spec.stage, self.around.keep_out):
+        if hidden_by_base(layout, self.spec.stage, self.keep_out):
             return "the base comes between a lamp and the object's room"
         return ""
 
     def _static_fault(self, layout: LampLayout) -> str:
-        if in_view(_bodies(layout), self.around.camera):
+        if in_view(_bodies(layout), self.camera):
             return "the camera sees a lamp or its stand"
-        if self.level and (name := _met(_bodies(layout), self.around.beside)):
+        if self.level and (name := _met(_bodies(layout), self.beside)):
             return f"a lamp or its holder meets the {name.replace('_', ' ')}"
         return ""
 
     def _moving_fault(self, layout: LampLayout) -> str:
         need, bodies = self.spec.frame.clearance_mm, _bodies(layout)
         for what, distance in (
-            ("the light of the balls", self.around.keep_out.to_light),
-            ("what the base sweeps", self.around.keep_out.to_swept),
+            ("the light of the balls", self.keep_out.to_light),
+            ("what the base sweeps", self.keep_out.to_swept),
         ):
             if min_distance(distance, bodies, need) < need:
                 return f"a lamp or its holder is less than {need:g} mm from {what}"

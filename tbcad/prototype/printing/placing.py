@@ -1,25 +1,81 @@
-"""Placing a part on the printer's bed: the orientation that fits and needs the least support."""
+"""Printed parts, and their place on the bed: what fits and needs the least support."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from OCP.TopoDS import TopoDS_Solid
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from tbcad.cad.measures import SolidProperties
+from tbcad.cad.checks import check_volume, closed_mesh
+from tbcad.cad.measures import SolidProperties, properties, volume
 from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import from_bytes, moved, solids, to_bytes
+from tbcad.cad.meshing import primitive_mesh, volume_by_meshes, without_degenerate
+from tbcad.cad.solids import (
+    cut,
+    cylinder,
+    from_bytes,
+    fused,
+    moved,
+    one_solid,
+    polygon,
+    prism,
+    revolved_polygon,
+    slot_face,
+    solids,
+    to_bytes,
+)
+from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.printing.bed import fitting_orientation, min_bed, size_text
-from tbcad.prototype.printing.pads_up import NO_PADS, downward_pads, opening_up
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
+LEVEL = 1e-6  # of a normal's downward part
+STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
+EXACT = 1e3  # weight of the sum of shares, which is one
+NO_PADS = np.zeros((0, 3))
 MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
 TOUCHING_MM = 0.05  # a facet no higher lies on the bed
+# Base and caps turn, stage and frame are static; a tool is not in the assembly.
+Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
+VOLUME_ERROR = 1e-4
+
+
+def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
+    """Pads that face down by more than 45 degrees, and all that face down.
+
+    Args:
+        normals: unit, (n, 3).
+        orientation: rows that the axes become, the third is up on the bed, (3, 3).
+    """
+    height = normals @ orientation[:, 2]
+    return int((height < -STEEP).sum()), int((height < -LEVEL).sum())
+
+
+def opening_up(normals: Floats) -> Floats | None:
+    """Unit direction that is down when the pad nearest to facing down is as far up as possible.
+
+    The point of the normals' convex hull that is nearest to the origin is up.
+
+    Args:
+        normals: unit, (n, 3).
+
+    Returns:
+        (3,), or None where some pad faces down in every direction.
+    """
+    if not len(normals):
+        return None
+    weighed = np.vstack([normals.T, np.full(len(normals), EXACT)])
+    shares, _ = nnls(weighed, np.array([0.0, 0.0, 0.0, EXACT]))
+    up = normals.T @ shares
+    length = float(np.linalg.norm(up))
+    if length < LEVEL or float((normals @ up).min()) < LEVEL * length:
+        return None
+    return np.asarray(-up / length)
 
 
 @dataclass(frozen=True)
@@ -126,3 +182,92 @@ def _overhang(mesh: Mesh, orientation: Floats) -> float:
     height = corner[..., 2].max(axis=1) - corner[..., 2].min()
     overhangs = (-normal[:, 2] > MAX_OVERHANG * 2 * area) & (height > TOUCHING_MM)
     return float(area[overhangs].sum())
+
+
+@dataclass(frozen=True)
+class PrintedPart:
+    """One printed part.
+
+    Attributes:
+        solid: in its place, and how it is laid on the bed.
+        role: what it belongs to.
+        what: it is for.
+        ball: of a cap, the number of its seat, from 0; -1 for all others.
+    """
+
+    solid: PlacedSolid
+    role: Role
+    what: str
+    ball: int = -1
+
+    @property
+    def name(self) -> str:
+        """Name of the part and of its files."""
+        return self.solid.name
+
+
+def part_mesh(part: PrintedPart) -> Mesh:
+    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL."""
+    return rounded(part.solid.mesh_on_bed)
+
+
+def rounded(mesh: Mesh) -> Mesh:
+    """The mesh with coordinates rounded to 32 bits; vertices that become equal are merged."""
+    single = mesh.vertices.astype(np.float32).astype(np.float64) + 0.0
+    corners, group = np.unique(single, axis=0, return_inverse=True)
+    return without_degenerate(corners, group.reshape(-1)[mesh.triangles])
+
+
+def primitive_solid(body: Primitive) -> TopoDS_Shape:
+    """The solid of a primitive."""
+    if isinstance(body, Cylinder):
+        return cylinder(body.start, body.axis, body.radius, body.length)
+    if isinstance(body, Revolved):
+        return moved(revolved_polygon(body.profile, 0.0, 2 * np.pi), body.axes, body.start)
+    if isinstance(body, Slot):
+        return prism(slot_face(body.middle, body.step, body.radius, body.along), body.along)
+    return prism(polygon(_outward(body)), body.along)
+
+
+def component_solid(component: Component) -> TopoDS_Solid:
+    """The one solid of a component, in the frame of the shell.
+
+    Raises:
+        InvalidSolidError: when the kernel fails, or its volume is not what meshes give.
+    """
+    if len(component.added) == 1 and not component.removed:  # no boolean that could go wrong
+        return one_solid(component.name, primitive_solid(component.added[0]))
+    added = [primitive_solid(body) for body in component.added]
+    removed = [primitive_solid(body) for body in component.removed]
+    solid = one_solid(component.name, cut(fused(added), removed))
+    meshes = (
+        [primitive_mesh(body) for body in bodies] for bodies in (component.added, component.removed)
+    )
+    expected = volume_by_meshes(*meshes)
+    check_volume(component.name, volume(solid), expected, VOLUME_ERROR)
+    return solid
+
+
+def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float) -> PlacedSolid:
+    """A component placed on the printer's bed, its mesh within a distance of the surface.
+
+    Raises:
+        SpecError: when it does not fit.
+        InvalidSolidError: when the kernel fails.
+    """
+    solid, name = component_solid(component), component.name
+    mesh, downs = closed_mesh(name, solid, mesh_mm), component.downs
+    return placed_on_bed(name, solid, mesh, properties(solid), downs, np.eye(3), printer)
+
+
+def placed_components(
+    components: Sequence[Component], printer: PrinterSpec, mesh_mm: float
+) -> list[PlacedSolid]:
+    """Several components, each as `placed_component` places it."""
+    return [placed_component(component, printer, mesh_mm) for component in components]
+
+
+def _outward(body: Prism) -> Floats:
+    """The corners in the order that turns the prism's faces outward."""
+    a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
+    return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]

@@ -6,6 +6,7 @@ is part of the scene, and goes through the sphere's bottom as a thin neck; below
 light and the post can be thick. The disc stands as low as LED pockets beside it still fit inside.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +15,17 @@ from tbcad.geometry.primitives import Component
 from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.keepout import KeepOut, min_distance
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
 from tbcad.prototype.stage.arms import UP
 from tbcad.prototype.stage.crown import (
     DISC_MM,
     INSIDE_MM,
     PLUG_MM,
     RIM_MM,
+    SCREW_DIRECTION,
+    SEAT_MM,
     SHOULDER_MM,
     CrownSizes,
     crown_component,
@@ -42,6 +46,8 @@ WALL_OF_POST = 0.3  # largest share of the post's radius
 SHELF_MM = 1.0  # smallest width of the crown's plate beyond the neck
 # Light may be taken from the sphere's bottom within this: its hulls are up to 2.5 mm too large.
 GRAZING_MM = 0.15
+THREAD_MM = 3.0
+BEYOND_POST_MM = 0.5  # that the set screw may stand out of the post
 
 
 @dataclass(frozen=True)
@@ -197,3 +203,24 @@ def _check_clearances(
             "or prototype.ball_wall_mm larger"
         )
     return light, swept
+
+
+def stage_fasteners(stage: StageLayout, parts: Parts) -> Iterator[Fastener]:
+    """The plug's set screw through the post, and the LEDs in their pockets."""
+    screw, tip = _set_screw(stage.sizes, parts), stage.sizes.plug - SEAT_MM
+    height = np.array([0.0, 0.0, stage.sizes.joint - PLUG_MM / 2])
+    place = (tip + screw["length_mm"]) * SCREW_DIRECTION + height
+    yield Fastener(screw, place, -SCREW_DIRECTION, ("stage_post", "stage_crown"))
+    below = stage.led["height_mm"] - stage.led["diameter_mm"] / 2
+    for dome in stage.leds:
+        yield Fastener(stage.led, dome - below * UP, UP, ("stage_crown",))
+
+
+def _set_screw(sizes: CrownSizes, parts: Parts) -> PurchasedPart:
+    """The longest set screw that does not stand out of the post; else the shortest."""
+    room = sizes.post - (sizes.plug - SEAT_MM) + BEYOND_POST_MM
+    screws = sorted(
+        of_kind(parts, "setscrews", thread_mm=THREAD_MM), key=lambda one: one["length_mm"]
+    )
+    fitting = [screw for screw in screws if screw["length_mm"] <= room]
+    return fitting[-1] if fitting else screws[0]

@@ -12,9 +12,8 @@ from tbcad.geometry.vectors import norm
 from tbcad.optics.surfaces import Surfaces
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.report.page.packing import PackedArrays
-from tbcad.shell.cell_middles import means, middles
 from tbcad.shell.envelope import closing_envelope
-from tbcad.shell.facets import Facets, mirror_facets
+from tbcad.shell.facets import Facets, means, middles, mirror_facets
 from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.spec.design import MeshSpec, Spec

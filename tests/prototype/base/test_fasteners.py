@@ -13,7 +13,7 @@ from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.split import UNCUT, BaseSplit, split_base
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.fasteners.fastener import Fastener, numbered
+from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec

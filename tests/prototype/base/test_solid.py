@@ -23,7 +23,7 @@ from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.base import hub_solids, seat_solids
+from tbcad.prototype.base import seat_solids
 from tbcad.prototype.base.cap_solids import (
     cap_parts,
     cap_pocket,
@@ -32,20 +32,28 @@ from tbcad.prototype.base.cap_solids import (
     flat_depth,
 )
 from tbcad.prototype.base.coupon import CouponRow, coupon_plates, coupon_rows, coupon_seats
-from tbcad.prototype.base.coupon_pose import SeatPose, expected_downs, worst_pose
 from tbcad.prototype.base.coupon_seat import (
     KEEL_MM,
+    SeatPose,
     core_radius,
+    expected_downs,
     height,
     keel_corners,
     leaning,
     seat_body,
     wall_section,
     with_pads,
+    worst_pose,
 )
 from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.base.solid import added_solids, carrier_parts, removed_solids
+from tbcad.prototype.base.solid import (
+    added_solids,
+    carrier_parts,
+    hub_bodies,
+    hub_holes,
+    removed_solids,
+)
 from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
@@ -325,16 +333,14 @@ class TestHub:
     def test_every_drive(self, drive: str, lock: str) -> None:
         keys = BaseSpec.model_validate({"drive": drive, "lock": lock})
         held = hub_layout(keys, -60.0)
-        solid = one_solid(
-            "hub", cut(fused(hub_solids.hub_bodies(held)), hub_solids.hub_holes(held, keys))
-        )
+        solid = one_solid("hub", cut(fused(hub_bodies(held)), hub_holes(held, keys)))
         assert as_trimesh(solid).is_watertight
         assert bounds(solid)[:, 2] == pytest.approx([held.face, held.front])
 
     def test_volume_of_a_stages_hub(self) -> None:
         keys = BaseSpec(drive="stage-60")
         hub = hub_layout(keys, -60.0)
-        solid = cut(fused(hub_solids.hub_bodies(hub)), hub_solids.hub_holes(hub, keys))
+        solid = cut(fused(hub_bodies(hub)), hub_holes(hub, keys))
         thick = hub.front - hub.face
         hole = 3.3**2 * (thick - 6.5) + 5.5**2 * 6.5
         key = (KEY_HOLE_MM / 2) ** 2 * KEY_DEPTH_MM

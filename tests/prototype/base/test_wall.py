@@ -8,7 +8,7 @@ from tbcad.cad.solids import faces, polyhedron, revolved_polygon
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout, base_layout
-from tbcad.prototype.base.wall import facet_count, wall_facets, wall_section
+from tbcad.prototype.base.solid import facet_count, wall_facets, wall_section
 from tbcad.spec.prototype import BaseSpec
 
 

@@ -18,8 +18,7 @@ from tbcad.prototype.frame.brackets import frame_axes
 from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
-from tbcad.prototype.purchased.choice import choose_part
-from tbcad.prototype.purchased.parts import load_parts
+from tbcad.prototype.purchased.parts import choose_part, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec

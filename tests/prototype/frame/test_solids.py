@@ -15,8 +15,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout, frame_layout
 from tbcad.prototype.keepout import KeepOut
-from tbcad.prototype.printing.component_solids import component_solid, placed_component
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError

@@ -19,7 +19,7 @@ from tbcad.prototype.drive.travel import (
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.homing.layout import ROLLER_MM, homing_layout
 from tbcad.prototype.homing.sizes import PIN_HOLE_MM, tab_radius
-from tbcad.prototype.printing.component_solids import component_solid
+from tbcad.prototype.printing.placing import component_solid
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import MotionSpec

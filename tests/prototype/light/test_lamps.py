@@ -11,8 +11,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.light import lamps as searched
-from tbcad.prototype.light.lamp import SHORT_STRIP, LampLayout
-from tbcad.prototype.light.lamp_sight import hidden_by_base
+from tbcad.prototype.light.lamp import SHORT_STRIP, LampLayout, hidden_by_base
 from tbcad.prototype.light.lamps import SIGNS, lamp_layout
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.errors import SpecError

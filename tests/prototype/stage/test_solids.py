@@ -8,8 +8,7 @@ import trimesh
 
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.keepout import KeepOut
-from tbcad.prototype.printing.component_solids import placed_component
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printing.placing import PlacedSolid, placed_component
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError

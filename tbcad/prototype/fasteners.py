@@ -1,10 +1,15 @@
-"""Bodies of small purchased parts, simplified as drawings do: no threads, no sockets.
+"""Small purchased parts in their places: screws, washers, nuts, inserts, dowels, magnets, LEDs.
 
-Threads are drawn at their core diameter in screws, and at their nominal one in inserts and nuts, so
-that a screw in its place shares no room with what it is screwed into.
+What is bought is counted from these records, drawn from them, and verified against the holes.
+
+Bodies are simplified as drawings do: no threads, no sockets. Threads are drawn at their core
+diameter in screws, and at their nominal one in inserts and nuts, so that a screw in its place
+shares no room with what it is screwed into.
 """
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +23,6 @@ from tbcad.geometry.primitives import (
 )
 from tbcad.geometry.rotations import unit_circle
 from tbcad.geometry.vectors import perpendicular_axes
-from tbcad.prototype.fasteners.fastener import Fastener
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 
@@ -33,6 +37,38 @@ FLANGE_MM = 1.0  # height of an LED's flange; no list gives it
 DOME = np.radians([0.0, 30.0, 60.0, 90.0])  # corners of an LED's dome
 UP = np.array([0.0, 0.0, 1.0])
 LEVEL = 1e-9  # upward part of a direction that is level
+
+
+@dataclass(frozen=True)
+class Fastener:
+    """A screw, set screw, washer, nut, insert, dowel, magnet or LED.
+
+    Attributes:
+        part: from the lists.
+        place: the point of its axis from which its body goes along, mm, (3,); of a screw and a
+            washer it is on the face that they press on.
+        along: unit vector in which it goes in, (3,).
+        through: names of the bodies that it goes through and into, in this order.
+        name: of its body, unique; empty until all are numbered.
+        rotates: whether it rotates with the base.
+    """
+
+    part: PurchasedPart
+    place: Floats
+    along: Floats
+    through: tuple[str, ...]
+    name: str = ""
+    rotates: bool = False
+
+
+def numbered(fasteners: Iterable[Fastener]) -> tuple[Fastener, ...]:
+    """Fasteners named by their part and a number from 1, such as M5x12_3 or INSERT_M3_1."""
+    counts: dict[str, int] = {}
+    named = []
+    for one in fasteners:
+        number = counts[one.part.name] = counts.get(one.part.name, 0) + 1
+        named.append(replace(one, name=re.sub(r"\W", "_", f"{one.part.name}_{number}")))
+    return tuple(named)
 
 
 def core_radius(thread: float) -> float:

@@ -5,9 +5,15 @@ import pytest
 
 from tbcad.cad.measures import volume as solid_volume
 from tbcad.geometry.primitives import enclosing_triangles, volume
-from tbcad.prototype.fasteners.bodies import PITCH_MM, PROFILES, core_radius, fastener_component
-from tbcad.prototype.fasteners.fastener import Fastener, numbered
-from tbcad.prototype.printing.component_solids import component_solid
+from tbcad.prototype.fasteners import (
+    PITCH_MM,
+    PROFILES,
+    Fastener,
+    core_radius,
+    fastener_component,
+    numbered,
+)
+from tbcad.prototype.printing.placing import component_solid
 from tbcad.prototype.purchased.parts import load_parts, of_kind
 
 PARTS = load_parts()

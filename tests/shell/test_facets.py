@@ -5,8 +5,8 @@ import pytest
 
 from tbcad.geometry.vectors import norm
 from tbcad.optics.surfaces import Surfaces
-from tbcad.shell.cell_middles import middles
 from tbcad.shell.cell_outlines import CellOutlines
+from tbcad.shell.facets import middles
 from tbcad.spec.errors import SpecError
 
 RADIUS = 1000.0

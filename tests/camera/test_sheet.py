@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tbcad.camera.candidates import candidates
 from tbcad.camera.catalogue import (
     CAMERA_COLUMNS,
     LENS_COLUMNS,
@@ -17,6 +16,7 @@ from tbcad.camera.catalogue import (
     load_lenses,
 )
 from tbcad.camera.requirements import CameraRequirements
+from tbcad.camera.sheet import candidates
 from tbcad.errors import InputError
 
 NEEDED = CameraRequirements(90.0, 70.0, 2000, 1400, 100.0, 150.0, 120.0, 0.8, 2.0, 2.0, 2.8)

@@ -1,1 +1,0 @@
-"""Small purchased parts in their places: screws, washers, nuts, inserts, dowels, magnets, LEDs."""
