@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.api.arguments import silent
-from tbcad.loading import large_libraries
 
 if TYPE_CHECKING:
     from tbcad.calibration.intrinsics.checkerboard import SolvedLens
@@ -304,8 +303,8 @@ def as_built(
     built = export_of(known) if exports is None else Path(exports)
     check_replaceable(Path(out), "as-built", force, (known, built))
     progress("solids")
-    with large_libraries():
-        from tbcad.as_built.export import as_built as write_files
+    from tbcad.as_built.export import as_built as write_files
+
     with replacing(Path(out), "as-built", force, (known, built)) as folder:
         record = write_files(known, built, folder)
         write_manifest(folder, "as-built")

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.api.arguments import Settings, silent
-from tbcad.loading import large_libraries
 from tbcad.spec.load import option_texts
 
 if TYPE_CHECKING:
@@ -97,9 +96,8 @@ def inspect(
 
     check_yield(wanted)
     check_replaceable(Path(out), "inspection", force, (exports,))
-    with large_libraries():
-        from tbcad.inspection.inspect import checked_export
-        from tbcad.inspection.inspect import inspect as write_files
+    from tbcad.inspection.inspect import checked_export
+    from tbcad.inspection.inspect import inspect as write_files
 
     export = checked_export(Path(exports))
     with replacing(Path(out), "inspection", force, (exports,)) as folder:
