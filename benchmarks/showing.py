@@ -21,15 +21,17 @@ from circumstances import RESULTS, circumstances, show_and_write
 from timing import Figure, Row, at_least, measured
 
 from tbcad import Views
+from tbcad.reconstruction.field import NAME, read_field
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.viewer.query import Query
-from tbcad.viewer.render import Renderer
+from tbcad.viewer.render import FieldRenderer, Renderer, ViewRenderer
 from tbcad.viewer.server import HOST, ViewServer
 
 Method = Literal["nearest", "blend", "depth"]
 VIEWS = 90  # once around, in steps of 4 degrees
 IN_FLIGHT = 2  # as the page
 BROWSER_S = 5.0
+FIELD_AT_REST, FIELD_MOVING = 5, 15  # views a second
 MS = 1000  # of a second
 
 
@@ -51,11 +53,14 @@ def synthesised(capture: Path, rounds: int) -> list[Row]:
                     found[name].append(one)
     rows = []
     for name, (_, _, limit) in works.items():
-        views_a_second, cpu = _rows(f"views a second, 640 x 480, {name}", found[name])
-        rows.append(views_a_second)
-        # Of two cores: what others do on them does not lengthen it.
-        rows.append(cpu if limit is None else replace(cpu, limit=round(2 * MS / limit, 1)))
+        rows += _by_cpu(f"views a second, 640 x 480, {name}", found[name], limit)
     return rows
+
+
+def _by_cpu(what: str, rates: list[tuple[float, float]], limit: float | None) -> list[Row]:
+    """Rows whose limit, views a second, is that of two cores' time, which no load lengthens."""
+    views_a_second, cpu = _rows(what, rates)
+    return [views_a_second, cpu if limit is None else replace(cpu, limit=round(2 * MS / limit, 1))]
 
 
 def few(views: Views, method: Method) -> int:
@@ -83,6 +88,23 @@ def showing(capture: Path, rounds: int) -> list[Row]:
     ]
 
 
+def field_shown(field: Path, rounds: int) -> list[Row]:
+    """Views by a field: at rest, and while the viewpoint moves, also half as large."""
+    renderer = FieldRenderer(read_field(field))
+    around(renderer.picture)  # compiles
+    still = [rates(lambda: around(renderer.picture, still=True)) for _ in range(rounds)]
+    moving = [rates(lambda: around(renderer.picture)) for _ in range(rounds)]
+    half = [rates(lambda: around(renderer.picture, width=320, height=240)) for _ in range(rounds)]
+    with running(renderer) as server:
+        drawn = in_chromium(server, rounds, smaller=True)
+    return [
+        *_by_cpu("views a second by a field, 640 x 480", still, FIELD_AT_REST),
+        *_by_cpu("- while the viewpoint moves", moving, None),
+        *_by_cpu("- while the viewpoint moves, 320 x 240", half, FIELD_MOVING),
+        *_rows("- drawn by the page in headless Chromium, 320 x 240", drawn, FIELD_MOVING),
+    ]
+
+
 def _rows(what: str, rates: list[tuple[float, float]], limit: float | None = None) -> list[Row]:
     if not rates:
         return [Row(what, (), note="chromium is not installed")]
@@ -91,10 +113,10 @@ def _rows(what: str, rates: list[tuple[float, float]], limit: float | None = Non
     return [first, measured("- - processor time of tbcad for each, all cores", cpu, "ms")]
 
 
-def around(show: Callable[[Query], object]) -> int:
+def around(show: Callable[[Query], object], **query: int) -> int:
     """All views of a turn, one after the other; their number."""
     for k in range(VIEWS):
-        show(Query(azimuth=360 * k / VIEWS))
+        show(replace(Query(azimuth=360 * k / VIEWS), **query))
     return VIEWS
 
 
@@ -107,7 +129,7 @@ def rates(work: Callable[[], int]) -> tuple[float, float]:
 
 
 @contextmanager
-def running(renderer: Renderer) -> Iterator[ViewServer]:
+def running(renderer: ViewRenderer) -> Iterator[ViewServer]:
     with ViewServer(renderer, "knot", Query()) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
@@ -133,8 +155,10 @@ def fetched(server: ViewServer) -> int:
     return VIEWS
 
 
-def in_chromium(server: ViewServer, rounds: int) -> list[tuple[float, float]]:
-    """As `rates`, of pictures that the turning page has drawn, all of them at full size."""
+def in_chromium(
+    server: ViewServer, rounds: int, smaller: bool = False
+) -> list[tuple[float, float]]:
+    """As `rates`, of pictures that the turning page has drawn, at full or half size."""
     program = shutil.which("chromium")
     if program is None:
         return []
@@ -144,7 +168,7 @@ def in_chromium(server: ViewServer, rounds: int) -> list[tuple[float, float]]:
     with tempfile.TemporaryDirectory() as profile, chromium(program, Path(profile)) as browser:
         browser.open(server.address)
         browser.value(
-            "viewer.smaller = false; window.drawn = 0; const plain = draw;"
+            f"viewer.smaller = {str(smaller).lower()}; window.drawn = 0; const plain = draw;"
             "draw = (...given) => { window.drawn++; plain(...given); }; turn(true)"
         )
         time.sleep(1)
@@ -168,6 +192,8 @@ def main() -> None:
     rows = synthesised(options.capture, options.rounds)
     if not options.alone:
         rows += showing(options.capture, options.rounds)
+        if (field := options.capture / NAME).is_file():
+            rows += field_shown(field, options.rounds)
     show_and_write(options.out, about, rows)
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         reconstruct,
         relight,
         run,
+        to_cadquery,
         verify,
         view,
     )
@@ -65,6 +66,7 @@ __all__ = [
     "reconstruct",
     "relight",
     "run",
+    "to_cadquery",
     "verify",
     "view",
 ]

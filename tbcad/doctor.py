@@ -43,11 +43,18 @@ _VTKS = ("vtk", "cadquery-vtk")
 _INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
 
 _KERNEL = "import OCP; print(OCP.__version__)"
-_SHARED_KERNEL = """
-import build123d, cadquery
-box = cadquery.Shape.cast(build123d.Box(1, 2, 3).wrapped)
-assert abs(box.Volume() - 6) < 1e-9, box.Volume()
-print("they share one kernel")
+_PART = """
+import build123d
+volume = build123d.Box(1, 2, 3).volume
+assert abs(volume - 6) < 1e-9, volume
+print("a box has its volume")
+try:
+    import cadquery
+except ModuleNotFoundError:
+    pass
+else:
+    assert abs(cadquery.Shape.cast(build123d.Box(1, 2, 3).wrapped).Volume() - 6) < 1e-9
+    print("cadquery shares its kernel")
 """
 _EMBREE = """
 import numpy as np
@@ -94,7 +101,7 @@ print("drawn")
 # Name, program and distributions; the first of these is installed again if the program fails.
 _LIBRARIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("OCP", _KERNEL, _KERNELS),
-    ("build123d with cadquery", _SHARED_KERNEL, _KERNELS),
+    ("build123d", _PART, _KERNELS),
     ("embreex", _EMBREE, ("embreex",)),
     ("manifold3d", _MANIFOLD, ("manifold3d",)),
     ("lib3mf", _LIB3MF, ("lib3mf",)),

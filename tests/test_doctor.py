@@ -33,7 +33,7 @@ class TestThisEnvironment:
             "CAD kernel",
             "VTK",
             "OCP",
-            "build123d with cadquery",
+            "build123d",
             "embreex",
             "manifold3d",
             "lib3mf",

@@ -73,6 +73,6 @@ def test_metadata_is_complete(wheel: zipfile.ZipFile) -> None:
     assert found["Description-Content-Type"] == "text/markdown"
     assert found.get_payload().startswith("# tbcad")
     assert len(found.get_all("Classifier")) > 5
-    assert {"cluster", "machine"} <= set(found.get_all("Provides-Extra"))
+    assert {"cadquery", "cluster", "machine"} <= set(found.get_all("Provides-Extra"))
     (scripts,) = (name for name in wheel.namelist() if name.endswith("/entry_points.txt"))
     assert "tbcad = tbcad.cli:main" in wheel.read(scripts).decode()

@@ -15,7 +15,7 @@ from tbcad.api.captures import (
     write_photographs,
 )
 from tbcad.api.datasets import export
-from tbcad.api.designs import design
+from tbcad.api.designs import design, to_cadquery
 from tbcad.api.machines import as_built, calibrate, merge, run, simulate_run, solve_intrinsics
 from tbcad.api.reconstructions import reconstruct
 from tbcad.api.tolerances import analyse, inspect
@@ -45,6 +45,7 @@ __all__ = [
     "run",
     "simulate_run",
     "solve_intrinsics",
+    "to_cadquery",
     "verify",
     "verify_as_built",
     "view",

@@ -9,6 +9,9 @@ from tbcad.api.arguments import Settings, chosen_spec, silent
 from tbcad.spec.design import Spec
 
 if TYPE_CHECKING:
+    from build123d import Part
+    from cadquery import Workplane
+
     from tbcad.types import Progress
     from tbcad.whole_design import Design
 
@@ -40,3 +43,18 @@ def design(
 
     mirrors = mirror_design(chosen_spec(spec, n, settings), detail)
     return Design(mirrors.spec, mirrors.arrays)
+
+
+def to_cadquery(part: Part) -> Workplane:
+    """Return a part as a cadquery workplane, to model on; both share one kernel and the geometry.
+
+    Args:
+        part: of `Design.shell`, `mandrel` or `printed_parts`, or of build123d, mm. Its label
+            becomes the workplane's tag.
+
+    Raises:
+        InputError: cadquery is not installed.
+    """
+    from tbcad.cad.part import as_workplane
+
+    return as_workplane(part)

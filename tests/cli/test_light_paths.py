@@ -11,7 +11,7 @@ from tests.cli.commands import Words, commands
 
 HEAVY = (
     *("numpy", "scipy", "OCP", "build123d", "cadquery", "trimesh", "numba", "pandas", "h5py"),
-    *("matplotlib", "pyvista", "embreex", "skimage", "PIL", "lib3mf", "manifold3d", "distributed"),
+    *("matplotlib", "pyvista", "embreex", "PIL", "lib3mf", "manifold3d", "distributed"),
 )
 BAD_INPUT = (
     ("--no-such-option",),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 from scipy.ndimage import gaussian_filter
+from skimage.metrics import structural_similarity
 
 from tbcad.errors import InputError
 from tbcad.simulate.image_files import (
@@ -99,6 +100,30 @@ def test_ssim_of_even_pictures_in_closed_form() -> None:
     c1 = (0.01 * 255) ** 2
     expected = (2 * 100 * 140 + c1) / (100**2 + 140**2 + c1)
     assert image_quality(one, other).ssim == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("shape", [(11, 14, 3), (60, 90, 3)])
+def test_ssim_is_that_of_scikit_image(shape: tuple[int, int, int]) -> None:
+    """An implementation that shares no code, with the settings of SSIM's authors."""
+    rng = np.random.default_rng(3)
+    one = rng.integers(0, 256, shape, dtype=np.uint8)
+    other = np.clip(one + rng.normal(0, 12, shape), 0, 255).astype(np.uint8)
+    ssim, about = structural_similarity(
+        *(one, other),
+        channel_axis=2,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        full=True,
+    )
+    quality, ours = image_quality_map(one, other)
+    assert quality.ssim == pytest.approx(ssim, abs=1e-12)
+    assert ours == pytest.approx(about.mean(axis=2), abs=1e-12)
+
+
+def test_pictures_smaller_than_the_window_are_compared_whole() -> None:
+    small = np.zeros((4, 4, 3), np.uint8)
+    assert 0 < image_quality(small, small + np.uint8(9)).ssim < 1
 
 
 @pytest.mark.parametrize("sigma", [0.7, 2.0, 6.0])
