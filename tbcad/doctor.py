@@ -26,7 +26,13 @@ from packaging.utils import canonicalize_name
 _TIMEOUT_S = 180  # the first import on a cold disk reads 1 GB
 _MIN_MEMORY_GB = 2.0
 _MIN_DISK_GB = 1.0
-_NO_CORE_DUMP = "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0))\n"
+_NO_CORE_DUMP = """
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+except ImportError:  # no POSIX
+    pass
+"""
 
 _KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
 _MACHINE = (

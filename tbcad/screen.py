@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 WIDTH = 80  # columns of what is printed where no terminal says how many it has
+BAR_WIDTH = 12
 # The pace of this computer is taken from the stages done, and from this share of all of them as if
 # it had been done at the expected pace: the first short stages say little of the others.
 PRIOR_SHARE = 0.1
@@ -63,6 +64,11 @@ class TimeLeft:
         pace = (self._clock() - self._started + prior) / (self.done + prior)
         return pace * (self.total - self.done)
 
+    def __str__(self) -> str:
+        """Return the estimate in words."""
+        minutes, seconds = divmod(round(self.seconds), 60)
+        return f"about {minutes}:{seconds:02d} left"
+
 
 def _sums_before(expected: Mapping[str, float]) -> list[float]:
     sums = [0.0]
@@ -74,12 +80,12 @@ def _sums_before(expected: Mapping[str, float]) -> list[float]:
 class Stages:
     """Stages of one command, shown on stderr."""
 
-    def __init__(
-        self, bar: Progress | None, total: float, time_left: TimeLeft | None = None
-    ) -> None:
+    def __init__(self, bar: Progress | None, expected: Mapping[str, float] | int) -> None:
         """Show stages on a bar, or in plain lines when there is none."""
-        self._bar, self._left = bar, time_left
-        self._task = bar.add_task("", total=total) if bar else None
+        self._left = None if isinstance(expected, int) else TimeLeft(expected)
+        total = expected if isinstance(expected, int) else sum(expected.values())
+        self._bar = bar
+        self._task = bar.add_task("", total=total, left=self._left or "") if bar else None
         self._started = monotonic()
         self._stage = ""
 
@@ -88,8 +94,9 @@ class Stages:
         if self._left is not None:
             self._left.begin(text)
         if self._bar is not None and self._task is not None:
-            counted = self._left is None and self._stage
-            self._bar.update(self._task, description=text, advance=1 if counted else 0)
+            self._bar.update(self._task, description=text, advance=1 if self._stage else 0)
+            if self._left is not None:
+                self._bar.update(self._task, completed=self._left.done)
         else:
             self._print(text)
         self._stage = text
@@ -136,12 +143,15 @@ def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterato
     if silent or not console.is_terminal:
         yield SilentStages() if silent else Stages(None, 0)
         return
-    from tbcad.progress_bar import progress_bar
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    if isinstance(expected, int):
-        time_left, total = None, float(expected)
-    else:
-        time_left = TimeLeft(expected)
-        total = time_left.total
-    with progress_bar(console, time_left) as bar:
-        yield Stages(bar, total, time_left)
+    bar = Progress(
+        SpinnerColumn(),
+        BarColumn(bar_width=BAR_WIDTH),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]} {task.description}", markup=False),
+        console=console,
+        transient=True,
+    )
+    with bar:
+        yield Stages(bar, expected)

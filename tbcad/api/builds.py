@@ -9,8 +9,8 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import chosen_spec
+from tbcad.api.verification import verify as verification
 from tbcad.errors import InputError
-from tbcad.loading import large_libraries
 from tbcad.options.call import silent
 from tbcad.spec.design import Spec
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tbcad_verify.report.as_made import AsMade
     from tbcad_verify.report.report import Report
 
+    from tbcad.mirrors.array import MirrorDesign
     from tbcad.types import Progress
     from tbcad.whole_design import Design
 
@@ -77,11 +78,9 @@ def build(
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
-    with large_libraries():
-        from tbcad.design_process import design_process
-        from tbcad.output.folder import check_replaceable
-        from tbcad.output.inputs import design_files
-        from tbcad.output.parts import PROTOTYPE, check_lists, default_parts
+    from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import design_files
+    from tbcad.output.parts import check_lists, default_parts
 
     chosen, out = chosen_spec(spec, None, ()), Path(out)
     asked = tuple(parts) if parts is not None else default_parts(chosen)
@@ -90,17 +89,71 @@ def build(
     check_lists(chosen, asked)
     started = monotonic()
     progress("mirrors: radii and cells")
-    with design_process(chosen, PROTOTYPE in asked) as ahead:
-        with large_libraries():
-            from tbcad.api.build_files import build_files
-            from tbcad.whole_design import Design
-        mirrors, export, report = build_files(
-            ahead, out, asked, verify, force, parts is None, progress, detail
-        )
-    if report:
-        report = replace(report, seconds=monotonic() - started)
-    finished = Design(export.spec, mirrors.arrays)
-    return Build(out, finished, export.parts, export.note, report)
+    finished = _build_files(chosen, out, asked, verify, force, parts is None, progress, detail)
+    if finished.report is None:
+        return finished
+    return replace(finished, report=replace(finished.report, seconds=monotonic() - started))
+
+
+def _build_files(
+    spec: Spec,
+    out: Path,
+    parts: Sequence[str],
+    verify: bool,
+    force: bool,
+    optional_prototype: bool,
+    progress: Progress,
+    detail: Progress,
+) -> Build:
+    """Write all files, verify them, write report.html, and replace the folder.
+
+    The files are read back before they replace the old ones.
+    """
+    from tbcad.background import background_processes
+    from tbcad.output.folder import replacing
+
+    with replacing(out, "build", force) as folder:
+        with background_processes() as submit:
+            submit(_load_libraries)  # while the mirrors are computed here
+            from tbcad.mirrors.array import design
+
+            mirrors = design(spec, detail)
+            simulated = submit(_as_made, mirrors) if verify and "shell" in parts else None
+            from tbcad.output.build import write_export
+
+            export = write_export(
+                mirrors, folder, parts, progress, submit, optional_prototype=optional_prototype
+            )
+        report = None
+        if verify:
+            report = replace(
+                verification(folder, progress=progress),
+                folder=out,
+                note=export.note,
+                as_made=simulated.result() if simulated else None,
+            )
+        progress("report")
+        from tbcad.report.page.write import write_report
+
+        write_report(folder, as_made=report.as_made if report else None)
+    from tbcad.whole_design import Design
+
+    return Build(out, Design(export.spec, mirrors.arrays), export.parts, export.note, report)
+
+
+def _load_libraries() -> None:
+    """Load what the background process works with."""
+    import tbcad.tolerance.as_made  # noqa: F401
+
+
+def _as_made(mirrors: MirrorDesign) -> AsMade:
+    """Simulate a few builds of a design by every built-in process."""
+    from tbcad.simulate.scene.reflector import reflectors
+    from tbcad.tolerance.as_made import as_made
+
+    spec = mirrors.spec
+    target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
+    return as_made(reflectors(mirrors), target, coat)
 
 
 def as_made(
@@ -152,8 +205,7 @@ def report_page(
     Raises:
         InputError: the export or the capture cannot be read, or the file may not be written.
     """
-    with large_libraries():
-        from tbcad.report.page.write import check_writable, write_report
+    from tbcad.report.page.write import check_writable, write_report
 
     folder, file = Path(exports), Path(out) if out is not None else None
     check_writable(file or folder / "report.html", force)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.errors import InputError
-from tbcad.loading import large_libraries
 from tbcad.options.call import keywords, silent
 from tbcad.options.checks import (
     check_is_any_calibration,
@@ -245,8 +244,8 @@ def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     built = export_of(known) if options.exports is None else Path(options.exports)
     check_replaceable(out, "as-built", options.force, (known, built))
     options.progress("solids")
-    with large_libraries():
-        from tbcad.as_built.files import as_built as write_files
+    from tbcad.as_built.files import as_built as write_files
+
     with replacing(out, "as-built", options.force, (known, built)) as folder:
         record = write_files(known, built, folder)
         write_manifest(folder, "as-built")

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.api.arguments import Settings
-from tbcad.loading import large_libraries
 from tbcad.options.call import keywords, silent
 from tbcad.options.checks import check_is_export
 from tbcad.options.tolerances import InspectionOptions
@@ -89,9 +88,8 @@ def inspect(options: InspectionOptions) -> dict[str, Any]:
 
     check_yield(options.wanted)
     check_replaceable(out, "inspection", options.force, (exports,))
-    with large_libraries():
-        from tbcad.inspection.inspect import checked_export
-        from tbcad.inspection.inspect import inspect as write_files
+    from tbcad.inspection.inspect import checked_export
+    from tbcad.inspection.inspect import inspect as write_files
 
     export = checked_export(exports)
     with replacing(out, "inspection", options.force, (exports,)) as folder:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,11 +35,18 @@ def verify(
     Raises:
         InputError: the folder is no readable export.
     """
+    from tbcad_verify.errors import BadExport
     from tbcad_verify.run.verify import VerifyOptions
     from tbcad_verify.run.verify import verify as verify_files
 
-    chosen = options or VerifyOptions()
-    return checked_report(partial(verify_files, options=chosen), Path(exports), progress)
+    try:
+        return verify_files(
+            Path(exports),
+            lambda name: progress(f"verification: {name}"),
+            options or VerifyOptions(),
+        )
+    except BadExport as error:
+        raise InputError(str(error)) from None
 
 
 def verify_as_built(
@@ -62,20 +67,5 @@ def verify_as_built(
 
     try:
         return verify_machine(Path(exports), Path(calibration), progress)
-    except BadExport as error:
-        raise InputError(str(error)) from None
-
-
-def checked_report(
-    verify_files: Callable[[Path, Progress], Report], folder: Path, progress: Progress
-) -> Report:
-    """Verify a folder; a folder that is no export raises InputError."""
-    from tbcad_verify.errors import BadExport
-
-    def stage(name: str) -> None:
-        progress(f"verification: {name}")
-
-    try:
-        return verify_files(folder, stage)
     except BadExport as error:
         raise InputError(str(error)) from None

@@ -2,6 +2,7 @@
 
 from tbcad.cli import garbage as _garbage  # noqa: F401, I001 - first of all
 
+import gc
 import os
 import sys
 import warnings
@@ -39,7 +40,6 @@ from tbcad.cli.help_order import order_help
 from tbcad.cli.stopping import INTERRUPTED, Stopped, signals_as_interrupt
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
-from tbcad.own_process import own_process
 
 order_help(app)
 add_examples(app)
@@ -88,5 +88,6 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Both cores are at work; threads of the linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with own_process():
-        sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    gc.freeze()  # at its end Python looks for no garbage among what the libraries brought
+    sys.exit(code)

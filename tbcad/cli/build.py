@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from tbcad.doctor import Finding
 
+# About as many stages has a build, without and with its verification.
+SHELL_STAGES, PROTOTYPE_STAGES, VERIFICATION_STAGES = (5, 14), (9, 27), 19
 FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
 
 
@@ -100,10 +102,9 @@ def build(
         raise InputError(f"--{output} shows a verification: leave --no-verify out")
     from tbcad.api import build as build_files
     from tbcad.cli.memory import keep_freed_memory
-    from tbcad.cli.stage_times import build_times, margin_stage
     from tbcad.output.folder import check_replaceable
     from tbcad.output.inputs import design_files, files_named
-    from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
+    from tbcad.output.parts import PROTOTYPE, check_lists, check_parts, default_parts, parse_parts
     from tbcad.spec.load import load_spec
 
     started = monotonic()
@@ -120,10 +121,10 @@ def build(
     check_lists(spec, chosen)
     inputs = [*design_files(spec, design), *files_named(for_process)]
     check_replaceable(out, "build", force, inputs)
-    times = build_times(spec.optics.n, chosen, verify, process.name if process else None)
-    with stages(times, silent=quiet) as screen:
+    number = (PROTOTYPE_STAGES if PROTOTYPE in chosen else SHELL_STAGES)[verify]
+    with stages(number, silent=quiet) as screen:
         if process is not None:
-            screen.stage(margin_stage(process.name))
+            screen.stage(f"edges and margins for {process.name}")
             spec = design_for(spec, process, wanted_yield, screen)
         if dry_run:
             from tbcad.cli.dry_run import show_overview
@@ -207,13 +208,12 @@ def verify_command(
     from tbcad_verify.run.verify import VerifyOptions
 
     from tbcad.api import as_made, verify
-    from tbcad.cli.stage_times import export_times
 
     options = VerifyOptions(
         seconds=time_limit, printers=tuple(printers or ()), clients=clients, strict=strict
     )
     started = monotonic()
-    with stages(export_times(folder), silent=quiet) as screen:
+    with stages(VERIFICATION_STAGES, silent=quiet) as screen:
         # Before the verification, which writes: a command that is stopped has changed nothing.
         simulated = as_made(folder, screen.stage, screen.detail)
         report = verify(folder, options, progress=screen.stage)

@@ -46,9 +46,8 @@ def report(
     if capture is not None:
         check_is_capture(capture)
     from tbcad.api import report_page
-    from tbcad.cli.stage_times import report_times
 
-    with stages(report_times(folder)) as screen:
+    with stages(2) as screen:
         file = report_page(
             folder, out, capture=capture, force=force, progress=screen.stage, detail=screen.detail
         )

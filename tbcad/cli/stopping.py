@@ -1,12 +1,17 @@
 """What ends a command from outside: it cleans up first, as after Ctrl-C."""
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
-STOPPING = ("SIGTERM", "SIGHUP")
+STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
+DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+IMPORTING = "<frozen importlib._bootstrap>"  # the code of imports
+AGAIN_S = 0.05
 
 
 class Stopped(Exception):
@@ -22,11 +27,22 @@ def signals_as_interrupt() -> Iterator[None]:
     numbers = [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
     if threading.current_thread() is not threading.main_thread():
         numbers = []
-    taken = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
+    taken = {number: signal.getsignal(number) for number in numbers}
+    taken = {number: handler for number, handler in taken.items() if handler in DEFAULTS}
     for number in taken:
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, _interrupt)
     try:
         yield
     finally:
-        for number in taken:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in taken.items():
+            signal.signal(number, handler)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Stop, but after an import: native modules that are stopped while they load hide the cause."""
+    while frame:
+        if frame.f_code.co_filename == IMPORTING:
+            threading.Timer(AGAIN_S, os.kill, (os.getpid(), number)).start()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt

@@ -85,12 +85,11 @@ def tolerance(
                 "--as-built is about no process: leave out --process, --margins and --set"
             )
         return _as_built(folder, as_built, builds, seed, out, json)
-    from tbcad.cli.tolerance_times import tolerance_times
     from tbcad.tolerance.options import ToleranceOptions
     from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
 
     changes = list(settings or [])
-    name = load_process(process or DEFAULT_PROCESS, changes).name
+    load_process(process or DEFAULT_PROCESS, changes)  # or refuse it
     options = ToleranceOptions(
         builds, seed, share, calibrated_mrad / 1000, scheduler, margins=margins
     )
@@ -102,7 +101,7 @@ def tolerance(
     from tbcad.tolerance.stages import TABLES
 
     check_study_folder(out)
-    with stages(tolerance_times(folder, name, builds, process is None, margins)) as screen:
+    with stages(6 + (process is None) + margins) as screen:
         analysis = analyse(
             folder,
             process,

@@ -1,17 +1,15 @@
 """All sheets of an export as PDF and DXF, drawn in several processes."""
 
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from tbcad.atomic_files import replace_files, write_errors_as_input_errors
-from tbcad.background import end_with_parent
+from tbcad.background import background_processes
 from tbcad.drafting.sheet import Sheet, paper_name, scale_text
 from tbcad.drawings.export import Export, read_export
 from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
@@ -79,8 +77,7 @@ def write_drawings(
         only: names of what is drawn; everything without names.
         force: whether files that exist may be replaced.
         progress: called with each sheet's name when its part is done.
-        workers: number of processes; more than one only in a command's own process: the script of
-            a library's user would run again in each.
+        workers: number of processes.
 
     Raises:
         InputError: no export, a file of it is not as it was written, a name is unknown, or files
@@ -166,20 +163,11 @@ def _results(
             yield draw(job, place)
             progress(job.name)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=end_with_parent) as pool:
-        futures = {pool.submit(draw, job, place): job.name for job in jobs}
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-                progress(futures[future])
-        except BrokenProcessPool:
-            raise RuntimeError(
-                "a process ended before its work was done: is memory short?"
-            ) from None
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with background_processes(workers) as submit:
+        futures = {submit(draw, job, place): job.name for job in jobs}
+        for future in as_completed(futures):
+            yield future.result()
+            progress(futures[future])
 
 
 def draw(job: Job, place: Path) -> list[Drawing]:

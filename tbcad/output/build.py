@@ -1,6 +1,6 @@
 """An export: the record, what was asked for, and the manifest."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,7 +16,6 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
-from tbcad.prototype.arrangement import Arrangement
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
 from tbcad.shell.mandrel import Mandrel
@@ -47,7 +46,6 @@ def write_export(
     parts: Sequence[str] = PARTS,
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
-    arranged: Iterable[Arrangement] | None = None,
     *,
     optional_prototype: bool = False,
 ) -> Export:
@@ -59,7 +57,6 @@ def write_export(
         parts: some of PARTS.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
-        arranged: the prototype's arrangements, the preferred first; None: they are worked out.
         optional_prototype: leave the prototype out where it cannot be made, instead of refusing.
 
     Raises:
@@ -74,9 +71,7 @@ def write_export(
 
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
-    write_prototype = partial(
-        export_prototype, design, folder, progress, submit_file, arranged=arranged
-    )
+    write_prototype = partial(export_prototype, design, folder, progress, submit_file)
     export = _write_parts(
         design, folder, parts, progress, submit_file, write_prototype, optional_prototype
     )

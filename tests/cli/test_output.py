@@ -1,6 +1,8 @@
 """What commands print: 80 columns, how much is asked for, progress, and interrupts."""
 
 import json
+import os
+import re
 import shutil
 import signal
 import subprocess
@@ -9,15 +11,11 @@ import time
 from pathlib import Path
 
 import pytest
-from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.report.summary import MAX_LINES
-from tbcad_verify.run.stages import SHELL_STAGES
 
 from tbcad.cli import run
-from tbcad.cli.stage_times import build_times, export_times, verify_times
 from tbcad.cli.study_output import _show
 from tbcad.doctor import Finding
-from tbcad.output.parts import PARTS
 from tbcad.results.study import Figure, Study
 from tbcad.screen import WIDTH, TimeLeft, paragraph, stages
 from tests.exported_files import contents
@@ -165,22 +163,32 @@ def test_piped_stages_are_lines_with_seconds(capsys: pytest.CaptureFixture[str])
     assert (shown.out, shown.err) == ("", "[  0 s] a\n[  0 s] margin\n")
 
 
-def test_expected_times_grow_with_the_mirrors() -> None:
-    small, large = (build_times(n, PARTS, verify=True, process="cnc") for n in (6, 36))
-    assert list(small) == list(large)
-    assert next(iter(small)) == "edges and margins for cnc"
-    measured = verify_times(18, PARTS)["verification: STEP"]
-    assert 3 * measured < large["verification: STEP"] < 4 * measured
-    assert small["prototype: base"] == large["prototype: base"]
-    shells = build_times(18, ("shell",), verify=True, process=None)
-    assert not any("prototype" in title for title in shells)
-    assert {f"verification: {title}" for title in SHELL_STAGES} <= shells.keys()
-    assert {f"verification: {title}" for title in PROTOTYPE_STAGES} <= small.keys()
+ON_A_TERMINAL = """
+import time
+from tbcad.screen import stages
+
+with stages({"first": 1.0, "second": 3.0}) as screen:
+    screen.stage("first")
+    time.sleep(0.2)
+    screen.stage("second")
+    screen.detail("of it")
+    time.sleep(0.5)
+print("done")
+"""
 
 
-def test_expected_times_of_any_folder(built: Path, tmp_path: Path) -> None:
-    assert export_times(built) == verify_times(4, ("shell",)) | export_times(built)
-    assert export_times(tmp_path) == verify_times(18, ())
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no terminals of this kind")
+def test_a_terminal_shows_stage_and_time_left() -> None:
+    terminal, screen = os.openpty()
+    variables = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+    command = [sys.executable, "-c", ON_A_TERMINAL]
+    done = subprocess.run(command, stdout=-1, stderr=screen, env=variables, check=False)
+    drawn = os.read(terminal, 1 << 16).decode()
+    os.close(screen)
+    os.close(terminal)
+    assert (done.stdout, done.returncode) == (b"done\n", 0), drawn
+    assert re.search(r"about 0:0\d left first", drawn)
+    assert re.search(r"about 0:0\d left second: of it", drawn)
 
 
 def _accept_interrupts() -> None:

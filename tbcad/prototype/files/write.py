@@ -1,6 +1,5 @@
 """All files of the prototype: parts, tables, plan, record and assembly."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 from tbcad.background import Submit, at_once
@@ -15,7 +14,7 @@ from tbcad.formats.step_assembly import write_assembly
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.arrangement import Arrangement, arrangements
+from tbcad.prototype.arrangement import arrangements
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
@@ -42,7 +41,6 @@ def export_prototype(
     folder: Path,
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
-    arranged: Iterable[Arrangement] | None = None,
 ) -> Spec:
     """Build the prototype and write all of its files into a folder.
 
@@ -51,7 +49,6 @@ def export_prototype(
         folder: to write into.
         progress: called with each stage.
         submit: takes what can be done meanwhile.
-        arranged: the design's arrangements, the preferred first; None: they are worked out.
 
     Returns:
         The design's spec with what was chosen for the prototype.
@@ -61,8 +58,7 @@ def export_prototype(
         InvalidSolidError: when the kernel fails.
     """
     prices = load_prices(design.spec.prototype.prices)
-    arranged = arrangements(design) if arranged is None else arranged
-    built = build_prototype_model(arranged, progress, submit)
+    built = build_prototype_model(arrangements(design), progress, submit)
     spec = built.spec
     progress("prototype: files")
     prints = [submit(_write_part, folder, part, spec) for part in built.printed]

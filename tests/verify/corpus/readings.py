@@ -53,7 +53,7 @@ from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.run import stages
 from tbcad_verify.run import verify as verification
-from tbcad_verify.run.child import Limits
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.shell import measured_shell
 from tbcad_verify.step import shell_checks, step_file
 from tbcad_verify.step.step_file import StepFile
@@ -213,14 +213,16 @@ class _EachOnce:
         self._work, self._found = work, dict[object, Any]()
 
     def __call__(
-        self, blobs: list[FileBytes], limits: Limits, originals: Mapping[int, int] = EMPTY
+        self, blobs: list[FileBytes], processes: Processes, originals: Mapping[int, int] = EMPTY
     ) -> list[Any]:
         first = [blobs[originals.get(k, k)].sha256 for k in range(len(blobs))]
-        keys = [(blob.sha256, one, limits.seconds) for blob, one in zip(blobs, first, strict=True)]
+        keys = [
+            (blob.sha256, one, processes.seconds) for blob, one in zip(blobs, first, strict=True)
+        ]
         unread = {k for k, key in enumerate(keys) if key not in self._found}
         new = sorted(unread | {originals[k] for k in unread if k in originals})
         among = {new.index(k): new.index(one) for k, one in originals.items() if k in new}
-        answers = dict(zip(new, self._work([blobs[k] for k in new], limits, among), strict=True))
+        answers = dict(zip(new, self._work([blobs[k] for k in new], processes, among), strict=True))
         self._found |= {
             keys[k]: answer for k, answer in answers.items() if isinstance(answer, StepFile)
         }

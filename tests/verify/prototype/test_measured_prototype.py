@@ -37,7 +37,7 @@ from tbcad_verify.prototype.step_files import part_step_checks
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import Check, Unknown
-from tbcad_verify.run.child import Limits
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
 from tests.exported_files import edit_json
@@ -402,7 +402,8 @@ def step_checks(folder: Path, low: list[float], high: list[float]) -> dict[str, 
     """Checks of a stage whose STEP file has a box of these corners."""
     context = context_of(stepped(folder, low, high))
     masses = {one.part.name: one.placed_mass for one in parts_of(context) if one.placed_mass}
-    files = read_step_files(context.export, Limits(60))
+    with Processes(1, 60) as processes:
+        files = read_step_files(context.export, processes)
     return {check.name: check for check in part_step_checks(context.export, masses, files)}
 
 
@@ -432,7 +433,8 @@ def test_one_broken_step_file_leaves_the_others_known(prototype_folder: Path) ->
     good = load(context.export.folder, "stage.step")
     (prototype_folder / "bad.step").write_text("ISO-10303-21;\nEND-ISO-10303-21;")
     bad = load(prototype_folder, "bad.step")
-    found = examine_all([bad, good, bad], Limits(60))
+    with Processes(1, 60) as processes:
+        found = examine_all([bad, good, bad], processes)
     assert [isinstance(one, StepFile) for one in found] == [False, True, False]
 
 

@@ -1,9 +1,12 @@
-"""A stage that crashes, hangs or sends nonsense is unknown, and so are those after it."""
+"""A stage that crashes or hangs is unknown, and so are those after it."""
 
 from __future__ import annotations
 
+import os
 import re
-import sys
+import signal
+import time
+from concurrent.futures import wait
 from pathlib import Path
 
 import numpy as np
@@ -11,66 +14,61 @@ import pytest
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import NAME
-from tbcad_verify.run.results import CollectedResults, Results
+from tbcad_verify.run.processes import Processes
+from tbcad_verify.run.results import CollectedResults, Results, ResultSink
 from tbcad_verify.run.verify import VerifyOptions, verify
-from tbcad_verify.run.watch import UNREADABLE, watch
+from tbcad_verify.run.watch import watch
 
 STAGES = ("one", "two", "three")
 CHECK = Check("a", "", True, 1.0, 2.0, "mm")
-BEGUN = """
-import os, sys, time
-from multiprocessing.connection import Connection
-from tbcad_verify.errors import BadExport
-from tbcad_verify.report.checks import Check
-from tbcad_verify.run.results import Results
-pipe = Connection(os.dup(1), readable=False)
-pipe.send(Results(stages=["one"], checks=[Check("a", "", True, 1.0, 2.0, "mm")]))
-pipe.send(Results(stages=["two"]))
-"""
 FAILURES = {
-    "crash": ("os.kill(os.getpid(), 11)", "crashed (SIGSEGV)"),
-    "killed": ("os.kill(os.getpid(), 9)", "crashed (SIGKILL)"),
-    "no end": ("sys.exit(0)", "ended with exit code 0"),
-    "exit code": ("sys.exit(3)", "ended with exit code 3"),
-    "hangs": ("time.sleep(60)", "took more than 5 s and was stopped"),
-    "no pickle": ("pipe.send_bytes(b'hello'); time.sleep(60)", UNREADABLE),
-    "no results": ("pipe.send('hello'); time.sleep(60)", UNREADABLE),
-    "half a message": ("os.write(1, bytes(3))", "ended with exit code 0"),
-    "hangs in a message": ("os.write(1, bytes(3)); time.sleep(60)", "took more than 5 s"),
+    "crash": "crashed (SIGKILL)",
+    "exit code": "ended with exit code 3",
+    "hangs": "no answer within 5 s",
 }
 
 
-def watched(code: str, seconds: float = 30) -> CollectedResults:
+def stages(end: str, report: ResultSink) -> None:
+    report(Results(stages=["one"], checks=[CHECK]))
+    report(Results(stages=["two"]))
+    match end:
+        case "crash":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case "exit code":
+            os._exit(3)
+        case "hangs":
+            report(Results(stages=[str(os.getpid())]))
+            time.sleep(60)
+        case "refuses":
+            raise BadExport("the file is bad")
+    report(Results(stages=["three"]))
+
+
+def watched(end: str, seconds: float = 30) -> CollectedResults:
     results = CollectedResults()
-    watch([sys.executable, "-c", BEGUN + code], STAGES, results, seconds)
+    watch(STAGES, results, seconds, stages, end)
     return results
 
 
 @pytest.mark.parametrize("failure", FAILURES)
 def test_a_stage_without_an_end_is_unknown(failure: str) -> None:
-    code, reason = FAILURES[failure]
-    results = watched(code, 5 if reason.startswith("took") else 30)
+    results = watched(failure, 5 if failure == "hangs" else 30)
+    broken, reason = results.stages[-1], FAILURES[failure]
     verdicts = [(check.name, check.passed) for check in results.checks]
-    assert verdicts == [("a", True), ("two", None), ("three", None)]
-    assert results.checks[1].detail.startswith(reason)
-    assert results.checks[2].detail == f"not reached: 'two' {results.checks[1].detail}"
-
-
-def test_a_worker_that_sends_nothing() -> None:
-    results = CollectedResults()
-    watch([sys.executable, "-c", "pass"], STAGES, results, 30)
-    assert [(c.name, c.passed) for c in results.checks] == [(name, None) for name in STAGES]
+    assert verdicts == [("a", True), (broken, None), ("three", None)]
+    assert results.checks[1].detail == reason
+    assert results.checks[2].detail == f"not reached: {broken!r} {reason}"
 
 
 def test_a_worker_that_ends_is_left_as_it_is() -> None:
-    results = watched("pipe.send(Results(stages=['three'])); pipe.send(None)")
+    results = watched("well")
     assert results.stages == list(STAGES)
     assert results.checks == [CHECK]
 
 
 def test_a_refusal_is_raised() -> None:
     with pytest.raises(BadExport, match="the file is bad"):
-        watched("pipe.send(BadExport('the file is bad'))")
+        watched("refuses")
 
 
 def test_no_worker_outlives_an_interrupt() -> None:
@@ -83,11 +81,31 @@ def test_no_worker_outlives_an_interrupt() -> None:
 
     started: list[int] = []
     results = CollectedResults(progress=interrupt)
-    code = "pipe.send(Results(stages=[str(os.getpid())])); time.sleep(60)"
     with pytest.raises(KeyboardInterrupt):
-        watch([sys.executable, "-c", BEGUN + code], STAGES, results, 30)
+        watch(STAGES, results, 30, stages, "hangs")
     assert started
     assert not Path(f"/proc/{started[0]}").exists()
+
+
+def test_a_crash_beside_the_shells_is_known_by_its_stage() -> None:
+    results = CollectedResults()
+    watch(STAGES, results, 30, crash_beside)
+    assert [(check.name, check.passed) for check in results.checks] == [
+        ("a", True),
+        ("two", None),
+        ("three", None),
+    ]
+    assert results.checks[1].detail == "crashed (SIGKILL)"
+
+
+def crash_beside(report: ResultSink) -> None:
+    inbox: list[Results] = []
+    with Processes(1) as beside:
+        ending = beside.submit(stages, "crash", heard=inbox.append)
+        wait([ending])
+        for results in inbox:
+            report(results)
+        ending.result()
 
 
 def test_results_add_up() -> None:

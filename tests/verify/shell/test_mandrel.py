@@ -17,7 +17,7 @@ from tbcad_verify.mesh.stl import read_facets
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.poses import contradictions
 from tbcad_verify.report.checks import Check
-from tbcad_verify.run.child import Limits
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.stages import stage_titles
 from tbcad_verify.run.verify import verify
 from tbcad_verify.shell.mandrel import mandrel_results
@@ -91,7 +91,8 @@ def step_failing(folder: Path) -> dict[str, str]:
     """What fails of the first negative's STEP, but for what needs its mesh."""
     record = read_export(folder)
     record = replace(record, parts=(), mandrels=record.mandrels[:1])  # no other file is read
-    files = read_step_files(record, Limits(120))
+    with Processes(1, 120) as processes:
+        files = read_step_files(record, processes)
     checks = mandrel_step_checks(record, {}, mandrel_comparisons(record, files))
     mine = [check for check in checks if check.file == STEP and check.passed is False]
     return {check.name: check.detail for check in mine}

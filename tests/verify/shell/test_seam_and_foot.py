@@ -15,7 +15,7 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from tbcad_verify.mesh.stl import read_facets
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Check
-from tbcad_verify.run.child import Limits
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.verify import verify
 from tbcad_verify.shell.integrity import mesh_ends_checks
 from tbcad_verify.shell.measured_shell import measure_shells
@@ -109,7 +109,8 @@ def step_ends(folder: Path) -> Check:
     """The check of the first half's STEP file."""
     record = read_export(folder)
     record = replace(record, parts=record.parts[:1])
-    comparisons = shell_comparisons(record, read_step_files(record, Limits(120)))
+    with Processes(1, 120) as processes:
+        comparisons = shell_comparisons(record, read_step_files(record, processes))
     checks = shell_step_checks(record, {}, comparisons, areas=())
     return next(check for check in checks if check.name == "step seam and foot")
 

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.run.child import Limits
-from tbcad_verify.step import __main__ as child
+from tbcad_verify.run.processes import Processes
+from tbcad_verify.step.kernel import reading
 from tbcad_verify.step.kernel.reading import read_solid
 from tbcad_verify.step.mirror_image import flipped_solid, is_mirror_image
-from tbcad_verify.step.step_file import examine_all, load, parse
+from tbcad_verify.step.step_file import examine_all, load, parse, read_file
 from tbcad_verify.step.text import read_text
 
 from tbcad.mirrors.array import MirrorDesign
@@ -118,8 +118,9 @@ def read_by(folder: Path, files: tuple[str, str]) -> list[str]:
         kept.append(path.name)
         return read_solid(path)
 
-    for k, name in enumerate(files):
-        child.read_file(read, folder / name, folder / f"answer{k}.json", folder / files[0])
+    with mock.patch.object(reading, "read_solid", read):
+        for name in files:
+            read_file(folder / name, folder / files[0])
     return kept
 
 
@@ -132,6 +133,6 @@ def test_the_kernel_reads_what_is_no_image(folder: Path, texts: tuple[str, str])
 
 def test_the_image_of_an_unknown_is_unknown(folder: Path) -> None:
     blobs = [load(folder, f"shell_{camera}.step") for camera in "ab"]
-    with mock.patch.object(child, "read_file"):
-        found = examine_all(blobs, Limits(60, fork=True), {1: 0})
+    with Processes(1, 0.01) as processes:
+        found = examine_all(blobs, processes, {1: 0})
     assert all(isinstance(one, Unknown) for one in found)

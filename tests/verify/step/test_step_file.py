@@ -14,7 +14,7 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPContro
 from OCP.TopoDS import TopoDS_Shape
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.run.child import Limits
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.kernel.reading import read_solid
 from tbcad_verify.step.step_file import StepFile, examine_all, known, load, parse
 from tbcad_verify.step.text import read_text
@@ -44,8 +44,9 @@ def both(file: Path) -> StepFile:
     return parse(read_text(file), read_solid(file))
 
 
-def examine(folder: Path, name: str, limits: Limits) -> StepFile:
-    return known(examine_all([load(folder, name)], limits)[0])
+def examine(folder: Path, name: str, seconds: float) -> StepFile:
+    with Processes(1, seconds) as processes:
+        return known(examine_all([load(folder, name)], processes)[0])
 
 
 def test_box_in_closed_form(tmp_path: Path) -> None:
@@ -114,7 +115,7 @@ def test_two_solids_are_counted(tmp_path: Path) -> None:
 
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     file = written(tmp_path, BOX)
-    found, here = examine(tmp_path, file.name, Limits(60)), both(file)
+    found, here = examine(tmp_path, file.name, 60), both(file)
     assert found.mass == here.mass
     assert found.faces.names == here.faces.names
 
@@ -122,7 +123,7 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
 def test_what_takes_too_long_is_unknown(tmp_path: Path) -> None:
     file = written(tmp_path, BOX)
     with pytest.raises(Unknown, match="no answer within"):
-        examine(tmp_path, file.name, Limits(0.05))
+        examine(tmp_path, file.name, 0.05)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +140,7 @@ def test_broken_inside_is_unknown(tmp_path: Path, change: object) -> None:
     file = written(tmp_path, BOX)
     file.write_text(change(file.read_text()))  # type: ignore[operator]
     with pytest.raises(Unknown):
-        examine(tmp_path, file.name, Limits(60))
+        examine(tmp_path, file.name, 60)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
 KEPT_VARIABLES = ("PATH", "LD_LIBRARY_PATH")  # all that a program needs of our environment
 POLL_S = 0.02
@@ -29,24 +29,11 @@ class Limits:
         seconds: time from its start.
         output: bytes printed.
         stop: once this is set, children are killed and none is started.
-        fork: STEP files are read in copies of this process, which has loaded the kernel.
     """
 
     seconds: float = 300.0
     output: int = 1_000_000
     stop: threading.Event = field(default_factory=threading.Event)
-    fork: bool = False
-
-
-class Child(Protocol):
-    """A process that this one started, the first of its group."""
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-
-    def wait(self) -> int:
-        """Wait for its end and return the exit status, that of a signal below zero."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +75,7 @@ def run(command: Sequence[str], folder: Path, limits: Limits) -> Outcome:
         try:
             reason = _wait(child, output, started + limits.seconds, limits)
         finally:
-            kill_group(child)
+            _kill_group(child)
         output.seek(0)
         text = output.read(limits.output).decode("utf-8", "replace").replace(str(folder), ".")
     reason = reason or crash_reason(child.returncode)
@@ -96,10 +83,13 @@ def run(command: Sequence[str], folder: Path, limits: Limits) -> Outcome:
     return Outcome(code, text, time.monotonic() - started, reason)
 
 
-def kill_group(child: Child) -> None:
+def _kill_group(child: subprocess.Popen[bytes]) -> None:
     """Kill a child's process group, which may outlive the child, and wait for the child's end."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(child.pid, signal.SIGKILL)
+        if hasattr(os, "killpg"):
+            os.killpg(child.pid, signal.SIGKILL)
+        else:
+            child.kill()
     child.wait()
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from queue import SimpleQueue
 
 from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.rays import RayScene, build_scene
@@ -22,7 +23,7 @@ from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
-from tbcad_verify.run.fork import StagesWork, in_order
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import (
@@ -59,19 +60,15 @@ def stage_titles(export: Export) -> tuple[str, ...]:
 
 
 def run_stages(
-    folder: Path,
-    sink: ResultSink,
-    printers: Sequence[str] = (),
-    begin: Callable[[StagesWork], StagesWork] = in_order,
+    folder: Path, printers: Sequence[str], sink: ResultSink, beside: Processes | None = None
 ) -> None:
     """Run all stages, and hand over what each measures.
 
     Args:
         folder: what `tbcad build` wrote.
-        sink: takes the results.
         printers: profiles that every part must suit; without any, the built-in ones inform only.
-        begin: may do the prototype's stages while the shells' are done, by its value when it is
-            called.
+        sink: takes the results.
+        beside: does the prototype's stages while the shells' are done here.
 
     Raises:
         BadExport: the folder is not a readable export, or a profile cannot be used.
@@ -96,9 +93,24 @@ def run_stages(
 
     shells, mandrels = len(export.parts), len(export.mandrels)
     printed, facets = facets[shells + mandrels :], facets[: shells + mandrels]
-    prototype = begin(lambda to: _verify_prototype(export, printed, profiles, bool(printers), to))
+    prototype: SimpleQueue[Results | None] = SimpleQueue()
+    work = _verify_prototype, export, printed, profiles, bool(printers)
+    if beside and export.prototype:
+        ending = beside.submit(*work, heard=prototype.put)
+        ending.add_done_callback(lambda _: prototype.put(None))
     _verify_shells(export, facets, profiles, bool(printers), sink)
-    prototype(sink)
+    if beside and export.prototype:
+        for results in iter(prototype.get, None):
+            sink(results)
+        ending.result()
+    else:
+        _verify_prototype(*work[1:], sink)
+
+
+def run_in_two(folder: Path, printers: Sequence[str], sink: ResultSink) -> None:
+    """Run all stages, those of the prototype in another process."""
+    with Processes(1) as beside:
+        run_stages(folder, printers, sink, beside)
 
 
 def _verify_shells(

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
-from multiprocessing.connection import Connection
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +23,10 @@ from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, Unknown, short_list
 from tbcad_verify.report.paper import strictly
 from tbcad_verify.report.report import NAME, Report
-from tbcad_verify.run.child import Limits, kill_group
-from tbcad_verify.run.fork import ForkedResult
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
-from tbcad_verify.run.stages import run_stages, stage_titles
-from tbcad_verify.run.watch import STAGE_LIMIT_S, watch, worker_command
-from tbcad_verify.run.worker import send_stages
+from tbcad_verify.run.stages import run_in_two, run_stages, stage_titles
+from tbcad_verify.run.watch import STAGE_LIMIT_S, watch
 from tbcad_verify.step.mandrel_checks import (
     MandrelComparison,
     mandrel_comparisons,
@@ -41,7 +38,7 @@ from tbcad_verify.step.shell_checks import (
     shell_comparisons,
     shell_step_checks,
 )
-from tbcad_verify.step.step_file import StepFile, read_step_files
+from tbcad_verify.step.step_file import PROCESSES, StepFile, read_step_files
 from tbcad_verify.types import Progress
 
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
@@ -65,8 +62,6 @@ class VerifyOptions:
             ones are tried, and what they find informs only.
         clients: also ask the programs that users open the files with, where they are installed.
         strict: fail also where a file was changed that only people read, such as a list of parts.
-        fork: other processes are copies of this one, which has no threads: quicker where it has
-            loaded the libraries.
     """
 
     write: bool = True
@@ -75,7 +70,6 @@ class VerifyOptions:
     printers: tuple[str, ...] = ()
     clients: bool = False
     strict: bool = False
-    fork: bool = False
 
 
 def verify(
@@ -126,48 +120,25 @@ def verify(
 
 def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> None:
     """All stages; an interrupt ends the processes that read files, which take long."""
-    limits = Limits(options.seconds, fork=options.fork)
-    with _steps(export, limits) as steps:
+    work = export.folder, options.printers
+    with _steps(export, options.seconds) as steps:
         # Reading STEP files needs none of the stages, and takes as long as they do.
         if options.apart:
-            watch(_worker(export, options), stage_titles(export), results, options.seconds)
+            watch(stage_titles(export), results, options.seconds, run_in_two, *work)
         else:
-            run_stages(export.folder, results.add, options.printers)
+            run_stages(*work, results.add)
         _compare_steps(export, results, steps)
 
 
-def _worker(export: Export, options: VerifyOptions) -> Sequence[str] | Callable[[Connection], None]:
-    if options.fork:
-        return partial(send_stages, export.folder, options.printers)
-    return worker_command(export.folder, options.printers)
-
-
 @contextmanager
-def _steps(export: Export, limits: Limits) -> Iterator[Callable[[], Steps]]:
+def _steps(export: Export, seconds: float) -> Iterator[Callable[[], Steps]]:
     """Read STEP files while the block runs; the value waits for them."""
-    if limits.fork:
-        reading = ForkedResult(partial(_read_steps, export, limits), partial(_no_steps, export))
-        try:
-            yield reading.result
-        finally:
-            kill_group(reading.fork)
-        return
-    with ThreadPoolExecutor(1) as pool:
-        try:
-            yield pool.submit(_read_steps, export, limits).result
-        except BaseException:
-            limits.stop.set()
-            raise
+    with ThreadPoolExecutor(1) as pool, Processes(PROCESSES, seconds) as processes:
+        yield pool.submit(_read_steps, export, processes).result
 
 
-def _no_steps(export: Export, reason: str) -> Steps:
-    parts = (*export.parts, *export.mandrels, *export.printed)
-    files: Files = {part.name: Unknown(reason) for part in parts}
-    return files, shell_comparisons(export, files), mandrel_comparisons(export, files), None
-
-
-def _read_steps(export: Export, limits: Limits) -> Steps:
-    files = read_step_files(export, limits)
+def _read_steps(export: Export, processes: Processes) -> Steps:
+    files = read_step_files(export, processes)
     areas = area_checks(export) if any(part.step for part in export.parts) else None
     mandrels = mandrel_comparisons(export, files)
     return files, shell_comparisons(export, files), mandrels, areas

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -21,18 +20,17 @@ from tbcad_verify.mesh.mass import MassProperties
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.run.child import Limits, run
-from tbcad_verify.step.__main__ import main as read_files
-from tbcad_verify.step.mirror_image import flipped_solid
+from tbcad_verify.run.processes import ProcessEnded, Processes
+from tbcad_verify.step.mirror_image import flipped_solid, is_mirror_image
+from tbcad_verify.step.text import ascii_text, read_text
 from tbcad_verify.types import Floats
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 SAME_SURFACE = 2e-9  # mm and differences of unit vectors: digits of the text
 EXACT_KINDS = ("sphere", "plane")
-PROCESSES = min(os.cpu_count() or 1, 4)  # read files at the same time, 0.2 GB each
-# -P: what lies in the current folder must not be imported.
-READER = ("-P", "-m", "tbcad_verify.step")
+# That read files at the same time, 0.2 GB each; meshes are read meanwhile.
+PROCESSES = min(max((os.cpu_count() or 1) - 1, 1), 4)
 
 Row = dict[str, Any]
 Found = TypeVar("Found")
@@ -107,12 +105,12 @@ def load(folder: Path, name: str) -> FileBytes:
     return blob
 
 
-def read_step_files(export: Export, limits: Limits) -> dict[str, StepFile | Unknown]:
+def read_step_files(export: Export, processes: Processes) -> dict[str, StepFile | Unknown]:
     """The STEP files of all parts, or why one is not known, by part.
 
     Args:
         export: the record.
-        limits: of the reading of one file.
+        processes: that read them.
 
     Raises:
         BadExport: a file is missing, foreign or truncated.
@@ -120,57 +118,62 @@ def read_step_files(export: Export, limits: Limits) -> dict[str, StepFile | Unkn
     parts = [part for part in (*export.parts, *export.mandrels, *export.printed) if part.step]
     blobs = [load(export.folder, part.step) for part in parts]
     shells = [k for k, part in enumerate(parts) if part in export.parts]
-    files = examine_all(blobs, limits, dict.fromkeys(shells[1:], *shells[:1]))
+    files = examine_all(blobs, processes, dict.fromkeys(shells[1:], *shells[:1]))
     return {part.name: file for part, file in zip(parts, files, strict=True)}
 
 
 def examine_all(
-    blobs: Sequence[FileBytes], limits: Limits, originals: Mapping[int, int] = MappingProxyType({})
+    blobs: Sequence[FileBytes],
+    processes: Processes,
+    originals: Mapping[int, int] = MappingProxyType({}),
 ) -> list[StepFile | Unknown]:
     """Read the bytes of files as text and by the kernel, from private copies.
 
-    The kernel takes long to load: one process loads it, and a fork of that process reads each
-    file, so that one that crashes or stops its reader does not make the others unknown.
-
     Args:
         blobs: the files.
-        limits: of the reading of one file.
+        processes: one that crashes, or is stopped, makes the file that it was at unknown, and no
+            other.
         originals: by the number of a file, that of the one whose mirror image it may be: the kernel
             does not read it if it is.
     """
     with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
-        place = Path(name)
-        for k, blob in enumerate(blobs):
-            blob.data.tofile(place / f"part{k}.step")
+        paths = [Path(name) / f"part{k}.step" for k in range(len(blobs))]
+        for path, blob in zip(paths, blobs, strict=True):
+            blob.data.tofile(path)
         # The largest first, so that no process is left with a large one at the end.
         order = sorted(range(len(blobs)), key=lambda k: (-blobs[k].data.size, k))
-        jobs = [(k, originals.get(k, k)) for k in order]
-        reason = _read(place, jobs, limits) if blobs else ""
-        answers = [_answer(place / f"answer{k}.json", reason) for k in range(len(blobs))]
+        asked = {
+            k: processes.submit(read_file, paths[k], paths[originals.get(k, k)]) for k in order
+        }
+        answers = [_answer(asked[k]) for k in range(len(blobs))]
     return [_joined_answer(answers, k, originals.get(k, k)) for k in range(len(blobs))]
 
 
-def _read(place: Path, jobs: Sequence[tuple[int, int]], limits: Limits) -> str:
-    """Read files, given their numbers and those of their originals; why it failed, or empty."""
-    paths = [
-        f"{place}/{name}"
-        for k, original in jobs
-        for name in (f"part{k}.step", f"answer{k}.json", f"part{original}.step")
-    ]
-    if limits.fork:
-        read_files(limits.seconds, PROCESSES, [Path(path) for path in paths])
-        return ""
-    command = [sys.executable, *READER, str(limits.seconds), str(PROCESSES), *paths]
-    # Loading the kernel, and one file after the other.
-    outcome = run(command, place, replace(limits, seconds=limits.seconds * (1 + len(jobs))))
-    return outcome.reason or ("" if outcome.code == 0 else outcome.text.strip().rpartition("\n")[2])
+def read_file(file: Path, original: Path) -> Row:
+    """Read one file as text and by the kernel, or say why it cannot be read.
+
+    Its solid is none where the kernel need not read it: the file is the mirror image of its
+    original. One without an original has itself there.
+    """
+    from tbcad_verify.step.kernel.reading import read_solid
+
+    try:
+        content: Row = {"text": read_text(file), "solid": None}
+        if original == file or not is_mirror_image(*(ascii_text(one) for one in (original, file))):
+            content["solid"] = read_solid(file)
+    except ValueError as error:
+        return {"refused": str(error)}
+    except Exception as error:
+        return {"refused": f"{type(error).__name__}: {error}"}
+    return content
 
 
-def _answer(path: Path, reason: str) -> Row:
-    """What was read of a file, or why it was refused."""
-    if not path.exists():
-        return {"refused": reason or "no answer"}
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+def _answer(asked: Future[Row]) -> Row:
+    """What was read of a file, or why it was not."""
+    try:
+        return asked.result()
+    except ProcessEnded as end:
+        return {"refused": str(end)}
 
 
 def _joined_answer(answers: Sequence[Row], number: int, original: int) -> StepFile | Unknown:
