@@ -6,13 +6,14 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from tbcad.errors import InputError
-from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from tbcad.types import Floats
 
 REBUILD = "build it again with tbcad build"
 MAX_DIGITS = 30  # of whole numbers
@@ -126,8 +127,10 @@ def read_csv(path: Path, model: type[Model], missing: str) -> list[Model]:
         raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
 
 
-def columns(rows: Sequence[Record], names: str) -> Floats:
+def columns(rows: Sequence[Record], names: str) -> "Floats":
     """Columns of numbers of a table, by their names with spaces between, (rows, columns)."""
+    import numpy as np  # not for help and bad input
+
     wanted = names.split()
     numbers = [[getattr(row, name) for name in wanted] for row in rows]
     return np.array(numbers, dtype=np.float64).reshape(len(rows), len(wanted))

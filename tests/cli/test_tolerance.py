@@ -32,7 +32,7 @@ def _quick() -> Iterator[None]:
         for name, value in {
             "analysis.SEARCH_BUILDS": 10,
             "analysis.PHOTOGRAPHED_BUILDS": 1,
-            "view_quality.VIEWPOINTS": ((60.0,), 1, 640.0),
+            "montecarlo.sharpness.VIEWPOINTS": ((60.0,), 1, 640.0),
             "analysis.BUILT_IN": ("sla", "diamond"),
         }.items():
             patch.setattr(f"tbcad.tolerance.{name}", value)

@@ -266,7 +266,7 @@ class TestJson:
         assert read["calibrated"]["worst_camera_mm"]["0.5"] == 61
 
     def test_prototype_whose_windows_miss_balls(self, analysis: Analysis) -> None:
-        """Its pointing error is infinite (tbcad.tolerance.prototype.windows.seen)."""
+        """Its pointing error is infinite (tbcad.tolerance.prototype.windows)."""
         lost = replace(analysis, prototype=prototype_yield(0.0, 0.0, math.inf))
         json.loads(json_text(lost))
 

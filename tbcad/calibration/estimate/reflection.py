@@ -115,7 +115,7 @@ def projection(camera: LensCamera, image: Floats) -> tuple[Floats, Floats, Float
 
 
 def _distortion_slopes(place: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
-    """Of tbcad.optics.lens_camera.distorted by the place (n, 2, 2), by k1 k2 p1 p2 k3 (n, 2, 5)."""
+    """Of tbcad.optics.camera.distorted by the place (n, 2, 2), by k1 k2 p1 p2 k3 (n, 2, 5)."""
     k1, k2, p1, p2, k3 = coefficients
     x, y = place.T
     s = x * x + y * y
