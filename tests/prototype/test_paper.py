@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -176,14 +176,8 @@ def test_what_is_bought_is_what_is_fastened(n: int, drive: str, hold: str, keys:
         found = arrange(design(load_spec(None, options)))
     except SpecError:
         return
-    model = PrototypeModel(
-        **{name: getattr(found, name) for name in ("spec", "layout", "base", "split", "stage")},
-        **{name: getattr(found, name) for name in ("wiring", "frame", "shroud", "balance")},
-        **{"drive": found.drive, "parts": found.parts},
-        gauge=None,
-        printed=(),
-        capture_radius=30.0,
-    )
+    layouts = {one.name: getattr(found, one.name) for one in fields(found)}
+    model = PrototypeModel(**layouts, gauge=None, printed=())
     bought, drawn = model.purchased, Counter(one.part.name for one in model.fasteners)
     assert all(bought[part] == count for part, count in drawn.items())
     assert len({one.name for one in model.fasteners}) == len(model.fasteners)
