@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from tbcad_verify.record.export import Design
+
+from tbcad.records.design import DesignRecord
 
 pytest.importorskip("mkdocs")
 pytestmark = pytest.mark.slow
@@ -53,4 +54,4 @@ def test_generated_pages_have_what_they_are_for(site: Path, page: str, words: li
 
 def test_schemas_are_those_of_the_models(site: Path) -> None:
     written = json.loads((site / "reference" / "design.json.schema.json").read_text("utf-8"))
-    assert written == Design.model_json_schema()
+    assert written == DesignRecord.model_json_schema()
