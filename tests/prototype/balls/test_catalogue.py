@@ -1,3 +1,4 @@
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,14 @@ class TestBuiltIn:
         expected = [steel_mass_g(diameter) for diameter in stock.diameter]
         assert stock.mass_g == pytest.approx(expected, rel=1e-3)
         assert steel_mass_g(60) == pytest.approx(883.3, abs=0.1)
+
+    @pytest.mark.parametrize("name", ["metric", "inch"])
+    def test_sizes_name_their_diameters(self, name: str) -> None:
+        """In millimetres, or in whole inches and a fraction: what is ordered is what is built."""
+        for ball in load_catalogue([name]).balls:
+            number, unit = ball.size.rsplit(" ", 1)
+            inches = float(sum(Fraction(part) for part in number.split()))
+            assert ball.diameter_mm == pytest.approx(inches * {"in": 25.4, "mm": 1.0}[unit])
 
     def test_grades_are_those_of_iso_3290_1(self) -> None:
         grades = load_grades()

@@ -119,6 +119,17 @@ def test_the_choice_that_was_taken_is_recorded(record: dict[str, Any], balls: Ro
     assert chosen["caps"] == sum(ball["kind"] == "cap" for ball in balls)
 
 
+def test_lengths_of_the_gauge_are_those_of_its_marks(folder: Path, record: dict[str, Any]) -> None:
+    place, design = record["camera_place"], json.loads((folder / "design.json").read_text())
+    lengths, marks = place["lengths_mm"], np.array(place["marks_mm"])
+    near, far = np.mean(marks @ record["frame"]["axis"], axis=0)
+    pinhole = np.linalg.norm(design["cameras"][0]["pinhole_mm"])
+    widths = np.linalg.norm(marks[0] - marks[1], axis=1)
+    assert widths == pytest.approx([lengths["near_width"], lengths["far_width"]])
+    assert lengths["hub_to_far"] - lengths["hub_to_near"] == pytest.approx(far - near)
+    assert lengths["hub_to_pinhole"] - lengths["hub_to_near"] == pytest.approx(pinhole - near)
+
+
 def test_tables_and_record_agree(folder: Path, record: dict[str, Any], balls: Rows) -> None:
     assert record["balls"] == "balls.csv"
     assert len(balls) == len(record["seats"]) == 4

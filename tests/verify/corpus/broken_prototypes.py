@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tests.verify.corpus.copies import put
-from tests.verify.corpus.mutation import Mutation, fails, refused
+from tests.verify.corpus.mutation import Job, Mutation, fails, refused
 from tests.verify.corpus.prototype_changes import (
     BALLS,
     GLB,
@@ -15,29 +14,25 @@ from tests.verify.corpus.prototype_changes import (
     RECORD,
     SETTINGS,
     STEP,
-    STOPS,
     UPRIGHT,
     WHEEL,
-    better_calibration,
+    bought,
     compact,
     drawn_away,
-    drive,
     empty_step,
-    exchange,
     fastener,
     fastener_off,
     fewer_circles,
     flat_fold,
     frame_key,
     glb,
-    held,
-    in_place,
     lamp_aside,
     lamps,
     lamps_on_their_sides,
     led,
     leds_on_one_side,
     longer_outline,
+    magnet,
     mark_aside,
     mounted_in,
     moved_part,
@@ -54,7 +49,6 @@ from tests.verify.corpus.prototype_changes import (
     record,
     redrawn,
     row,
-    scaled,
     shifted,
     shifted_circle,
     shiny_card,
@@ -66,57 +60,22 @@ from tests.verify.corpus.prototype_changes import (
     together,
     undrawn,
     unpainted,
-    upside_down,
     wider_circle,
 )
 
+
+def unsure(name: str, kind: str, job: Job, check: str, words: str) -> Mutation:
+    """A mutation by which a check cannot be made."""
+    return Mutation(name, kind, job, 1, (check,), (words,), unknown=True)
+
+
 PLAN = "plan program"
-DWELL = r"G4 P0\.500\n"
-WORDS = (
-    *("G28", "G2 X1.0000", "Y5000", "G93", "G10 L2 P1 X5.0000", "G55", "M7", "G20", "G91", "M30"),
-    *("G0 X1.0000", "G1 X1.0000 (hold on!)", "$H"),
-    *("M18", "M84", "$SLP", "$1=25", "$37=0", "!"),  # by which the motor lets go, or runs no longer
-)
+DWELL = "G4 P0.500\n"
 
 PROGRAMS: tuple[Mutation, ...] = (
-    *(
-        fails(f"program: {word}", PROGRAM, program(DWELL, f"{word}\nG4 P0.500\n", 1), PLAN, "line")
-        for word in WORDS
-    ),
+    fails("program: a foreign word", PROGRAM, program(DWELL, f"$SLP\n{DWELL}", 1), PLAN, "line"),
     fails("program: G92 X50", PROGRAM, program("G92 X.*", "G92 X50.0000"), PLAN, "swing"),
-    fails("program: no homing", PROGRAM, program(r"\$H\n", ""), PLAN, "before a person"),
-    fails(
-        "program: homing with the pin in",
-        PROGRAM,
-        program(r"M0 \(MSG, zero pin.*\n", ""),
-        PLAN,
-        "before the zero pin",
-    ),
-    fails("program: M2 halfway", PROGRAM, program(DWELL, "M2\n", 1), PLAN, "after the end"),
-    fails("program: never turned", PROGRAM, program(r"M0 \(MSG, turn.*\n", ""), PLAN, "pauses for"),
-    fails("program: no dwell", PROGRAM, program("G4 .*\n", ""), PLAN, "0 s after the motion"),
-    fails("program: too short a dwell", PROGRAM, program("P0.500", "P0.100"), PLAN, "0.2 s after"),
-    fails("program: a light stays on", PROGRAM, program("M65 P0\n", ""), PLAN, "a light is on"),
     fails("program: no LED", PROGRAM, program("M64 P2\n", ""), PLAN, "outputs none on, not [2]"),
-    fails(
-        "program: a light before the end of the motion",
-        PROGRAM,
-        program(DWELL, "M64 P1\nM65 P1\nG4 P0.500\n", 1),
-        PLAN,
-        "before the motion has ended",
-    ),
-    fails(
-        "program: lamp and LED exchanged",
-        PROGRAM,
-        together(program("P1\n", "P9\n"), program("P0\n", "P1\n"), program("P9\n", "P0\n")),
-        PLAN,
-        "outputs [0] on, not [1]",
-    ),
-    fails("program: no M9", PROGRAM, program("M9\n", ""), PLAN, "release is on"),
-    fails("program: no F", PROGRAM, program(" F900", ""), PLAN, "without a speed"),
-    fails("program: F0", PROGRAM, program(" F900", " F0"), PLAN, "without a speed"),
-    fails("program: no photograph", PROGRAM, program("M8\n", "", 1), PLAN, "is not on"),
-    fails("program: other steps", PROGRAM, program(r"\$100=[\d.]+", r"$100=99"), PLAN, "steps is"),
 )
 
 PARTS: tuple[Mutation, ...] = (
@@ -188,13 +147,6 @@ PARTS: tuple[Mutation, ...] = (
     fails(
         "a screw in no step", RECORD, mounted_in("stage_foot", None), "key access", "is in no step"
     ),
-    fails(
-        "a fall of half the energy",
-        RECORD,
-        record(lambda r: r["power_off"].update(fall_energy_j=r["power_off"]["fall_energy_j"] / 2)),
-        "power off",
-        "fall_energy_j is 0.",
-    ),
     fails("an LED elsewhere", RECORD, led(2.0, spec=False), "leds as designed", "led_1 is not"),
     fails(
         "an LED elsewhere, spec too", RECORD, led(2.0, spec=True), "leds as designed", "no pocket"
@@ -232,14 +184,6 @@ PARTS: tuple[Mutation, ...] = (
         "um",
     ),
     fails("LEDs on one side", RECORD, record(leds_on_one_side), "leds seen", "past an object"),
-    fails("a better calibration", RECORD, record(better_calibration), "calibration", "median"),
-    fails(
-        "no calibration",
-        RECORD,
-        record(lambda r: r.update(calibration=None)),
-        "calibration",
-        "missing",
-    ),
     fails(
         "an LED that shines down",
         RECORD,
@@ -252,15 +196,7 @@ PARTS: tuple[Mutation, ...] = (
 ASSEMBLIES: tuple[Mutation, ...] = (
     fails("an empty assembly", STEP, step_text(empty_step), "inventory", "solid in prototype.step"),
     fails("a plate of another size", STEP, step_text(moved_point), "assembly step", "plate"),
-    Mutation(
-        "an assembly that moves a part",
-        STEP,
-        step_text(moved_part),
-        1,
-        ("inventory",),
-        ("the assembly moves a part",),
-        unknown=True,
-    ),
+    unsure("a part moved", STEP, step_text(moved_part), "inventory", "the assembly moves a part"),
     fails("the motor drawn aside", GLB, glb(nudged("motor", 0.1)), "assembly step", "motor"),
     fails("a disc drawn aside", GLB, glb(nudged("stage_disc", 0.1)), "assembly step", "stage_disc"),
 )
@@ -284,18 +220,7 @@ PURCHASES: tuple[Mutation, ...] = (
         "plate holes",
         "hole 1",
     ),
-    fails(
-        "sizes of two balls exchanged",
-        BALLS,
-        table(BALLS, exchange("size")),
-        "ball labels",
-        "ball 1 is no",
-    ),
-    fails(
-        "a grade that does not exist", BALLS, row(BALLS, 0, grade="G7"), "ball labels", "grade G7"
-    ),
-    fails("a cap of steel", BALLS, row(BALLS, 0, mass_g=9.0), "ball labels", "a cap has none"),
-    fails("an error of direction", BALLS, row(BALLS, 0, error_deg=0.0), "ball labels", "deg off"),
+    fails("a cap of steel", BALLS, row(BALLS, 0, mass_g=9.0), "ball sizes", "ball 1"),
 )
 
 
@@ -312,15 +237,7 @@ DRAWINGS: tuple[Mutation, ...] = (
             ("a longer strip", LAMP, longer_outline, "lamp_1: its outlines are not"),
         )
     ),
-    Mutation(
-        "drawing: no DXF",
-        PLATE,
-        lambda folder: put(folder, PLATE, b"plate") or (),
-        1,
-        ("drawings",),
-        ("is no DXF",),
-        unknown=True,
-    ),
+    unsure("drawing: no DXF", PLATE, text_of(PLATE, "(?s).*", "plate", 1), "drawings", "no DXF"),
     fails(
         "no drawing of the plate",
         RECORD,
@@ -334,52 +251,13 @@ DRAWINGS: tuple[Mutation, ...] = (
 HOMING: tuple[Mutation, ...] = (
     *(
         fails(
-            f"settings: {name}",
-            SETTINGS,
-            text_of(SETTINGS, pattern, new),
-            "controller settings",
-            words,
+            f"settings: {name}", SETTINGS, text_of(SETTINGS, old, new), "controller settings", words
         )
-        for name, pattern, new, words in (
+        for name, old, new, words in (
             ("steps of another gear", r"\$100=.*", "$100=80", "$100 is 80"),
-            ("another speed", r"\$110=.*", "$110=90000", "$110 is 90000"),
-            ("another acceleration", r"\$120=.*", "$120=5000", "$120 is 5000"),
             ("too short a travel", r"\$130=.*", "$130=100", "do not hold the program"),
             ("too long a travel", r"\$130=.*", "$130=360", "above the program"),
-            ("no travel", r"\$130=.*\n", "", "do not hold the program"),
-            ("homing upward", r"\$23=.*", "$23=0", "$23 is 0"),
-            ("a switch that closes", r"\$5=.*", "$5=7", "$5 is 7"),
-            ("empty inputs that read as pressed", r"\$5=.*", "$5=0", "$5 is 0"),
-            ("no soft limits", r"\$20=.*", "$20=0", "$20 is 0"),
-            ("the motor turned off", r"\$1=.*", "$1=25", "$1 is 25"),
-            ("homing of all axes", r"\$45=.*", "$45=3", "$45 is 3"),
-            ("homing too fast", r"\$25=.*", "$25=3000", "homing at 3000"),
-            ("a setting too many", r"\$26=", "$30=1\n$26=", "$30 is not needed"),
-            ("the board's enable inverted", r"\$26=", "$4=1\n$26=", "$4 is not needed"),
-            ("the motor off in alarms", r"\$37=.*", "$37=0", "$37 is 0"),
-            ("the motor on of no axis", r"\$37=.*\n", "", "$37 is missing"),
-            ("sleep", r"\$62=.*", "$62=1", "$62 is 1"),
-            ("silent homing", r"\$10=.*", "$10=511", "$10 is 511"),
-            ("reports of GRBL", r"\$10=.*", "$10=1", "$10 is 1"),
-            ("reports in inches", r"\$13=.*", "$13=1", "$13 is 1"),
-            ("a laser", r"\$32=.*", "$32=1", "$32 is 1"),
-            ("a lathe", r"\$32=.*", "$32=2", "$32 is 2"),
-            ("too short a pulse", r"\$0=.*", "$0=1", "$0 is 1"),
-            ("switches without pull-up", r"\$18=.*", "$18=1", "$18 is 1"),
-            ("many passes of homing", r"\$43=.*", "$43=9", "$43 is 9"),
-            ("a setting twice", r"\$26=", "$22=1\n$26=", "$22 is there twice"),
-            ("no setting at all", r"\$26=", "G28\n$26=", "is no setting"),
         )
-    ),
-    fails(
-        "settings: soft limits before homing",
-        SETTINGS,
-        together(
-            text_of(SETTINGS, r"\$20=1\n", ""),
-            text_of(SETTINGS, r"\$22=1\n", "$20=1\n$22=1\n"),
-        ),
-        "controller settings",
-        "$20 before $22",
     ),
     fails(
         "home: another angle of the switch",
@@ -403,100 +281,38 @@ HOMING: tuple[Mutation, ...] = (
         "does not reach",
     ),
     fails(
-        "home: an angle zero that is not known",
-        RECORD,
-        record(lambda r: r["home"].update(zero_error_deg=5.0)),
-        "homing",
-        "angle zero is known to 5.00 deg",
-    ),
-    *(
-        fails(f"klipper: {name}", KLIPPER, text_of(KLIPPER, pattern, new, 1), "klipper", words)
-        for name, pattern, new, words in (
-            ("another angle", r"(?<=: 2 mirrors\n)(.*MOVE=).*?( SPEED)", r"\g<1>5\2", "is another"),
-            ("another speed", r"(MOVE=.* SPEED=)15", r"\g<1>1500", "a speed of 1500"),
-            ("a light left on", r"SET_PIN PIN=lamp VALUE=0\n(?=; stop)", "", "with lamp on"),
-            ("no LED", r"SET_PIN PIN=led_2 VALUE=1\n", "", "is another"),
-            ("no homing", r".*STOP_ON_ENDSTOP=1\n.*SET_POSITION.*\n", "", "before homing"),
-            ("another switch", r"SET_POSITION=-\S+", "SET_POSITION=-50", "deg at the switch"),
-            ("never turned", r'RESPOND MSG="turn.*\nPAUSE\n', "", "is another"),
-            ("a foreign line", r"(?=; stop 1 )", "G28\n", "is none that a plan has"),
-            *(
-                (f"motor off by {line}", r"(?=; stop 2 )", f"{line}\n", "is none that a plan has")
-                for line in (
-                    *("M84", "M18", "m84", "M112", "HOLD", "SET_IDLE_TIMEOUT TIMEOUT=1"),
-                    *("SET_STEPPER_ENABLE STEPPER=base ENABLE=0", "RESTART", "FIRMWARE_RESTART"),
-                    "MANUAL_STEPPER STEPPER=base ENABLE=0",
-                )
-            ),
-        )
-    ),
-    *(
-        fails(
-            f"klipper.cfg: {name}",
-            "klipper.cfg",
-            text_of("klipper.cfg", pattern, new, 1),
-            "klipper",
-            words,
-        )
-        for name, pattern, new, words in (
-            ("no idle timeout", r"\[idle_timeout\]\n.*\n.*\n.*\n", "", "no [idle_timeout]"),
-            ("the default at idle", r"gcode:\n.*\n", "", "no [idle_timeout] with a gcode"),
-            *(
-                (f"{line} at idle", r"    RESPOND .*", f"    {line}", "may let the motor go")
-                for line in (
-                    *("M84", "M18", "m84", "HOLD", "{% if 1 %}M84{% endif %}"),
-                    "SET_STEPPER_ENABLE STEPPER=base ENABLE=0",
-                    "MANUAL_STEPPER STEPPER=base ENABLE=0",
-                )
-            ),
-            ("M84 after a message", r"(    RESPOND .*)", r"\1\n    M84", "does 'M84'"),
-            ("M84 beside gcode", r"gcode:\n.*\n", "gcode: M84\n", "gcode of [idle_timeout]"),
-            ("gcode twice", r"(?=\[static)", "gcode:\n    M84\n", "gcode of [idle_timeout]"),
-            ("idle twice", r"\Z", "[idle_timeout]\ngcode:\n", "[idle_timeout] is twice"),
-            ("a macro", r"\Z", "[gcode_macro RESPOND]\ngcode:\n    M84\n", "[gcode_macro RESPOND]"),
-            ("a timer", r"\Z", "[delayed_gcode off]\ngcode:\n    M84\n", "[delayed_gcode off]"),
-            ("an include", r"\A", "[include more.cfg]\n", "[include more.cfg]"),
-            ("homing of its own", r"\Z", "[homing_override]\ngcode:\n", "[homing_override]"),
-            ("a saved section", r"\Z", "#*# [idle_timeout]\n", "is none that a configuration has"),
-            ("another separator", r"timeout: ", "timeout = ", "is none that a configuration has"),
-            ("an enable pin", r"(dir_pin.*)", r"\1\nenable_pin: PA1", "enable_pin of [manual_st"),
-            ("no enable", r"\[static.*\n.*\n", "", "a shutdown lets the motor go"),
-            ("another output", r"\[output_pin lamp\]", "[output_pin lamb]", "pins are others"),
-        )
+        "klipper: another angle",
+        KLIPPER,
+        text_of(KLIPPER, r"(?<=: 2 mirrors\n)(.*MOVE=).*?( SPEED)", r"\g<1>5\2", 1),
+        "klipper",
+        "is another",
     ),
     fails(
         "klipper: another gear",
         "klipper.cfg",
         text_of("klipper.cfg", "gear_ratio: .*", "gear_ratio: 5:1"),
         "klipper",
-        "gear_ratio is 5:1",
+        "gear_ratio: 5:1",
     ),
     refused("no home", RECORD, record(lambda r: r.pop("home")), RECORD, "home is missing"),
 )
 
 CAMERA: tuple[Mutation, ...] = (
     fails(
-        "screws too short to tilt the camera",
+        "camera: screws too short to move it",
         RECORD,
         record(
             lambda r: [one.update(part="M5x26") for one in r["fasteners"] if one["part"] == "M5x30"]
         ),
         "camera mount",
-        "30.0 are needed to tilt",
+        "out_mm is",
     ),
     fails(
-        "a camera without a place",
-        RECORD,
-        record(lambda r: r.update(camera_place=None)),
+        "camera: more travel asked for",
+        "design.json",
+        frame_key(camera_travel_mm=40.0),
         "camera mount",
-        "no camera_place",
-    ),
-    *(
-        fails(f"camera: {key}", RECORD, in_place("travel", key, value), "camera mount", key)
-        for key, value in (
-            *(("along_axis_mm", 12.0), ("across_mm", 8.0), ("out_mm", 6.0)),
-            *(("along_plate_mm", 9.0), ("yaw_deg", 9.0), ("roll_deg", 9.0), ("across_mm", 1.0)),
-        )
+        "along_axis_mm",
     ),
     fails(
         "camera: another place of its thread",
@@ -513,27 +329,6 @@ CAMERA: tuple[Mutation, ...] = (
         "the fence is 100.00 mm behind",
     ),
     fails("gauge: a mark aside", RECORD, mark_aside(0.1), "camera gauge", "a mark is no corner"),
-    fails(
-        "gauge: another length",
-        RECORD,
-        in_place("lengths_mm", "near_width", 60.0),
-        "camera gauge",
-        "near_width is 60.000",
-    ),
-    fails(
-        "gauge: better than it is",
-        RECORD,
-        in_place("error", "along_mm", 0.05),
-        "camera gauge",
-        "other errors",
-    ),
-    fails(
-        "gauge: another pixel",
-        RECORD,
-        picture(0, column_px=100.0),
-        "camera gauge",
-        "appears elsewhere",
-    ),
     fails(
         "gauge: a small turn",
         RECORD,
@@ -574,76 +369,26 @@ CAPS: tuple[Mutation, ...] = (
     ),
 )
 
+HEAVY = row(BALLS, -1, mass_g=20_000.0)
 DRIVES: tuple[Mutation, ...] = (
-    *(
-        fails(f"drive: {key}", RECORD, scaled(key, 1.1), "drive", key)
-        for key in (
-            *("mass_g", "moment_g_mm", "azimuth_deg", "inertia_g_mm2", "worst_torque_nmm"),
-            *("required_torque_nmm", "holding_torque_nmm", "ratio", "steps_per_deg"),
-            *("belt_pull_n", "belt_centre_mm", "peak_torque_nmm", "teeth_in_mesh"),
-            *("belt_rating_n", "belt_tension_n", "belt_tone_hz", "motor_wind_up_deg"),
-            *("belt_wind_up_deg", "hold_current_a", "hold_loss_w"),
-            *("motor_rise_k", "motor_radial_n"),
-        )
-    ),
+    fails("a heavy ball", BALLS, HEAVY, "ball sizes", "ball"),
+    fails("a heavy ball on the motor", BALLS, HEAVY, "drive", "the drive holds"),
+    fails("a heavy ball on its magnet", BALLS, HEAVY, "hold ratio", "ball"),
     fails(
-        "the carrier printed upside down",
-        RECORD,
-        upside_down("carrier"),
-        "pads printed up",
-        "of 15 pads",
-    ),
-    *(
-        fails(f"holding: {key}", RECORD, held(3, **{key: by}), "holding", f"ball 3: {words}")
-        for key, by, words in (
-            ("force_needed_n", 0.5, "force_needed_n is"),
-            ("force_available_n", 1.05, "force_available_n is"),
-            ("ratio", 2.0, "ratio is"),
-            ("wider_gap_n", 1.1, "wider_gap_n is"),
-        )
-    ),
-    fails(
-        "holding: another magnet",
-        RECORD,
-        record(lambda r: r["holding"]["balls"][0].update(magnet="MAGNET-4x3")),
-        "holding",
-        "ball 1: magnet MAGNET-4x3, its pocket is for",
-    ),
-    fails(
-        "holding: glue where a magnet is",
-        RECORD,
-        record(lambda r: r["holding"]["balls"][0].update(by="glue")),
-        "holding",
-        "ball 1: held by glue",
-    ),
-    fails(
-        "holding: a heavy ball",
+        "a heavy ball on the zero pin",
         BALLS,
-        row(BALLS, -1, mass_g=20_000.0),
-        "hold ratio",
-        "ball",
+        row(BALLS, -1, mass_g=1e6),
+        "power off",
+        "zero pin's pressure",
     ),
-    fails("drive: centre", RECORD, drive(centre_mm=[0.0, 0.0, 0.0]), "drive", "centre_mm"),
-    fails("drive: a torque", STOPS, row(STOPS, 1, torque_nmm=5.0), "drive", "stop 2: torque_nmm"),
-    fails("drive: a turn", STOPS, row(STOPS, 1, wind_up_deg=0.3), "drive", "stop 2: wind_up_deg"),
-    fails("drive: a hard pull", RECORD, scaled("peak_torque_nmm", 9.0), "motor bearing", "N are"),
-    fails("drive: another motor", RECORD, drive(motor="NEMA17-60"), "drive", "motor is NEMA17-60"),
-    fails("drive: another kind", RECORD, drive(drive="stage-60"), "drive", "drive is stage-60"),
-    refused("drive: less than nothing", RECORD, drive(mass_g=-1.0), RECORD, "drive.mass_g is -1.0"),
-    refused("no drive", RECORD, record(lambda r: r.pop("drive")), RECORD, "drive is missing"),
-    fails(
-        "pads of 10 mm error",
-        RECORD,
-        record(lambda r: r.update(target_pad_um=10_000.0)),
-        "prototype requirements",
-        "target_pad_um",
-    ),
+    unsure("another motor", RECORD, bought("motor", "NEMA17-20"), "drive", "NEMA17-20 is no motor"),
+    unsure("a wheel of more teeth", RECORD, bought("wheel", "GT2-80"), "drive", "not 80 teeth"),
+    unsure("a smaller magnet", RECORD, magnet("MAGNET-4x3"), "hold ratio", "its pocket is"),
 )
 
 PATTERN = "shroud_front.dxf"
 SHROUD_AND_LAMPS: tuple[Mutation, ...] = (
-    fails("lamps: brighter", RECORD, lamps(lumen_each=900.0), "lamps", "lumen_each is 900"),
-    fails("lamps: another strip", RECORD, lamps(strip="STRIP"), "lamps", "2 strips STRIP"),
+    unsure("lamps: another strip", RECORD, lamps(strip="STRIP"), "lamps", "STRIP is no strip"),
     fails("lamps: on their sides", RECORD, lamps_on_their_sides, "lamps", "is drawn elsewhere"),
     fails("lamps: one aside", RECORD, lamp_aside(0, 30.0), "lamps", "no images of one another"),
     fails("lamps: light from one", RECORD, lamp_aside(0, 30.0), "light before and after", "turn"),
@@ -659,8 +404,8 @@ SHROUD_AND_LAMPS: tuple[Mutation, ...] = (
         "a lamp before the pinhole",
         GLB,
         drawn_away("lamp_1", -23.0, -52.0, 35.0),
-        "light past lamps and card",
-        "by lamp_1",
+        "light paths, balls",
+        "lamp_1",
     ),
     fails(
         "a carrier that is not black",

@@ -21,8 +21,7 @@ Record = dict[str, Any]
 RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
 BALLS, BILL, HOLES = "balls.csv", "bom.csv", "plate_holes.csv"
-STOPS = "stops.csv"
-WIRING, SETTINGS = "wiring.csv", "grbl_settings.txt"
+SETTINGS = "grbl_settings.txt"
 PLATE, WHEEL, UPRIGHT, LAMP = (
     f"drawing_{name}.dxf" for name in ("plate", "wheel", "upright", "lamp")
 )
@@ -100,16 +99,6 @@ def longer_outline(space: Any) -> None:
             line.set_points([(1.001 * x, y, *rest) for x, y, *rest in line.get_points()])
 
 
-def listed(part: str, **cells: object) -> Job:
-    """Other cells in a part's row of the parts list."""
-
-    def how(rows: Rows) -> None:
-        (found,) = (one for one in rows if one["part"] == part)
-        found.update({key: str(value) for key, value in cells.items()})
-
-    return table(BILL, how)
-
-
 def program(pattern: str, new: str, count: int = 0) -> Job:
     """Change the program, with a regular expression."""
     return text_of(PROGRAM, pattern, new, count)
@@ -163,30 +152,21 @@ def glb(how: Callable[[trimesh.Scene], object]) -> Job:
     return job
 
 
-def drive(**figures: object) -> Job:
-    return record(lambda value: value["drive"].update(figures))
-
-
-def scaled(key: str, by: float) -> Job:
-    return record(lambda value: value["drive"].update({key: value["drive"][key] * by}))
-
-
-def upside_down(name: str) -> Job:
-    """A part that is recorded as printed upside down."""
+def bought(name: str, part: str) -> Job:
+    """A purchased body that is another part of the list."""
 
     def how(value: Record) -> None:
-        part = next(one for one in value["parts"] if one["name"] == name)
-        part["axes"] = [[x, -y, -z] for x, y, z in part["axes"]]
+        next(one for one in value["bought"] if one["name"] == name)["part"] = part
 
     return record(how)
 
 
-def held(ball: int, **factors: float) -> Job:
-    """What holds a ball, by its number, with figures multiplied."""
+def magnet(part: str) -> Job:
+    """The first magnet is another one."""
 
     def how(value: Record) -> None:
-        one = value["holding"]["balls"][ball - 1]
-        one.update({key: one[key] * by for key, by in factors.items()})
+        some = value["fasteners"]
+        next(one for one in some if one["part"].startswith("MAGNET"))["part"] = part
 
     return record(how)
 
@@ -327,11 +307,6 @@ def drawn_away(name: str, x: float, y: float = 0.0, z: float = 0.0) -> Job:
     return glb(how)
 
 
-def in_place(section: str, key: str, value: float) -> Job:
-    """Change a figure of how the camera is put in its place."""
-    return record(lambda r: r["camera_place"][section].update({key: value}))
-
-
 def picture(number: int, **values: float) -> Job:
     """Change a picture of the gauge's marks."""
     return record(lambda r: r["camera_place"]["pictures"][number].update(values))
@@ -359,10 +334,6 @@ def origin_of(name: str, by: float) -> Job:
 def leds_on_one_side(value: Record) -> None:
     for k, led in enumerate(value["leds"]):
         led["position_mm"] = [-23.0, float(k), -5.0]
-
-
-def better_calibration(value: Record) -> None:
-    value["calibration"]["centre_um_median"] /= 2
 
 
 def no_led(value: Record) -> None:
@@ -396,15 +367,6 @@ def moved_part(text: str) -> str:
     old = f"#{point[1]} = CARTESIAN_POINT('',(0.,0.,0.))"
     assert old in text
     return text.replace(old, f"#{point[1]} = CARTESIAN_POINT('',(5.,0.,0.))")
-
-
-def exchange(key: str) -> Callable[[Rows], None]:
-    """Two rows take each other's cell."""
-
-    def how(rows: Rows) -> None:
-        rows[0][key], rows[1][key] = rows[1][key], rows[0][key]
-
-    return how
 
 
 def shifted(key: str, by: float) -> Callable[[Rows], None]:

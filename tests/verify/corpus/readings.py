@@ -25,7 +25,6 @@ from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype import (
     assembly,
     bodies,
-    calibration,
     camera_gauge_checks,
     caps,
     fastener_checks,
@@ -34,10 +33,10 @@ from tbcad_verify.prototype import (
     homing_checks,
     klipper_checks,
     lamp_light,
-    leds,
     measured_parts,
     measured_prototype,
     seats,
+    stage_checks,
 )
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.assembly import Shape
@@ -80,7 +79,6 @@ PURE: dict[Any, tuple[str, ...]] = {
     measured_parts: ("manifold",),
     assembly: ("manifold",),
     bodies: ("_scene",),
-    calibration: ("joined_meshes", "build_scene", "highlights"),
     camera_gauge_checks: ("joined_meshes", "build_scene"),
     caps: ("fit_sphere",),
     flat_drawing: ("dxf_entities",),
@@ -88,9 +86,9 @@ PURE: dict[Any, tuple[str, ...]] = {
     gcode_checks: ("run_program",),
     homing_checks: ("run_program",),
     klipper_checks: ("run_program", "_run"),
-    leds: ("joined_meshes",),
-    measured_prototype: ("joined_meshes", "build_scene"),
+    measured_prototype: ("join_meshes", "build_scene"),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
+    stage_checks: ("joined_meshes", "build_scene"),
 }
 
 
@@ -267,7 +265,7 @@ def _traced_key(measured: MeasuredPrototype, *_: object) -> object:
     context = measured.context
     return (
         *(measured.centre, measured.radius, measured.body, context.angle, context.ball),
-        *(measured.rotating.owner, measured.fixed.owner),
+        *(measured.rotating.scene, measured.fixed.scene),
         *(context.export.mirrors.columns("ux", 15), context.camera),
         *(context.export.target_mm, context.export.foot_z_mm),
     )

@@ -43,51 +43,13 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 # that are printed with their pads down;
 # and its only LED stands where the object is.
 NOT_MADE = {
-    *("inventory", "leds as designed", "assembly step", "plate holes"),
-    *("drawings", "fasteners", "fastener holes", "key access", "power off"),
-    *("homing", "controller settings", "klipper"),
-    *("camera mount", "camera gauge", "camera place", "cap tilt"),
-    *("light past lamps and card", "lamps seen", "shroud"),
+    *("inventory", "leds as designed", "assembly step", "plate holes", "drawings"),
+    *("fasteners", "fastener holes", "key access", "homing", "controller settings", "klipper"),
+    *("camera mount", "camera gauge", "camera place", "cap tilt", "shroud", "radius rule"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
-    "light in the stage's shadow",
-    *("holding", "hold ratio", "drive", "motor bearing", "ball labels", "radius rule"),
-    *("object room", "leds seen", "calibration", "pads printed up"),
+    *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
+    *("fall energy", "object room", "leds seen"),
 }
-POWER_OFF = ("fall_energy_j", "fall_speed_deg_s", "pin_force_n", "pin_shear_mpa")
-POWER_OFF += ("pin_pressure_mpa",)
-STEPS = 200 * 16 * 3 / 360
-DRIVE = {
-    "mass_g": 500.0,
-    "centre_mm": [0.0, 0.0, 0.0],
-    "moment_g_mm": 0.0,
-    "azimuth_deg": 0.0,
-    "inertia_g_mm2": 0.0,
-    "worst_torque_nmm": 0.0,
-    "required_torque_nmm": 0.0,
-    "holding_torque_nmm": 450 * 3 * 0.95,
-    "drive": "nema17-belt",
-    "motor": "NEMA17-40",
-    "ratio": 3.0,
-    "steps_per_deg": STEPS,
-    "motor_wind_up_deg": 0.0,
-    "belt_wind_up_deg": 0.0,
-    "teeth_in_mesh": 9.0,
-    "belt_pull_n": 0.0,
-    "belt_rating_n": 26.22,
-    "belt_tension_n": 0.0,
-    "belt_tone_hz": 0.0,
-    "motor_radial_n": 0.0,
-    "hold_current_a": 0.0,
-    "hold_loss_w": 0.0,
-    "motor_rise_k": 0.0,
-    "peak_torque_nmm": 0.0,
-    "belt_centre_mm": 78.97134949670655,
-}
-BALL_COLUMNS = (
-    "number,kind,size,diameter_mm,grade,standard,mass_g,radius_mm,body_radius_mm,polar_deg,"
-    "azimuth_deg,px,py,pz,nx,ny,nz,cx,cy,cz,bx,by,bz,mirrors,pixels,pixels_shell,coverage_mm,"
-    "coverage_fixed_mm,error_deg"
-)
 
 
 @dataclass
@@ -243,9 +205,7 @@ def facets(shape: Any) -> np.ndarray:
     return mesh.vert_properties[:, :3][mesh.tri_verts]
 
 
-def pictures(
-    spec: SyntheticPrototype, balls: list[Ball], record: list[dict[str, Any]]
-) -> list[list[Any]]:
+def pictures(record: list[dict[str, Any]]) -> list[list[Any]]:
     """The plan's rows: every mirror at a stop of its own, the ball of nearest polar angle."""
     shown = []
     for m in record:
@@ -258,14 +218,8 @@ def pictures(
     twin = {m["number"]: image(m, record) for m in record}
     for turn in (0, 180):
         for angle, k, m in shown:
-            at = turned(balls[k].p, angle)
-            polar, azimuth = angles(at) - angles(m["u"])
-            chord = np.linalg.norm(unit(at) - m["u"])
-            error = np.degrees(2 * np.arcsin(chord / 2))
             name = f"a{m['number']:04d}" if turn == 0 else f"b{twin[m['number']]:04d}"
-            azimuth = (azimuth + 180) % 360 - 180
-            row = [len(plan) + 1, turn, stops.index(angle) + 1, angle, k + 1, name]
-            plan.append([*row, polar, azimuth, error])
+            plan.append([len(plan) + 1, turn, stops.index(angle) + 1, angle, k + 1, name])
     return plan
 
 
@@ -277,13 +231,7 @@ def image(m: dict[str, Any], record: list[dict[str, Any]]) -> int:
 
 
 def stop_rows(plan: list[list[Any]]) -> list[list[Any]]:
-    out = []
-    for stop in sorted({row[2] for row in plan}):
-        here = [row for row in plan if row[2] == stop and row[1] == 0]
-        which = " ".join(str(k) for k in sorted({row[4] for row in here}))
-        worst = [max(abs(row[j]) for row in here) for j in (7, 8)]
-        out.append([stop, here[0][3], len(here), which, *worst, 0.0, 0.0])
-    return out
+    return [[stop, angle] for stop, angle in sorted({(row[2], row[3]) for row in plan})]
 
 
 def switch_angle(stops: list[list[Any]]) -> float:
@@ -294,16 +242,10 @@ def switch_angle(stops: list[list[Any]]) -> float:
 def program(stops: list[list[Any]]) -> str:
     """As tbcad writes it, by hand: times and speeds are those of the paper's design."""
     at = [f"X{np.trunc(row[1] * 1e4) / 1e4:.4f}" for row in stops]
-    rest = len(stops) * (0.5 + 3 * 1.3) / 30 + (stops[-1][1] - stops[0][1]) / 225
     expose = ["G4 P0.100", "M8", "G4 P0.200", "M9", "G4 P1.000"]
     lights = [expose, ["M64 P1", *expose, "M65 P1"], ["M64 P0", *expose, "M65 P0"]]
     lines = [
-        f"(rotation plan: {len(stops)} stops, twice, about {rest:.0f} min)",
-        f"($100={STEPS:.6g}: steps a degree)",
-        "($110=900: degrees a minute, at most)",
-        "($120=50: degrees/s^2)",
-        "(digital output 1: led_1)",
-        "(digital output 0: lamp)",
+        f"(rotation plan: {len(stops)} stops, twice, about 1 min)",
         "M0 (MSG, zero pin out, object straight? Then resume)",
         "$H",
         "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)",
@@ -313,8 +255,8 @@ def program(stops: list[list[Any]]) -> str:
     ]
     for run in range(2):
         lines.append(f"G1 {at[0]} F900")
-        for k, row in enumerate(stops):
-            lines.append(f"(stop {k + 1} of {len(stops)}: {row[2]} mirrors)")
+        for k in range(len(stops)):
+            lines.append(f"(stop {k + 1} of {len(stops)}: 1 mirrors)")
             lines += [f"G1 {at[k]}", "G4 P0.500", *chain.from_iterable(lights)]
         if run == 0:
             lines.append(f"G1 {at[0]}")
@@ -322,24 +264,17 @@ def program(stops: list[list[Any]]) -> str:
     return "\n".join([*lines, "G1 X0.0000", "G92.1", "M2"]) + "\n"
 
 
-def ball_rows(
-    spec: SyntheticPrototype, balls: list[Ball], plan: list[list[Any]]
-) -> list[dict[str, Any]]:
+def ball_rows(balls: list[Ball]) -> list[dict[str, Any]]:
     out = []
     for k, ball in enumerate(balls):
-        mine = [row for row in plan if row[4] == k + 1 and row[1] == 0]
-        named = ("cap", "cap", None, None, None) if k == CAP else ("ball", "b", "G40", "ISO", 4.0)
-        row: dict[str, Any] = {"number": k + 1, "kind": named[0], "size": named[1]}
-        row |= {"diameter_mm": 2 * float(ball.body), "grade": named[2], "standard": named[3]}
-        row |= {"mass_g": named[4], "radius_mm": float(ball.radius)}
-        row |= {"body_radius_mm": float(ball.body)}
+        row: dict[str, Any] = {"number": k + 1, "kind": "cap" if k == CAP else "ball"}
+        row |= {"diameter_mm": 2 * float(ball.body), "mass_g": None if k == CAP else 4.0}
+        row |= {"radius_mm": float(ball.radius), "body_radius_mm": float(ball.body)}
         polar, azimuth = angles(unit(ball.p)).tolist()
         row |= {"polar_deg": polar, "azimuth_deg": azimuth}
         for name, v in {"p": ball.p, "n": ball.n, "c": ball.c, "b": ball.b}.items():
             row |= {name + axis: x for axis, x in zip("xyz", (v + 0.0).tolist(), strict=True)}
-        row |= {"mirrors": len(mine), "pixels": 1.0, "pixels_shell": 1.0, "coverage_mm": 30.0}
-        row |= {"coverage_fixed_mm": 0.0, "error_deg": max(row[8] for row in mine)}
-        out.append(row)
+        out.append(row | {"coverage_mm": 30.0, "coverage_fixed_mm": 0.0})
     return out
 
 
@@ -363,22 +298,16 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
     """prototype.json as a value, and all other files of the prototype."""
     record, balls = poses(shell_of(spec)), make_balls(spec)
     plan = [
-        [float(x) if isinstance(x, np.floating) else x for x in row]
-        for row in pictures(spec, balls, record)
+        [float(x) if isinstance(x, np.floating) else x for x in row] for row in pictures(record)
     ]
     stops = stop_rows(plan)
-    rows_ = ball_rows(spec, balls, plan)
+    table_ = ball_rows(balls)
     files = {
-        "balls.csv": csv_bytes(BALL_COLUMNS, [list(row.values()) for row in rows_]),
+        "balls.csv": csv_bytes(",".join(table_[0]), [list(row.values()) for row in table_]),
         "rotation_plan.csv": csv_bytes(
-            "order,object_turn_deg,stop,base_angle_deg,ball,mirror,polar_error_deg,"
-            "azimuth_error_deg,error_deg",
-            plan,
+            "order,object_turn_deg,stop,base_angle_deg,ball,mirror", plan
         ),
-        "stops.csv": csv_bytes(
-            "stop,base_angle_deg,mirrors,balls,azimuth_error_deg,error_deg,torque_nmm,wind_up_deg",
-            stops,
-        ),
+        "stops.csv": csv_bytes("stop,base_angle_deg", stops),
         "rotation_plan.nc": program(stops).encode(),
         "grbl_settings.txt": b"($1)\n",
     }
@@ -413,7 +342,6 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         "picture": "moved" if spec.moved else "fixed",
         "frame": dict(zip(("axis", "zero", "third"), frame().tolist(), strict=True)),
         "swing_deg": [switch_angle(stops), stops[-1][1]],
-        "target_pad_um": 10,
         "balls": "balls.csv",
         "seats": [
             {
@@ -425,20 +353,6 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             }
             for k, ball in enumerate(balls)
         ],
-        "holding": {
-            "balls": [
-                {
-                    "ball": k + 1,
-                    "by": "glue",
-                    "magnet": None,
-                    "force_needed_n": 1.0,
-                    "force_available_n": 2.0,
-                    "ratio": 2.0,
-                    "wider_gap_n": 2.0,
-                }
-                for k in range(len(balls))
-            ],
-        },
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
         "home": {
@@ -446,12 +360,9 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             "homed_deg": switch_angle(stops) + 2,
             "travel_deg": 200.0,
             "pin": "ROD-4x40",
-            "zero_error_deg": 0.3,
         },
-        "drive": DRIVE,
         "fasteners": [],
         "assembly_steps": [],
-        "power_off": dict.fromkeys(POWER_OFF, 0.0),
         "bought": [
             {
                 "name": "motor",

@@ -39,7 +39,6 @@ def test_a_machine_knows_the_true_angle_whatever_the_offset() -> None:
     machine = run_program(START + "G92 X5.0000\nG1 X7.0000 F60\nG4 P2.000\nG1 X1.0000\nM2\n")
     assert machine.faults == []
     assert machine.moves == [4.0, -2.0]
-    assert machine.seconds == 2 + 2 + 6
     assert not machine.rising
 
 
@@ -48,7 +47,7 @@ def test_a_photograph_knows_when_it_is_taken() -> None:
     machine = run_program(text)
     (one,) = machine.photographs
     assert (one.angle, one.settled, one.rising, one.turned) == (3.0, 0.5, True, 0)
-    assert (one.released, one.waited) == (pytest.approx(0.2), 1.0)
+    assert (one.released, one.waited) == pytest.approx((0.2, 1.0))
     pause = START + "G92 A2.0000\nG1 A3.0000 F60\nM0 (MSG, stop 1: photograph, then resume)\nM2\n"
     (one,) = run_program(pause).photographs
     assert (one.released, one.waited, one.settled) == (math.inf, math.inf, 0)
@@ -58,11 +57,8 @@ def test_the_program_of_the_plan_has_no_fault(context: PrototypeContext) -> None
     assert said(context, context.prototype.program) == ""
 
 
-def test_another_axis_has_its_own_settings(context: PrototypeContext) -> None:
-    """A controller with more axes takes A, and numbers its settings by the axis."""
+def test_another_axis_is_the_designs(context: PrototypeContext) -> None:
     text = context.prototype.program.replace(" X", " A")
-    for number in (100, 110, 120):
-        text = text.replace(f"${number}=", f"${number + 3}=")
     spec = context.export.spec
     motion = spec.prototype.motion.model_copy(update={"axis": "A"})
     prototype = spec.prototype.model_copy(update={"motion": motion})
@@ -121,6 +117,7 @@ FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     "homing twice": (once("$H\n", "$H\n$H\n"), "homes"),
     "no dwell before photographs": (without("G4 P0.[15]00\n"), "0 s after the motion"),
     "a dwell too short": (once("G4 P0.500", "G4 P0.100"), "photograph 1 0.2 s after the motion"),
+    "a dwell too short at the end": (at_end("G4 P0.500", "G4 P0.100"), "0.2 s after the motion"),
     "a light without a dwell": (without("G4 P0.500\n(?=G4 P0.100\n)"), "0.1 s after the motion"),
     "a light that is switched while the base turns": (
         once("G4 P0.500\n", "M64 P1\nM65 P1\nG4 P0.500\n"),
@@ -146,8 +143,6 @@ FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
         "while the camera's release is on",
     ),
     "a light turned on twice": (once("M64 P1\n", "M64 P1\nM64 P1\n"), "turns output 1 on twice"),
-    "another light in the comments": (once("output 1: led_1", "output 1: led_2"), "other lights"),
-    "an output that the comments do not name": (without(r"\(digital output 0.*\n"), "other lights"),
     "the end while a light is on": (at_end("M2\n", "M64 P0\nM2\n"), "ends while a light is on"),
     "no release": (without("M9\n"), "moves while the camera's release is on"),
     "no release at the end": (at_end("M9\n", ""), "moves while the camera's release is on"),
@@ -164,19 +159,10 @@ FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "another axis": (lambda text: text.replace(" X", " A"), "drives axis A"),
     "two axes": (after_a_move("G1 A1.0000"), "drives another axis"),
-    "steps of another gear": (once("$100=26.6667", "$100=53.3333"), "steps is not 26.6667"),
-    "steps of another axis": (once("$100=", "$103="), "steps setting is not 100"),
-    "another acceleration": (once("$120=50", "$120=5000"), "acceleration is not 50"),
-    "settings left out": (without(r"\(\$110.*\n"), "speed is not 900"),
     "another stop in the comments": (
         once("(stop 2 of", "(stop 3 of"),
         "another comment than its stop",
     ),
-    "another number of mirrors": (
-        lambda text: re.sub(r"(\(stop 1 of \d+: )\d+", r"\g<1>77", text),
-        "another comment than its stop",
-    ),
-    "another duration": (lambda text: re.sub(r"about \d+ min", "about 99 min", text), "takes "),
     "not back at its start": (at_end("G1 X0.0000", "G1 X1.0000"), "does not end at home_deg"),
     **{f"a foreign line: {line}": (after_a_move(line), "line") for line in FOREIGN},
 }

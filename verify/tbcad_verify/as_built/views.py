@@ -16,15 +16,15 @@ from tbcad_verify.mesh.surfaces import (
     prepare_for_rays,
     reflect,
 )
-from tbcad_verify.mesh.vectors import cross, norm, unit
+from tbcad_verify.mesh.vectors import cross, dot, norm, unit
 from tbcad_verify.prototype.ball_views import ended_on_balls, outline_coverage
-from tbcad_verify.prototype.calibration import highlights
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.pinhole_cells import MirrorSpheres, cell_outlines
 from tbcad_verify.prototype.ray_transfer import rotated
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.types import Bools, Floats, Ints
 
+HALVINGS = 50
 HALF_TURN = np.array([[-1.0], [-1.0], [1.0]])
 """Turns points by 180 degrees about z, as the object is turned for the second run."""
 
@@ -182,3 +182,27 @@ def _sight(apex: Floats, pinhole: Floats) -> Floats:
 def _least(values: Floats, is_edge: Bools) -> Floats:
     """(m,) smallest of values (m * s,) on edges of cells (m, s)."""
     return np.asarray(np.where(is_edge, values.reshape(is_edge.shape), np.inf).min(axis=1))
+
+
+def highlights(pinhole: Floats, centre: Floats, radius: Floats, led: Floats) -> Floats:
+    """(3, m) points of spheres by which the way from a light (3,) to the pinhole is shortest.
+
+    They lie in the plane of centre, light and pinhole, between both, where the way's slope is zero.
+    """
+    to_led, to_pinhole = led[:, None] - centre, pinhole[:, None] - centre
+    first, between = unit(to_led), dot(to_led, to_pinhole) / (norm(to_led) * norm(to_pinhole))
+    second = unit(to_pinhole - dot(to_pinhole, first) * first)
+    low, high = np.zeros(radius.size), np.arccos(np.clip(between, -1, 1))
+
+    def point(angle: Floats) -> Floats:
+        return np.asarray(radius * (np.cos(angle) * first + np.sin(angle) * second))
+
+    def slope(angle: Floats) -> Floats:
+        along = -np.sin(angle) * first + np.cos(angle) * second
+        return dot(along, unit(point(angle) - to_led) + unit(point(angle) - to_pinhole))
+
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        falls = slope(middle) < 0
+        low, high = np.where(falls, middle, low), np.where(falls, high, middle)
+    return np.asarray(centre + point((low + high) / 2))

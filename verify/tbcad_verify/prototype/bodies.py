@@ -15,6 +15,7 @@ from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.types import Floats, Ints
 
+OWN = ("camera",)  # body that its own rays start in
 NOT_BODIES = frozenset({"capture_sphere", "camera_view"})
 SWUNG = ("base", "cap")  # roles of printed parts that turn with the base
 LEAST_ANGLES = 7
@@ -70,14 +71,20 @@ class AssembledBodies:
 
     def without(self, names: Iterable[str]) -> Bodies:
         """All but some that are named."""
-        prototype, left_out = self.context.prototype, NOT_BODIES | set(names)
-        swung = {part.name for part in prototype.parts if part.role in SWUNG}
-        swung |= {one.name for one in prototype.bought if one.turns}
-        swung |= {one.name for one in prototype.fasteners if one.turns}
-        bodies = [name for name in self.drawn if name not in left_out]
-        turning = [name for name in bodies if name in swung or name.startswith("ball_")]
-        still = [name for name in bodies if name not in turning]
-        return Bodies(self, tuple(turning), tuple(still))
+        bodies, swung = (
+            self.drawn.keys() - NOT_BODIES - set(names),
+            turning(self.context, self.drawn),
+        )
+        return Bodies(self, tuple(sorted(bodies & swung)), tuple(sorted(bodies - swung)))
+
+
+def turning(context: PrototypeContext, names: Iterable[str]) -> set[str]:
+    """Names of the bodies that turn with the base."""
+    record = context.prototype
+    swung = {part.name for part in record.parts if part.role in SWUNG}
+    swung |= {one.name for one in record.bought if one.turns}
+    swung |= {one.name for one in record.fasteners if one.turns}
+    return swung | {name for name in names if name.startswith("ball_")}
 
 
 @dataclass(frozen=True)

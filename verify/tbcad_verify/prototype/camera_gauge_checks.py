@@ -34,9 +34,6 @@ from tbcad_verify.types import Floats
 GAUGE = "camera_gauge"
 PLACE_MM, PAPER_MM = 0.2, 100 * math.sqrt(2)  # allowed where the pinhole is so far from the origin
 MARK_MM = 0.02  # of a corner from the recorded mark, and of the pinhole from a line through marks
-PARALLEL = 1e-6
-FIGURES = 1e-3  # share by which recorded errors may be off
-PIXEL = 0.01
 BESIDE_MM = 0.3  # of the rays from a near mark
 BEFORE_MM = 3.0  # of a hit from the mark it belongs to
 PRESSED_MM3 = 5.0  # that the plug may share with the hub
@@ -74,9 +71,6 @@ def checks(
         *_room_faults(context, place, gauge, parts),
     ]
     errors = place_errors(context, place, lens)
-    recorded = np.array([place.error.along_mm, place.error.across_mm, place.error.out_mm])
-    if not np.allclose(recorded, errors, rtol=FIGURES):
-        faults.append("other errors of the place are recorded")
     limit = PLACE_MM * max(1.0, float(np.linalg.norm(camera.pinhole)) / PAPER_MM)
     ways = "along the base's axis", "across", "out"
     return [
@@ -93,7 +87,7 @@ def _marks(place: CameraPlace) -> Floats:
 def _mark_faults(
     context: PrototypeContext, place: CameraPlace, gauge: MeasuredPart
 ) -> Iterator[str]:
-    """Marks are corners of the mesh, in line with the pinhole; lengths are theirs."""
+    """Marks are corners of the mesh, in line with the pinhole."""
     marks, points = _marks(place), gauge.placed_mesh.points
     if place.gauge != GAUGE:
         yield f"the gauge is {place.gauge}"
@@ -104,43 +98,18 @@ def _mark_faults(
         toward = unit((far - near)[:, None])[:, 0]
         if np.linalg.norm(np.cross(context.pinhole - near, toward)) > MARK_MM:
             yield "near and far mark are not in line with the pinhole"
-    along, hub = marks @ context.frame[0], _hub(context, gauge)
-    width = np.linalg.norm(marks[0] - marks[1], axis=1)
-    expected = {
-        "hub_to_near": along[0, 0] - hub,
-        "hub_to_far": along[0, 1] - hub,
-        "near_width": width[0],
-        "far_width": width[1],
-        "hub_to_pinhole": np.linalg.norm(context.pinhole) - hub,
-    }
-    for name, value in expected.items():
-        if abs(getattr(place.lengths, name) - value) > MARK_MM:
-            yield f"{name} is {getattr(place.lengths, name):.3f}, not {value:.3f} mm"
-
-
-def _hub(context: PrototypeContext, gauge: MeasuredPart) -> float:
-    """Where the gauge lies on the hub, along the axis: above the plug's end, mm."""
-    mesh, axis = gauge.placed_mesh, context.frame[0]
-    facing = axis @ unit(mesh.area) < -1 + PARALLEL
-    places = np.unique(np.round(mesh.points[mesh.faces[facing, 0]] @ axis, 3))
-    if places.size < 2:
-        raise Unknown("the gauge has no face for the hub")
-    return float(places[1])
 
 
 def _picture_faults(context: PrototypeContext, place: CameraPlace) -> Iterator[str]:
-    """Marks appear where the record has them, within the picture."""
+    """Marks appear within the picture, the base turned to either side."""
     camera = context.camera
     size = np.array([camera.width, camera.height])
     for picture in place.pictures:
         mark = _turned(context, picture, _marks(place)[SIDES[picture.side], 1]) - camera.pinhole
         depth = camera.forward @ mark
         image = np.array([camera.right @ mark, camera.down @ mark]) / depth
-        pixels = image / camera.pitch + (size - 1) / 2
-        if (np.abs(pixels - (size - 1) / 2) > size / 2).any():
+        if (np.abs(image) > size * camera.pitch / 2).any():
             yield f"a mark at {picture.base_angle_deg:.0f} degrees is out of the picture"
-        if np.abs(pixels - [picture.column_px, picture.row_px]).max() > PIXEL:
-            yield f"the mark at {picture.base_angle_deg:.0f} degrees appears elsewhere"
     seen = {(picture.side, np.sign(picture.base_angle_deg)) for picture in place.pictures}
     if not {("positive", 0), ("negative", 0), ("positive", -1), ("negative", 1)} <= seen:
         yield "pictures to either side are missing"

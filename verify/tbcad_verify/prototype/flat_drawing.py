@@ -1,4 +1,7 @@
-"""Flat drawings in DXF, read by group codes in plain Python: circles and outlines to be cut."""
+"""Flat drawings in DXF, read by group codes in plain Python: circles and outlines to be cut.
+
+Another unit, or a layer that tbcad does not draw on, is refused: who cuts may take it for a cut.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,9 @@ from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats
 
 CUT = "cut"  # the layer of outlines and holes
-X, Y, RADIUS, LAYER, NAME = 10, 20, 40, 8, 2  # group codes
+LAYERS = frozenset({CUT, "fold", "centre", "dimensions", "frame"})
+X, Y, RADIUS, LAYER, NAME, VARIABLE, VALUE = 10, 20, 40, 8, 2, 9, 70  # group codes
+MILLIMETRES = "4"
 MOST_CIRCLES = 1000
 SAME_MM = 1e-6
 
@@ -55,7 +60,7 @@ def dxf_entities(text: str) -> list[Entity]:
     """Entities of a DXF, the values of each by group code.
 
     Raises:
-        Unknown: it is no DXF.
+        Unknown: it is no DXF, in another unit than millimetres, or on a layer of another name.
     """
     lines = [line.strip() for line in text.splitlines()]
     try:
@@ -65,10 +70,15 @@ def dxf_entities(text: str) -> list[Entity]:
         end = pairs.index((0, "ENDSEC"), begin)
     except ValueError:
         raise Unknown("a drawing is no DXF") from None
+    unit = [k for k, pair in enumerate(pairs) if pair == (VARIABLE, "$INSUNITS")]
+    if [pairs[k + 1] for k in unit] != [(VALUE, MILLIMETRES)]:
+        raise Unknown("a drawing is not in millimetres")
     found: list[Entity] = []
     for code, value in pairs[begin + 1 : end]:
         if code == 0:
             found.append({})
         if found:
             found[-1].setdefault(code, []).append(value)
+    if others := {layer for one in found for layer in one.get(LAYER, ())} - LAYERS:
+        raise Unknown(f"a drawing has a layer {min(others)}")
     return found

@@ -23,10 +23,6 @@ SHARE = 1e-5  # of other numbers, which have six digits
 RUNS = 2  # one for each turn of the object
 PAUSES = {"grblhal": ["pin", "turn"], "grbl": ["base", "turn"]}
 PULL_OFF_DEG = 2.0
-SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
-MINUTES = 1.0  # by which the duration in the comment may be off, and
-MINUTES_SHARE = 0.1
-SETTINGS = ("steps", "speed", "acceleration")
 
 
 def program_check(name: CheckName, context: PrototypeContext) -> Check:
@@ -38,7 +34,6 @@ def program_check(name: CheckName, context: PrototypeContext) -> Check:
 
 def _deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     yield from _travel(context, machine)
-    yield from _settings(context, machine)
     motion, stops = context.export.spec.prototype.motion, context.prototype.stops
     lights = expected_lights(context)
     expected = np.repeat(np.tile(stops.angle, RUNS), len(lights))
@@ -52,7 +47,7 @@ def _deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
                 yield f"photograph {k + 1} at {one.angle:.4f} deg"
             if one.turned != turned:
                 yield f"photograph {k + 1} with the object turned {one.turned} times"
-            if (one.stop, one.mirrors) != (stop + 1, stops.mirrors[stop]):
+            if one.stop != stop + 1:
                 yield f"photograph {k + 1} has another comment than its stop"
             yield from (f"photograph {k + 1} {what}" for what in _unlike_light(one, lights, phase))
     low = min(machine.driven, default=np.nan)
@@ -114,6 +109,8 @@ def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     motion = context.export.spec.prototype.motion
     low, high = context.prototype.swing
     pauses = PAUSES[motion.controller]
+    if machine.axis != motion.axis:
+        yield f"drives axis {machine.axis or 'none'}"
     if machine.pauses != pauses:
         yield f"pauses for {', '.join(machine.pauses) or 'nothing'}, not for {', '.join(pauses)}"
     if machine.homes != (motion.controller == "grblhal"):
@@ -133,39 +130,6 @@ def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     for name, end, far in (("lower", low, min), ("upper", high, max)):
         if reached and abs(far(reached) - end) > PROGRAM_DEG:
             yield f"{far(reached):.4f} deg is not the swing's {name} end"
-
-
-def _settings(context: PrototypeContext, machine: Machine) -> Iterator[str]:
-    """What comments tell the person who sets the controller up."""
-    motion, told = context.export.spec.prototype.motion, machine.told
-    steps = context.prototype.drive.steps_per_deg
-    expected = {
-        "steps": steps,
-        "speed": motion.feed_deg_min,
-        "acceleration": motion.acceleration_deg_s2,
-        "stops": len(context.prototype.stops),
-    }
-    number = SETTING[motion.axis]
-    expected |= {f"{name}_setting": 100 + 10 * k + number for k, name in enumerate(SETTINGS)}
-    for name, value in expected.items():
-        if len(told.get(name, ())) != 1 or not _is_close(told[name][0], value):
-            yield f"the comments' {name.replace('_', ' ')} is not {value:g}"
-    yield from _told_lights(context, machine)
-    if machine.axis != motion.axis:
-        yield f"drives axis {machine.axis or 'none'}"
-    if any(count != len(context.prototype.stops) for count in told.get("count", ())):
-        yield "a comment has another number of stops"
-    minutes, known = machine.seconds / 60, told.get("minutes", [np.inf])
-    if not abs(known[0] - minutes) <= MINUTES + MINUTES_SHARE * minutes:
-        yield f"takes {minutes:.0f} min"
-
-
-def _told_lights(context: PrototypeContext, machine: Machine) -> Iterator[str]:
-    """The comments name every output and its light."""
-    named = {(min(outputs), number) for number, outputs in expected_lights(context) if outputs}
-    told = list(zip(machine.told.get("output", ()), machine.told.get("light", ()), strict=True))
-    if sorted(told) != sorted(named):
-        yield "the comments name other lights than the outputs have"
 
 
 def _is_close(one: float, two: float) -> bool:

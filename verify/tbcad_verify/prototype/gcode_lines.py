@@ -24,30 +24,25 @@ COMMANDS = (
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d\d)?"
 LED = r"led_\d+"
 COMMENTS = (
-    r"rotation plan: (?P<stops>\d+) stops, twice, about (?P<minutes>\d+) min",
+    r"rotation plan: \d+ stops, twice, about \d+ min",
     rf"[\w-]+, [\w-]+, {NUMBER} turns of the motor a turn",
     r"settings for the controller, to be sent before:",
     r"\$1=255: motor always on, for the base falls without it",
-    rf"\$(?P<steps_setting>10[03])=(?P<steps>{NUMBER}): steps a degree",
-    rf"\$(?P<speed_setting>11[03])=(?P<speed>{NUMBER}): degrees a minute, at most",
-    rf"\$(?P<acceleration_setting>12[03])=(?P<acceleration>{NUMBER}): degrees/s\^2",
+    rf"\$1[012][03]={NUMBER}: (?:steps a degree|degrees a minute, at most|degrees/s\^2)",
     r"the camera's release is a relay on the coolant output",
     r"a degree for a millimetre, absolute, units a minute",
+    rf"digital output \d: (?:lamp|{LED})",
     rf"MSG, base at (?P<base>{NUMBER}) degrees, object straight\? Then resume",
     r"MSG, zero pin (?P<pin>out), object straight\? Then resume",
     r"MSG, turn the object by (?P<turn>180) degrees about z, then resume",
-    rf"digital output (?P<output>\d): (?P<light>lamp|{LED})",
     rf"MSG, stop (?P<photograph>\d+): (?:(?P<phase>dark|{LED}|lit), )?photograph, then resume",
-    r"stop (?P<stop>\d+) of (?P<count>\d+): (?P<mirrors>\d+) mirrors",
+    r"stop (?P<stop>\d+) of \d+: \d+ mirrors",
 )
 LINE = re.compile(rf"(?P<command>{'|'.join(COMMANDS)})?(?: ?\((?P<comment>[^()]+)\))?")
 WORD = re.compile(r"([A-Z$])(\S+)")
 FORMS = tuple(re.compile(form) for form in COMMENTS)
-
-
 LAMP = -1.0  # number that stands for the lamp where LEDs are numbered from 1
-LIGHTS = {"dark": 0.0, "lit": LAMP, "lamp": LAMP}
-OUT = {"out": 1.0}  # the pin is
+WORDS = {"dark": 0.0, "lit": LAMP, "out": 1.0}
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,4 @@ def _said(comment: str) -> dict[str, float] | None:
 
 def _number(value: str) -> float:
     """A number, or that of a light: 0 for none."""
-    if value.startswith("led_"):
-        return float(value.removeprefix("led_"))
-    words = LIGHTS | OUT
-    return words[value] if value in words else float(value)
+    return WORDS[value] if value in WORDS else float(value.removeprefix("led_"))

@@ -17,8 +17,6 @@ import numpy as np
 from tbcad_verify.prototype.gcode_lines import Line, parse_program
 from tbcad_verify.types import Floats
 
-SECONDS = 60.0  # of a minute, in which speeds are given
-
 
 @dataclass
 class Photograph:
@@ -32,7 +30,6 @@ class Photograph:
         rising: whether the base came there from below.
         turned: how often the object was turned before it.
         stop: number of its stop in the comments, from 1; 0 without.
-        mirrors: that the comment of the stop tells.
         lights: digital outputs that are on.
         lit: time since one of them was switched, s.
         phase: light that the pause tells: 0 none, -1 the lamp, else the LED's number; NaN without.
@@ -45,7 +42,6 @@ class Photograph:
     rising: bool
     turned: int
     stop: int
-    mirrors: int
     lights: frozenset[int]
     lit: float
     phase: float = math.nan
@@ -63,22 +59,22 @@ class Machine:
         angle: of the base, degrees; NaN before a person has put it to a known one.
         offset: of the base's angle from the program's coordinate, degrees; NaN before it is set.
         feed: degrees a minute; 0 before it is set.
-        rest: time since the last motion, or since the release was turned off, s.
-        still: time since the last motion, s.
+        now: time that the base has rested, s; motions take none.
+        moved: time of the last motion, and
+        switched: of the last switching of an output, s.
+        release: time at which the camera's release was last turned on, s; NaN while it is off.
+        closed: time at which it was last turned off, s.
         ended_motion: whether the controller has waited for the end of the last motion.
         lights: digital outputs that are on.
-        switched: time since one of them was switched, s.
         rising: whether the last motion, if any, was upward.
-        release: value of `rest` when the camera's release was turned on; NaN while it is off.
         ended: the program has ended.
+        stop: number of the last stop in the comments.
         moves: base angles driven to, degrees.
         photographs: in order.
         homes: how often the base was homed; each adds the switch's angle and its end to `moves`.
         pauses: what a person does at each but photographs: "base", "pin" or "turn".
         bases: angle to which a person puts the base, degrees.
         feeds: every speed that is set.
-        told: what comments tell, by name, each with all of its values.
-        seconds: duration without pauses.
         faults: what no program may do, a few words each.
     """
 
@@ -89,22 +85,22 @@ class Machine:
     angle: float = math.nan
     offset: float = math.nan
     feed: float = 0.0
-    rest: float = 0.0
-    still: float = 0.0
+    now: float = 0.0
+    moved: float = 0.0
+    switched: float = -math.inf
+    release: float = math.nan
+    closed: float = 0.0
     ended_motion: bool = True
     lights: set[int] = field(default_factory=set)
-    switched: float = math.inf
     rising: bool = False
-    release: float = math.nan
     ended: bool = False
+    stop: int = 0
     moves: list[float] = field(default_factory=list)
     homes: int = 0
     photographs: list[Photograph] = field(default_factory=list)
     pauses: list[str] = field(default_factory=list)
     bases: list[float] = field(default_factory=list)
     feeds: list[float] = field(default_factory=list)
-    told: dict[str, list[float]] = field(default_factory=dict)
-    seconds: float = 0.0
     faults: list[str] = field(default_factory=list)
 
     @property
@@ -117,14 +113,13 @@ class Machine:
         """Base angles that the program itself drives to, without homing."""
         return self.moves[2 * self.homes :]
 
-    def last_told(self, name: str) -> int:
-        """The last number that a comment told by this name; 0 without."""
-        return int(self.told.get(name, [0])[-1])
+    @property
+    def _on(self) -> bool:
+        return not math.isnan(self.release)
 
     def run(self, line: Line) -> str:
         """Do what a line says; what is wrong with it, or empty."""
-        for name, value in line.says.items():
-            self.told.setdefault(name, []).append(value)
+        self.stop = int(line.says.get("stop", self.stop))
         if not line.code:
             return ""
         if self.ended:
@@ -173,12 +168,17 @@ class Machine:
         self.offset = math.nan
         return ""
 
+    def _set_offset(self, coordinate: float) -> str:
+        if math.isnan(self.angle):
+            return "sets a coordinate before a person has put the base to a known angle"
+        if self.driven:
+            return "sets a coordinate after a motion"
+        self.offset = self.angle - coordinate
+        return ""
+
     def _wait(self, seconds: float) -> str:
         self.ended_motion = True
-        self.rest += seconds
-        self.still += seconds
-        self.switched += seconds
-        self.seconds += seconds
+        self.now += seconds
         return ""
 
     def _switch_on(self, output: int) -> str:
@@ -193,113 +193,78 @@ class Machine:
 
     def _switch(self) -> str:
         self._end_photograph()
-        self.switched = 0.0
-        if self._is_on():
+        self.switched = self.now
+        if self._on:
             return "switches a light while the camera's release is on"
         return "" if self.ended_motion else "switches a light before the motion has ended"
 
     def _end(self) -> str:
         self.ended = True
+        self._end_photograph()
         if self.lights:
             return "ends while a light is on"
-        return "ends while the camera's release is on" if self._is_on() else ""
-
-    def _is_on(self) -> bool:
-        return not math.isnan(self.release)
-
-    def _set_offset(self, coordinate: float) -> str:
-        if math.isnan(self.angle):
-            return "sets a coordinate before a person has put the base to a known angle"
-        if len(self.moves) > 2 * self.homes:
-            return "sets a coordinate after a motion"
-        self.offset = self.angle - coordinate
-        return ""
+        return "ends while the camera's release is on" if self._on else ""
 
     def _move(self, values: dict[str, float]) -> str:
         self.feed = values.get("F", self.feed)
         if "F" in values:
             self.feeds.append(self.feed)
-        if not self.modes_set:
-            return "moves before units and distance mode are set"
-        if math.isnan(self.offset):
-            return "moves without a known coordinate"
-        if not self.feed > 0:
-            return "moves without a speed"
-        if self._is_on():
-            return "moves while the camera's release is on"
-        if self.lights:
-            return "moves while a light is on"
+        refused = {
+            "before units and distance mode are set": not self.modes_set,
+            "without a known coordinate": math.isnan(self.offset),
+            "without a speed": not self.feed > 0,
+            "while the camera's release is on": self._on,
+            "while a light is on": bool(self.lights),
+        }
+        if any(refused.values()):
+            return f"moves {next(why for why, true in refused.items() if true)}"
         target = values[self.axis] + self.offset
         if target != self.angle:
-            self.rising = target > self.angle
-            self._end_rest()
-            self.ended_motion = False
-        duration = abs(target - self.angle) / self.feed * SECONDS
-        self.seconds += duration
-        self.switched += duration
+            self._end_photograph()
+            self.rising, self.moved, self.ended_motion = target > self.angle, self.now, False
         self.angle = target
         self.moves.append(target)
         return ""
 
-    def _end_rest(self) -> None:
-        """The base begins to move: nothing rests any longer."""
-        self._end_photograph()
-        self.rest = self.still = 0.0
-
-    def _end_photograph(self) -> None:
-        if self.photographs and math.isnan(self.photographs[-1].waited):
-            self.photographs[-1].waited = self.rest
-
     def _release_on(self) -> str:
-        if self._is_on():
+        if self._on:
             return "turns the camera's release on twice"
         self.ended_motion = True
         self._photograph(math.nan, math.nan)
-        self.release = self.rest
+        self.release = self.now
         return ""
 
     def _release_off(self) -> str:
-        if not self._is_on():
+        if not self._on:
             return "turns the camera's release off, which is not on"
-        self.photographs[-1].released = self.rest - self.release
-        self.release, self.rest = math.nan, 0.0
+        self.photographs[-1].released = self.now - self.release
+        self.release, self.closed = math.nan, self.now
         return ""
 
     def _photograph(self, released: float, waited: float, phase: float = math.nan) -> None:
         self._end_photograph()
-        self.photographs.append(
-            Photograph(
-                self.angle,
-                self.still,
-                released,
-                waited,
-                self.rising,
-                self.pauses.count("turn"),
-                self.last_told("stop"),
-                self.last_told("mirrors"),
-                frozenset(self.lights),
-                self.switched,
-                phase,
-            )
-        )
+        turned, lights = self.pauses.count("turn"), frozenset(self.lights)
+        settled, lit = self.now - self.moved, self.now - self.switched
+        state = self.rising, turned, self.stop, lights, lit
+        self.photographs.append(Photograph(self.angle, settled, released, waited, *state, phase))
+
+    def _end_photograph(self) -> None:
+        """The base moves, a light is switched, or another photograph begins."""
+        if self.photographs and math.isnan(self.photographs[-1].waited):
+            self.photographs[-1].waited = self.now - self.closed
 
     def _pause(self, says: dict[str, float]) -> str:
-        if self._is_on():
+        if self._on:
             return "pauses while the camera's release is on"
         self.ended_motion = True
         if "photograph" in says:
             self._photograph(math.inf, math.inf, says.get("phase", math.nan))
             return ""
-        if "base" in says:
-            self.pauses.append("base")
-            self.bases.append(says["base"])
-            self.angle = says["base"]
-            return ""
-        if "pin" in says:
-            self.pauses.append("pin")
-            return ""
-        if "turn" in says:
-            self.pauses.append("turn")
+        for what in {"base", "pin", "turn"} & says.keys():
+            self.pauses.append(what)
+            if what == "base":
+                self.bases.append(says[what])
+                self.angle = says[what]
             return ""
         return "pauses, and does not say for what"
 
@@ -319,5 +284,4 @@ def run_program(text: str, switch: float = math.nan, homed: float = math.nan) ->
             machine.faults.append(f"line {line.number} {wrong}")
     if not machine.ended:
         machine.faults.append("the program has no end")
-    machine._end_rest()
     return machine

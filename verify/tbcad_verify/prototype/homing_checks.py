@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.gcode_checks import homing
+from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
+from tbcad_verify.prototype.gcode_checks import PULL_OFF_DEG, homing
 from tbcad_verify.prototype.gcode_machine import run_program
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, require, short_list
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
@@ -21,25 +22,21 @@ from tbcad_verify.types import Floats
 
 PIN_MM = 4.0  # diameter of the rod
 PIN_HOLE_MM = 4.2
-SCREW_HOLE_MM, STAGE_HOLE_MM, KEY_HOLE_MM, HUB_SCREWS = 3.4, 6.6, 3.1, 4
 MIN_PIN_OUT_MM = 40.0  # of the pin from the axis: for 0.3 degrees
 SAME_MM = 1e-6
 ROLLER_MM = 2.4  # radius
 PRESSED_MM = (0.05, 1.5)  # of the tab from the pressed roller
 SWITCH_DEG = 1.5  # of the switch's angle from the record's
 MIN_FREE_DEG = 2.5  # of the switch below all that the program drives to
-MAX_ZERO_ERROR_DEG = 1.0
 TOP_MM = 0.01  # of the tab's corners
 SETTING = re.compile(r"\$(\d{1,3})=(-?\d+(?:\.\d+)?(?:e-?\d+)?)")
 COMMENT = re.compile(r"\([^()]{1,76}\)")
 SHARE = 1e-6
-FULL_STEPS = 200.0
-PULSE_US = 10.0
+PULSE_US, DEBOUNCE_MS = 10.0, 25.0
 PLACES = 1.0  # bit of $10 in both firmwares: the machine's place
 HAL_DEFAULT, REPORTS_HOMING = 511, 4096  # bits 0 to 8, and 12: grblHAL core, settings.h
 MAX_STEPS_S = 30_000.0  # that GRBL makes
 MAX_SEEK_DEG_MIN = 720.0
-PULL_OFF_DEG = 2.0
 # A pulled-up input is high with an open switch and with none: pressed, unless $5 inverts it.
 XYZ = 0b111
 MAX_BEYOND_DEG = 4.0  # of soft limits beyond the program
@@ -48,14 +45,11 @@ CHECKS = {"homing": "faults", "controller settings": "faults"}
 
 
 def checks(
-    names: list[CheckName],
-    context: PrototypeContext,
-    solids: Mapping[str, TextSolid],
-    carriers: Sequence[TextSolid],
+    names: list[CheckName], context: PrototypeContext, solids: Mapping[str, TextSolid]
 ) -> list[Check]:
-    """Pin, tab, switch and screws in the solids; settings against drive and program."""
-    home = [*_pin(context, solids), *_switch(context, solids), *_on_hub(context, solids, carriers)]
-    found = [*_settings(context)]
+    """Pin, tab and switch in the solids; settings against gear and program."""
+    home = [*_pin(context, solids), *_switch(context, solids)]
+    found = [*_settings(context, gear_of(context, solids).ratio)]
     return [
         at_most(name, len(faults), 0, short_list(faults))
         for name, faults in zip(names, (home, found), strict=True)
@@ -87,35 +81,6 @@ def _pin(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator
     rod = re.fullmatch(r"ROD-4x(\d+)", home.pin)
     if not rod or float(rod[1]) < path:
         yield f"{home.pin} does not reach through {path:.0f} mm"
-    if home.zero_error > MAX_ZERO_ERROR_DEG:
-        yield f"angle zero is known to {home.zero_error:.2f} deg"
-
-
-def _on_hub(
-    context: PrototypeContext, solids: Mapping[str, TextSolid], carriers: Sequence[TextSolid]
-) -> Iterator[str]:
-    """The disc's screws and key have their holes in the hub."""
-    base, disc = context.export.spec.prototype.base, solids["zero_disc"]
-    stage = base.drive == "stage-60"
-    screw, below = (STAGE_HOLE_MM,) * 2 if stage else (SCREW_HOLE_MM, base.insert_hole_mm)
-    pairs = (
-        ("screw", HUB_SCREWS, screw, below),
-        ("key", 1, KEY_HOLE_MM, KEY_HOLE_MM),
-    )
-    for name, count, diameter, in_hub in pairs:
-        own = holes(disc.faces, diameter / 2, SAME_MM)
-        others = [hole for one in carriers for hole in holes(one.faces, in_hub / 2, SAME_MM)]
-        if len(own) != count:
-            yield f"the zero disc has {len(own)} holes for a {name}"
-        for hole in own:
-            found = [
-                one
-                for one in others
-                if abs(one.axis @ hole.axis) > 1 - SAME_MM
-                and distance_to_line(one.point, hole.point, hole.axis) < SAME_MM
-            ]
-            if not found:
-                yield f"a {name} of the zero disc has no hole in the hub"
 
 
 def _polar(context: PrototypeContext, points: Floats) -> Floats:
@@ -163,10 +128,10 @@ def _arc(azimuth: Floats) -> tuple[float, float]:
     return first, 360.0 - float(gaps[last])
 
 
-def _settings(context: PrototypeContext) -> Iterator[str]:
+def _settings(context: PrototypeContext, ratio: float) -> Iterator[str]:
     values, faults = _parsed(context.prototype.settings)
     yield from faults
-    motion, drive = context.export.spec.prototype.motion, context.prototype.drive
+    motion = context.export.spec.prototype.motion
     axis = AXES.index(motion.axis)
     expected: dict[int, float] = {
         0: PULSE_US,
@@ -175,7 +140,7 @@ def _settings(context: PrototypeContext) -> Iterator[str]:
         10: PLACES,
         13: 0,
         32: 0,
-        100 + axis: FULL_STEPS * motion.microsteps * drive.ratio / 360,
+        100 + axis: FULL_STEPS * motion.microsteps * ratio / 360,
         110 + axis: motion.feed_deg_min,
         120 + axis: motion.acceleration_deg_s2,
     }
@@ -186,11 +151,11 @@ def _settings(context: PrototypeContext) -> Iterator[str]:
         # The motor on in alarms; no sleep; pulled-up inputs; reports while it homes.
         expected |= {37: mask, 62: 0, 18: 0, 10: HAL_DEFAULT | REPORTS_HOMING, 43: 1}
         expected |= {5: XYZ & ~(1 << axis), 20: 1, 21: 1, 22: 1, 23: mask, 27: PULL_OFF_DEG}
-        expected |= {44: mask} | dict.fromkeys(range(45, 50), 0.0)
+        expected |= {26: DEBOUNCE_MS, 44: mask} | dict.fromkeys(range(45, 50), 0.0)
     for number, value in expected.items():
         if not math.isclose(values.get(number, math.nan), value, rel_tol=SHARE):
             yield f"${number} is {values.get(number, 'missing')}, not {value:g}"
-    others = {24, 25, 26} if motion.controller == "grblhal" else set()
+    others = {24, 25} if motion.controller == "grblhal" else set()
     if foreign := set(values) - set(expected) - {130 + axis} - others:
         yield f"${min(foreign)} is not needed"
     steps = values.get(110 + axis, 0.0) / 60 * values.get(100 + axis, 0.0)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.bodies import NOT_BODIES, SWUNG
+from tbcad_verify.prototype.bodies import NOT_BODIES, turning
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import manifold
 from tbcad_verify.record.prototype_sections import PlacedFastener
@@ -147,7 +147,7 @@ def _order_faults(context: PrototypeContext, drawn: Mapping[str, Shape]) -> Iter
 
 
 def _unreached(context: PrototypeContext, drawn: Mapping[str, Shape]) -> Iterator[str]:
-    steps, turning = _steps(context), _turning(context, drawn)
+    steps, swung = _steps(context), turning(context, drawn)
     solids = {name: _solid(name, drawn[name]) for name in drawn if name in steps}
     keys = [(one, key_of(one)) for one in context.prototype.fasteners if one.name in steps]
     screws = {one.name: key for one, key in keys if key}
@@ -158,10 +158,10 @@ def _unreached(context: PrototypeContext, drawn: Mapping[str, Shape]) -> Iterato
         step = steps[one.name]
         beside = [name for name in screws if steps[name] == step and name != one.name]
         after[one.name] = list(_met(key.solid, solids, beside))
-        there = _there(context, one, steps, turning)
+        there = _there(context, one, steps, swung)
         before = [name for name in solids if name in there.difference(beside)]
-        along = [name for name in before if (name in turning) == one.turns]
-        across = [name for name in before if (name in turning) != one.turns]
+        along = [name for name in before if (name in swung) == one.turns]
+        across = [name for name in before if (name in swung) != one.turns]
         met = [*_in_the_way(context, one, key, solids, (along, across))]
         if met:
             yield f"{one.name} behind {met[0]}"
@@ -169,7 +169,7 @@ def _unreached(context: PrototypeContext, drawn: Mapping[str, Shape]) -> Iterato
 
 
 def _there(
-    context: PrototypeContext, one: PlacedFastener, steps: Mapping[str, int], turning: set[str]
+    context: PrototypeContext, one: PlacedFastener, steps: Mapping[str, int], swung: set[str]
 ) -> set[str]:
     """Names of what is round a screw when it is put in, but for the screw."""
     step = steps[one.name]
@@ -180,7 +180,7 @@ def _there(
         if other.name in mounted
     ]
     if step >= _together(steps):
-        joints.append({FRAME} | turning)
+        joints.append({FRAME} | swung)
     group = {one.name}
     while more := [joint for joint in joints if joint & group and joint - group]:
         group = group.union(*more)
@@ -204,15 +204,6 @@ def _without_order(after: Mapping[str, list[str]]) -> Iterator[str]:
         TopologicalSorter(after).prepare()
     except CycleError as error:
         yield f"{short_list(error.args[1][1:])} behind each other"
-
-
-def _turning(context: PrototypeContext, drawn: Mapping[str, Shape]) -> set[str]:
-    """Bodies that turn with the base."""
-    record = context.prototype
-    names = {part.name for part in record.parts if part.role in SWUNG}
-    names |= {one.name for one in record.bought if one.turns}
-    names |= {one.name for one in record.fasteners if one.turns}
-    return names | {name for name in drawn if name.startswith("ball_")}
 
 
 def _in_the_way(

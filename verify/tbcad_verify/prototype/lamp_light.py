@@ -20,6 +20,7 @@ from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
+    Unknown,
     at_most,
     informative,
     short_list,
@@ -38,7 +39,6 @@ CHANGE = 5.0  # %
 PLACE_MM = 1e-6
 FACET_MM = 0.1  # by which facets of the assembly may be off the faces that they stand for
 PAIR_MM = 1e-3  # between an LED and the image of another
-SHARE = 1e-9
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
 IMAGES = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])
 IMAGES_BY_COUNT = {2: np.stack([np.ones(3), HALF_TURN]), 4: IMAGES}
@@ -64,6 +64,8 @@ def checks(
         asked = context.export.spec.prototype.light.lamp_z_mm != 0
         missing = at_most(listed, float(asked), 0, "the spec has lamps, the record has none")
         return [missing, *(informative(name, 0, "there are no lamps") for name in names[1:])]
+    if lamps.strip not in STRIPS:
+        raise Unknown(f"{lamps.strip} is no strip that is known")
     faults = [*_faults(context, lamps, solids)]
     own = {lamp.name for lamp in lamps.places}
     bodies = assembly.without(stage_bodies(context) | own)
@@ -151,18 +153,12 @@ def _faults(
 ) -> Iterator[str]:
     """What is wrong with the lamps' figures, places and bodies."""
     spec = context.export.spec.prototype.light
-    if lamps.strip not in STRIPS or lamps.strips != spec.strips:
-        yield f"{lamps.strips} strips {lamps.strip} on each"
-        return
-    strip_mm, cut_mm, lumen_mm = STRIPS[lamps.strip]
-    length, width = spec.segments * cut_mm, spec.strips * strip_mm
-    for what, value, expected in (
-        ("length_mm", lamps.length, length),
-        ("width_mm", lamps.width, width),
-        ("lumen_each", lamps.lumen_each, spec.strips * length * lumen_mm),
-    ):
-        if abs(value - expected) > SHARE * expected:
-            yield f"{what} is {value:g}, not {expected:g}"
+    if lamps.strips != spec.strips:
+        yield f"{lamps.strips} strips on each, the spec has {spec.strips}"
+    strip_mm, cut_mm, _ = STRIPS[lamps.strip]
+    sides = spec.segments * cut_mm, spec.strips * strip_mm
+    if np.abs(np.subtract((lamps.length, lamps.width), sides)).max() > PLACE_MM:
+        yield f"a lamp is {lamps.length:g} x {lamps.width:g} mm, not {sides[0]:g} x {sides[1]:g}"
     places = np.array([lamp.position for lamp in lamps.places])
     images = IMAGES_BY_COUNT.get(len(places), IMAGES)
     if places.shape != images.shape or np.abs(places - places[0] * images).max() > PLACE_MM:
@@ -235,7 +231,8 @@ def irradiance(
     places, index = np.unique(points, axis=0, return_inverse=True)
     index = index.reshape(-1)
     total = np.zeros(len(points))
-    exitance = lamps.lumen_each / (lamps.width * lamps.length)
+    wide, _, lumen = STRIPS[lamps.strip]
+    exitance = lumen / wide
     area = lamps.width * lamps.length / (TILES[0] * TILES[1])
     for lamp in lamps.places:
         for tile in _tiles(lamps, lamp.position, lamp.direction):

@@ -6,16 +6,20 @@ back by the base's angle. Pinhole and capture sphere lie on the axis, so they st
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad_verify.mesh.mesh import indexed_mesh, join_meshes
 from tbcad_verify.mesh.rays import RayScene, build_scene
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
+from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.bodies import NOT_BODIES, OWN, turning
 from tbcad_verify.prototype.caps import MeasuredCap
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats, Ints
@@ -23,12 +27,12 @@ from tbcad_verify.types import Floats, Ints
 
 @dataclass(frozen=True)
 class Obstacles:
-    """Parts that may obstruct the light.
+    """Bodies that may obstruct the light.
 
     Attributes:
         scene: all of them; None without any.
-        owner: (F + 1,) number of each facet's part; -1 at the end, for no facet.
-        names: of the parts.
+        owner: (F + 1,) number of each facet's body; -1 at the end, for no facet.
+        names: of the bodies.
     """
 
     scene: RayScene | None
@@ -47,8 +51,8 @@ class MeasuredPrototype:
         body: (3, K) centres of the spheres that lie on the pads, mm.
         body_radius: (K,) mm.
         mirrors: the reflecting spheres, for rays from the pinhole.
-        rotating: base and caps.
-        fixed: stage and frame.
+        rotating: base, caps, and what is fastened to them.
+        fixed: all else.
     """
 
     context: PrototypeContext
@@ -66,8 +70,16 @@ def measure_prototype(
     seats: list[MeasuredSeat],
     caps: list[MeasuredCap],
     parts: list[MeasuredPart],
+    drawn: Mapping[str, Shape],
 ) -> MeasuredPrototype:
     """Put balls on their pads, and caps as they were measured.
+
+    Args:
+        context: the record.
+        seats: of all balls.
+        caps: as measured.
+        parts: printed.
+        drawn: bodies of the assembly, of which all that is bought is taken.
 
     Raises:
         Unknown: a centre, a cap or a mesh is not known.
@@ -86,6 +98,9 @@ def measure_prototype(
         radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
     normal = unit(balls.columns("nx", 3))
     surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
+    bought = drawn.keys() - {*NOT_BODIES, *OWN, *(part.part.name for part in parts)}
+    bought = {name for name in bought if not name.startswith("ball_")}
+    swung = turning(context, ())
     return MeasuredPrototype(
         context,
         centre,
@@ -93,14 +108,19 @@ def measure_prototype(
         body,
         body_radius,
         prepare_for_rays(context.pinhole, surfaces),
-        _obstacles(of_roles(parts, "base", "cap")),
-        _obstacles(of_roles(parts, "stage", "frame")),
+        _obstacles(of_roles(parts, "base", "cap"), drawn, bought & swung),
+        _obstacles(of_roles(parts, "stage", "frame"), drawn, bought - swung),
     )
 
 
-def _obstacles(parts: list[MeasuredPart]) -> Obstacles:
-    names = tuple(part.part.name for part in parts)
-    if not parts:
-        return Obstacles(None, np.full(1, -1), names)
-    mesh, owner = joined_meshes(parts)
-    return Obstacles(build_scene(mesh), np.append(owner, -1), names)
+def _obstacles(
+    parts: list[MeasuredPart], drawn: Mapping[str, Shape], bought: set[str]
+) -> Obstacles:
+    meshes = {part.part.name: part.placed_mesh for part in parts}
+    shapes = [(name, *drawn[name]) for name in sorted(bought)]
+    meshes |= {name: indexed_mesh(points, faces.astype(np.int32)) for name, points, faces in shapes}
+    if not meshes:
+        return Obstacles(None, np.full(1, -1), ())
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
+    scene = build_scene(join_meshes([*meshes.values()]))
+    return Obstacles(scene, np.append(owner, -1), tuple(meshes))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from tbcad_verify.mesh.lines import polar_and_azimuth, wrapped
@@ -23,23 +21,18 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.types import Bools, Floats
 
 PAD_UM = 10.0  # largest error of a ball's centre that its pads may cause
-CATALOGUES = {"metric", "inch"}  # whose labels are sizes, and whose balls are of steel
-INCH_MM = 25.4
-LABEL_MM = 0.0501  # a cap's radius has one decimal in its label
-STEEL_G_MM3, MASS_SHARE = 7.81e-3, 1e-2
-ERROR_DEG = 1e-6
+DENSITIES_G_MM3 = 1.5e-3, 20e-3  # of anything that balls are made of
 TOLERANCE = 1e-9  # mm, radians, and of unit vectors
 CHECKS = (
     ("prototype requirements", RECORD, "unlike the design"),
     ("ball positions", BALLS, "mm off"),
     ("ball sizes", BALLS, "balls"),
-    ("ball labels", BALLS, "faults"),
 )
 
 
 def checks(context: PrototypeContext) -> list[Check]:
     """The frame is the camera's, and every ball is where it must be."""
-    return guarded_each(CHECKS, (_requirements, _positions, _sizes, _labels), context)
+    return guarded_each(CHECKS, (_requirements, _positions, _sizes), context)
 
 
 def _requirements(name: CheckName, context: PrototypeContext) -> Check:
@@ -52,7 +45,6 @@ def _requirements(name: CheckName, context: PrototypeContext) -> Check:
         "pads": _off_unit(np.array([seat.normals for seat in prototype.seats])),
     }
     errors["picture"] = float(export.spec.prototype.picture != prototype.picture)
-    errors["target_pad_um"] = float(prototype.pad_um > PAD_UM)
     wrong = sorted(what for what, error in errors.items() if not error <= TOLERANCE)
     return at_most(name, len(wrong), 0, f"not as designed: {short_list(wrong)}")
 
@@ -102,53 +94,18 @@ def _sizes(name: CheckName, context: PrototypeContext) -> Check:
     )
 
 
-def _labels(name: CheckName, context: PrototypeContext) -> Check:
-    """Labels, grades, masses and errors of direction, as sizes, spec and plan have them."""
-    balls, spec = context.prototype.balls, context.export.spec.prototype
-    built_in = set(spec.catalogues) <= CATALOGUES
-    faults = []
-    for k, (label, diameter) in enumerate(zip(balls.size, balls.diameter_mm, strict=True)):
-        cap, radius = bool(balls.cap[k]), float(balls.radius_mm[k])
-        known = radius if cap else diameter
-        size = labelled_mm(str(label), cap)
-        if (size is None and (built_in or cap)) or abs((size or known) - known) > (
-            LABEL_MM if cap else POSE_MM
-        ):
-            faults.append(f"ball {k + 1} is no {label}")
-        if str(balls.grade[k]) != ("" if cap else spec.grade):
-            faults.append(f"ball {k + 1} has grade {balls.grade[k]}")
-        steel = STEEL_G_MM3 * np.pi / 6 * diameter**3
-        if cap != bool(np.isnan(balls.mass_g[k])):
-            faults.append(f"ball {k + 1}: a ball has a mass, a cap has none")
-        elif not cap and built_in and abs(balls.mass_g[k] - steel) > MASS_SHARE * steel:
-            faults.append(f"ball {k + 1} is not {balls.mass_g[k]:g} g")
-    largest = np.zeros(len(balls))
-    np.maximum.at(largest, context.ball, context.prototype.plan.error[context.plan_rows])
-    unlike = np.flatnonzero(~(np.abs(largest - balls.error_deg) <= ERROR_DEG))
-    faults += [f"ball {k + 1} is {largest[k]:.3f} deg off" for k in unlike.tolist()]
-    return at_most(name, len(faults), 0, short_list(faults))
-
-
-def labelled_mm(label: str, cap: bool) -> float | None:
-    """The diameter of a ball, or a cap's radius, that a label names; None if it names none."""
-    if cap:
-        label_parts = re.fullmatch(r"cap R ([\d.]+) mm", label)
-        return float(label_parts[1]) if label_parts else None
-    if label_parts := re.fullmatch(r"([\d.]+) mm", label):
-        return float(label_parts[1])
-    if label_parts := re.fullmatch(r"(?:(\d+) )?(?:(\d+)/(\d+))? ?in", label):
-        whole, share, parts = (float(one or 0) for one in label_parts.groups())
-        return INCH_MM * (whole + (share / parts if parts else 0))
-    return None
-
-
 def _has_its_size(balls: Balls) -> Bools:
-    """(K,) a ball reflects with all of its diameter; a cap's front is flatter than its body."""
+    """(K,) a ball reflects with all of its diameter; a cap's front is flatter than its body.
+
+    A ball has the mass of a solid, a cap has none of its own.
+    """
     radius, body, half = balls.radius_mm, balls.body_radius_mm, balls.diameter_mm / 2
     p, c, b = (balls.columns(key, 3) for key in ("px", "cx", "bx"))
     ball = (np.abs(radius - half) <= POSE_MM) & (np.abs(body - half) <= POSE_MM)
     ball &= norm(b - c) <= POSE_MM
+    density, (least, most) = balls.mass_g / (np.pi / 6 * balls.diameter_mm**3), DENSITIES_G_MM3
+    ball &= (density >= least) & (density <= most)
     depth = dot(p - b, balls.columns("nx", 3))
     cap = (np.abs(body - half) <= POSE_MM) & (body <= radius)
-    cap &= (depth > 0) & (depth <= body + POSE_MM)
+    cap &= (depth > 0) & (depth <= body + POSE_MM) & np.isnan(balls.mass_g)
     return np.where(balls.cap, cap, ball)

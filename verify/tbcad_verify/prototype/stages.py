@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from tbcad_verify.prototype import (
     assembly,
     ball_views,
     bodies,
-    calibration,
     camera_gauge_checks,
     camera_mount_checks,
     cap_checks,
@@ -29,19 +29,15 @@ from tbcad_verify.prototype import (
     key_access,
     klipper_checks,
     lamp_light,
-    lamp_views,
-    leds,
-    pad_pose,
     plan_checks,
-    power_checks,
     seats,
     shroud_checks,
+    stage_checks,
     swing,
 )
 from tbcad_verify.prototype import record_checks as records
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.ball_views import BallViews, PixelRays, ball_coverage
-from tbcad_verify.prototype.caps import MeasuredCap
+from tbcad_verify.prototype.ball_views import BallViews, ball_coverage
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
@@ -77,13 +73,28 @@ STAGES = (
 )
 RECORD, PARTS, FITS, SEATS, LIGHT, SWING, PRINTING = STAGES
 PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
-OWN = ("camera",)  # body that its own rays start in
-NO_SEATS = "the seats could not be measured"
 PATTERNS = "shroud_*.dxf"
 DRAWINGS = "drawing_*.dxf, plate_holes.csv"
 DIGITS = 9
 
 Row = dict[str, Any]
+T = TypeVar("T")
+
+
+class Once(Generic[T]):
+    """A value that is worked out when it is first asked for; why it is not known is kept too."""
+
+    def __init__(self, work: Callable[[], T]) -> None:
+        """Take what works the value out."""
+        self._work = cache(lambda: attempt(work))
+
+    def __call__(self) -> T:
+        """The value.
+
+        Raises:
+            Unknown: it could not be worked out.
+        """
+        return require(*self._work())
 
 
 def verify_prototype(
@@ -111,40 +122,25 @@ def verify_prototype(
     for part in parts:
         masses = {} if part.placed_mass is None else {part.part.name: part.placed_mass}
         sink(Results(checks=part.checks, masses=masses))
+    drawn = Once(lambda: assembly.assembly_meshes(context))
+    solids = Once(lambda: inventory.assembly_solids(context))
     sink(Results(stages=[FITS]))
-    drawn, no_drawing = attempt(lambda: assembly.assembly_meshes(context))
-    solids, no_solids = attempt(lambda: inventory.assembly_solids(context))
-    _fits(
-        context,
-        parts,
-        sink,
-        lambda: require(drawn, no_drawing),
-        lambda: require(solids, no_solids),
-    )
+    _fits(context, parts, sink, drawn, solids)
     sink(Results(stages=[SEATS]))
-    seats_measured = _seats(context, parts, sink)
-    fitted = _caps(context, parts, sink) if prototype.balls.cap.any() else []
+    held = Once(lambda: seats.measure_seats(context, joined_meshes(of_roles(parts, "base"))[0]))
+    fitted = Once(lambda: [caps.measure_cap(context, part) for part in of_roles(parts, "cap")])
+    base = stl_names(parts, "base")
+    _add(sink, seats, base, lambda: (context, held()))
+    if prototype.balls.cap.any():
+        _add(sink, caps, stl_names(parts, "cap"), lambda: (context, fitted()))
     sink(Results(stages=[LIGHT]))
-    measured, reason = attempt(
-        lambda: measure_prototype(context, require(seats_measured, NO_SEATS), fitted, parts)
-    )
-    pixel, no_pixel = attempt(lambda: ball_views.pixel_rays(require(measured, reason)))
-    views, no_views = attempt(
-        lambda: ball_views.ball_views(require(measured, reason), require(pixel, no_pixel))
-    )
-    placed_files = stl_names(parts, *PLACED)
-    _add(sink, ball_views, placed_files, lambda: (context, require(views, no_views)))
+    measured = Once(lambda: measure_prototype(context, held(), fitted(), parts, drawn()))
+    pixel = Once(lambda: ball_views.pixel_rays(measured()))
+    views = Once(lambda: ball_views.ball_views(measured(), pixel()))
+    _add(sink, ball_views, stl_names(parts, *PLACED), lambda: (context, views()))
     sink(Results(stages=[SWING]))
-    _swing(
-        context,
-        parts,
-        sink,
-        lambda: require(measured, reason),
-        lambda: require(pixel, no_pixel),
-        lambda: require(drawn, no_drawing),
-        lambda: require(solids, no_solids),
-    )
-    sink(Results(prototype=json_rows(context, seats_measured, views)))
+    _swing(context, parts, sink, measured, drawn, solids)
+    sink(Results(prototype=json_rows(context, attempt(held)[0], attempt(views)[0])))
     return parts
 
 
@@ -160,14 +156,11 @@ def _fits(
     context: PrototypeContext,
     parts: list[MeasuredPart],
     sink: ResultSink,
-    drawn: Callable[[], dict[str, Shape]],
-    solids: Callable[[], dict[str, TextSolid]],
+    drawn: Once[dict[str, Shape]],
+    solids: Once[dict[str, TextSolid]],
 ) -> None:
     """What there is, in all files that list it, and what follows from it."""
-    part_files, no_part_files = attempt(lambda: inventory.part_solids(context))
-
-    def own() -> dict[str, TextSolid]:
-        return require(part_files, no_part_files)
+    own = Once(lambda: inventory.part_solids(context))
 
     def held() -> Sequence[object]:
         return context, _carriers(context, own()), _of_role(context, "cap", own())
@@ -175,16 +168,15 @@ def _fits(
     _add(sink, inventory, RECORD_FILE, lambda: (context, drawn(), solids(), own()))
     _add(sink, fastener_checks, RECORD_FILE, lambda: (context, solids()))
     _add(sink, key_access, RECORD_FILE, lambda: (context, drawn()))
-    _add(sink, homing_checks, SETTINGS, lambda: (context, solids(), _carriers(context, own())))
+    _add(sink, homing_checks, SETTINGS, lambda: (context, solids()))
     _add(sink, drawing_checks, DRAWINGS, lambda: (context, solids()))
-    _add(sink, klipper_checks, KLIPPER, lambda: (context,))
+    _add(sink, klipper_checks, KLIPPER, lambda: (context, solids()))
     _add(sink, holding_checks, RECORD_FILE, held)
     if context.prototype.balls.cap.any():
         _add(sink, cap_checks, RECORD_FILE, held)
     _add(sink, camera_mount_checks, RECORD_FILE, lambda: (context, solids()))
     _add(sink, camera_gauge_checks, RECORD_FILE, lambda: (context, parts))
     _add(sink, drive_checks, RECORD_FILE, lambda: (context, parts, solids()))
-    _add(sink, power_checks, RECORD_FILE, lambda: (context,))
 
 
 def _carriers(context: PrototypeContext, solids: dict[str, TextSolid]) -> list[TextSolid]:
@@ -199,63 +191,25 @@ def _of_role(context: PrototypeContext, role: str, solids: dict[str, TextSolid])
     return [solids[part.name] for part in context.prototype.parts if part.role == role]
 
 
-def _seats(
-    context: PrototypeContext, parts: list[MeasuredPart], sink: ResultSink
-) -> list[MeasuredSeat] | None:
-    base, no_base = attempt(lambda: joined_meshes(of_roles(parts, "base"))[0])
-    seats_measured, reason = attempt(lambda: seats.measure_seats(context, require(base, no_base)))
-    _add(sink, seats, stl_names(parts, "base"), lambda: (context, require(seats_measured, reason)))
-    _add(sink, pad_pose, stl_names(parts, "base"), lambda: (context, of_roles(parts, "base")))
-    return seats_measured
-
-
-def _caps(
-    context: PrototypeContext, parts: list[MeasuredPart], sink: ResultSink
-) -> list[MeasuredCap]:
-    of_caps = of_roles(parts, "cap")
-    fitted, reason = attempt(lambda: [caps.measure_cap(context, part) for part in of_caps])
-    _add(sink, caps, stl_names(parts, "cap"), lambda: (context, require(fitted, reason)))
-    return fitted or []
-
-
 def _swing(
     context: PrototypeContext,
     parts: list[MeasuredPart],
     sink: ResultSink,
-    measured: Callable[[], MeasuredPrototype],
-    pixel: Callable[[], PixelRays],
-    drawn: Callable[[], dict[str, Shape]],
-    solids: Callable[[], dict[str, TextSolid]],
+    measured: Once[MeasuredPrototype],
+    drawn: Once[dict[str, Shape]],
+    solids: Once[dict[str, TextSolid]],
 ) -> None:
-    bought, reason = attempt(
-        lambda: (
-            assembly.fixed_solids(context, drawn()),
-            assembly.fastener_solids(context, drawn(), turns=True),
-        )
-    )
-    assembled, no_bodies = attempt(lambda: bodies.AssembledBodies(context, drawn()))
+    still = Once(lambda: assembly.fixed_solids(context, drawn()))
+    turning = Once(lambda: assembly.fastener_solids(context, drawn(), turns=True))
+    assembled = Once(lambda: bodies.AssembledBodies(context, drawn()))
     files, file = stl_names(parts, *PLACED), context.prototype.assembly.glb
-    _add(sink, swing, files, lambda: (measured(), parts, *require(bought, reason)))
-    _add(sink, assembly, file, lambda: (context, parts, drawn()))
-    _add(sink, leds, stl_names(parts, "stage"), lambda: (context, of_roles(parts, "stage")))
-    _add(sink, darkness, file, lambda: (context, require(assembled, no_bodies).without(OWN)))
-    _add(
-        sink,
-        lamp_views,
-        file,
-        lambda: (measured(), pixel(), require(assembled, no_bodies).without(_followed(context))),
-    )
-    _add(sink, shroud_checks, PATTERNS, lambda: (context, drawn(), solids()))
-    _add(sink, lamp_light, file, lambda: (context, require(assembled, no_bodies), solids()))
     static = of_roles(parts, "stage", "frame")
-    _add(sink, calibration, stl_names(static, "stage", "frame"), lambda: (context, static))
-
-
-def _followed(context: PrototypeContext) -> set[str]:
-    """Bodies that other checks follow rays past, and the camera."""
-    parts = {part.name for part in context.prototype.parts}
-    fasteners = {one.name for one in context.prototype.fasteners}
-    return ({*OWN} | parts | fasteners) - bodies.stage_bodies(context)
+    _add(sink, swing, files, lambda: (measured(), parts, still(), turning()))
+    _add(sink, assembly, file, lambda: (context, parts, drawn()))
+    _add(sink, darkness, file, lambda: (context, assembled().without(bodies.OWN)))
+    _add(sink, shroud_checks, PATTERNS, lambda: (context, drawn(), solids()))
+    _add(sink, lamp_light, file, lambda: (context, assembled(), solids()))
+    _add(sink, stage_checks, stl_names(static, "stage", "frame"), lambda: (context, static))
 
 
 def json_rows(

@@ -20,15 +20,13 @@ WIDEST = 200  # characters of a text
 
 
 class Columns(BaseModel):
-    """A table: one field a column, in the order of the header line, as arrays over the rows.
+    """A table: one field a column that is used, by its name, as arrays over the rows.
 
-    Numbers are finite. A subclass sets the maximum number of rows, and whether further columns may
-    follow, which are not read.
+    Numbers are finite. A subclass sets the maximum number of rows. Other columns are not read.
     """
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
     most_rows: ClassVar[int]
-    may_be_wider: ClassVar[bool] = False
 
     @classmethod
     def header(cls) -> tuple[str, ...]:
@@ -43,24 +41,22 @@ class Columns(BaseModel):
             BadExport: broken or truncated CSV, other columns, too few or too many rows, or a cell
                 that is not allowed.
         """
-        rows = cls._rows(blob)
-        cells = zip(*rows, strict=True)
+        header, *rows = cls._rows(blob)
+        cells = dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
         try:
-            return cls.model_validate(dict(zip(cls.header(), map(list, cells), strict=False)))
+            return cls.model_validate({name: cells[name] for name in cls.header()})
         except ValidationError as error:
             raise BadExport(f"{blob.name}: {fault(cls, error, _place)}; {AGAIN}") from error
 
     @classmethod
     def _rows(cls, blob: FileBytes) -> list[list[str]]:
-        """The rows below the header line, all of its width."""
+        """The header line and the rows below it, all of its width."""
         try:
             header, *rows = list(csv.reader(io.StringIO(blob.text()), strict=True)) or [[]]
         except csv.Error as error:
             raise BadExport(f"{blob.name}: broken CSV ({error}); {AGAIN}") from error
-        names = cls.header()
-        if tuple(header[: len(names)] if cls.may_be_wider else header) != names:
-            start = ",".join(names[:5])
-            raise BadExport(f"{blob.name}: the first line must be {start}...; {AGAIN}")
+        if missing := [name for name in cls.header() if name not in header]:
+            raise BadExport(f"{blob.name}: the first line has no column {missing[0]}; {AGAIN}")
         twice = sorted({name for name in header if header.count(name) > 1})
         if twice:
             raise BadExport(f"{blob.name}: column {shown(twice[0])} is there twice; {AGAIN}")
@@ -74,7 +70,7 @@ class Columns(BaseModel):
             raise BadExport(
                 f"{blob.name}: {len(rows)} rows; allowed are 1 to {cls.most_rows}; {AGAIN}"
             )
-        return rows
+        return [header, *rows]
 
     def __len__(self) -> int:
         """Number of rows."""

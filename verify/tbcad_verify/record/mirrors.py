@@ -22,7 +22,6 @@ class Mirrors(Columns):
     """One mirror a row, M of them; centre and radius are NaN for planar mirrors."""
 
     most_rows: ClassVar[int] = 200_000
-    may_be_wider: ClassVar[bool] = True
 
     id: Texts
     camera: Texts

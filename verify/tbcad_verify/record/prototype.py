@@ -17,17 +17,13 @@ from tbcad_verify.record.prototype_sections import (
     Angle,
     Assembly,
     AssemblyStep,
-    Calibration,
     CameraPlace,
     Drawing,
-    DriveRecord,
     Frame,
-    Holding,
     Home,
     Lamps,
     Led,
     PlacedFastener,
-    PowerOff,
     PrintedPart,
     PurchasedBody,
     Seat,
@@ -66,12 +62,9 @@ class Prototype(Strict):
         picture: whether pictures are moved along with their balls when they are merged.
         frame: of the base.
         swing: smallest and largest base angle driven, degrees.
-        pad_um: largest error of a ball's centre that its pads may cause.
         seats: one for each ball.
-        holding: what holds each ball.
         parts: printed.
         leds: of the stage.
-        calibration: by the LEDs; None without any.
         camera_place: how the camera is put in its place; None without one.
         home: angles of homing.
         bought: purchased parts other than balls and fasteners.
@@ -81,8 +74,6 @@ class Prototype(Strict):
         shroud: round the rig; None without.
         drawings: of what is cut or drilled.
         assembly: files of the whole.
-        drive: of the base.
-        power_off: the base without power.
         balls: K of them.
         plan: every picture.
         stops: of the base.
@@ -99,12 +90,9 @@ class Prototype(Strict):
     picture: Literal["moved", "fixed"]
     frame: Frame
     swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
-    pad_um: float = Field(alias="target_pad_um", ge=1e-3, le=1e4)
     seats: list[Seat] = Field(max_length=MOST)
-    holding: Holding
     parts: list[PrintedPart] = Field(min_length=1, max_length=MOST)
     leds: list[Led] = Field(max_length=MOST)
-    calibration: Calibration | None = None
     camera_place: CameraPlace | None = None
     home: Home
     bought: list[PurchasedBody] = Field(max_length=MOST)
@@ -114,8 +102,6 @@ class Prototype(Strict):
     shroud: Shroud | None
     drawings: list[Drawing] = Field(max_length=MOST)
     assembly: Assembly = Assembly()
-    drive: DriveRecord
-    power_off: PowerOff
     balls: Balls
     plan: Plan
     stops: Stops
@@ -132,8 +118,6 @@ class Prototype(Strict):
             raise ValueError(f"swing_deg must ascend, not {self.swing}")
         if [seat.ball for seat in self.seats] != list(range(1, len(self.balls) + 1)):
             raise ValueError("seats must be one for each ball, in order")
-        if [one.ball for one in self.holding.balls] != list(range(1, len(self.balls) + 1)):
-            raise ValueError("holding.balls must be one for each ball, in order")
         for part in self.parts:
             balls = range(1, len(self.balls) + 1) if part.role == "cap" else (None,)
             if part.number not in balls:

@@ -1,4 +1,4 @@
-"""Sections of prototype.json: frame, seats, parts, LEDs, controller, homing, drive."""
+"""Sections of prototype.json, with the fields that are used: frame, seats, parts, LEDs, homing."""
 
 from __future__ import annotations
 
@@ -54,34 +54,6 @@ class Seat(Strict):
     pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)
 
 
-class HeldBall(Strict):
-    """What holds one ball against its pads, and the force along the seat's axis that it needs.
-
-    Attributes:
-        ball: its number, from 1.
-        by: what holds it.
-        magnet: in its seat, as in the parts list.
-        needed: N.
-        available: N.
-        ratio: of the two.
-        wider: force there is with a wider gap, N.
-    """
-
-    ball: int
-    by: Literal["magnet", "glue"]
-    magnet: str | None = Field(max_length=WIDEST)
-    needed: float = Field(alias="force_needed_n", ge=0, le=LARGEST)
-    available: float = Field(alias="force_available_n", ge=0, le=LARGEST)
-    ratio: float = Field(ge=0, le=LARGEST)
-    wider: float = Field(alias="wider_gap_n", ge=0, le=LARGEST)
-
-
-class Holding(Strict):
-    """What holds all balls."""
-
-    balls: list[HeldBall] = Field(max_length=MOST)
-
-
 class PrintedPart(PartFiles):
     """One part to be printed; y = x @ axes + origin lays it on the bed.
 
@@ -113,24 +85,6 @@ class Led(Strict):
     name: Name
     position: Vector = Field(alias="position_mm")
     direction: Vector
-
-
-class Calibration(Strict):
-    """What one photograph of each LED tells of the spheres' centres, with known radii.
-
-    Attributes:
-        noise_px: standard deviation of a highlight's place.
-        leds_seen_min: LEDs that every mirror sees past an object.
-        centre_um_median: standard deviation in a centre's least certain direction.
-        centre_um_95: the same, of 95 % of the mirrors at most.
-        across_um_median: standard deviation across the line of sight.
-    """
-
-    noise_px: float = Field(gt=0, le=10)
-    leds_seen_min: int = Field(ge=0, le=MOST)
-    centre_um_median: float = Field(ge=0, le=LARGEST)
-    centre_um_95: float = Field(ge=0, le=LARGEST)
-    across_um_median: float = Field(ge=0, le=LARGEST)
 
 
 class PurchasedBody(Strict):
@@ -167,7 +121,6 @@ class Lamps(Strict):
         width: of all strips of a lamp side by side, mm.
         level: whether they lie level, else they are upright.
         places: of all lamps.
-        lumen_each: light of one lamp.
     """
 
     strip: str = Field(max_length=WIDEST)
@@ -176,7 +129,6 @@ class Lamps(Strict):
     width: float = Field(alias="width_mm", gt=0, le=LARGEST)
     level: bool
     places: list[Lamp] = Field(min_length=1, max_length=MOST)
-    lumen_each: float = Field(gt=0, le=LARGEST)
 
 
 class Panel(Strict):
@@ -231,9 +183,6 @@ class AssemblyStep(Strict):
     mounts: list[Name] = Field(max_length=MOST)
 
 
-Amount = Annotated[float, Field(ge=0, le=LARGEST)]
-
-
 class Drawing(Strict):
     """A drawing: the part that it shows, by its name in the parts list, and what is cut by."""
 
@@ -242,52 +191,19 @@ class Drawing(Strict):
 
 
 class Home(Strict):
-    """Base angles of homing in degrees, the rod that fixes angle zero, and that angle's error."""
+    """Base angles of homing in degrees, and the rod that fixes angle zero."""
 
     switch: Angle = Field(alias="switch_deg")
     homed: Angle = Field(alias="homed_deg")
     travel: Annotated[float, Field(alias="travel_deg", ge=0, le=720)]
     pin: str = Field(max_length=WIDEST)
-    zero_error: Annotated[float, Field(alias="zero_error_deg", ge=0, le=10)]
-
-
-class GaugeLengths(Strict):
-    """Lengths of the gauge as calipers measure them, mm; from the hub's face or over both sides."""
-
-    hub_to_near: Amount
-    hub_to_far: Amount
-    near_width: Amount
-    far_width: Amount
-    hub_to_pinhole: Amount
 
 
 class MarkPicture(Strict):
-    """Where a pair of marks appears, pixels, the base at an angle, degrees."""
+    """The pair of marks of a picture, the base at an angle, degrees."""
 
     base_angle_deg: Angle
     side: Literal["positive", "negative"]
-    column_px: float = Field(ge=-LARGEST, le=LARGEST)
-    row_px: float = Field(ge=-LARGEST, le=LARGEST)
-
-
-class PlaceError(Strict):
-    """Standard deviations of the pinhole's place: along the base's axis, across, out, mm."""
-
-    along_mm: Amount
-    across_mm: Amount
-    out_mm: Amount
-
-
-class CameraTravel(Strict):
-    """How far the mount moves the camera to either side."""
-
-    along_axis_mm: Amount
-    across_mm: Amount
-    out_mm: Amount
-    along_plate_mm: Amount
-    yaw_deg: Amount
-    roll_deg: Amount
-    pitch_deg: Amount
 
 
 class CameraPlace(Strict):
@@ -296,18 +212,12 @@ class CameraPlace(Strict):
     Attributes:
         gauge: name of its part.
         marks: near and far mark of either side, at base angle zero, (2, 2, 3) mm.
-        lengths: of the gauge.
         pictures: of the marks.
-        error: of the pinhole's place.
-        travel: of the mount.
     """
 
     gauge: Name
     marks: list[list[Vector]] = Field(alias="marks_mm")
-    lengths: GaugeLengths = Field(alias="lengths_mm")
     pictures: list[MarkPicture] = Field(min_length=1, max_length=99)
-    error: PlaceError
-    travel: CameraTravel
 
     @field_validator("marks")
     @classmethod
@@ -315,46 +225,6 @@ class CameraPlace(Strict):
         if [len(side) for side in marks] != [2, 2]:
             raise ValueError("marks must be a near and a far one on either side")
         return marks
-
-
-class DriveRecord(Strict):
-    """What the drive must bear and does; balance and torques with the base at angle zero."""
-
-    mass_g: Amount
-    centre: Vector = Field(alias="centre_mm")
-    moment_g_mm: Amount
-    azimuth_deg: Angle
-    inertia_g_mm2: Annotated[float, Field(ge=0, le=1e15)]
-    worst_torque_nmm: Amount
-    peak_torque_nmm: Amount
-    required_torque_nmm: Amount
-    holding_torque_nmm: Amount
-    drive: str
-    motor: str
-    ratio: Amount
-    steps_per_deg: Amount
-    motor_wind_up_deg: Angle
-    belt_wind_up_deg: Angle
-    belt_centre_mm: Amount
-    teeth_in_mesh: Amount
-    belt_pull_n: Amount
-    belt_rating_n: Amount
-    belt_tension_n: Amount
-    belt_tone_hz: Amount
-    motor_radial_n: Amount
-    hold_current_a: Amount
-    hold_loss_w: Amount
-    motor_rise_k: Amount
-
-
-class PowerOff(Strict):
-    """The base without power: its fall to an end of the travel, and what the zero pin bears."""
-
-    fall_energy_j: Amount
-    fall_speed_deg_s: Amount
-    pin_force_n: Amount
-    pin_shear_mpa: Amount
-    pin_pressure_mpa: Amount
 
 
 class Assembly(Strict):

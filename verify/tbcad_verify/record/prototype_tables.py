@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tbcad_verify.record.columns import Columns, Counts, Texts, column, numbers, numbers_or_empty
-from tbcad_verify.record.validation import Name, allowed, array
+from tbcad_verify.record.columns import Columns, Counts, column, numbers, numbers_or_empty
+from tbcad_verify.record.validation import Name
 from tbcad_verify.types import Bools, Floats
 
 MOST = 1000  # balls, parts or LEDs
@@ -31,10 +31,7 @@ class Balls(Columns):
 
     number: Counts
     kind: Kinds
-    size: Texts
     diameter_mm: Lengths
-    grade: Texts
-    standard: Texts
     mass_g: Masses
     radius_mm: Lengths
     body_radius_mm: Lengths
@@ -52,12 +49,8 @@ class Balls(Columns):
     bx: Numbers
     by: Numbers
     bz: Numbers
-    mirrors: Counts
-    pixels: Numbers
-    pixels_shell: Numbers
     coverage_mm: Numbers
     coverage_fixed_mm: Numbers
-    error_deg: Numbers
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -80,11 +73,8 @@ class PlateHoles(Columns):
 
     most_rows: ClassVar[int] = MOST
 
-    hole: Counts
     x_mm: Numbers
     y_mm: Numbers
-    thread: Texts
-    holds: Texts
 
 
 class Plan(Columns):
@@ -98,25 +88,6 @@ class Plan(Columns):
     angle: Angles = Field(alias="base_angle_deg")
     ball: Counts
     mirror: Names
-    polar_error: Angles = Field(alias="polar_error_deg")
-    azimuth_error: Angles = Field(alias="azimuth_error_deg")
-    error: Angles = Field(alias="error_deg")
-
-    @property
-    def errors(self) -> Floats:
-        """(N, 3) of polar angle, of azimuth, and of direction, as recorded."""
-        return self.columns("polar_error", 3).T
-
-
-def _ball_lists(cells: list[str]) -> tuple[tuple[int, ...], ...]:
-    return tuple(tuple(int(number) for number in cell.split()) for cell in cells)
-
-
-BallList = Annotated[
-    str,
-    Field(pattern="^ *([0-9]{1,9}( +|$))*$"),
-    allowed("whole numbers, with spaces between them"),
-]
 
 
 class Stops(Columns):
@@ -126,14 +97,3 @@ class Stops(Columns):
 
     stop: Counts
     angle: Angles = Field(alias="base_angle_deg")
-    mirrors: Counts
-    balls: Annotated[tuple[tuple[int, ...], ...], array(list[BallList], _ball_lists)]
-    azimuth_error: Angles = Field(alias="azimuth_error_deg")
-    error: Angles = Field(alias="error_deg")
-    torque: Numbers = Field(alias="torque_nmm")
-    wind_up: Angles = Field(alias="wind_up_deg")
-
-    @property
-    def errors(self) -> Floats:
-        """(S, 2) largest error of azimuth and of direction, as recorded."""
-        return self.columns("azimuth_error", 2).T

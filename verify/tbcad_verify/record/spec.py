@@ -21,7 +21,6 @@ def _or_auto(value: object, check: ValidatorFunctionWrapHandler) -> object:
 
 
 OR_AUTO = WrapValidator(_or_auto)
-Side = Annotated[float, Field(ge=20, le=2000)]
 Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
 Place = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
@@ -100,10 +99,8 @@ class MeshSpec(Strict):
 
 
 class PrinterSpec(Strict):
-    """The printer and its material, for all printed parts of the prototype."""
+    """The material of all printed parts of the prototype."""
 
-    bed_mm: Annotated[list[Side], Field(min_length=3, max_length=3)]
-    bed_margin_mm: float = Field(ge=0, le=50)
     density_g_cm3: float = Field(gt=0, le=20)
 
 
@@ -170,8 +167,6 @@ class PrototypeSpec(Strict):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
     k: Annotated[int, Field(ge=1, le=1000), OR_AUTO]
-    catalogues: Annotated[list[str], Field(min_length=1)]
-    grade: Literal["G3", "G5", "G10", "G16", "G20", "G24", "G28", "G40", "G60", "G100", "G200"]
     picture: Literal["moved", "fixed"]
     camera_diameter_mm: Annotated[float, Field(ge=0, le=500), OR_AUTO]
     camera_length_mm: float = Field(ge=0, le=1000)

@@ -1,0 +1,168 @@
+"""The stage: the object's room is free, its LEDs are in the light, and mirrors see them past it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
+from tbcad_verify.mesh.vectors import norm, unit
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import (
+    MeasuredPart,
+    distance_to_facets,
+    joined_meshes,
+    of_roles,
+)
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    at_least,
+    at_most,
+    informative,
+    short_list,
+    worst_offenders,
+)
+from tbcad_verify.types import Bools, Floats
+
+CHECKS = {
+    "object room": "mm^3",
+    "leds seen": "LEDs",
+    "leds inside": "outside the capture sphere",
+    "leds free": "in the stage",
+    "leds to stage": "mm",
+}
+NEEDED = 2  # LEDs, for the three coordinates of a centre
+ROOM_MM3 = 0.1  # of parts in the room: facets of the arms' rounding
+LIFT_MM = 0.01  # of the room above the disc
+ROOM_SIDES = 180
+CUBE_MM = 0.02  # edge of the cube that represents an LED
+
+
+def checks(
+    names: list[CheckName], context: PrototypeContext, fixed: list[MeasuredPart]
+) -> list[Check]:
+    """Room and LEDs against the parts of stage and frame.
+
+    Args:
+        names: of the checks.
+        context: the export.
+        fixed: parts of stage and frame.
+    """
+    room, seen, *in_place = names
+    volume, inside = _volume_in_room(context, fixed)
+    free = at_most(room, volume, ROOM_MM3, f"in the object's room: {short_list(inside)}")
+    if not context.prototype.leds:
+        return [free, *(informative(name, 0, "no LEDs") for name in names[1:])]
+    counted = (~_hidden_by_room(context) & ~_hidden_by_parts(context, fixed)).sum(axis=0)
+    few = worst_offenders(
+        tuple(context.mirror_ids), counted.astype(np.float64), "", counted < NEEDED, ".0f"
+    )
+    past = at_least(seen, int(counted.min()), NEEDED, f"seen past an object in its room: {few}")
+    return [free, past, *_led_checks(in_place, context, of_roles(fixed, "stage"))]
+
+
+def _led_checks(
+    names: list[CheckName], context: PrototypeContext, stage: list[MeasuredPart]
+) -> list[Check]:
+    """Every LED is inside the capture sphere and not in the stage's material.
+
+    The distance of the farthest from the stage informs: an LED in its pocket has a wall close by.
+    """
+    inside, free, on_stage = names
+    leds = context.prototype.leds
+    beyond = [led.name for led in leds if np.linalg.norm(led.position) > context.radius]
+    sphere = at_most(inside, len(beyond), 0, f"the camera may not see {short_list(beyond)}")
+    if not stage:
+        return [sphere, *(informative(name, 0, "no stage") for name in (free, on_stage))]
+    mesh, facet = joined_meshes(stage)
+    distance = [distance_to_facets(led.position, mesh, np.arange(facet.size)) for led in leds]
+    sunk = [led.name for led in leds if _is_in_material(stage, led.position)]
+    k = int(np.argmax(distance))
+    return [
+        sphere,
+        at_most(free, len(sunk), 0, f"in the material of the stage: {short_list(sunk)}"),
+        informative(on_stage, distance[k], f"{leds[k].name} is farthest from the stage"),
+    ]
+
+
+def _is_in_material(stage: list[MeasuredPart], point: Floats) -> bool:
+    """Whether a small cube about a point is in the material of a part."""
+    import manifold3d
+
+    cube = manifold3d.Manifold.cube([CUBE_MM] * 3, center=True).translate(point)
+    return any((part.solid ^ cube).volume() > cube.volume() / 2 for part in stage)
+
+
+def _room(context: PrototypeContext) -> tuple[float, float, float]:
+    """Radius, lower and upper end of the upright cylinder that the object may fill, mm."""
+    stage = context.export.spec.prototype.stage
+    radius = stage.object_diameter_mm / 2
+    high = math.sqrt(max(context.radius**2 - radius**2, 0.0))
+    return radius, stage.top_mm, high
+
+
+def _volume_in_room(
+    context: PrototypeContext, fixed: list[MeasuredPart]
+) -> tuple[float, list[str]]:
+    """Volume of parts in the room, mm^3, and which parts and LEDs are in it."""
+    import manifold3d
+
+    radius, low, high = _room(context)
+    height = max(high - low - LIFT_MM, LIFT_MM)
+    room = manifold3d.Manifold.cylinder(height, radius, radius, ROOM_SIDES)
+    room = room.translate([0.0, 0.0, low + LIFT_MM])
+    volumes = {
+        part.part.name: (part.solid ^ room).volume() for part in fixed if _near(part, radius, low)
+    }
+    leds = [led.name for led in context.prototype.leds if np.hypot(*led.position[:2]) < radius]
+    names = [name for name, volume in volumes.items() if volume > ROOM_MM3 / max(len(volumes), 1)]
+    return float(sum(volumes.values())) + len(leds), names + leds
+
+
+def _near(part: MeasuredPart, radius: float, low: float) -> bool:
+    """Whether a part's box meets the room's."""
+    points = part.placed_mesh.points
+    least, most = points.min(axis=0), points.max(axis=0)
+    return bool((least[:2] < radius).all() and (most[:2] > -radius).all() and most[2] > low)
+
+
+def _sights(context: PrototypeContext) -> tuple[Floats, Floats]:
+    """(l, 3) LEDs, and (l, 3, m) ways from them to the virtual cameras, mm."""
+    mirrors = context.export.mirrors.take(context.mirror_rows)
+    semi_major = math.hypot(
+        context.export.semi_minor_mm, float(np.linalg.norm(context.pinhole)) / 2
+    )
+    cameras = 2 * semi_major * mirrors.columns("ux", 3)
+    leds = np.stack([led.position for led in context.prototype.leds])
+    return leds, cameras[None] - leds[:, :, None]
+
+
+def _hidden_by_room(context: PrototypeContext) -> Bools:
+    """(l, m) whether the way passes through the room, by the part of it within its height."""
+    radius, low, high = _room(context)
+    leds, sight = _sights(context)
+    rise = np.where(np.abs(sight[:, 2]) < 1e-12, 1e-12, sight[:, 2])
+    ends = np.stack([(level - leds[:, 2, None]) / rise for level in (low, high)])
+    first, last = np.clip(np.sort(ends, axis=0), 0.0, 1.0)
+    flat, across = sight[:, :2], leds[:, :2, None]
+    nearest = -(flat * across).sum(axis=1) / np.maximum((flat**2).sum(axis=1), 1e-12)
+    share = np.clip(nearest, first, last)
+    distance = np.hypot(*np.moveaxis(across + share[:, None] * flat, 1, 0))
+    return np.asarray((distance < radius) & (first < last))
+
+
+def _hidden_by_parts(context: PrototypeContext, fixed: list[MeasuredPart]) -> Bools:
+    """(l, m) whether a facet of a part is on the way to the mirror; beyond it is no light."""
+    mesh, _ = joined_meshes(fixed)
+    apex = context.export.mirrors.take(context.mirror_rows).columns("px", 3)
+    scene, (leds, sight) = build_scene(mesh), _sights(context)
+    hidden = np.zeros((len(leds), sight.shape[2]), dtype=np.bool_)
+    for k, place in enumerate(leds):
+        start, d = np.repeat(place[:, None], sight.shape[2], axis=1), unit(sight[k])
+        facet = first_hits(scene, start, d)
+        hit = np.flatnonzero(facet >= 0)
+        reach = distances_to_planes(scene, facet[hit], start[:, hit], d[:, hit])
+        hidden[k, hit] = reach < norm(apex[:, hit] - place[:, None])
+    return hidden
