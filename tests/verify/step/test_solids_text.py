@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step import solids_text
+from tbcad_verify.step import part21
 from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.solids_text import (
     RoundFace,
@@ -47,7 +47,7 @@ def test_below_geometry_is_nothing_that_counts(
     text: str, casing: Casing, sample: Export, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = read_solids(text)["shell_a"]
-    monkeypatch.setattr(solids_text, "GEOMETRY", frozenset())
+    monkeypatch.setattr(part21, "GEOMETRY", frozenset())
     slow = read_solids(text)["shell_a"]
     assert np.array_equal(found.corners, slow.corners)
     assert repr(found.faces) == repr(slow.faces)

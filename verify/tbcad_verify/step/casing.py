@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 from tbcad_verify.record.export import Camera
 from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.solids_text import TEXT, StepTable, holes, round_face
+from tbcad_verify.step.part21 import StepTable
+from tbcad_verify.step.solids_text import holes, round_face
 from tbcad_verify.types import Floats
 
 AXIAL_MM = 1e-6  # of the spheroid's centre, axis and semi-axes
@@ -91,8 +92,7 @@ def read_bores(text: str, mirrors: frozenset[str]) -> tuple[Hole, ...]:
 
 
 def _face_names(table: StepTable) -> dict[int, str]:
-    faces = table.of("ADVANCED_FACE")
-    return {one: TEXT.findall(table.bodies[one])[0] for one in faces}
+    return {one: table.label(one) for one in table.of("ADVANCED_FACE")}
 
 
 def _bores(table: StepTable, names: dict[int, str], mirrors: frozenset[str]) -> tuple[Hole, ...]:
