@@ -26,8 +26,7 @@ from tbcad_verify.report.checks import (
     informative,
     worst_offenders,
 )
-from tbcad_verify.report.document import summary_json
-from tbcad_verify.report.report import Report
+from tbcad_verify.report.report import Report, summary_json
 from tbcad_verify.run.verify import VerifyOptions
 from tbcad_verify.shell import pixels
 from tbcad_verify.shell.integrity import manifest_checks

@@ -11,7 +11,7 @@ from typing import Literal
 from rich.console import Console
 
 from tbcad_verify.report.checks import Check, finite
-from tbcad_verify.report.remedies import remedy
+from tbcad_verify.report.methods import remedy
 from tbcad_verify.report.table import table
 from tbcad_verify.report.text import WIDTH, figure, limit_text, shortened
 

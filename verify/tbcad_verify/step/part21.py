@@ -65,7 +65,7 @@ class StepTable:
 
     def label(self, number: int) -> str:
         """First text of an entity: its name."""
-        return LABEL.findall(self.bodies[number])[0][1:-1].replace("''", "'")
+        return str(LABEL.findall(self.bodies[number])[0])[1:-1].replace("''", "'")
 
     def forward(self, face: int) -> bool:
         """Whether a face has its surface's sense."""
