@@ -165,6 +165,12 @@ def test_a_failing_export(
     assert "coverage, facets" in " ".join(lines)
     assert remedy_by_name("coverage, facets") in " ".join(lines)
     assert lines[-1].endswith(": x")
+    written = json.loads((tmp_path / "x" / "verify.json").read_text())
+    bad = {check["name"]: check["detail"] for check in written["checks"] if check["pass"] is False}
+    assert {"coverage, facets", "coverage, spheres"} <= bad.keys()
+    assert {"centre error", "radius error"}.isdisjoint(bad)
+    assert all(bad.values())
+    assert written["pass"] is False
 
 
 def test_full_shows_every_check_and_ends_like_the_summary(shell_report: Report) -> None:

@@ -41,7 +41,7 @@ def compared(folder: Path, camera: str = "a") -> ShellComparison:
 @pytest.fixture(scope="module")
 def shells(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pedestals")
-    write_export(pedestal_design("n=3", COARSE, "shell.negative=true"), folder, ["shell"])
+    write_export(pedestal_design("n=3", COARSE), folder, ["shell"])
     return folder
 
 
@@ -59,11 +59,12 @@ def errors(shell: ShellComparison, widths: float = 1.0, **changes: Any) -> Float
     return wall_errors(grooves, shell.mirrors.surfaces(), camera.pinhole, planes, width)
 
 
-def test_shells_and_negatives_are_verified(shells: Path) -> None:
+@pytest.mark.slow
+def test_shells_are_verified(shells: Path) -> None:
     checks = verify(shells).checks
     assert all(check.passed for check in checks)
     walls = {check.file for check in checks if check.name == "step walls"}
-    assert walls == {f"{part}_{camera}.step" for part in ("shell", "mandrel") for camera in "ab"}
+    assert walls == {"shell_a.step", "shell_b.step"}
 
 
 @pytest.mark.slow
