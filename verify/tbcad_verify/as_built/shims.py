@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad_verify.as_built.machine import AsBuilt
-from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.types import Floats
 
@@ -55,11 +54,6 @@ def seat_errors(context: PrototypeContext, machine: AsBuilt) -> SeatErrors:
     about = float(turn.as_rotvec() @ context.frame[0])
     aside = float(np.linalg.norm(turn.as_rotvec() - about * context.frame[0]))
     return SeatErrors(off, shim, placed, about, aside, float(np.linalg.norm(shift)))
-
-
-def error_um(errors: SeatErrors) -> Floats:
-    """(K,) distances of the centres from where they should be, um."""
-    return 1000 * norm(errors.off)
 
 
 def _motion(designed: Floats, found: Floats) -> tuple[Rotation, Floats]:
