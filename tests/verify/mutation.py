@@ -56,7 +56,7 @@ TESTS: dict[str, list[str]] = {
     "report/checks.py": ["tests/verify/report/test_checks.py"],
     "shell/mesh_casing.py": CASING,
     "step/casing.py": ["tests/verify/step/test_solids_text.py"],
-    "step/part21.py": ["tests/verify/step/test_part21.py"],
+    "step/part21.py": ["tests/verify/step/test_part21.py", "tests/verify/step/test_solids_text.py"],
     "step/pedestals.py": ["tests/verify/step/test_pedestals.py"],
     "step/solids_text.py": ["tests/verify/step/test_solids_text.py"],
     "step/sphere_union.py": ["tests/verify/step/test_sphere_union.py"],

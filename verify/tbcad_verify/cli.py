@@ -13,8 +13,7 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
 from tbcad_verify.report.report import Output
 from tbcad_verify.report.text import WIDTH
-from tbcad_verify.run.verify import VerifyOptions, verify
-from tbcad_verify.run.watch import STAGE_LIMIT_S
+from tbcad_verify.run.verify import STAGE_LIMIT_S, VerifyOptions, verify
 from tbcad_verify.types import Progress
 
 ABOUT = """Verify the files in DIR, which `tbcad build` wrote: every virtual camera sees the whole

@@ -11,11 +11,10 @@ import pickle
 import stat
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 from unittest import mock
 
@@ -58,7 +57,6 @@ from tbcad_verify.step import shell_checks, step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
 
-EMPTY: Mapping[int, int] = MappingProxyType({})
 MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
 # Of an export, what no result depends on that is kept by the export.
 NOT_DERIVED_FROM = {"folder", "manifest", "digests"}
@@ -210,17 +208,10 @@ class _EachOnce:
     def __init__(self, work: Callable[..., list[Any]]) -> None:
         self._work, self._found = work, dict[object, Any]()
 
-    def __call__(
-        self, blobs: list[FileBytes], processes: Processes, originals: Mapping[int, int] = EMPTY
-    ) -> list[Any]:
-        first = [blobs[originals.get(k, k)].sha256 for k in range(len(blobs))]
-        keys = [
-            (blob.sha256, one, processes.seconds) for blob, one in zip(blobs, first, strict=True)
-        ]
-        unread = {k for k, key in enumerate(keys) if key not in self._found}
-        new = sorted(unread | {originals[k] for k in unread if k in originals})
-        among = {new.index(k): new.index(one) for k, one in originals.items() if k in new}
-        answers = dict(zip(new, self._work([blobs[k] for k in new], processes, among), strict=True))
+    def __call__(self, blobs: list[FileBytes], processes: Processes) -> list[Any]:
+        keys = [(blob.sha256, processes.seconds) for blob in blobs]
+        new = [k for k, key in enumerate(keys) if key not in self._found]
+        answers = dict(zip(new, self._work([blobs[k] for k in new], processes), strict=True))
         self._found |= {
             keys[k]: answer for k, answer in answers.items() if isinstance(answer, StepFile)
         }

@@ -229,22 +229,3 @@ def test_a_rigid_motion_changes_no_figure(
     assert found.mass.volume == pytest.approx(BASE.mass.volume, rel=1e-5)
     at = matrix @ [*BASE.holes.middle[:, BASE.holes.diameter.argmin()], 1]
     assert found.holes.middle[:, found.holes.diameter.argmin()] == pytest.approx(at[:3], abs=1e-3)
-
-
-@given(st.floats(0.02, 50))
-@settings(max_examples=25)
-def test_scaling_scales(scale: float) -> None:
-    found = shape(flange().apply_scale(scale))
-    assert found.walls.minimum == pytest.approx(scale * BASE.walls.minimum, rel=1e-5)
-    diameters = np.sort(found.holes.diameter)
-    assert diameters == pytest.approx(scale * np.sort(BASE.holes.diameter), rel=1e-5)
-    assert found.mass.volume == pytest.approx(scale**3 * BASE.mass.volume, rel=1e-5)
-
-
-def test_the_same_mesh_gives_the_same_bits() -> None:
-    again = shape(flange())
-    assert again.walls.minimum == BASE.walls.minimum
-    np.testing.assert_array_equal(again.walls.thickness, BASE.walls.thickness)
-    np.testing.assert_array_equal(again.walls.where, BASE.walls.where)
-    np.testing.assert_array_equal(again.holes.middle, BASE.holes.middle)
-    np.testing.assert_array_equal(again.hull.down, BASE.hull.down)

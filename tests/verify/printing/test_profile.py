@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 
 import pytest
-from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import MAX_BYTES, BadProfile, Profile, built_in, load
 
 GOOD = """\
@@ -55,30 +54,19 @@ def test_a_users_file(file: Path) -> None:
     assert mine.max_triangles is None
 
 
-def test_a_profile_cannot_be_changed(file: Path) -> None:
-    with pytest.raises(ValueError, match="frozen"):
-        load(str(file)).wall_mm = 2  # type: ignore[misc]
-
-
 BAD = [
     ("wall_mm", "wal_mm", "unknown key wal_mm: did you mean wall_mm\\? allowed are name, process"),
     ("wall_mm = 1.8", "", "wall_mm is missing, allowed is a number from 0 to 1000: change it"),
     ("wall_mm = 1.8", "wall_mm = -1", "wall_mm is -1, allowed is a number from 0 to 1000"),
     ("wall_mm = 1.8", 'wall_mm = "1"', "wall_mm is 1, allowed is a number"),
-    ("wall_mm = 1.8", "wall_mm = true", "wall_mm is True, allowed is a number"),
     ("wall_mm = 1.8", "wall_mm = nan", "wall_mm is nan, allowed is a number"),
-    ("wall_mm = 1.8", "wall_mm = inf", "wall_mm is inf, allowed is a number"),
     ("spot_mm = 0.6", "spot_mm = 0", "spot_mm is 0, allowed is a number above 0 to 100:"),
     ('"FDM"', '"fdm"', "process is fdm, allowed is FDM, SLA, SLS or CNC"),
     ("[200, 210.5, 250]", "[200, 210.5]", "bed_mm.* allowed is three numbers above 0 to 100000"),
-    ("[200, 210.5, 250]", "[200, 0, 250]", "bed_mm\\[1\\] is 0, allowed is three numbers above"),
-    ("[200, 210.5, 250]", "200", "bed_mm is 200, allowed is three numbers above"),
     ("clearance_mm = 0.4", "clearance_mm = 100", "clearance_mm is 100, allowed is less than half"),
     ("overhang_deg = 50", "overhang_deg = 91", "overhang_deg is 91, allowed is a number from 0 to"),
     ('"mine"', '"a\\nb"', "name is 'a.*, allowed is text that matches"),
-    ('"PETG"', '""', "material is '', allowed is text that matches"),
     ("hole_mm = 2", "hole_mm = 2\nhole_mm = 3", "no TOML"),
-    ("hole_mm = 2", "hole_mm = 2\nmax_triangles = 1e6", "max_triangles is .*, allowed is a whole"),
     ("hole_mm = 2", "hole_mm = 2\ncavities = 1", "cavities is 1, allowed is true or false"),
     ("hole_mm = 2", "hole_mm = 2\n[bed]\nx = 1", "unknown key bed: .*allowed are"),
     ("hole_mm = 2", "hole_mm = 2\n'a\\u000ab' = 1", "unknown key"),
@@ -101,21 +89,14 @@ def test_broken_files_are_refused_in_one_line(file: Path, old: str, new: str, me
     assert len(line) < 400
 
 
-def test_a_bad_profile_is_a_bad_export() -> None:
-    assert issubclass(BadProfile, BadExport)
-
-
 @pytest.mark.parametrize(
     ("name", "message"),
     [
         ("fmd", "did you mean fdm"),
         ("machined", "^profile machined: it is called cnc now: write cnc$"),
-        ("FDM", "built in are cnc, fdm, sla, sls; or give the path of a .toml"),
         ("no/such.toml", "neither built in nor a file"),
-        ("", "neither built in nor a file"),
         ("a\0b", "neither built in nor a file"),
         ("a\nb", "neither built in nor a file"),
-        ("/", "not a regular file"),
         ("/dev/null", "not a regular file"),
     ],
 )

@@ -16,7 +16,15 @@ from tbcad_verify.programs.answers import skipped
 from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.key_figures import KEY_FIGURES, LABEL_WIDTH, key_figures
-from tbcad_verify.report.remedies import ELSE, REMEDIES, UNKNOWN, remedy
+from tbcad_verify.report.methods import (
+    AS_BUILT,
+    ELSE,
+    EXPORT,
+    UNKNOWN,
+    methods,
+    remedy,
+    remedy_by_name,
+)
 from tbcad_verify.report.report import Output, Report
 from tbcad_verify.report.summary import MAX_LINES
 from tbcad_verify.report.text import WIDTH
@@ -119,7 +127,7 @@ def test_a_failure_says_what_where_and_what_to_do(shell_report: Report) -> None:
     lines = fits(shown(replace(report, checks=checks)))
     assert lines[0] == "FAIL: failed: frame margin"
     assert lines[1] == f"- frame margin: -3.25 px, at least 0: {detail} ..."
-    assert lines[2] == f"    -> {REMEDIES['frame margin']}"
+    assert lines[2] == f"    -> {remedy_by_name('frame margin')}"
     assert "hfov_deg" in lines[2]
 
 
@@ -141,7 +149,7 @@ def test_the_worst_comes_first_and_remedies_are_shared(shell_report: Report) -> 
         "- coverage, spheres",
         "- coverage, facets",
     ]
-    assert lines[3] == f"    -> {REMEDIES['coverage']}"
+    assert lines[3] == f"    -> {remedy_by_name('coverage, facets')}"
     assert "3 more: poses; watertight; folds" in " ".join(lines)
 
 
@@ -155,8 +163,14 @@ def test_a_failing_export(
     assert len(lines) <= MAX_LINES
     assert "virtual cameras see less than 40 mm" in lines[0]
     assert "coverage, facets" in " ".join(lines)
-    assert REMEDIES["coverage"] in " ".join(lines)
+    assert remedy_by_name("coverage, facets") in " ".join(lines)
     assert lines[-1].endswith(": x")
+    written = json.loads((tmp_path / "x" / "verify.json").read_text())
+    bad = {check["name"]: check["detail"] for check in written["checks"] if check["pass"] is False}
+    assert {"coverage, facets", "coverage, spheres"} <= bad.keys()
+    assert {"centre error", "radius error"}.isdisjoint(bad)
+    assert all(bad.values())
+    assert written["pass"] is False
 
 
 def test_full_shows_every_check_and_ends_like_the_summary(shell_report: Report) -> None:
@@ -247,7 +261,10 @@ def test_every_check_has_a_remedy_that_fits(shell_report: Report, tmp_path: Path
     checks = (*shell_report.checks, *verify(folder, options=IN_PROCESS).checks)
     failing = [replace(check, passed=False) for check in checks if check.limit is not None]
     assert [check.name for check in failing if remedy(check) == ELSE] == []
-    for text in (*REMEDIES.values(), UNKNOWN, ELSE):
+    every = [
+        text for table in (EXPORT, AS_BUILT) for one in methods(table) for text in one.remedies
+    ]
+    for text in (*every, UNKNOWN, ELSE):
         assert len(f"    -> {text}") <= WIDTH
 
 

@@ -16,8 +16,7 @@ from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import NAME
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import CollectedResults, Results, ResultSink
-from tbcad_verify.run.verify import VerifyOptions, verify
-from tbcad_verify.run.watch import watch
+from tbcad_verify.run.verify import VerifyOptions, verify, watch
 
 STAGES = ("one", "two", "three")
 CHECK = Check("a", "", True, 1.0, 2.0, "mm")

@@ -136,7 +136,7 @@ def with_cameras(folder: Path, **changed: float) -> Path:
 
 
 def pixel_checks(optical_setup: OpticalSetup) -> dict[str, Check]:
-    return {check.name: check for check in pixels.checks(optical_setup, None, "x")[1]}
+    return {check.name: check for check in pixels.checks(optical_setup, None, "x")[0]}
 
 
 def with_post(folder: Path, low: list[float], high: list[float]) -> Path:
@@ -151,7 +151,7 @@ def with_post(folder: Path, low: list[float], high: list[float]) -> Path:
 def test_a_post_between_camera_and_mirrors_is_named(export_folder: Path) -> None:
     optical_setup = optical_setup_of(with_post(export_folder, [66, 9, -23], [68, 11, -21]))
     lines = {
-        c.name: c for c in coverage.checks(optical_setup, coverage.measure(optical_setup), "x")
+        c.name: c for c in coverage.checks(optical_setup, coverage.measure(optical_setup), "x")[0]
     }
     assert lines["mirrors visible"].passed is False
     assert "behind post (no mirror)" in lines["mirrors visible"].detail

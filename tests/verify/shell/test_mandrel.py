@@ -122,14 +122,6 @@ def moved(mesh: Mesh) -> Mesh:
     return changed(mesh, mesh.vertices + np.array([0, 0.01, 0]))
 
 
-def scaled(mesh: Mesh) -> Mesh:
-    return changed(mesh, 1.0005 * mesh.vertices)
-
-
-def mirrored(mesh: Mesh) -> Mesh:
-    return mesh.mirrored()
-
-
 def mirrored_in_y(mesh: Mesh) -> Mesh:
     """The design is symmetrical about y = 0, its mirrors' facets are not."""
     return Mesh(mesh.vertices * [1, -1, 1], mesh.triangles[:, ::-1])
@@ -162,8 +154,6 @@ def with_a_facet_less(mesh: Mesh) -> Mesh:
     ("change", "found"),
     [
         (moved, "mandrel mirrors"),
-        (scaled, "mandrel mirrors"),
-        (mirrored, "mandrel mirrors"),
         (mirrored_in_y, "mandrel mirrors"),
         (with_a_dent, "mandrel mirrors"),
         (with_a_long_foot, "mandrel body"),
@@ -276,21 +266,6 @@ class TestStep:
         assert {"step outward", "step mandrel planes", "step mandrel volume"} <= {
             *step_failing(folder)
         }
-
-    @ON_VALLEYS
-    def test_the_other_cameras_is_refused(self, folder: Path) -> None:
-        text = (folder / "mandrel_b.step").read_text(encoding="utf-8")
-        (folder / STEP).write_text(text.replace("mandrel_b", "mandrel_a"), encoding="utf-8")
-        assert {"step names", "step surfaces"} <= {*step_failing(folder)}
-
-    @ON_VALLEYS
-    def test_a_larger_sphere_is_named(self, folder: Path) -> None:
-        text = (folder / STEP).read_text(encoding="utf-8")
-        sphere = re.search(r"SPHERICAL_SURFACE\('',#\d+,([0-9.]+)\)", text)
-        assert sphere is not None
-        larger = sphere[0].replace(sphere[1], f"{float(sphere[1]) + 1e-4:.12f}")
-        (folder / STEP).write_text(text.replace(sphere[0], larger), encoding="utf-8")
-        assert "a0001" in step_failing(folder)["step surfaces"]
 
     @ON_VALLEYS
     def test_a_face_that_is_not_turned_is_named(self, folder: Path) -> None:

@@ -111,7 +111,7 @@ def step_ends(folder: Path) -> Check:
     record = replace(record, parts=record.parts[:1])
     with Processes(1, 120) as processes:
         comparisons = shell_comparisons(record, read_step_files(record, processes))
-    checks = shell_step_checks(record, {}, comparisons, areas=())
+    checks = shell_step_checks(record, {}, comparisons, None, ())
     return next(check for check in checks if check.name == "step seam and foot")
 
 

@@ -1,100 +1,106 @@
-"""Pedestals in closed form from the record, and shells on them verified as a whole."""
+"""Shells on pedestals: grooves as the spec has them, cells between the walls in the file."""
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import read_export
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.verify import verify
-from tbcad_verify.step.sphere_union import cells_of_export, walls_of_export
+from tbcad_verify.step.front_checks import SURFACE_MM
+from tbcad_verify.step.pedestals import wall_errors
+from tbcad_verify.step.shell_checks import ShellComparison, area_checks, shell_comparisons
+from tbcad_verify.step.sphere_union import bounds
+from tbcad_verify.step.step_file import known, read_step_files
+from tbcad_verify.types import Floats
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.cells import cell_areas
-from tbcad.optics.power_diagram import PLANES
 from tbcad.output.build import write_export
 from tests.pedestal_designs import pedestal_design
-from tests.verify.step.test_sphere_union import as_export
 
+COARSE = "mesh.structure_error_mm=0.5"
 SETTINGS = [
-    ["n=2"],
-    ["n=7"],
-    ["n=12"],  # some borders are shorter than the groove
+    ["n=12", "coating_um=100"],  # some borders are shorter than the groove
     ["n=5", "shell.groove_mm=0.6"],
     ["n=4", "radius_rule=flat"],
     ["n=5", "camera_mm=[120, 15, -90]"],
 ]
 
 
-def exported(design: MirrorDesign) -> Export:
-    """What a reader of this design's files would hand on."""
-    export = as_export(design)
-    shell = export.spec.shell.model_copy(
-        update={"edges": "pedestal", "groove_mm": design.spec.shell.groove_mm}
-    )
-    return replace(export, spec=export.spec.model_copy(update={"shell": shell}))
-
-
-@pytest.mark.parametrize("settings", SETTINGS, ids=str)
-def test_areas_and_walls_follow_from_the_record(settings: list[str]) -> None:
-    design = pedestal_design(*settings)
-    export = exported(design)
-    for camera, array in zip("ab", design.arrays, strict=True):
-        cells = cells_of_export(export, camera, coated=True)
-        np.testing.assert_allclose(cells.area, array.area, rtol=1e-9)
-        assert cells.closed.all()
-        walls = walls_of_export(export, camera)
-        assert walls is not None
-        row, column = np.nonzero(walls.real & (walls.across < len(array)))
-        found = dict(
-            zip(
-                zip(row.tolist(), walls.across[row, column].tolist(), strict=True),
-                walls.normal[row, column],
-                strict=True,
-            )
-        )
-        built = array.cells.surfaces.normal[len(array) + PLANES :]
-        assert len(found) == len(built)
-        for pair, normal in zip(array.cells.walls.tolist(), built, strict=True):
-            np.testing.assert_allclose(found[tuple(pair)], -normal, atol=1e-9)
-
-
-def test_areas_under_the_coat() -> None:
-    design = pedestal_design("n=5", "coating_um=100")
-    area = cells_of_export(exported(design), "a").area
-    np.testing.assert_allclose(area, cell_areas(design.arrays[0].modelled_cells), rtol=1e-9)
+def compared(folder: Path, camera: str = "a") -> ShellComparison:
+    export = read_export(folder)
+    with Processes(1) as processes:
+        files = read_step_files(export, processes)
+    return known(shell_comparisons(export, files)[f"shell_{camera}"])
 
 
 @pytest.fixture(scope="module")
 def shells(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pedestals")
-    write_export(pedestal_design("n=3", "mesh.structure_error_mm=0.1"), folder, ["shell"])
+    write_export(pedestal_design("n=3", COARSE), folder, ["shell"])
     return folder
 
 
-def failed(folder: Path) -> set[str]:
-    return {check.name for check in verify(folder).checks if check.passed is False}
+@pytest.fixture(scope="module")
+def shell(shells: Path) -> ShellComparison:
+    return compared(shells)
 
 
-def test_a_shell_on_pedestals_is_verified(shells: Path) -> None:
-    assert verify(shells).passed
+def errors(shell: ShellComparison, widths: float = 1.0, **changes: Any) -> Floats:
+    """Of the walls, with changes to what was read, and another width of grooves."""
+    assert shell.grooves
+    grooves, camera = replace(shell.grooves, **changes), shell.camera
+    planes = bounds(float(np.sign(camera.pinhole[0])), shell.export.foot_z_mm)
+    width = widths * shell.export.spec.shell.groove_mm
+    return wall_errors(grooves, shell.mirrors.surfaces(), camera.pinhole, planes, width)
 
 
 @pytest.mark.slow
-def test_another_groove_than_the_record_s_is_found(shells: Path) -> None:
-    record = shells / "design.json"
-    text = record.read_text()
-    document = json.loads(text)
-    document["spec"]["shell"]["groove_mm"] *= 1.01
-    record.write_text(json.dumps(document))
-    try:
-        assert {"cell areas", "step cells", "step walls"} <= failed(shells)
-    finally:
-        record.write_text(text)
+def test_shells_are_verified(shells: Path) -> None:
+    checks = verify(shells).checks
+    assert all(check.passed for check in checks)
+    walls = {check.file for check in checks if check.name == "step walls"}
+    assert walls == {"shell_a.step", "shell_b.step"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", SETTINGS, ids=str)
+def test_grooves_of_other_designs(settings: list[str], tmp_path: Path) -> None:
+    write_export(pedestal_design(COARSE, *settings), tmp_path, ["shell"])
+    found = {camera: compared(tmp_path, camera) for camera in "ab"}
+    assert max(errors(one).max() for one in found.values()) < SURFACE_MM
+    (areas,) = area_checks(found["a"].export, {key: one.grooves for key, one in found.items()})
+    assert areas.passed, areas
+
+
+def test_a_wall_off_its_place_is_found(shell: ShellComparison) -> None:
+    """Planes, bottoms and the spec's width: each changes the errors by as much as it is off."""
+    assert shell.grooves
+    assert errors(shell).max() < SURFACE_MM
+    one, off = np.eye(len(shell.grooves.names))[3], 1e-6
+    moved = shell.grooves.point + off * one * shell.grooves.normal
+    assert np.flatnonzero(errors(shell, point=moved) > off / 2).tolist() == [3]
+    turned = shell.grooves.normal + off * one * np.array([[0.6], [0.0], [0.8]])
+    assert np.flatnonzero(errors(shell, normal=turned) > off / 10).tolist() == [3]
+    assert (errors(shell, 1 + off) > off / 10).all()
+    loose = shell.grooves.bottom.copy()
+    loose[0] = np.nan
+    assert 0 < np.isinf(errors(shell, bottom=loose)).sum() < len(one)
+
+
+def test_areas_hold_where_walls_are(shell: ShellComparison) -> None:
+    """The record's areas are those between the walls of the files, both."""
+    other = compared(shell.export.folder, "b")
+    assert shell.grooves
+    found = {"a": shell.grooves, "b": other.grooves}
+    assert area_checks(shell.export, found)[0].passed
+    moved = shell.grooves.point + 1e-4 * shell.grooves.normal
+    found["a"] = replace(shell.grooves, point=moved)
+    assert area_checks(shell.export, found)[0].passed is False
 
 
 @pytest.mark.slow
@@ -105,6 +111,7 @@ def test_a_wall_with_the_name_of_another_is_found(shells: Path) -> None:
     swapped = text.replace(f"'{one}'", "'?'").replace(f"'{two}'", f"'{one}'")
     step.write_text(swapped.replace("'?'", f"'{two}'"))
     try:
-        assert "step walls" in failed(shells)
+        failed = {check.name for check in verify(shells).checks if check.passed is False}
+        assert "step walls" in failed
     finally:
         step.write_text(text)

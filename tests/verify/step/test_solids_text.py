@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step import solids_text
+from tbcad_verify.step import part21
 from tbcad_verify.step.casing import Casing, read_casing, wall
+from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.solids_text import (
     RoundFace,
     distance_to_line,
@@ -32,7 +33,7 @@ def text() -> str:
 
 @pytest.fixture(scope="module")
 def casing(sample: Export, text: str) -> Casing:
-    return read_casing(text, frozenset(sample.mirrors.ids))
+    return read_casing(StepTable(text), frozenset(sample.mirrors.ids))
 
 
 def test_a_solid_has_its_product_name_and_corners(text: str) -> None:
@@ -47,11 +48,11 @@ def test_below_geometry_is_nothing_that_counts(
     text: str, casing: Casing, sample: Export, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = read_solids(text)["shell_a"]
-    monkeypatch.setattr(solids_text, "GEOMETRY", frozenset())
+    monkeypatch.setattr(part21, "GEOMETRY", frozenset())
     slow = read_solids(text)["shell_a"]
     assert np.array_equal(found.corners, slow.corners)
     assert repr(found.faces) == repr(slow.faces)
-    everything = read_casing(text, frozenset(sample.mirrors.ids))
+    everything = read_casing(StepTable(text), frozenset(sample.mirrors.ids))
     assert np.array_equal(casing.valleys, everything.valleys)
 
 
@@ -85,7 +86,7 @@ def test_the_wall_is_the_design_s(casing: Casing, sample: Export) -> None:
 
 def test_what_is_no_shell_is_unknown(text: str) -> None:
     with pytest.raises(Unknown, match="0 surfaces of revolution"):
-        read_casing(text.replace("SURFACE_OF_REVOLUTION", "PLANE"), frozenset())
+        read_casing(StepTable(text.replace("SURFACE_OF_REVOLUTION", "PLANE")), frozenset())
     with pytest.raises(Unknown, match="no product's"):
         read_solids(text.replace("PRODUCT(", "PRODUCTS("))
 

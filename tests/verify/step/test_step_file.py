@@ -15,9 +15,14 @@ from OCP.TopoDS import TopoDS_Shape
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.processes import Processes
-from tbcad_verify.step.kernel.reading import read_solid
-from tbcad_verify.step.step_file import StepFile, examine_all, known, load, parse
-from tbcad_verify.step.text import read_text
+from tbcad_verify.step.step_file import (
+    StepFile,
+    examine_all,
+    known,
+    load,
+    parse,
+    read_file,
+)
 
 
 def written(folder: Path, *shapes: TopoDS_Shape) -> Path:
@@ -41,7 +46,7 @@ BOX = box((-5, -10, -15), (5, 10, 15))
 
 
 def both(file: Path) -> StepFile:
-    return parse(read_text(file), read_solid(file))
+    return parse(*read_file(file))
 
 
 def examine(folder: Path, name: str, seconds: float) -> StepFile:

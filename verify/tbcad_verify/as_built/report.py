@@ -6,16 +6,15 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from typing import Literal
 
 from rich.console import Console
 
 from tbcad_verify.report.checks import Check, finite
-from tbcad_verify.report.remedies import remedy
+from tbcad_verify.report.methods import remedy
+from tbcad_verify.report.report import Output
 from tbcad_verify.report.table import table
 from tbcad_verify.report.text import WIDTH, figure, limit_text, shortened
 
-Output = Literal["summary", "full", "quiet", "json"]
 HEAD = (
     "ball mirrors short coverage  off by  shim of pad 1, 2, 3 radius off  shimmed",
     "                         mm      um       um     um     um        um       mm",
@@ -138,15 +137,11 @@ class AsBuiltReport:
 
 
 def _line(row: BallRow) -> str:
-    shims = "".join(f"{_whole(shim):>+7}" for shim in row.shim_um)
+    shims = "".join(f"{round(shim):>+7}" for shim in row.shim_um)
     return (
         f"{row.number:>4}{row.mirrors:>8}{row.short:>6}{_mm(row.coverage_mm):>9}"
-        f"{_whole(row.off_um):>8}  {shims}{_whole(row.radius_um):>+10}{_mm(row.shimmed_mm):>9}"
+        f"{round(row.off_um):>8}  {shims}{round(row.radius_um):>+10}{_mm(row.shimmed_mm):>9}"
     )
-
-
-def _whole(value: float) -> int:
-    return round(value)
 
 
 def _mm(value: float | None) -> str:

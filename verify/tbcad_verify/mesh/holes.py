@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges, half_edge_vectors
 from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
+from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.types import Bools, Floats, Ints
 
 Groups = NDArray[np.int32]
@@ -46,6 +47,14 @@ class RoundHoles:
     def smallest(self) -> int | None:
         """Index of the hole with the smallest diameter; None without holes."""
         return int(self.diameter.argmin()) if self.diameter.size else None
+
+    @property
+    def each(self) -> list[Hole]:
+        """The holes one by one."""
+        rows = zip(self.middle.T, self.axis.T, self.diameter / 2, self.depth, strict=True)
+        return [
+            Hole(point, axis, float(radius), float(depth)) for point, axis, radius, depth in rows
+        ]
 
 
 @dataclass(frozen=True)

@@ -10,23 +10,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from rich.console import Console
 
 from tbcad_verify.record.mirrors import Mirrors
+from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.report.as_made import AsMade
 from tbcad_verify.report.checks import Check, finite
-from tbcad_verify.report.document import summary_json
-from tbcad_verify.report.paper import changed_lines
-from tbcad_verify.report.printers import printer_lines
+from tbcad_verify.report.key_figures import key_figures
+from tbcad_verify.report.methods import remedy
 from tbcad_verify.report.summary import summary
-from tbcad_verify.report.table import table
-from tbcad_verify.report.text import WIDTH
-from tbcad_verify.report.verdict import verdict_line
+from tbcad_verify.report.table import printer_lines, table
+from tbcad_verify.report.text import WIDTH, changed_files, changed_lines, listed_names
 from tbcad_verify.types import Floats
 
 DIGITS = 9
 LIMIT_DIGITS = 12  # significant
 NAME = "verify.json"
+SCHEMA = "tbcad-verify-summary/1"
+BEGIN = "FAIL: "
+STATES = (("failed", False), ("unknown", None))
 Output = Literal["summary", "full", "quiet", "json"]
 
 
@@ -74,7 +77,7 @@ class Report:
     @property
     def verdict(self) -> str:
         """One line: PASS or FAIL, and what decides it."""
-        return verdict_line(self)
+        return _pass_line(self) if self.passed else _fail_line(self)
 
     def names_of(self, state: bool | None) -> list[str]:
         """Names of the checks that passed (True), failed (False) or are unknown (None)."""
@@ -179,3 +182,83 @@ def _rounded(value: float | None) -> float | int | None:
     if value is None:
         return None
     return int(value) if float(value).is_integer() else round(float(value), DIGITS)
+
+
+def _pass_line(report: Report) -> str:
+    sees, balls = f"{report.target_mm:g} mm or more", report.prototype and report.prototype["balls"]
+    if not report.shell:
+        return f"PASS: as designed, every mirror sees {sees} on {len(balls or ())} balls; no shell"
+    count = virtual_cameras(report.mirrors).count
+    too = f", on {len(balls)} balls too" if balls else ""
+    return f"PASS: as designed, {count} virtual cameras see {sees}{too}"
+
+
+def _fail_line(report: Report) -> str:
+    parts = _short_of_target(report)
+    groups = [(word, names) for word, state in STATES if (names := report.names_of(state))]
+    for k, (word, names) in enumerate(groups):
+        used = len("; ".join([BEGIN, *parts])) + len(f"; {word}: ")
+        parts.append(f"{word}: {listed_names(names, (WIDTH - used) // (len(groups) - k))}")
+    return BEGIN + "; ".join(parts)
+
+
+def _short_of_target(report: Report) -> list[str]:
+    """How many virtual cameras see too little."""
+    measured, target = report.measured, report.target_mm
+    coverage = np.fmin(measured["coverage_facet_mm"], measured["coverage_fitted_mm"])
+    virtual = virtual_cameras(report.mirrors)
+    short = np.unique(virtual.index[coverage < target]).size
+    text = f"{short} of {virtual.count} virtual cameras see less than {target:g} mm"
+    return [text] if short else []
+
+
+def summary_json(report: Report) -> str:
+    """Verdict, key figures and what failed as a JSON object, explained in verify/README.md."""
+    document = {
+        "schema": SCHEMA,
+        "verdict": "pass" if report.passed else "fail",
+        "target_mm": report.target_mm,
+        "figures": [
+            {"label": one.label, **_figures(check), "pass": check.passed}
+            for one, check in key_figures(report)
+        ],
+        "failed": [
+            {
+                **_figures(check),
+                "pass": check.passed,
+                "detail": check.detail,
+                "remedy": remedy(check),
+            }
+            for check in (*report.checks, *report.programs)
+            if check.passed is not True
+        ],
+        "changed": changed_files(report.checks),
+        "as_made": _as_made(report),
+        "note": report.note or None,
+        "folder": None if report.folder is None else str(report.folder),
+        "seconds": None if report.seconds is None else round(report.seconds, 1),
+    }
+    return json.dumps(document, indent=1, allow_nan=False)
+
+
+def _figures(check: Check) -> dict[str, Any]:
+    bound = None if check.limit is None else check.bound
+    return {
+        "check": check.name,
+        "file": check.file,
+        "measured": check.measured,
+        "bound": bound,
+        "limit": check.limit,
+        "unit": check.unit,
+    }
+
+
+def _as_made(report: Report) -> dict[str, Any] | None:
+    as_made = report.as_made
+    if as_made is None:
+        return None
+    processes = [
+        {"process": one.process, "yield": one.share, "coverage_mm": one.coverage_mm}
+        for one in as_made.processes
+    ]
+    return {"builds": as_made.builds, "processes": processes, "reason": as_made.reason or None}

@@ -14,9 +14,16 @@ from tbcad_verify.programs import is_skipped
 from tbcad_verify.report.as_made import as_made_lines
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.key_figures import KEY_FIGURES, KeyFigure, checks_named, key_figures
-from tbcad_verify.report.paper import changed_lines
-from tbcad_verify.report.remedies import remedy
-from tbcad_verify.report.text import MORE, WIDTH, figure, limit_text, listed_names, shortened
+from tbcad_verify.report.methods import remedy
+from tbcad_verify.report.text import (
+    MORE,
+    WIDTH,
+    changed_lines,
+    figure,
+    limit_text,
+    listed_names,
+    shortened,
+)
 
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report

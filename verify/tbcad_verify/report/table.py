@@ -1,9 +1,10 @@
-"""All checks as a table for people, 80 columns wide."""
+"""All checks as a table for people, 80 columns wide, and which printers can make which parts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -90,3 +91,33 @@ def _state(check: Check) -> str:
     if is_skipped(check):
         return "skipped"
     return "info" if check.limit is None else "pass"
+
+
+def printer_lines(printing: Sequence[Mapping[str, Any]]) -> list[str]:
+    """For each printer how many parts it can make; parts with the same problems share a line.
+
+    Args:
+        printing: a row for each part on each printer, as in verify.json.
+    """
+    printers = dict.fromkeys(row["profile"] for row in printing)
+    return [
+        line
+        for name in printers
+        for line in _printer(name, [row for row in printing if row["profile"] == name])
+    ]
+
+
+def _printer(name: str, rows: Sequence[Mapping[str, Any]]) -> Iterable[str]:
+    good = [row for row in rows if not row["problems"]]
+    yield f"{name} ({rows[0]['material']}): {len(good)} of {len(rows)} parts can be made"
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        if row["problems"]:
+            reasons.setdefault("; ".join(map(_short, row["problems"])), []).append(row["part"])
+    for reason, parts in reasons.items():
+        yield f"  not {', '.join(parts)}: {reason}"
+
+
+def _short(problem: str) -> str:
+    """The problem without what follows a colon, such as every size of the part and the bed."""
+    return problem.partition(": ")[0]

@@ -1,14 +1,19 @@
-"""Figures, limits and lists as text of limited width."""
+"""Figures, limits, lists and changed files as text of limited width.
+
+Files that people read may be edited: a change is told, and fails only where that is asked for.
+"""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from tbcad_verify.report.checks import AT_LEAST, AT_MOST, EXACTLY, Check
+from tbcad_verify.report.checks import AT_LEAST, AT_MOST, EXACTLY, Check, at_most
 
 WIDTH = 80  # columns of everything that is shown
 MORE = " ..."
+PAPER = ("paper", "manifest.json", "files")
+CHANGED = "changed since the build: "
 _EXPONENT_FROM = 1e6  # figures below are shown without an exponent
 SIGNS = {AT_MOST: "<=", AT_LEAST: ">=", EXACTLY: "="}
 
@@ -42,3 +47,25 @@ def listed_names(names: Sequence[str], width: int) -> str:
         if len(text) <= width:
             return text
     return str(len(names))
+
+
+def changed_files(checks: Iterable[Check]) -> list[str]:
+    """Names of the paper that was changed since the build."""
+    lines = [check.detail for check in checks if check.name == PAPER[0]]
+    return [name for line in lines if line for name in line.removeprefix(CHANGED).split(", ")]
+
+
+def changed_lines(checks: Iterable[Check]) -> list[str]:
+    """The line that says what was changed, where that is no failure; else none."""
+    names = changed_files(check for check in checks if check.passed)
+    return [shortened(CHANGED + ", ".join(names))] if names else []
+
+
+def strictly(checks: Iterable[Check]) -> list[Check]:
+    """The same checks, of which the one of paper fails where a file was changed."""
+    return [
+        at_most(PAPER, check.measured, 0, check.detail)
+        if check.name == PAPER[0] and check.measured is not None
+        else check
+        for check in checks
+    ]

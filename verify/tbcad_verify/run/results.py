@@ -11,6 +11,8 @@ from tbcad_verify.report.checks import Check
 from tbcad_verify.types import Floats, Progress
 
 Row = dict[str, Any]
+MirrorChecks: TypeAlias = tuple[list[Check], dict[str, Floats]]
+"""Checks, and columns of `PER_MIRROR`."""
 PER_MIRROR = (
     "coverage_facet_mm",
     "coverage_fitted_mm",

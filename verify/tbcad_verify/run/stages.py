@@ -22,9 +22,9 @@ from tbcad_verify.prototype.stages import PRINTING, verify_prototype
 from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.validation import PartFiles
-from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
+from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require, unknown
 from tbcad_verify.run.processes import Processes
-from tbcad_verify.run.results import Results, ResultSink
+from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import (
     MANIFEST,
@@ -37,7 +37,6 @@ from tbcad_verify.shell.measured_shell import ShellPart, measure_shells
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
 from tbcad_verify.shell.mirror_image import flipped_measures
 from tbcad_verify.shell.optics import OpticalSetup, set_up
-from tbcad_verify.types import Floats
 
 SHELL_STAGES = (
     "reading",
@@ -245,38 +244,25 @@ def _trace_shells(
     """The optical stages: mirrors against the record, the casing, coverage, and every pixel."""
     files = ", ".join(part.stl for part in export.parts)
 
-    def report(
-        units: Mapping[str, str], work: Callable[[], list[Check]], mirrors: dict[str, Floats]
-    ) -> None:
-        sink(Results(checks=guarded(check_names(units, files), work), mirrors=mirrors))
+    def report(units: Mapping[str, str], work: Callable[[], MirrorChecks]) -> None:
+        found, reason = attempt(work)
+        lost = [unknown(name, reason) for name in check_names(units, files)]
+        checks, columns = found or (lost, {})
+        sink(Results(checks=checks, mirrors=columns))
 
     sink(Results(stages=[SETUP]))
     setup, no_setup = attempt(lambda: _set_up(export, shells, first))
-    report(
-        mirrors_found.CHECKS,
-        lambda: mirrors_found.checks(require(setup, no_setup), files),
-        mirrors_found.columns(setup) if setup else {},
-    )
+    report(mirrors_found.CHECKS, lambda: mirrors_found.checks(require(setup, no_setup), files))
     casing = guarded(casing_names(export), lambda: casing_checks(require(setup, no_setup), holes))
     sink(Results(checks=casing))
-
     sink(Results(stages=[COVERAGE]))
-    covered, not_covered = attempt(lambda: coverage.measure(require(setup, no_setup)))
+    covered, lost = attempt(lambda: coverage.measure(require(setup, no_setup)))
     report(
         coverage.CHECKS,
-        lambda: coverage.checks(require(setup, no_setup), require(covered, not_covered), files),
-        coverage.columns(setup, covered) if setup and covered else {},
+        lambda: coverage.checks(require(setup, no_setup), require(covered, lost), files),
     )
-
     sink(Results(stages=[PIXELS]))
-    pixel_counts, no_pixels = attempt(
-        lambda: pixels.checks(require(setup, no_setup), covered, files)
-    )
-    report(
-        pixels.CHECKS,
-        lambda: require(pixel_counts, no_pixels)[1],
-        {"pixels": pixel_counts[0]} if pixel_counts else {},
-    )
+    report(pixels.CHECKS, lambda: pixels.checks(require(setup, no_setup), covered, files))
     return setup, no_setup
 
 

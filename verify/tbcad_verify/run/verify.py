@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +21,12 @@ from tbcad_verify.prototype.step_files import part_step_checks
 from tbcad_verify.record.export import TEXTS, Export, listed_names, read_export
 from tbcad_verify.record.files import open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
-from tbcad_verify.report.checks import Check, Unknown, short_list
-from tbcad_verify.report.paper import strictly
+from tbcad_verify.report.checks import Check, Unknown, short_list, unknown
 from tbcad_verify.report.report import NAME, Report
-from tbcad_verify.run.processes import Processes
+from tbcad_verify.report.text import strictly
+from tbcad_verify.run.processes import ProcessEnded, Processes
 from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_in_two, run_stages, stage_titles
-from tbcad_verify.run.watch import STAGE_LIMIT_S, watch
 from tbcad_verify.step.mandrel_checks import (
     MandrelComparison,
     mandrel_comparisons,
@@ -41,13 +41,13 @@ from tbcad_verify.step.shell_checks import (
 from tbcad_verify.step.step_file import PROCESSES, StepFile, read_step_files
 from tbcad_verify.types import Progress
 
+STAGE_LIMIT_S = 600.0
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
 Stamps = dict[str, tuple[int, ...]]
 Files = dict[str, StepFile | Unknown]
 Comparisons = dict[str, ShellComparison | Unknown]
 Mandrels = dict[str, MandrelComparison | Unknown]
-AreaChecks = list[Check] | None
-Steps = tuple[Files, Comparisons, Mandrels, AreaChecks]
+Steps = tuple[Files, Comparisons, Mandrels, list[Check]]
 
 
 @dataclass(frozen=True)
@@ -130,6 +130,42 @@ def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> N
         _compare_steps(export, results, steps)
 
 
+def watch(
+    titles: Sequence[str],
+    results: CollectedResults,
+    seconds: float,
+    stages: Callable[..., None],
+    *arguments: Any,
+) -> None:
+    """Do stages in a process, which sends their results; those that it does not end are unknown.
+
+    Args:
+        titles: of all stages, in order.
+        results: are added to.
+        seconds: time limit of one stage.
+        stages: function of a module; takes the arguments, and what receives results.
+        arguments: of it.
+
+    Raises:
+        BadExport: the folder is not a readable export.
+    """
+    with Processes(1, seconds) as processes:
+        try:
+            processes.call(stages, *arguments, heard=results.add)
+        except ProcessEnded as end:
+            results.checks += _unknown_stages(titles, results.stages, str(end))
+
+
+def _unknown_stages(titles: Sequence[str], begun: Sequence[str], reason: str) -> list[Check]:
+    """The stage that was under way, and those that were not reached."""
+    broken = begun[-1] if begun else titles[0]
+    later = [title for title in titles if title not in begun and title != broken]
+    return [
+        unknown((broken, "", ""), reason),
+        *(unknown((title, "", ""), f"not reached: {broken!r} {reason}") for title in later),
+    ]
+
+
 @contextmanager
 def _steps(export: Export, seconds: float) -> Iterator[Callable[[], Steps]]:
     """Read STEP files while the block runs; the value waits for them."""
@@ -139,9 +175,10 @@ def _steps(export: Export, seconds: float) -> Iterator[Callable[[], Steps]]:
 
 def _read_steps(export: Export, processes: Processes) -> Steps:
     files = read_step_files(export, processes)
-    areas = area_checks(export) if any(part.step for part in export.parts) else None
-    mandrels = mandrel_comparisons(export, files)
-    return files, shell_comparisons(export, files), mandrels, areas
+    shells = shell_comparisons(export, files)
+    found = {one.camera.id: one.grooves for one in shells.values() if not isinstance(one, Unknown)}
+    areas = area_checks(export, found) if shells else []
+    return files, shells, mandrel_comparisons(export, files), areas
 
 
 def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[], Steps]) -> None:

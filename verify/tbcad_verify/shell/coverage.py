@@ -22,6 +22,7 @@ from tbcad_verify.report.checks import (
     short_list,
     worst_offenders,
 )
+from tbcad_verify.run.results import MirrorChecks
 from tbcad_verify.shell import seam
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
@@ -98,27 +99,23 @@ def measure(setup: OpticalSetup) -> Coverage:
     )
 
 
-def checks(setup: OpticalSetup, coverage: Coverage, files: str) -> list[Check]:
+def checks(setup: OpticalSetup, coverage: Coverage, files: str) -> MirrorChecks:
     """Every virtual camera sees the target, on facets and on fitted surfaces, and is seen."""
     facets, spheres, seen, gap, off = check_names(CHECKS, files)
     ids, hidden = setup.export.mirrors.ids, coverage.hidden
     who = worst_offenders(ids, hidden, "points", hidden > 0, ".0f")
+    virtual = setup.virtual.index
+    columns = {
+        "coverage_facet_mm": coverage.facet[virtual],
+        "coverage_fitted_mm": coverage.fitted[virtual],
+    }
     return [
         _covers(setup, facets, coverage.facet),
         _covers(setup, spheres, coverage.fitted),
         at_most(seen, int(hidden.sum()), 0, f"{who}; behind {short_list(coverage.blockers)}"),
         _no_gap(setup, gap, coverage.gap),
         informative(off, _off_the_record(setup, coverage)),
-    ]
-
-
-def columns(setup: OpticalSetup, covered: Coverage) -> dict[str, Floats]:
-    """What verify.json says of each recorded mirror."""
-    virtual = setup.virtual.index
-    return {
-        "coverage_facet_mm": covered.facet[virtual],
-        "coverage_fitted_mm": covered.fitted[virtual],
-    }
+    ], columns
 
 
 def _diameters(

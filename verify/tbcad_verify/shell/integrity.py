@@ -38,8 +38,8 @@ from tbcad_verify.report.checks import (
     require,
     short_list,
 )
-from tbcad_verify.report.paper import CHANGED, PAPER
 from tbcad_verify.report.report import NAME
+from tbcad_verify.report.text import CHANGED, PAPER
 
 LEAST_VOLUME_MM3 = 1e-6
 PART_KINDS = (".step", ".stl", ".3mf")  # of files that must be measured

@@ -21,7 +21,7 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import chunks, dot, unit
 from tbcad_verify.record.export import Export, Mandrel
-from tbcad_verify.record.flange_holes import Hole, HoleLimits
+from tbcad_verify.record.flange_holes import HoleLimits
 from tbcad_verify.record.mandrel_holes import blind_hole_faults
 from tbcad_verify.report.checks import (
     Check,
@@ -244,7 +244,7 @@ def _body_faults(export: Export, mandrel: Mandrel, mesh: Mesh, own: NDArray[np.i
     stray = int((~_in_planes(export, mesh, blur) & ~_in_holes(mesh, holes) & (own == -2)).sum())
     faults = [f"{stray} facets outside the planes x = 0 and z = foot and their holes"] * (stray > 0)
     limits = HoleLimits(SIZE_MM + blur, PLACE_MM + blur)
-    return faults + blind_hole_faults(_each(holes), export, mandrel.camera, limits)
+    return faults + blind_hole_faults(holes.each, export, mandrel.camera, limits)
 
 
 def _in_planes(export: Export, mesh: Mesh, blur: float) -> Bools:
@@ -258,12 +258,3 @@ def _in_holes(mesh: Mesh, holes: RoundHoles) -> Bools:
     of_wall = np.zeros(len(mesh.points), dtype=np.bool_)
     of_wall[mesh.faces[holes.wall]] = True
     return np.asarray(of_wall[mesh.faces].all(axis=1))
-
-
-def _each(holes: RoundHoles) -> list[Hole]:
-    return [
-        Hole(point, axis, float(diameter) / 2, float(depth))
-        for point, axis, diameter, depth in zip(
-            holes.middle.T, holes.axis.T, holes.diameter, holes.depth, strict=True
-        )
-    ]

@@ -16,9 +16,10 @@ import numpy as np
 from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.rays import first_hits
 from tbcad_verify.mesh.segments import rounding
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.spheroids import growth, least_wall
+from tbcad_verify.mesh.vectors import dot, unit
 from tbcad_verify.record.export import Camera, Export, Part
-from tbcad_verify.record.flange_holes import Hole, HoleLimits, flanges, hole_faults
+from tbcad_verify.record.flange_holes import HoleLimits, flanges, hole_faults
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -37,8 +38,6 @@ WALL_MM, SIZE_MM, PLACE_MM = 1e-3, 1e-3, 2e-3
 ROUNDINGS = 8
 SQUARE_COS = math.cos(math.radians(30))  # of a ray and the back's normal; a joining face has less
 LIFT_MM = 1e-3  # by which rays start below the valley
-MERIDIAN = 2001  # rays between two spheroids
-HALVINGS = 60
 NOT_MEASURED = "holes were not looked for: see the checks of printers"
 CHECKS = {"mesh wall": "mm", "mesh holes": "faults"}
 
@@ -74,22 +73,10 @@ class MeshCasing:
 
     def walls(self) -> tuple[float, float]:
         """Material behind the deepest valley where the back is nearest, and otherwise, mm."""
-        return self._wall(self.nearest), self._wall(self.beyond)
-
-    def _wall(self, beyond: float) -> float:
-        """Length of the shortest ray between two spheroids, at right angles to the inner, mm."""
-        angle = np.linspace(0, np.pi / 2, MERIDIAN)
-        circle = np.stack([np.cos(angle), np.sin(angle)])
-        inner, outer = ((self.semi_axes + more)[:, None] for more in (self.deepest, beyond))
-        start, direction = inner * circle / outer, circle / inner
-        direction /= np.hypot(*direction) * outer
-        # The ray and the outer spheroid, both scaled so that this is a circle.
-        a, b, c = (
-            (direction**2).sum(axis=0),
-            (direction * start).sum(axis=0),
-            (start**2).sum(axis=0) - 1,
+        return (
+            least_wall(self.semi_axes, self.deepest, self.nearest),
+            least_wall(self.semi_axes, self.deepest, self.beyond),
         )
-        return float(((np.sqrt(b * b - a * c) - b) / a).min())
 
 
 def casing_checks(setup: OpticalSetup, holes: Mapping[str, RoundHoles]) -> list[Check]:
@@ -136,8 +123,8 @@ def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
     back = _back(setup, valleys, camera)
     if not back.size:
         raise Unknown("no ray from a valley between mirrors leaves through a back")
-    deepest = float(_beyond(semi_axes, camera, valleys.point).max())
-    beyond = _beyond(semi_axes, camera, back)
+    deepest = float(growth(semi_axes, camera, valleys.point).max())
+    beyond = growth(semi_axes, camera, back)
     return MeshCasing(semi_axes, deepest, float(np.median(beyond)), float(beyond.min()))
 
 
@@ -152,22 +139,13 @@ def _of_part(setup: OpticalSetup, number: int, round_holes: RoundHoles | None) -
         detail = f"the wall is {measured:.3f} mm, the spec has {asked:g}"
         wanted = flanges(export, export.cameras[part.camera], casing.beyond)
         limits = HoleLimits(SIZE_MM + blur, PLACE_MM + blur)
-        faults = hole_faults(_each(require(round_holes, NOT_MEASURED)), wanted, limits)
+        faults = hole_faults(require(round_holes, NOT_MEASURED).each, wanted, limits)
         return [
             at_most(wall, abs(measured - asked), WALL_MM + blur, detail),
             at_most(holes, len(faults), 0, short_list(faults)),
         ]
 
     return guarded([wall, holes], work)
-
-
-def _each(holes: RoundHoles) -> list[Hole]:
-    return [
-        Hole(point, axis, float(diameter) / 2, float(depth))
-        for point, axis, diameter, depth in zip(
-            holes.middle.T, holes.axis.T, holes.diameter, holes.depth, strict=True
-        )
-    ]
 
 
 def find_valleys(setup: OpticalSetup, number: int) -> Valleys:
@@ -209,16 +187,3 @@ def _back(setup: OpticalSetup, valleys: Valleys, camera: Camera) -> Floats:
     square = dot(np.take(setup.scene.planes[:, :3], facet, axis=0).T, direction) > SQUARE_COS
     corners = np.unique(setup.mesh.faces[facet[(facet >= 0) & square]])
     return np.ascontiguousarray(setup.mesh.points[corners].T)
-
-
-def _beyond(semi_axes: Floats, camera: Camera, point: Floats) -> Floats:
-    """(N,) by how much both semi-axes must grow for the spheroid to pass through points, mm."""
-    offset = point - camera.pinhole[:, None] / 2
-    along = dot(offset, unit(camera.pinhole[:, None]))
-    across = np.sqrt(np.maximum(dot(offset, offset) - along**2, 0))
-    low, high = np.full(along.size, -semi_axes[1] / 2), norm(offset)
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        out = (along / (semi_axes[0] + middle)) ** 2 + (across / (semi_axes[1] + middle)) ** 2 > 1
-        low, high = np.where(out, middle, low), np.where(out, high, middle)
-    return high

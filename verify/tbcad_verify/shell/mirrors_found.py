@@ -17,6 +17,7 @@ from tbcad_verify.report.checks import (
     short_list,
     worst_offenders,
 )
+from tbcad_verify.run.results import MirrorChecks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import FORM_MM
 from tbcad_verify.types import Floats
@@ -32,8 +33,8 @@ CHECKS = {
 }
 
 
-def checks(setup: OpticalSetup, files: str) -> list[Check]:
-    """The recovered mirrors against the record."""
+def checks(setup: OpticalSetup, files: str) -> MirrorChecks:
+    """The recovered mirrors against the record, and the errors of each."""
     found, form, centre, radius, surface = check_names(CHECKS, files)
     match, ids = setup.match, setup.export.mirrors.ids
     missing = [ids[k] for k in np.flatnonzero(match.segment < 0).tolist()]
@@ -42,21 +43,14 @@ def checks(setup: OpticalSetup, files: str) -> list[Check]:
     sphere_limit = np.maximum(POSITION_MM, match.blur)
     surface_limit = np.full(len(ids), POSITION_MM)
     hint = _exchanged(setup) + _scale(setup)
+    columns = {"centre_error_mm": match.centre_error, "radius_error_mm": match.radius_error}
     return [
         at_most(found, number, 0, _missing_and_extra(setup, missing) + _scale(setup)),
         each_at_most(form, ids, _form_errors(setup), FORM_MM, "mm RMS"),
         _within_limits(centre, ids, match.centre_error, sphere_limit, hint),
         _within_limits(radius, ids, match.radius_error, sphere_limit),
         _within_limits(surface, ids, match.surface_error, surface_limit),
-    ]
-
-
-def columns(setup: OpticalSetup) -> dict[str, Floats]:
-    """What verify.json says of each recorded mirror."""
-    return {
-        "centre_error_mm": setup.match.centre_error,
-        "radius_error_mm": setup.match.radius_error,
-    }
+    ], columns
 
 
 def _form_errors(setup: OpticalSetup) -> Floats:

@@ -20,6 +20,7 @@ from tbcad_verify.report.checks import (
     unknown,
     worst_offenders,
 )
+from tbcad_verify.run.results import MirrorChecks
 from tbcad_verify.shell import image_rim, light
 from tbcad_verify.shell.coverage import Coverage
 from tbcad_verify.shell.optics import OpticalSetup
@@ -38,8 +39,8 @@ CHECKS = {
 }
 
 
-def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floats, list[Check]]:
-    """Useful pixels of each recorded mirror (M,), and what else the sensor and the rim show.
+def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> MirrorChecks:
+    """What the sensor and the rim show, and the useful pixels of each recorded mirror (M,).
 
     Args:
         setup: what to look at.
@@ -55,7 +56,7 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
     each = np.bincount(setup.virtual.index, tally.pixels, setup.virtual.count)
     none = [setup.virtual_ids[k] for k in np.flatnonzero(each < 1).tolist()]
     spread = np.percentile(tally.spread, [50, 95]) if tally.spread.size else [np.nan, np.nan]
-    return tally.pixels.astype(np.float64), [
+    figures = [
         _path(setup, path, tally),
         _clear(setup, clear, tally, rings),
         at_least(minimum, float(each.min()), 1, f"no pixel sees the object in {short_list(none)}"),
@@ -66,6 +67,7 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> tuple[Floa
         informative(half, float(spread[0])),
         informative(nearly_all, float(spread[1])),
     ]
+    return figures, {"pixels": tally.pixels.astype(np.float64)}
 
 
 def _tallies(setup: OpticalSetup) -> list[light.PixelTally]:

@@ -24,7 +24,7 @@ def arc_loops(arcs: MapArcs, spread: float) -> tuple[Ints, Bools]:
         (N,) number of each arc's loop, and whether it ends where no other of its cell begins.
     """
     start, end = arcs.point(arcs.s[0]), arcs.point(arcs.s[1])
-    index, other = _partners(arcs.mirror, arcs.mirror)
+    index, other = partners(arcs.mirror, arcs.mirror)
     gap = np.abs(start[:, other] - end[:, index]).max(axis=0)
     order = np.lexsort((gap, index))
     best = order[np.unique(index[order], return_index=True)[1]]
@@ -34,7 +34,7 @@ def arc_loops(arcs: MapArcs, spread: float) -> tuple[Ints, Bools]:
     return label, ~(gap[best] <= CLOSED * spread)
 
 
-def _partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
+def partners(mirror: Ints, among: Ints) -> tuple[Ints, Ints]:
     """All pairs (P,), (P,) of an item and one of the same mirror among others, which are sorted."""
     first, last = (np.searchsorted(among, mirror, side) for side in ("left", "right"))
     count = last - first
@@ -77,7 +77,7 @@ def inside(arcs: MapArcs, mirror: Ints, y: Floats) -> Bools:
 
     A ray from such a point crosses the loops an odd number of times.
     """
-    index, other = _partners(mirror, arcs.mirror)
+    index, other = partners(mirror, arcs.mirror)
     some, from_ = arcs.take(other), y[:, index]
     across = np.array([[-RAY[1]], [RAY[0]]])
     line = (np.zeros(len(other)), across + 0 * from_, -(across * from_).sum(axis=0))

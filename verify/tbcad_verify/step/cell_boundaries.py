@@ -20,9 +20,8 @@ from tbcad_verify.step.stereographic import (
     SurfaceMaps,
     map_circles,
     surface_maps,
-    with_apex_uncovered,
 )
-from tbcad_verify.types import Bools, Floats, Ints
+from tbcad_verify.types import Floats, Ints
 
 FIRST = 20  # circles that each mirror starts with
 MOST_NUMBERS = 1_000_000  # in one array of intermediate results
@@ -36,13 +35,11 @@ class CellBoundaries:
         maps: of the mirrors.
         arcs: in ascending order of mirror; `circle` is the number of the other surface: mirrors,
             walls, then the horizon.
-        whole: (M,) a whole sphere that no other one cuts.
         spread: extent of all surfaces, mm.
     """
 
     maps: SurfaceMaps
     arcs: MapArcs
-    whole: Bools
     spread: float
 
 
@@ -65,21 +62,17 @@ class MapBatch:
     spread: float
 
 
-def cell_boundaries(mirrors: Surfaces, walls: Surfaces, front: bool) -> CellBoundaries:
-    """The cells that mirrors leave each other, cut by walls.
-
-    With `front`, only those parts of them that lie on the half toward the normal.
-    """
+def cell_boundaries(mirrors: Surfaces, walls: Surfaces) -> CellBoundaries:
+    """The cells that mirrors leave each other, cut by walls, on the half toward the normal."""
     spread, others = _spread(mirrors, walls), joined([mirrors, walls])
-    maps = surface_maps(mirrors if front else with_apex_uncovered(mirrors, others), front, spread)
-    whole = np.zeros(len(maps.reach), dtype=np.bool_)
-    arcs: list[MapArcs] = []
-    for batch in _batches(maps, others, spread):
-        whole[batch.index] = ~(batch.circles.covers | batch.circles.real).any(axis=1)
-        for row, some in _solved(batch, np.arange(len(batch.index)), FIRST):
-            arcs.append(replace(some, mirror=batch.index[row][some.mirror]))
+    maps = surface_maps(mirrors, spread)
+    arcs = [
+        replace(some, mirror=batch.index[row][some.mirror])
+        for batch in _batches(maps, others, spread)
+        for row, some in _solved(batch, np.arange(len(batch.index)), FIRST)
+    ]
     every = joined_arcs(arcs)
-    return CellBoundaries(maps, every.take(np.argsort(every.mirror, kind="stable")), whole, spread)
+    return CellBoundaries(maps, every.take(np.argsort(every.mirror, kind="stable")), spread)
 
 
 def _spread(mirrors: Surfaces, walls: Surfaces) -> float:

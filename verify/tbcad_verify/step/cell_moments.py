@@ -21,19 +21,18 @@ import numpy as np
 from tbcad_verify.mesh.vectors import chunks
 from tbcad_verify.step.map_arcs import MapArcs
 from tbcad_verify.step.stereographic import SurfaceMaps
-from tbcad_verify.types import Bools, Floats
+from tbcad_verify.types import Floats
 
 NODES = 20
 MAX_PIECES = 64
 
 
-def cell_moments(maps: SurfaceMaps, arcs: MapArcs, whole: Bools) -> tuple[Floats, Floats]:
+def cell_moments(maps: SurfaceMaps, arcs: MapArcs) -> tuple[Floats, Floats]:
     """Integrals over the cells of M maps by Gauss-Legendre quadrature along their arcs.
 
     Args:
         maps: of the mirrors.
         arcs: that bound the cells.
-        whole: (M,) whole spheres, which have no arcs.
 
     Returns:
         Area (M,), mm^2, and first moment (3, M) of d = x - p about each mirror's apex p, in its own
@@ -46,9 +45,7 @@ def cell_moments(maps: SurfaceMaps, arcs: MapArcs, whole: Bools) -> tuple[Floats
         values = _line_integrals(pieces, k[pieces.mirror])
         total += [np.bincount(pieces.mirror, value, minlength=len(k)) for value in values]
     area, x, y, m = total
-    radius = 1 / np.where(whole, k, 1.0)
-    area = np.where(whole, 4 * np.pi * radius**2, area)
-    return area, np.stack([x, y, np.where(whole, -area * radius, -k / 2 * m)])
+    return area, np.stack([x, y, -k / 2 * m])
 
 
 def _pieces(arcs: MapArcs, k: Floats) -> MapArcs:

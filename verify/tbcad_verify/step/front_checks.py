@@ -23,13 +23,14 @@ from tbcad_verify.report.checks import (
     attempt,
     each_at_most,
     guarded,
+    require,
     short_list,
 )
+from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.part_checks import Checks, PartComparison, names_of, run_checks
-from tbcad_verify.step.pedestal_faces import wall_errors
-from tbcad_verify.step.pedestals import PedestalWalls
-from tbcad_verify.step.sphere_union import ClosedFormCells, cells_of_export, walls_of_export
-from tbcad_verify.step.step_file import StepFile, known
+from tbcad_verify.step.pedestals import Grooves, read_grooves, wall_errors
+from tbcad_verify.step.sphere_union import ClosedFormCells, bounds, cells_of_export
+from tbcad_verify.step.step_file import StepFaces, StepFile, known
 from tbcad_verify.types import Floats, Ints
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
@@ -47,8 +48,9 @@ class FrontComparison(PartComparison):
         foreign: ids of all other mirrors.
         coating_mm: that is not part of the solid.
         face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
+        front: the file's faces as seen from the light.
         cells: (m,) in closed form.
-        walls: of pedestals, by the record.
+        grooves: between pedestals, in the file.
         part: its record.
         export: the record.
         camera: that the part is for.
@@ -58,8 +60,9 @@ class FrontComparison(PartComparison):
     foreign: frozenset[str]
     coating_mm: float
     face: Ints
+    front: StepFaces
     cells: ClosedFormCells
-    walls: PedestalWalls | None
+    grooves: Grooves | None
     part: Part
     export: Export
     camera: Camera
@@ -69,12 +72,16 @@ AnyPart = TypeVar("AnyPart", bound=Part)
 AnyComparison = TypeVar("AnyComparison", bound=FrontComparison)
 
 
-def front_fields(export: Export, part: Part, file: StepFile) -> dict[str, Any]:
+def front_fields(
+    export: Export, part: Part, file: StepFile, table: StepTable, front: StepFaces
+) -> dict[str, Any]:
     """The fields of a `FrontComparison` of a camera's part, but for the mesh's mass."""
     mine = export.mirrors.camera == part.camera
     mirrors = export.mirrors.take(np.flatnonzero(mine))
     count = Counter(file.faces.names)
     index = {name: k for k, name in enumerate(file.faces.names)}
+    pedestals = export.spec.shell.edges == "pedestal"
+    grooves = read_grooves(table, front, mirrors.ids) if pedestals else None
     return {
         "name": part.name,
         "file": file,
@@ -84,8 +91,9 @@ def front_fields(export: Export, part: Part, file: StepFile) -> dict[str, Any]:
         "foreign": frozenset(export.mirrors.ids) - frozenset(mirrors.ids),
         "coating_mm": export.coating_mm,
         "face": np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
-        "cells": cells_of_export(export, part.camera),
-        "walls": walls_of_export(export, part.camera),
+        "front": front,
+        "cells": cells_of_export(export, part.camera, grooves),
+        "grooves": grooves,
         "part": part,
         "export": export,
         "camera": export.cameras[part.camera],
@@ -106,7 +114,7 @@ def names(name: CheckName, part: FrontComparison) -> Check:
 
 def surfaces(name: CheckName, part: FrontComparison) -> Check:
     """Centre and radius of every sphere, position and tilt of every plane, as recorded."""
-    faces, mirrors = part.file.faces, part.mirrors
+    faces, mirrors = part.front, part.mirrors
     centre, apex, normal = (mirrors.columns(key, 3).T for key in ("cx", "px", "nx"))
     point = _of(part, faces.point)
     spheres = np.maximum(
@@ -124,7 +132,7 @@ def surfaces(name: CheckName, part: FrontComparison) -> Check:
 
 def outward(name: CheckName, part: FrontComparison) -> Check:
     """Mirrors are convex seen from outside the solid; `surfaces` tests where planes face."""
-    outward = _of(part, part.file.faces.outward)
+    outward = _of(part, part.front.outward)
     inward = [part.mirrors.ids[k] for k in np.flatnonzero(~outward).tolist()]
     detail = f"the solid lies on the wrong side: {short_list(inward)}"
     return at_most(name, len(inward), 0, detail)
@@ -132,20 +140,20 @@ def outward(name: CheckName, part: FrontComparison) -> Check:
 
 def areas(name: CheckName, part: FrontComparison) -> Check:
     """Each mirror's area is its cell's, so that no face is the rest of its sphere."""
-    error = np.abs(_of(part, part.file.faces.area) / part.cells.area - 1)
+    error = np.abs(_of(part, part.front.area) / part.cells.area - 1)
     return worst_of(name, part.mirrors.ids, error, CELL_SHARE, "of its cell's area off")
 
 
 def centroids(name: CheckName, part: FrontComparison) -> Check:
     """The middle of each mirror's area is its cell's."""
     centroid = part.cells.first / part.cells.area[:, None]
-    error = np.linalg.norm(_of(part, part.file.faces.middle) - centroid, axis=1)
+    error = np.linalg.norm(_of(part, part.front.middle) - centroid, axis=1)
     return worst_of(name, part.mirrors.ids, error, MIDDLE_MM, "mm")
 
 
 def front_volume(name: CheckName, part: FrontComparison) -> Check:
     """Volume between the origin and all mirrors: what the faces enclose against the closed form."""
-    faces = part.file.faces
+    faces = part.front
     area, middle = _of(part, faces.area), _of(part, faces.middle)
     centre, radius = _of(part, faces.point), _of(part, faces.radius)
     normal = _of(part, faces.normal)
@@ -162,9 +170,13 @@ def front_volume(name: CheckName, part: FrontComparison) -> Check:
 
 
 def walls(name: CheckName, part: FrontComparison) -> Check:
-    """The walls of pedestals, against those that follow from the record."""
-    errors = wall_errors(part.file.faces, part.mirrors.ids, part.walls)
-    return worst_of(name, *errors, SURFACE_MM, "mm")
+    """The walls of pedestals lean, and their grooves are deep, as the spec has them."""
+    grooves = require(part.grooves, "the mirrors stand on no pedestals")
+    pinhole, side = part.camera.pinhole, float(np.sign(part.camera.pinhole[0]))
+    planes = bounds(side, part.export.foot_z_mm)
+    width = part.export.spec.shell.groove_mm
+    errors = wall_errors(grooves, part.mirrors.surfaces(), pinhole, planes, width)
+    return worst_of(name, grooves.names, errors, SURFACE_MM, "mm")
 
 
 def ends(name: CheckName, part: FrontComparison) -> Check:
@@ -202,12 +214,14 @@ def each_compared(
 
 
 def each_checked(
+    export: Export,
     parts: Iterable[Part],
-    chosen: Checks,
+    checks: Checks,
     masses: Mapping[str, MassProperties],
     comparisons: Mapping[str, AnyComparison | Unknown],
 ) -> list[Check]:
-    """The chosen checks of each part with a STEP file, with its mesh; unknown where they break."""
+    """The checks of each part with a STEP file, with its mesh; unknown where they break."""
+    chosen = {**checks, **(WALLS if export.spec.shell.edges == "pedestal" else {})}
 
     def of_part(part: Part) -> list[Check]:
         comparison = known(comparisons[part.name])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,22 +18,22 @@ from tbcad_verify.report.checks import (
     at_most,
     short_list,
 )
-from tbcad_verify.step.casing import read_bores
+from tbcad_verify.step.casing import bores
 from tbcad_verify.step.front_checks import (
     CELL_SHARE,
-    WALLS,
     FrontComparison,
     each_checked,
     each_compared,
     front_fields,
 )
 from tbcad_verify.step.front_checks import CHECKS as FRONT_CHECKS
+from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
     Checks,
 )
-from tbcad_verify.step.pedestal_faces import fronts
+from tbcad_verify.step.pedestals import fronts
 from tbcad_verify.step.step_file import StepFaces, StepFile, known, load
 
 PLANE_MM = 1e-8  # of the joining planes and the bottoms of holes
@@ -72,35 +71,24 @@ def mandrel_step_checks(
         masses: of the meshes, by part.
         comparisons: by part.
     """
-    chosen = {**CHECKS, **(TURNED_WALLS if export.spec.shell.edges == "pedestal" else {})}
-    return each_checked(export.mandrels, chosen, masses, comparisons)
+    return each_checked(export, export.mandrels, CHECKS, masses, comparisons)
 
 
 def _comparison(export: Export, part: Mandrel, read: StepFile | Unknown) -> MandrelComparison:
-    file = known(read)
-    fields = front_fields(export, part, file)
-    names = fronts(file.faces, frozenset(fields["mirrors"].ids))
-    holes = read_bores(load(export.folder, part.step).text(), names)
-    return MandrelComparison(**fields, holes=holes)
-
-
-def _turned(check: Callable[..., Check]) -> Callable[[CheckName, MandrelComparison], Check]:
-    """A check of a shell's front, made of the negative's faces seen from behind."""
-
-    def seen_from_behind(name: CheckName, part: MandrelComparison) -> Check:
-        faces = part.file.faces
-        outward = np.where(faces.kind == "sphere", faces.inward, faces.outward)
-        turned = replace(faces, normal=-faces.normal, outward=outward)
-        return check(name, replace(part, file=replace(part.file, faces=turned)))
-
-    return seen_from_behind
+    file, table = known(read), StepTable(load(export.folder, part.step).text())
+    faces = file.faces
+    outward = np.where(faces.kind == "sphere", faces.inward, faces.outward)
+    turned = replace(faces, normal=-faces.normal, outward=outward)
+    fields = front_fields(export, part, file, table, turned)
+    names = fronts(faces.names, frozenset(fields["mirrors"].ids))
+    return MandrelComparison(**fields, holes=bores(table, names))
 
 
 def _planes(name: CheckName, part: MandrelComparison) -> Check:
     """The seam is x = 0, the foot is z = foot, and all other planes are bottoms of holes."""
     faces, side = part.file.faces, float(np.sign(part.camera.pinhole[X]))
     wanted = {"seam": (X, 0.0, -side), "foot": (Z, part.export.foot_z_mm, -1.0)}
-    front = fronts(faces, frozenset(part.mirrors.ids))
+    front = fronts(faces.names, frozenset(part.mirrors.ids))
     faults = [one for one in PLANES if one not in faces.names]
     for k, one in enumerate(faces.names):
         plane = one.partition("_")[0]
@@ -148,16 +136,15 @@ def _enclosed(name: CheckName, part: MandrelComparison) -> Check:
 def _wall_volume(part: MandrelComparison, faces: StepFaces) -> float:
     """Between the origin and the walls of pedestals, mm^3."""
     ids = frozenset(part.mirrors.ids)
-    walls = fronts(faces, ids) - ids
+    walls = fronts(faces.names, ids) - ids
     at = [k for k, one in enumerate(faces.names) if one in walls]
     height = (faces.middle[at] * faces.normal[at]).sum(axis=1)
     return float((height * faces.area[at]).sum() / 3)
 
 
-TURNED_WALLS: Checks = {name: (unit, _turned(check)) for name, (unit, check) in WALLS.items()}
 CHECKS: Checks = {
     **SOLID_CHECKS,
-    **{name: (unit, _turned(check)) for name, (unit, check) in FRONT_CHECKS.items()},
+    **FRONT_CHECKS,
     "step mandrel planes": ("faults", _planes),
     "step mandrel holes": ("faults", _holes),
     "step mandrel volume": ("of the volume", _enclosed),

@@ -1,16 +1,19 @@
-"""Entities of a STEP file's text (ISO 10303-21), found by one expression and parsed when asked for.
+"""Entities of a STEP file's text (ISO 10303-21), read without any CAD kernel.
 
-A shell has 30,000 entities, of which the verification needs a fifth: a parser of the whole grammar
-takes twenty times as long. It is the oracle of the tests.
+What one kernel writes and reads can be wrong both times. Names, spheres, planes, holes and
+validation properties are therefore taken from the text. A shell has 30,000 entities, of which the
+verification needs a fifth: references and numbers are searched for in the text of those.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterator
+
+import numpy as np
+
+from tbcad_verify.types import Floats
 
 # No expression tries again what it has read, so that the time grows with the length alone.
 TEXT = r"'(?:[^']++|'')*+'"
@@ -21,117 +24,127 @@ ENTITY = re.compile(
 START = re.compile(r"\s*+ISO-10303-21;\s*+HEADER;")
 HEADER_END = re.compile(rf"{TEXT}|(?P<end>ENDSEC;\s*+DATA;)|(?P<open>')")
 END = re.compile(r"\s*+ENDSEC;\s*+END-ISO-10303-21;\s*+")
-TOKEN = re.compile(
-    rf"\s*+(?:(?P<text>{TEXT})|#(?P<reference>\d{{1,15}}+)"
-    r"|(?P<number>[-+]?\d++\.?\d*+(?:E[-+]?\d++)?)|\.(?P<enumeration>[A-Z]\w*+)\."
-    r"|(?P<none>[$*])|(?P<name>[A-Z]\w*+)\s*+(?=\()|(?P<mark>[(),]))"
-)
-MAX_DEPTH = 30  # of lists in lists; a surface by splines has three
+LABEL = re.compile(TEXT)
+REFERENCE = re.compile(r"#(\d+)")
+NUMBER = re.compile(r"[-+]?(?<!\d)\d++\.\d*+(?:E[-+]?\d++)?")  # begins at none but the first digit
 SHOWN = 40  # characters of what cannot be read
+TRIPLES = ("CARTESIAN_POINT", "DIRECTION")
+# What lies below these is geometry, which refers to neither vertices nor faces (ISO 10303-42).
+GEOMETRY = frozenset(
+    (
+        *(*TRIPLES, "AXIS2_PLACEMENT_3D"),
+        *("LINE", "CIRCLE", "ELLIPSE", "HYPERBOLA", "B_SPLINE_CURVE_WITH_KNOTS"),
+        *("PLANE", "SPHERICAL_SURFACE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE"),
+    )
+)
 
 
-class Reference(NamedTuple):
-    """The number of an entity."""
-
-    number: int
-
-
-class Enumeration(NamedTuple):
-    """A word of a list, such as T for true."""
-
-    word: str
-
-
-class Typed(NamedTuple):
-    """A value with the name of its type."""
-
-    name: str
-    values: list[Value]
-
-
-Value: TypeAlias = "str | float | Reference | Enumeration | Typed | list[Value] | None"
-"""A parameter; None: left open."""
-
-
-def finite(digits: str) -> float:
-    """A number, none too large.
-
-    Raises:
-        ValueError: it is beyond all floats.
-    """
-    if not math.isfinite(number := float(digits)):
-        raise ValueError(f"broken STEP text: the number {digits[:SHOWN]} is too large")
-    return number
-
-
-SIMPLE: Mapping[str, Callable[[str], Value]] = {
-    "text": lambda word: word[1:-1].replace("''", "'"),
-    "reference": lambda word: Reference(int(word)),
-    "number": finite,
-    "enumeration": Enumeration,
-    "none": lambda word: None,
-}
-"""How each kind of token that is a value by itself is read."""
-
-
-@dataclass
-class Entities:
-    """The entities of a file, by number.
+class StepTable:
+    """The entities of a STEP file with one data section, by number, but for complex ones (units).
 
     Attributes:
-        texts: of simple ones, name and text of the parameters.
-        units: of complex ones, which carry units, the text.
-        header: all before the first.
+        kinds: name of each.
+        bodies: text of its parameters.
     """
 
-    texts: dict[int, tuple[str, str]] = field(repr=False)
-    units: dict[int, str] = field(default_factory=dict, repr=False)
-    header: str = field(default="", repr=False)
+    def __init__(self, text: str) -> None:
+        """Find all entities.
 
-    def of(self, name: str) -> Iterator[tuple[int, list[Value]]]:
-        """Number and parameters of every entity of a name, in the order of the file."""
-        for number, (kind, text) in self.texts.items():
-            if kind == name:
-                yield number, parameters(text)
+        Raises:
+            ValueError: the text is no STEP file, or two entities have one number.
+        """
+        entities = _entities(text)
+        self.kinds = {number: kind for number, (kind, _) in entities.items() if kind}
+        self.bodies = {number: body for number, (kind, body) in entities.items() if kind}
+        self._references: dict[int, list[int]] = {}
+        self._topology: dict[int, list[int]] = {}
 
-    def name(self, reference: Value) -> str:
-        """Name of the entity that a parameter refers to."""
-        return self._entity(reference)[0]
+    def of(self, kind: str) -> list[int]:
+        """Numbers of all entities of a kind, in the order of the file."""
+        return [number for number, one in self.kinds.items() if one == kind]
 
-    def parameters(self, reference: Value) -> list[Value]:
-        """Parameters of the entity that a parameter refers to."""
-        return parameters(self._entity(reference)[1])
+    def label(self, number: int) -> str:
+        """First text of an entity: its name."""
+        return str(LABEL.findall(self.bodies[number])[0])[1:-1].replace("''", "'")
 
-    def _entity(self, reference: Value) -> tuple[str, str]:
-        if not isinstance(reference, Reference) or reference.number not in self.texts:
-            raise ValueError(f"broken STEP text: {reference!r} where an entity must be")
-        return self.texts[reference.number]
+    def forward(self, face: int) -> bool:
+        """Whether a face has its surface's sense."""
+        return self.bodies[face].rstrip().endswith(".T.")
+
+    def references(self, number: int) -> list[int]:
+        """Numbers of what an entity refers to."""
+        if number not in self._references:
+            digits = REFERENCE.findall(self.bodies.get(number, ""))
+            self._references[number] = [int(one) for one in digits]
+        return self._references[number]
+
+    def numbers(self, number: int) -> list[float]:
+        """Decimal numbers in an entity.
+
+        Raises:
+            ValueError: one is beyond all floats.
+        """
+        values = [float(digits) for digits in NUMBER.findall(self.bodies[number])]
+        if not all(map(math.isfinite, values)):
+            raise ValueError(f"a number in {self.bodies[number][:SHOWN]!r} is too large")
+        return values
+
+    def reached(self, *start: int) -> Iterator[int]:
+        """Some entities, all that they refer to, and what these refer to, each once.
+
+        But for points, curves and surfaces, which are two thirds of a file.
+        """
+        seen, todo = set(start), list(start)
+        while todo:
+            number = todo.pop()
+            yield number
+            if references := self._but_geometry(number):
+                new = [one for one in references if one not in seen]
+                seen.update(new)
+                todo += new
+
+    def _but_geometry(self, number: int) -> list[int]:
+        if number not in self._topology:
+            kinds = self.kinds
+            self._topology[number] = [
+                one for one in self.references(number) if kinds.get(one) not in GEOMETRY
+            ]
+        return self._topology[number]
+
+    def triple(self, number: int) -> Floats:
+        """(3,) of a point or direction.
+
+        Raises:
+            ValueError: it is neither.
+        """
+        values = self.numbers(number)
+        if self.kinds[number] not in TRIPLES or len(values) != 3:
+            raise ValueError(f"{self.kinds[number]} where a point or direction must be")
+        return np.array(values)
+
+    def placement(self, number: int) -> tuple[Floats, Floats]:
+        """Origin and axis of a placement."""
+        point, axis = self.references(number)[:2]
+        return self.triple(point), self.triple(axis)
 
 
-def read_entities(text: str) -> Entities:
-    """Find the entities of a file with one data section.
-
-    Raises:
-        ValueError: the text is no STEP file, or two entities have one number.
-    """
+def _entities(text: str) -> dict[int, tuple[str, str]]:
+    """Name, empty for complex ones, and text of the parameters of each entity."""
     if "/*" in text:
         text = NOTE.sub(lambda found: found[0] if found[0].startswith("'") else " ", text)
-    place = _data_start(text)
-    header = text[:place]
-    texts: dict[int, tuple[str, str]] = {}
-    numbers = 0
+    place, numbers = _data_start(text), 0
+    entities: dict[int, tuple[str, str]] = {}
     while (match := ENTITY.match(text, place)) and (inside := match[3].rstrip()).endswith(")"):
+        plain = LABEL.sub("", inside)
+        if plain.count("(") + 1 != plain.count(")"):
+            break
         numbers, place = numbers + 1, match.end()
-        texts[int(match[1])] = (match[2] or "", inside[:-1])
+        entities[int(match[1])] = (match[2] or "", inside[:-1])
     if not END.fullmatch(text, place):
         raise ValueError(f"broken STEP text at {text[place : place + SHOWN].strip()!r}")
-    if len(texts) < numbers:
+    if len(entities) < numbers:
         raise ValueError("broken STEP text: two entities have one number")
-    composed = {number: inside for number, (name, inside) in texts.items() if not name}
-    for inside in composed.values():
-        _check_complex(inside)
-    simple = {number: entity for number, entity in texts.items() if entity[0]}
-    return Entities(simple, composed, header)
+    return entities
 
 
 def _data_start(text: str) -> int:
@@ -143,74 +156,3 @@ def _data_start(text: str) -> int:
         if found["open"]:
             break
     raise ValueError("broken STEP text: no header and data section")
-
-
-def _check_complex(text: str) -> None:
-    """Refuse what is not one named list after the other."""
-    tokens = _tokens(text)
-    for kind, word in tokens:
-        if kind != "name":
-            raise ValueError(f"broken STEP text: {word!r} where a name must be")
-        _value(kind, word, tokens, 0)
-
-
-def parameters(text: str) -> list[Value]:
-    """Values of a list without its outer parentheses.
-
-    Raises:
-        ValueError: it is no list of parameters.
-    """
-    tokens = _tokens(f"({text})")
-    if next(tokens) != ("mark", "("):
-        raise ValueError("broken STEP text: no list")
-    values = _list(tokens, 0)
-    if next(tokens, None) is not None:
-        raise ValueError(f"broken STEP text in {text[:SHOWN]!r}")
-    return values
-
-
-def _tokens(text: str) -> Iterator[tuple[str, str]]:
-    place, end = 0, len(text.rstrip())
-    while place < end:
-        match = TOKEN.match(text, place)
-        if match is None or match.lastgroup is None:
-            raise ValueError(f"broken STEP text at {text[place : place + SHOWN]!r}")
-        yield match.lastgroup, match[match.lastgroup]
-        place = match.end()
-
-
-def _list(tokens: Iterator[tuple[str, str]], depth: int) -> list[Value]:
-    """Values up to the closing parenthesis."""
-    if depth > MAX_DEPTH:
-        raise ValueError(f"broken STEP text: more than {MAX_DEPTH} lists in each other")
-    values: list[Value] = []
-    kind, word = _next(tokens)
-    if (kind, word) == ("mark", ")"):
-        return values
-    while True:
-        values.append(_value(kind, word, tokens, depth))
-        match _next(tokens):
-            case ("mark", ")"):
-                return values
-            case ("mark", ","):
-                kind, word = _next(tokens)
-            case (_, other):
-                raise ValueError(f"broken STEP text: {other!r} where a comma must be")
-
-
-def _value(kind: str, word: str, tokens: Iterator[tuple[str, str]], depth: int) -> Value:
-    if kind in SIMPLE:
-        return SIMPLE[kind](word)
-    if kind == "name":
-        _next(tokens)
-        return Typed(word, _list(tokens, depth + 1))
-    if word == "(":
-        return _list(tokens, depth + 1)
-    raise ValueError(f"broken STEP text: {word!r} where a value must be")
-
-
-def _next(tokens: Iterator[tuple[str, str]]) -> tuple[str, str]:
-    token = next(tokens, None)
-    if token is None:
-        raise ValueError("broken STEP text: a list without an end")
-    return token

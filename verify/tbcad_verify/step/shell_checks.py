@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -25,7 +25,6 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.front_checks import (
     CELL_SHARE,
-    WALLS,
     FrontComparison,
     each_checked,
     each_compared,
@@ -33,12 +32,13 @@ from tbcad_verify.step.front_checks import (
     worst_of,
 )
 from tbcad_verify.step.front_checks import CHECKS as FRONT_CHECKS
+from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.part_checks import (
     MASS_CHECKS,
     SOLID_CHECKS,
     Checks,
 )
-from tbcad_verify.step.pedestal_faces import fronts
+from tbcad_verify.step.pedestals import Grooves, fronts
 from tbcad_verify.step.sphere_union import cells_of_export
 from tbcad_verify.step.step_file import StepFile, known, load
 from tbcad_verify.types import Floats
@@ -79,8 +79,8 @@ def shell_step_checks(
     export: Export,
     masses: dict[str, MassProperties],
     comparisons: dict[str, ShellComparison | Unknown],
-    coverage: Floats | None = None,
-    areas: Sequence[Check] | None = None,
+    coverage: Floats | None,
+    areas: Sequence[Check],
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
 
@@ -89,26 +89,26 @@ def shell_step_checks(
         masses: of the meshes, by part.
         comparisons: by part.
         coverage: (M,) mm, as measured on spheres.
-        areas: what `area_checks` gives; None: it is called.
+        areas: what `area_checks` gives.
     """
-    chosen = {**CHECKS, **(WALLS if export.spec.shell.edges == "pedestal" else {})}
-    checks = each_checked(export.parts, chosen, masses, comparisons)
-    recorded = [*(area_checks(export) if areas is None else areas)]
+    checks = each_checked(export, export.parts, CHECKS, masses, comparisons)
+    recorded = [*areas]
     recorded += guarded([RULE], lambda: [rule_check(export)])
     recorded += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
     return recorded + checks
 
 
-def area_checks(export: Export) -> list[Check]:
-    """The check of the recorded areas, which takes long and needs the record alone."""
-    return guarded([AREAS], lambda: [_recorded_areas(export)])
+def area_checks(export: Export, grooves: Mapping[str, Grooves | None]) -> list[Check]:
+    """The check of the recorded areas, which takes long; with the grooves of each camera."""
+    return guarded([AREAS], lambda: [_recorded_areas(export, grooves)])
 
 
-def _recorded_areas(export: Export) -> Check:
+def _recorded_areas(export: Export, grooves: Mapping[str, Grooves | None]) -> Check:
     """Areas of the reflecting surfaces as recorded, against the closed form of the spheres."""
     mirrors, area = export.mirrors, np.full(len(export.mirrors), np.nan)
     for camera in export.cameras:
-        area[mirrors.camera == camera] = cells_of_export(export, camera, coated=True).area
+        cells = cells_of_export(export, camera, grooves.get(camera), coated=True)
+        area[mirrors.camera == camera] = cells.area
     error = np.abs(mirrors.cell_area_mm2 / area - 1)
     return worst_of(AREAS, mirrors.ids, error, CELL_SHARE, "of its area off")
 
@@ -121,10 +121,9 @@ def _recorded_coverage(export: Export, coverage: Floats | None) -> Check:
 
 
 def _comparison(export: Export, part: Part, read: StepFile | Unknown) -> ShellComparison:
-    file = known(read)
-    fields = front_fields(export, part, file)
-    ids, text = frozenset(fields["mirrors"].ids), load(export.folder, part.step).text()
-    casing = read_casing(text, fronts(file.faces, ids))
+    file, table = known(read), StepTable(load(export.folder, part.step).text())
+    fields = front_fields(export, part, file, table, file.faces)
+    casing = read_casing(table, fronts(file.faces.names, frozenset(fields["mirrors"].ids)))
     thickness, no_wall = attempt(lambda: wall(casing, fields["camera"], export.semi_minor_mm))
     thick = Unknown(no_wall) if thickness is None else thickness
     return ShellComparison(**fields, casing=casing, wall=thick)

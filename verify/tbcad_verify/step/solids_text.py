@@ -7,31 +7,18 @@ numbers are searched for in the text of each entity's parameters, which are not 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.part21 import finite, read_entities
+from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.types import Floats
 
-REFERENCE = re.compile(r"#(\d+)")
-NUMBER = re.compile(r"[-+]?(?<!\d)\d++\.\d*+(?:E[-+]?\d++)?")  # begins at none but the first digit
-TEXT = re.compile(r"'([^']*+)'")
 UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 SAME_LINE_MM = 1e-6  # of axes of one hole
 PARALLEL = 1e-9
-# What lies below these is geometry, which refers to neither vertices nor faces (ISO 10303-42).
-GEOMETRY = frozenset(
-    (
-        *("CARTESIAN_POINT", "DIRECTION", "AXIS2_PLACEMENT_3D"),
-        *("LINE", "CIRCLE", "ELLIPSE", "HYPERBOLA", "B_SPLINE_CURVE_WITH_KNOTS"),
-        *("PLANE", "SPHERICAL_SURFACE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE"),
-    )
-)
 ROUND = {"CYLINDRICAL_SURFACE": "cylinder", "SPHERICAL_SURFACE": "sphere"}
 
 
@@ -67,64 +54,6 @@ class TextSolid:
 
     corners: Floats
     faces: tuple[RoundFace, ...]
-
-
-class StepTable:
-    """The simple entities of a STEP file by their number."""
-
-    def __init__(self, text: str) -> None:
-        """Find all entities in a text; ValueError: it is no STEP file."""
-        entities = read_entities(text).texts
-        self.kinds = {number: kind for number, (kind, _) in entities.items()}
-        self.bodies = {number: body for number, (_, body) in entities.items()}
-        self._references: dict[int, list[int]] = {}
-        self._topology: dict[int, list[int]] = {}
-
-    def of(self, kind: str) -> list[int]:
-        """Numbers of all entities of a kind."""
-        return [number for number, one in self.kinds.items() if one == kind]
-
-    def references(self, number: int) -> list[int]:
-        """What an entity refers to."""
-        if number not in self._references:
-            digits = REFERENCE.findall(self.bodies.get(number, ""))
-            self._references[number] = [int(one) for one in digits]
-        return self._references[number]
-
-    def numbers(self, number: int) -> list[float]:
-        """Decimal numbers in an entity."""
-        return [finite(digits) for digits in NUMBER.findall(self.bodies[number])]
-
-    def reached(self, *start: int) -> Iterator[int]:
-        """Some entities, all that they refer to, and what these refer to, each once.
-
-        But for points, curves and surfaces, which are two thirds of a file.
-        """
-        seen, todo = set(start), list(start)
-        while todo:
-            number = todo.pop()
-            yield number
-            if references := self._but_geometry(number):
-                new = [one for one in references if one not in seen]
-                seen.update(new)
-                todo += new
-
-    def _but_geometry(self, number: int) -> list[int]:
-        if number not in self._topology:
-            kinds = self.kinds
-            self._topology[number] = [
-                one for one in self.references(number) if kinds.get(one) not in GEOMETRY
-            ]
-        return self._topology[number]
-
-    def triple(self, number: int) -> Floats:
-        """(3,) of a point or direction."""
-        return np.array(self.numbers(number)[-3:])
-
-    def placement(self, number: int) -> tuple[Floats, Floats]:
-        """Origin and axis of a placement."""
-        point, axis = self.references(number)[:2]
-        return self.triple(point), self.triple(axis)
 
 
 def read_solids(text: str) -> dict[str, TextSolid]:
@@ -232,7 +161,7 @@ def _product(table: StepTable, shape: int) -> str:
     product = table.references(formation)[-1]
     if table.kinds[product] != "PRODUCT":
         raise Unknown("a solid is no product's")
-    return str(TEXT.findall(table.bodies[product])[0])
+    return table.label(product)
 
 
 def _solid(table: StepTable, solid: int) -> TextSolid:
@@ -261,5 +190,4 @@ def round_face(table: StepTable, face: int) -> RoundFace | None:
         if table.kinds.get(one) == "VERTEX_POINT"
     ]
     radius = table.numbers(surface)[-1]
-    hollow = table.bodies[face].rstrip().endswith(".F.")
-    return RoundFace(kind, point, axis, radius, hollow, (min(places), max(places)))
+    return RoundFace(kind, point, axis, radius, not table.forward(face), (min(places), max(places)))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,14 +20,20 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.processes import ProcessEnded, Processes
-from tbcad_verify.step.mirror_image import flipped_solid, is_mirror_image
-from tbcad_verify.step.text import ascii_text, read_text
+from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.types import Floats
 
 MAX_STEP_BYTES = 10**9
 START, END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 SAME_SURFACE = 2e-9  # mm and differences of unit vectors: digits of the text
-EXACT_KINDS = ("sphere", "plane")
+BROKEN = "broken STEP text"
+SURFACES = {"SPHERICAL_SURFACE": "sphere", "PLANE": "plane"}
+# Recommended Practices for Geometric and Assembly Validation Properties, CAx-IF, section 4.
+PROPERTIES = {
+    "volume measure": "volume",
+    "surface area measure": "area",
+    "centre point": "centroid",
+}
 # That read files at the same time, 0.2 GB each; meshes are read meanwhile.
 PROCESSES = min(max((os.cpu_count() or 1) - 1, 1), 4)
 
@@ -116,25 +121,17 @@ def read_step_files(export: Export, processes: Processes) -> dict[str, StepFile 
         BadExport: a file is missing, foreign or truncated.
     """
     parts = [part for part in (*export.parts, *export.mandrels, *export.printed) if part.step]
-    blobs = [load(export.folder, part.step) for part in parts]
-    shells = [k for k, part in enumerate(parts) if part in export.parts]
-    files = examine_all(blobs, processes, dict.fromkeys(shells[1:], *shells[:1]))
+    files = examine_all([load(export.folder, part.step) for part in parts], processes)
     return {part.name: file for part, file in zip(parts, files, strict=True)}
 
 
-def examine_all(
-    blobs: Sequence[FileBytes],
-    processes: Processes,
-    originals: Mapping[int, int] = MappingProxyType({}),
-) -> list[StepFile | Unknown]:
+def examine_all(blobs: Sequence[FileBytes], processes: Processes) -> list[StepFile | Unknown]:
     """Read the bytes of files as text and by the kernel, from private copies.
 
     Args:
         blobs: the files.
         processes: one that crashes, or is stopped, makes the file that it was at unknown, and no
             other.
-        originals: by the number of a file, that of the one whose mirror image it may be: the kernel
-            does not read it if it is.
     """
     with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
         paths = [Path(name) / f"part{k}.step" for k in range(len(blobs))]
@@ -142,50 +139,78 @@ def examine_all(
             blob.data.tofile(path)
         # The largest first, so that no process is left with a large one at the end.
         order = sorted(range(len(blobs)), key=lambda k: (-blobs[k].data.size, k))
-        asked = {
-            k: processes.submit(read_file, paths[k], paths[originals.get(k, k)]) for k in order
-        }
-        answers = [_answer(asked[k]) for k in range(len(blobs))]
-    return [_joined_answer(answers, k, originals.get(k, k)) for k in range(len(blobs))]
+        asked = {k: processes.submit(read_file, paths[k]) for k in order}
+        return [_answer(asked[k]) for k in range(len(blobs))]
 
 
-def read_file(file: Path, original: Path) -> Row:
-    """Read one file as text and by the kernel, or say why it cannot be read.
+def read_file(file: Path) -> tuple[Row, Row]:
+    """Text and solid of one file.
 
-    Its solid is none where the kernel need not read it: the file is the mirror image of its
-    original. One without an original has itself there.
+    Raises:
+        ValueError: why it cannot be read.
     """
     from tbcad_verify.step.kernel.reading import read_solid
 
+    return read_text(file), read_solid(file)
+
+
+def _answer(asked: Future[tuple[Row, Row]]) -> StepFile | Unknown:
+    """A file, or why it is not known."""
     try:
-        content: Row = {"text": read_text(file), "solid": None}
-        if original == file or not is_mirror_image(*(ascii_text(one) for one in (original, file))):
-            content["solid"] = read_solid(file)
-    except ValueError as error:
-        return {"refused": str(error)}
+        return parse(*asked.result())
+    except (ProcessEnded, ValueError) as error:
+        return Unknown(str(error))
     except Exception as error:
-        return {"refused": f"{type(error).__name__}: {error}"}
-    return content
+        return Unknown(f"{type(error).__name__}: {error}")
 
 
-def _answer(asked: Future[Row]) -> Row:
-    """What was read of a file, or why it was not."""
+def read_text(path: Path) -> Row:
+    """Named faces with their spheres and planes, solids by name, and validation properties; mm.
+
+    Raises:
+        ValueError: the text is no STEP file, or an entity lacks what its kind must have.
+    """
     try:
-        return asked.result()
-    except ProcessEnded as end:
-        return {"refused": str(end)}
+        # Names are ASCII, and the standard writes all other characters so too.
+        table = StepTable(path.read_bytes().decode("ascii"))
+        return {
+            "solids": [table.label(one) for one in table.of("MANIFOLD_SOLID_BREP")],
+            "faces": [_text_face(table, one) for one in table.of("ADVANCED_FACE")],
+            "properties": _properties(table),
+        }
+    except (LookupError, ValueError) as error:
+        begin = "" if str(error).startswith(BROKEN) else f"{BROKEN}: "
+        raise ValueError(f"{begin}{error}") from error
 
 
-def _joined_answer(answers: Sequence[Row], number: int, original: int) -> StepFile | Unknown:
-    """Text and solid of a file; that of a mirror image is its original's, reflected."""
-    answer = answers[number]
-    if "refused" in answer:
-        return Unknown(str(answer["refused"]))
-    if answer["solid"] is not None:
-        return parse(answer["text"], answer["solid"])
-    if "refused" in answers[original]:
-        return Unknown(str(answers[original]["refused"]))
-    return parse(answer["text"], flipped_solid(answers[original]["solid"]))
+def _text_face(table: StepTable, face: int) -> Row:
+    surface = table.references(face)[-1]
+    row: Row = {"name": table.label(face), "kind": SURFACES.get(table.kinds[surface], "other")}
+    if row["kind"] == "other":
+        return row
+    point, axis = table.placement(table.references(surface)[0])
+    row |= {"forward": table.forward(face), "point": point.tolist()}
+    if row["kind"] == "sphere":
+        return row | {"radius": table.numbers(surface)[-1]}
+    return row | {"axis": axis.tolist()}
+
+
+def _properties(table: StepTable) -> Row:
+    """Values under every property definition called a geometric validation property."""
+    properties: Row = {}
+    for link in table.of("PROPERTY_DEFINITION_REPRESENTATION"):
+        definition, representation = table.references(link)
+        if table.label(definition) != "geometric validation property":
+            continue
+        for item in table.references(representation):
+            key = PROPERTIES.get(table.label(item)) if item in table.kinds else None
+            if key in properties:
+                raise ValueError(f"{key} is claimed twice")
+            if key == "centroid":
+                properties[key] = table.triple(item).tolist()
+            elif key:
+                (properties[key],) = table.numbers(item)
+    return properties
 
 
 def known(found: Found | Unknown) -> Found:
@@ -217,7 +242,7 @@ def parse(text: Row, solid: Row) -> StepFile:
 def _joined(rows: list[Row], measured: list[Row]) -> list[Row]:
     """Each row with what the kernel measured of the same surface, to the precision of the text."""
     joined: list[Row] = [{} for _ in rows]
-    for kind in EXACT_KINDS:
+    for kind in SURFACES.values():
         mine, theirs = (
             [k for k, row in enumerate(some) if row["kind"] == kind] for some in (rows, measured)
         )

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.surfaces import Surfaces
-from tbcad_verify.mesh.vectors import chunks, dot, take, tangent_basis
+from tbcad_verify.mesh.vectors import dot, take, tangent_basis
 from tbcad_verify.types import Bools, Floats, Ints
 
 COINCIDENT = 1e-12
@@ -85,17 +85,14 @@ class MapCircles:
         return np.where(self.real, distance, np.where(self.covers, -np.inf, np.inf))
 
 
-def surface_maps(surfaces: Surfaces, front: bool, spread: float) -> SurfaceMaps:
-    """Maps of surfaces that lie `spread` mm apart at most.
+def surface_maps(surfaces: Surfaces, spread: float) -> SurfaceMaps:
+    """Maps of surfaces that lie `spread` mm apart at most, to the horizon, 90 degrees off the apex.
 
-    With `front`, a map ends at the horizon, 90 degrees from the apex; otherwise it is unbounded. A
-    plane has no horizon: its map ends far outside of everything.
+    A plane has no horizon: its map ends far outside of everything.
     """
-    right, up = tangent_basis(surfaces.normal)
     far = np.full(len(surfaces.curvature), FAR * spread)
     reach = np.divide(2, surfaces.curvature, out=far, where=surfaces.curvature > 0)
-    whole = ~front & (surfaces.curvature > 0)
-    return SurfaceMaps(surfaces, right, up, np.where(whole, np.inf, reach))
+    return SurfaceMaps(surfaces, *tangent_basis(surfaces.normal), reach)
 
 
 def map_circles(maps: SurfaceMaps, number: Ints, others: Surfaces, spread: float) -> MapCircles:
@@ -159,54 +156,12 @@ def _forms(maps: SurfaceMaps, others: Surfaces) -> tuple[Floats, Floats, Floats]
 
 def _with_horizon(circles: MapCircles, reach: Floats) -> MapCircles:
     """A last column: 1 - |y|^2 / reach^2 >= 0."""
-    finite = np.isfinite(reach)
-    edge = np.where(finite, reach, 1.0)[:, None]
+    edge = reach[:, None]
     no = np.zeros_like(edge, dtype=bool)
     return MapCircles(
         np.hstack([circles.alpha, -1 / (2 * edge)]),
         np.concatenate([circles.beta, np.zeros((2, *edge.shape))], axis=2),
         np.hstack([circles.gamma, edge / 2]),
-        np.hstack([circles.real, finite[:, None]]),
+        np.hstack([circles.real, ~no]),
         np.hstack([circles.covers, no]),
     )
-
-
-def to_surface(maps: SurfaceMaps, y: Floats) -> Floats:
-    """(3, M) points of the surfaces for points (2, M) of their maps, one each, mm."""
-    s = maps.surfaces
-    square = y[0] ** 2 + y[1] ** 2
-    w = 1 / (1 + s.curvature**2 * square / 4)
-    return np.asarray(
-        s.point + w * (y[0] * maps.right + y[1] * maps.up - s.curvature / 2 * square * s.normal)
-    )
-
-
-def with_apex_uncovered(surfaces: Surfaces, others: Surfaces) -> Surfaces:
-    """Whole spheres with their apex moved opposite to the largest cap that others cover.
-
-    So the point that the map cannot show is covered, unless nothing is.
-    """
-    out = [_opposite(surfaces, others, part) for part in chunks(len(surfaces.curvature), 256)]
-    normal = np.concatenate(out, axis=1)
-    k = surfaces.curvature
-    reach = np.divide(1, k, out=np.zeros_like(k), where=k > 0)
-    return Surfaces(surfaces.point + reach * (normal - surfaces.normal), normal, k)
-
-
-def _opposite(surfaces: Surfaces, others: Surfaces, part: slice) -> Floats:
-    """(3, part) new normals."""
-    mine = surfaces.take(np.arange(len(surfaces.curvature))[part])
-    k = mine.curvature
-    centre = mine.point - np.divide(mine.normal, k, out=np.zeros((3, len(k))), where=k > 0)
-    offset = centre[:, :, None] - others.point[:, None]
-    slope = others.normal[:, None] + others.curvature * offset
-    value = np.einsum("it,imt->mt", others.normal, offset)
-    value = value + others.curvature / 2 * np.einsum("imt,imt->mt", offset, offset)
-    steep = np.sqrt(np.einsum("imt,imt->mt", slope, slope))
-    # On the sphere C + r s, k times the other's function is level + slope . s.
-    level = value * k[:, None] + others.curvature / 2 / np.where(k > 0, k, 1)[:, None]
-    cuts = (np.abs(level) < steep) & (steep > COINCIDENT) & (k > 0)[:, None]
-    size = np.where(cuts, -level / np.where(cuts, steep, 1), -np.inf)
-    best, row = np.argmax(size, axis=1), np.arange(len(k))
-    chosen = slope[:, row, best] / np.where(steep[row, best] > 0, steep[row, best], 1)
-    return np.where(cuts[row, best], chosen, mine.normal)

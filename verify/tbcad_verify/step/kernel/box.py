@@ -19,10 +19,8 @@ from OCP.BRepClass import BRepClass_FaceClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepTools import BRepTools
 from OCP.GeomAbs import (
-    GeomAbs_Circle,
     GeomAbs_Cone,
     GeomAbs_Cylinder,
-    GeomAbs_Ellipse,
     GeomAbs_Line,
     GeomAbs_Plane,
     GeomAbs_Sphere,
@@ -61,50 +59,14 @@ def _of_corners(corners: Floats) -> Floats:
 
 
 def _of_edges(shape: TopoDS_Shape) -> Floats:
-    """(6,) how far the edges reach between their ends."""
-    ellipses: list[list[float]] = []
-    reach: Floats = np.full(6, -np.inf)
-    for edge in edges_of(shape):
-        curve = BRepAdaptor_Curve(edge)
-        kind = curve.GetType()
-        if kind in (GeomAbs_Circle, GeomAbs_Ellipse):
-            ellipses.append(_ellipse(curve))
-        elif kind != GeomAbs_Line:
-            reach = np.maximum(reach, _of_curve(curve))
-    return np.asarray(np.maximum(reach, _of_ellipses(np.array(ellipses).reshape(-1, 11))))
-
-
-def _ellipse(curve: BRepAdaptor_Curve) -> list[float]:
-    """Centre, half axes as vectors, first and last parameter of an ellipse or circle."""
-    if curve.GetType() == GeomAbs_Circle:
-        bounds = curve.Circle()
-        radii = bounds.Radius(), bounds.Radius()
-    else:
-        bounds = curve.Ellipse()
-        radii = bounds.MajorRadius(), bounds.MinorRadius()
-    place = bounds.Position()
-    one, two = triple(place.XDirection()), triple(place.YDirection())
-    return [
-        *triple(place.Location()),
-        *(radii[0] * value for value in one),
-        *(radii[1] * value for value in two),
-        curve.FirstParameter(),
-        curve.LastParameter(),
-    ]
-
-
-def _of_ellipses(rows: Floats) -> Floats:
-    """(6,) how far arcs reach where they run at right angles to the axis."""
-    centre, one, two = (OUTWARD @ rows[:, k : k + 3].T for k in (0, 3, 6))
-    first, last = rows[:, 9], rows[:, 10]
-    # The point of the whole ellipse that reaches farthest, at its first parameter in the arc.
-    at = first + np.mod(np.arctan2(two, one) - first, FULL_TURN)
-    tops = np.where(at <= last, centre + np.hypot(one, two), -np.inf)
-    return np.asarray(tops.max(axis=1, initial=-np.inf))
+    """(6,) how far the edges reach between their ends, which straight ones do not."""
+    curves = map(BRepAdaptor_Curve, edges_of(shape))
+    bent = [_of_curve(curve) for curve in curves if curve.GetType() != GeomAbs_Line]
+    return np.asarray(np.max([np.full(6, -np.inf), *bent], axis=0))
 
 
 def _of_curve(curve: BRepAdaptor_Curve) -> Floats:
-    """(6,) how far any other curve reaches, by the kernel's search for its extremes."""
+    """(6,) how far a curve reaches, by the kernel's search for its extremes."""
     bounds = Bnd_Box()
     BndLib_Add3dCurve.AddOptimal_s(curve, 0.0, bounds)
     bounds.SetGap(0.0)
