@@ -32,6 +32,7 @@ class ShellDraws:
         foot: of the foot plane at each mirror, along its normal, mm, (s, m).
         wall: of each wall of a pedestal, along its normal into the mirror's cell, mm, (s, w).
         form: factors of the mirrors' form errors (tbcad.tolerance.montecarlo.form), mm, (s, m, t).
+        valley: radius of the fillets in the valleys between mirrors, mm, (s,).
     """
 
     centre: Floats
@@ -46,6 +47,7 @@ class ShellDraws:
     foot: Floats
     wall: Floats
     form: Floats
+    valley: Floats
 
     def __len__(self) -> int:
         return len(self.focal)
@@ -85,7 +87,9 @@ def shell_error_shapes(m: int, modes: int = 0, walls: int = 0) -> dict[str, Shap
     """Shape of each kind of error of a shell, in the order of the streams; only append to it.
 
     A half has m mirrors, w walls of pedestals, and a warp that follows from so many vectors.
+    Mirrors on pedestals have no valleys.
     """
+    valleys = (2, int(walls == 0))
     return {
         "sphere_centre": (2, m, 3),
         "sphere_radius": (2, m),
@@ -101,6 +105,8 @@ def shell_error_shapes(m: int, modes: int = 0, walls: int = 0) -> dict[str, Shap
         "warp": (2, modes, 3),
         "waviness": (2, m, len(TERMS)),
         "groove_wall": (2, walls),
+        "cutter_radius": valleys,
+        "ridge_rounding": valleys,
     }
 
 
@@ -121,6 +127,7 @@ def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> Shell
         foot=np.zeros(of("sphere_radius").shape),
         wall=of("groove_wall"),
         form=of("waviness") * np.sqrt(term_shares()),
+        valley=np.maximum(of("cutter_radius"), of("ridge_rounding")).max(axis=1, initial=0),
     )
     if warp is None:  # each mirror is displaced by its own
         return replace(draws, centre=draws.centre + of("warp"))

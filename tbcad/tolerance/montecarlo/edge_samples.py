@@ -34,6 +34,7 @@ FIRST_HEIGHT, SECOND_HEIGHT = 26 * STRIDE, 27 * STRIDE
 PLACES = 28 * STRIDE
 # Rows of a view; axes of a screen.
 PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
+VALLEY = 6  # radius of the fillets in the valleys, and nothing in its other two places
 FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
 # A parabola falls below its minimum sample by an eighth of the rise to the samples beside it at
 # most. The distance squared along an edge is smooth; four times as much is certain.
@@ -65,6 +66,24 @@ def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: 
         chord = plus_scaled(start, t / w, tangent)
         point = plus_scaled(chord, -bend * t * t / 2 / w, outward)
         put_sample(samples, POINT, s, point)
+        point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
+        put_sample(samples, SCALED, s, point)
+        put_sample(samples, RAY, s, minus(point, pinhole))
+
+
+@compiled_loop
+def touch_samples(surface: Floats, view: Floats, samples: Floats) -> None:
+    """Fill in where a ball about each point touches the mirror that a surface (7,) is beside.
+
+    The points are centres of a ball as large as the valleys' fillets, and the surface is the
+    mirror's, moved out by the ball's radius. Points stay; rays are to where the ball touches.
+    """
+    apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
+    radius, scale, pinhole = view[VALLEY, 0], vector(view[SCALE]), vector(view[PINHOLE])
+    for s in range(SAMPLES):
+        centre = get_sample(samples, POINT, s)
+        gradient = plus_scaled(normal, curvature, minus(centre, apex))
+        point = plus_scaled(centre, -radius / sqrt(dot(gradient, gradient)), gradient)
         point = (point[0] * scale[0], point[1] * scale[1], point[2] * scale[2])
         put_sample(samples, SCALED, s, point)
         put_sample(samples, RAY, s, minus(point, pinhole))

@@ -54,6 +54,8 @@ class Errors:
         ball_radius: of each ball's radius, by its grade.
         coating: by which a shell's coating is thicker than the design allows for.
         warp: of length 0 an error of each mirror's centre.
+        cutter_radius: of the fillets that a cutter leaves in the valleys between mirrors.
+        ridge_rounding: of the fillets there that a mandrel's ridges leave.
     """
 
     sphere_centre: Error = NO_ERROR
@@ -77,6 +79,8 @@ class Errors:
     warp: Error = NO_ERROR
     waviness: Error = NO_ERROR
     groove_wall: Error = NO_ERROR
+    cutter_radius: Error = NO_ERROR
+    ridge_rounding: Error = NO_ERROR
 
     @property
     def whole_radius(self) -> Error:

@@ -33,6 +33,7 @@ DEFAULT_PROCESS = "sla"
 RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
 MICROMETRE = 1e-3  # mm
 BY_USER = "set by an option"
+SHARP = "Not stated: valleys are taken as sharp, a judgement that flatters milled shells"
 
 Source: TypeAlias = Annotated[str, Field(pattern=r"\S", max_length=600)]
 
@@ -94,6 +95,29 @@ class RootMeanSquare(Micrometres):
     """None: it differs from mirror to mirror."""
     distribution: Literal["normal"] = "normal"
     """Always normal."""
+
+
+class FilletRadius(ErrorSpec):
+    """Radius of the fillets in the valleys between mirrors, in millimetres."""
+
+    magnitude: float = Field(ge=0, le=10)
+    """The radius: the same in all builds."""
+    mean: float = Field(0.0, ge=0, le=0)
+    """None: the radius is the magnitude."""
+    distribution: Literal["normal"] = "normal"
+    """Without a meaning here."""
+
+    @property
+    def error(self) -> Error:
+        """The same in mm."""
+        return Error(0.0, self.unit * self.magnitude)
+
+
+class FilletMicrometres(FilletRadius):
+    """Radius of the fillets in the valleys between mirrors, in micrometres."""
+
+    unit: ClassVar[float] = MICROMETRE
+    magnitude: float = Field(ge=0, le=10_000)
 
 
 class Millimetres(ErrorSpec):
@@ -184,6 +208,10 @@ class Process(Section):
     """Prototype: each cap about each axis across its own."""
     wind_up_percent: Percent
     """Prototype: turn of the base because motor and belt yield to gravity, of that worked out."""
+    cutter_radius_mm: FilletRadius = FilletRadius(magnitude=0, source=SHARP)
+    """Ball cutter that mills the valleys between mirrors of a shell: 0 for sharp valleys."""
+    ridge_rounding_um: FilletMicrometres = FilletMicrometres(magnitude=0, source=SHARP)
+    """Radius to which polishing and coating round a mandrel's ridges, the replica's valleys."""
     ball_grade: GradeName
     """Prototype: grade of the balls by ISO 3290-1."""
 
