@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 import tbcad.calibration.run
 from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
-from tbcad.calibration.detection.detection import Detection, Rejected, Rejection
+from tbcad.calibration.detection.detection import Detection
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
@@ -135,21 +135,6 @@ def test_a_few_noisy_highlights_are_not_enough(setup: Setup, detection: Detectio
     judged = verdict(result)
     assert judged.answer is Answer.NOT_GOOD
     assert any("--measured" in step for step in judged.steps)
-
-
-def test_saturated_highlights_are_counted_and_ask_for_a_shorter_exposure(
-    calibrated: Calibration, detection: Detection
-) -> None:
-    most = len(detection.highlights)
-    reasons = [Rejection.SATURATED] * most + [Rejection.HIDDEN] * 3 + [Rejection.OUTSIDE] * 7
-    rejected = tuple(Rejected(0, 0, 0, reason) for reason in reasons)
-    result = replace(calibrated, detection=replace(detection, rejected=rejected))
-    judged = verdict(result)
-    text = " ".join(verdict_text(result, judged).split())
-    assert f"not used ({most + 3}): {most} saturated; 3 hidden, or partly " in text
-    assert (
-        f"next: {most} highlights are saturated: photograph the LEDs again with a shorter" in text
-    )
 
 
 BASIS = {

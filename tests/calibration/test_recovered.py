@@ -4,21 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 from tbcad.calibration.calibrate import Calibration
 from tbcad.calibration.estimate.covariance import Covariance, covariance
 from tbcad.calibration.estimate.solve import estimate
-from tbcad.calibration.report.plots import COLUMNS, draw_recovered
 from tbcad.calibration.report.recovered import (
     BESIDES,
-    SIGMAS,
     Kind,
     place_mm,
     ray_errors,
     recovered_errors,
-    recovered_table,
     turn_mrad,
 )
 from tbcad.calibration.report.tables import angles_table, spheres_table
@@ -102,23 +98,6 @@ def test_a_machine_that_is_another_shows(
     assert len(changed) == 1
     assert changed[0][0].startswith("radii of")
     assert changed[0][1] == pytest.approx(1000)
-
-
-def test_the_picture_shows_what_the_table_says(kinds: tuple[Kind, ...]) -> None:
-    figure = Figure()
-    draw_recovered(figure, kinds)
-    rows = recovered_table(kinds).records()
-    for axes, kind in zip(figure.axes, kinds, strict=False):
-        mine = [row for row in rows if row["kind"] == kind.name]
-        points = axes.containers[0][0].get_xydata()
-        assert points[:, 0] == pytest.approx([row["injected"] for row in mine])
-        assert points[:, 1] == pytest.approx([row["recovered"] for row in mine])
-        bars = np.array([one[:, 1] for one in axes.containers[0][2][0].get_segments()])
-        sigma = np.array([row["sigma"] for row in mine])
-        assert np.diff(bars)[:, 0] == pytest.approx(2 * SIGMAS * sigma)
-        assert kind.name.split()[0] in axes.get_title()
-    assert len(figure.axes) % COLUMNS == 0
-    assert len(rows) == sum(len(kind.sigma) for kind in kinds)
 
 
 def test_rays_of_the_machine_itself_are_right(calibrated: Calibration) -> None:

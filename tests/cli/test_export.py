@@ -10,7 +10,6 @@ import pytest
 
 import tbcad
 from tbcad.cli import run
-from tests.exported_files import contents
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -108,30 +107,6 @@ def test_real_captures_come_without_the_object(captured: Path, tmp_path: Path) -
     assert by_file == figures
 
 
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        (["--to", "gsplat"], "gsplat"),
-        (["--to", "rays", "--size", "64"], "as it was captured"),
-        (["--to", "ngp-rays", "--size", "64"], "as it was captured"),
-        (["--to", "colmap", "--size", "5"], "from 8 to 4096"),
-        (["--to", "colmap", "--size", "5000"], "from 8 to 4096"),
-        (["--to", "colmap", "--size", "4096"], "GiB"),
-        (["--to", "colmap", "--every", "0"], "every"),
-        (["--to", "colmap", "--cameras", "c0001"], "no virtual camera"),
-        ([], "--to"),
-    ],
-)
-def test_exports_that_cannot_be(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
-) -> None:
-    assert run(["export", str(captured), "--out", str(tmp_path / "data"), *more]) == 2
-    said = capsys.readouterr().err
-    assert wrong in said
-    assert "Traceback" not in said
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_capture_is_not_replaced_by_its_export(
     captured: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,13 +116,6 @@ def test_a_capture_is_not_replaced_by_its_export(
         assert run(["export", name, "--to", "rays", "--out", "knot"]) == 2
         assert "is read by this command" in capsys.readouterr().err
     assert files(captured) == before
-
-
-def test_a_folder_that_is_no_capture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "none").mkdir()
-    assert run(["export", str(tmp_path / "none"), "--to", "colmap"]) == 2
-    assert "lightfield.h5: no such file" in capsys.readouterr().err
-    assert contents(tmp_path / "none") == {}
 
 
 def test_captures_by_the_prototype(export_folder: Path, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from tbcad.cli.examples import EXAMPLES
 from tbcad.doctor import Finding
 from tests.cli.commands import Words, leaves, long_name, options
 
-EXPORT = Path(__file__).parents[2] / "docs" / "sample"
 # Write files or pictures that are their result, and print no figures.
 WITHOUT_FIGURES = {"picture", "report", "simulate-run", "view", "refocus"}
 # One name for one thing; where the values differ, it is said why.
@@ -127,8 +126,3 @@ def test_a_plot_for_papers(tmp_path: Path) -> None:
     assert run(words) == 0
     assert (tmp_path / "elevation.svg").read_bytes().startswith(b"<?xml")
     assert not (tmp_path / "elevation.png").exists()
-
-
-def test_json_without_dry_run_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(EXPORT), "--json"]) == 2
-    assert "--json is about --dry-run" in capsys.readouterr().err

@@ -147,19 +147,6 @@ def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) ->
     assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (options_of(stops="500"), "stop 500 is not in the plan: allowed is 1 to"),
-        (options_of(phases="led_9"), "phase led_9 is not photographed: allowed is dark, led_1"),
-    ],
-)
-def test_refused(export_with_wind_up: Path, options: SimulateRunOptions, message: str) -> None:
-    export = read_export(export_with_wind_up)
-    with pytest.raises(InputError, match=message):
-        simulate.prepare_run(export, fdm_errors(), simulate.run_object(export, None), options)
-
-
 def test_the_stage_hides_leds_as_it_stands(tmp_path: Path) -> None:
     import trimesh
 

@@ -21,7 +21,6 @@ from tbcad.viewer.turntable import (
     KIND,
     WEBP_QUALITIES,
     Turntable,
-    even_elevations,
     smallest_loss,
     turntable_page,
     write_turntable,
@@ -85,8 +84,3 @@ def test_pictures_lose_detail_until_they_fit() -> None:
         assert len(smallest_loss(pictures, TABLE, "knot", size)) == size
     with pytest.raises(InputError, match="4 x 1 views do not fit into"):
         smallest_loss(pictures, TABLE, "knot", sizes[-1] - 1)
-
-
-def test_elevations_of_rows() -> None:
-    assert even_elevations(1, 42) == (42,)
-    assert even_elevations(3, 42) == (15, 45, 75)

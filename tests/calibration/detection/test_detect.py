@@ -17,7 +17,7 @@ from tbcad.calibration.detection.expected import Room, expected_highlights
 from tbcad.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
-from tbcad.records.exposure import PhaseTimes, exposure_name
+from tbcad.records.exposure import exposure_name
 from tbcad.runs.photographs import read_run
 from tbcad.simulated_run.photographs import Chain
 from tbcad.types import Floats
@@ -96,15 +96,6 @@ def test_a_camera_that_moves_in_mid_run(
     assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
 
 
-def test_a_camera_that_is_knocked_over(write: Callable[[Small], Path], export_folder: Path) -> None:
-    small = small_run(export_folder, STOPS)
-    folder = write(_moved(small, first=10, shift=np.array([60.0, 25.0])))
-    found = detected(folder, small)
-    assert "so far that its highlights are not found" in " ".join(found.faults)
-    assert found.highlights.frame.max() == 9
-    assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
-
-
 def _moved(small: Small, first: int, shift: Floats) -> Small:
     """The same run, whose picture shifts between two frames."""
     whole = type(small.run)
@@ -172,16 +163,6 @@ def test_a_dark_photograph_of_another_exposure(
     assert line.startswith(f"{name} was exposed for 1 s, its dark photograph for {seconds:g} s")
     assert says in line
     assert len(found.highlights) == pytest.approx(len(whole.highlights), abs=2)
-
-
-def test_brighter_leds_and_a_shorter_exposure_are_as_before(
-    write: Callable[[Small], Path], export_folder: Path, whole: Detection
-) -> None:
-    chain = Chain(led_light=100 * BRIGHT, times=PhaseTimes(leds_s=0.01, lit_s=1.0))
-    small = small_run(export_folder, STOPS, chain=chain)
-    found = detected(write(small), small)
-    assert len(found.highlights) == pytest.approx(len(whole.highlights), rel=0.02)
-    assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
 
 
 @pytest.mark.parametrize(

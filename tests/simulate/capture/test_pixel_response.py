@@ -25,16 +25,6 @@ def test_low_pass_filter_passes_its_cosine(separation: float, frequency: float) 
     assert contrast(low_pass_shifts(separation, 3), frequency) == pytest.approx(expected, abs=1e-12)
 
 
-def test_nothing_passes_at_the_zero() -> None:
-    assert contrast(low_pass_shifts(2.0, 2), 0.25) < 1e-12
-    assert contrast(low_pass_shifts(1.0, 2), 0.5) < 1e-12
-
-
-def test_filter_of_one_pixel_averages_four_pixels() -> None:
-    """Four images of a square pixel, a pixel apart, are one square of two pixels."""
-    assert sorted(low_pass_shifts(1.0, 2)) == sorted((2 * x, 2 * y) for x, y in subpixel_shifts(4))
-
-
 def test_defocus_fills_its_circle() -> None:
     """Radius of gyration: that of the circle and of the pixel, d^2 / 8 + 1 / 6."""
     places = np.array(defocus_shifts(6.0, 400))

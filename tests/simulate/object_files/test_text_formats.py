@@ -219,6 +219,7 @@ def test_stl_with_colours(tmp_path: Path, header: bytes, word: int, wanted: list
         ("a.dae", "<COLLADA/>", "export it as GLB"),
         ("a.pcd", "# .PCD", "cloud of points"),
         ("a.stl.gz", "", "unpack it"),
+        ("a.unknown", "?", "cannot be read"),
         ("a.ply", "\x1f\x8b", "no header"),
         ("a.ply", ply()[:-12], "cut off"),
         ("a.ply", ply(faces=("3 0 1 7",)), "corners that do not exist"),

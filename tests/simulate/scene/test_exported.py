@@ -91,10 +91,3 @@ def test_a_record_that_is_not_there(record: Path, tmp_path: Path, name: str) -> 
     (folder / name).unlink()
     with pytest.raises(InputError, match=f"{name} is not there: name a folder that tbcad build"):
         read_export(folder)
-
-
-@pytest.mark.parametrize("text", ["", "[]", "{", "null", '{"schema": 5}', "[" * 100_000])
-def test_files_of_other_kinds_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "design.json").write_text(text)
-    with pytest.raises(InputError, match=r"design\.json"):
-        read_export(tmp_path)
