@@ -19,7 +19,7 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Highlights
 from tbcad.records.exposure import exposure_name
 from tbcad.runs.photographs import read_run
-from tbcad.simulated_run.photographs import Chain
+from tbcad.simulated_run.photographs import ImagingChain
 from tbcad.types import Floats
 from tests.simulated_runs import BRIGHT, Small, small_run
 
@@ -72,7 +72,7 @@ def test_outside_is_what_the_truth_has_outside(whole: Detection, small: Small) -
 
 
 def test_an_led_that_never_lights(write: Callable[[Small], Path], export_folder: Path) -> None:
-    dead = Chain(led_light=(BRIGHT, BRIGHT, 0.0, BRIGHT))
+    dead = ImagingChain(led_light=(BRIGHT, BRIGHT, 0.0, BRIGHT))
     small = small_run(export_folder, STOPS, chain=dead)
     found = detected(write(small), small)
     assert "LED 3 shines in no photograph" in " ".join(found.faults)
@@ -178,7 +178,7 @@ def test_a_dark_photograph_of_another_exposure(
 def test_no_highlights_are_told_by_reason(
     write: Callable[[Small], Path], export_folder: Path, light: float, says: str
 ) -> None:
-    small = small_run(export_folder, STOPS, chain=Chain(led_light=light))
+    small = small_run(export_folder, STOPS, chain=ImagingChain(led_light=light))
     with pytest.raises(InputError, match=says):
         detected(write(small), small)
 

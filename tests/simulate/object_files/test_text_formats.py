@@ -9,7 +9,7 @@ import trimesh
 from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part
+from tbcad.simulate.object_files.contents import ObjectFile, ObjectPart
 from tbcad.simulate.object_files.read import read_object_file
 
 CORNERS = ("-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0")
@@ -44,12 +44,12 @@ def obj(*lines: str) -> str:
     return "\n".join([*(f"v {corner}" for corner in CORNERS), *lines]) + "\n"
 
 
-def only(found: ObjectFile) -> Part:
+def only(found: ObjectFile) -> ObjectPart:
     (part,) = found.parts
     return part
 
 
-def area(part: Part) -> float:
+def area(part: ObjectPart) -> float:
     return float(trimesh.Trimesh(part.points, part.faces, process=False).area)
 
 

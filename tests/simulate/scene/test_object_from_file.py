@@ -10,7 +10,7 @@ from PIL import Image
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.geometry.vectors import norm, unit
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.prototype.lamps import Lamps, lit_by
+from tbcad.simulate.prototype.lamps import RectangularLamps, lit_by
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.simulate.scene.point_lights import PointLights
@@ -109,7 +109,7 @@ def test_a_ball_is_lit_on_the_side_that_rays_meet(tmp_path: Path, kind: str) -> 
 @pytest.mark.parametrize("kind", FILES)
 def test_a_ball_under_the_prototypes_lamps(tmp_path: Path, kind: str) -> None:
     (tmp_path / "a.ply").write_bytes(FILES[kind])
-    lamps = Lamps(np.array([[200.0, 0, 0]]), np.array([[-1.0, 0, 0]]), 10, 10, 100)
+    lamps = RectangularLamps(np.array([[200.0, 0, 0]]), np.array([[-1.0, 0, 0]]), 10, 10, 100)
     scene = prepared_scene(lit_by(lamps, load_object(tmp_path / "a.ply", CAPTURE_MM)))
     colour, normal = seen_ball(scene)
     assert (colour[normal[:, 0] < -0.1] == 0).all()
