@@ -10,14 +10,7 @@ import pytest
 
 import tbcad
 from tbcad.cli import run
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+from tests.exported_files import contents
 
 
 @pytest.mark.parametrize("target", ["nerfstudio", "colmap", "ngp-rays", "rays"])
@@ -25,11 +18,11 @@ def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str) -> No
     export = ["export", str(captured), "--to", target, "--every", "20", "--out"]
     assert run([*export, str(tmp_path / "one")]) == 0
     assert run([*export, str(tmp_path / "other")]) == 0
-    assert files(tmp_path / "one") == files(tmp_path / "other")
+    assert contents(tmp_path / "one") == contents(tmp_path / "other")
     assert run([*export, str(tmp_path / "one")]) == 0  # replaced, folders and all
-    assert files(tmp_path / "one") == files(tmp_path / "other")
+    assert contents(tmp_path / "one") == contents(tmp_path / "other")
     listed = json.loads((tmp_path / "one" / "manifest.json").read_text())["files"]
-    assert listed.keys() | {"manifest.json"} == files(tmp_path / "one").keys()
+    assert listed.keys() | {"manifest.json"} == contents(tmp_path / "one").keys()
 
 
 def test_what_is_not_its_own_is_kept(
@@ -39,14 +32,14 @@ def test_what_is_not_its_own_is_kept(
     out = tmp_path / "data"
     export = ["export", str(captured), "--to", "nerfstudio", "--every", "50", "--out", str(out)]
     assert run(export) == 0
-    before = files(out)
+    before = contents(out)
     (mine := out / "images" / "mine.png").write_text("mine")
     assert run(export) == 2
     assert "images" in capsys.readouterr().err
-    assert files(out) == {**before, "images/mine.png": b"mine"}
+    assert contents(out) == {**before, "images/mine.png": b"mine"}
     assert run([*export, "--force"]) == 0
     assert (out / "images.kept" / "mine.png").read_text() == "mine"
-    assert files(out).items() >= before.items()
+    assert contents(out).items() >= before.items()
     shutil.rmtree(out / "images.kept")
     changed = next((out / "masks").iterdir())
     changed.write_text("changed")
@@ -111,11 +104,11 @@ def test_a_capture_is_not_replaced_by_its_export(
     captured: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(captured.parent)
-    before = files(captured)
+    before = contents(captured)
     for name in (str(captured), "knot/lightfield.h5"):
         assert run(["export", name, "--to", "rays", "--out", "knot"]) == 2
         assert "is read by this command" in capsys.readouterr().err
-    assert files(captured) == before
+    assert contents(captured) == before
 
 
 def test_captures_by_the_prototype(export_folder: Path, tmp_path: Path) -> None:

@@ -119,10 +119,3 @@ def test_a_study_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert record["study"] == "elevation"
     assert {Path(file) for file in record["files"]} == set(tmp_path.iterdir())
     assert {"quantity", "unit", "value", "paper", "where"} == set(record["figures"][0])
-
-
-def test_a_plot_for_papers(tmp_path: Path) -> None:
-    words = ["study", "elevation", "--set", "n=4", "--format", "svg", "--out", str(tmp_path)]
-    assert run(words) == 0
-    assert (tmp_path / "elevation.svg").read_bytes().startswith(b"<?xml")
-    assert not (tmp_path / "elevation.png").exists()

@@ -57,7 +57,7 @@ def test_solid_is_valid_and_has_the_volume_of_its_mesh(
 
 
 @EVERY_BODY
-@pytest.mark.parametrize("options", [["n=2"], ["n=3", "camera_mm=[70.0,20.0,-38.8]"]], ids=str)
+@pytest.mark.parametrize("options", [["n=2"], ["n=3", "camera_mm=[120, 15, -90]"]], ids=str)
 def test_properties_are_those_that_the_kernel_integrates(
     body: str, edges: str, options: list[str]
 ) -> None:

@@ -61,12 +61,6 @@ def test_strong_read_noise_is_everywhere() -> None:
     assert 0.2 < (image > 0).mean() < 0.5
 
 
-def test_no_noise() -> None:
-    image = photographed(replace(SENSOR, noise=0.0), 0.5)
-    expected = round((5000 + SENSOR.dark_electrons) * 255 / 10_000)
-    assert (image == expected).all()
-
-
 def test_saturation_and_bits() -> None:
     assert (photographed(SENSOR, 2.0) == 255).all()
     sixteen = photographed(replace(SENSOR, bits=16, noise=0.0), 0.5)

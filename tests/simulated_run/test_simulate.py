@@ -17,6 +17,7 @@ from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run import simulate
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.prototype.draws import read_wind_up
+from tests.exported_files import contents
 from tests.prototype_records import printed_part, write_prototype
 from tests.simulated_runs import Small, fdm_errors, small_run
 
@@ -26,14 +27,6 @@ PHASES = ("dark", "led_1", "lit")
 @pytest.fixture(scope="module")
 def small(export_folder: Path) -> Small:
     return small_run(export_folder, (3, 6))
-
-
-def digests(folder: Path) -> dict[str, str]:
-    return {
-        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def test_a_folder_that_is_read_back(small: Small, export_folder: Path, tmp_path: Path) -> None:
@@ -64,7 +57,7 @@ def test_the_same_bytes_with_any_number_of_threads(
         monkeypatch.setattr(simulate, "THREADS", threads)
         out = tmp_path / str(threads)
         simulate.write_run((small.run,), PHASES, export_folder, out, lambda _: None)
-    assert digests(tmp_path / "1") == digests(tmp_path / "3")
+    assert contents(tmp_path / "1") == contents(tmp_path / "3")
 
 
 def test_photographs_are_not_replaced(small: Small, export_folder: Path, tmp_path: Path) -> None:

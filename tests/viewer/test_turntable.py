@@ -1,8 +1,6 @@
 """Turntables: one file, bounded, with the views that it says it has."""
 
 import base64
-import json
-import re
 from io import BytesIO
 from pathlib import Path
 
@@ -25,15 +23,9 @@ from tbcad.viewer.turntable import (
     turntable_page,
     write_turntable,
 )
+from tests.viewer.fields import data_of
 
 TABLE = Turntable(4, (20.0, 60.0), 640.0, (160, 120), "nearest")
-
-
-def data_of(page: str) -> dict[str, object]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page)
-    assert found
-    record: dict[str, object] = json.loads(found[1])
-    return record
 
 
 def test_views_are_those_of_the_library(renderer: Renderer, tmp_path: Path) -> None:

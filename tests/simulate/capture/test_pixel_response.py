@@ -7,7 +7,7 @@ from tbcad.simulate.capture.photograph import photograph, subpixel_shifts
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.studies.pixel_response import defocus_shifts, low_pass_shifts
+from tbcad.studies.low_pass import defocus_shifts, low_pass_shifts
 
 
 def contrast(shifts: tuple[tuple[float, float], ...], frequency: float) -> float:

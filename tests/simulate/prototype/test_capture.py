@@ -22,6 +22,7 @@ from tbcad.simulate.prototype.ball_rays import (
     reflected_colours,
     resampled_photograph,
     trace_balls,
+    trace_own_ball,
 )
 from tbcad.simulate.prototype.merge import (
     MergePlan,
@@ -118,6 +119,9 @@ class TestGeometry:
             assert (seen.ball == run.ball + 1).all()
             assert np.abs(seen.origin - run.ball_surfaces.apex).max() < 1e-9
             assert np.abs(seen.direction + unit(run.ball_surfaces.apex)).max() < 1e-9
+            alone = trace_own_ball(run, turned, run.stop, run.ball + 1)
+            for mine, found in zip(vars(alone).values(), vars(seen).values(), strict=True):
+                assert mine == pytest.approx(found)
 
     def test_direction_errors_of_balls_are_those_of_the_plan(
         self, runs: Runs, layout: PrototypeLayout
@@ -345,18 +349,14 @@ class TestReading:
             (lambda table: table.append(table[7]), "a second time"),
             (lambda table: table[3].update(mirror="b0001"), "row 4 shows b0001"),
             (lambda table: table[3].update(mirror="a9999"), "allowed .* is a0001 to a0103"),
-            (lambda table: table[3].update(mirror="a1"), "4 mirror: "),
             (lambda table: table[3].update(ball="6"), "names ball 6, allowed is 1 to 5"),
-            (lambda table: table[3].update(ball="1.5"), "4 ball: "),
             (lambda table: table[3].update(object_turn_deg="90"), "object_turn_deg 90"),
             (lambda table: table[3].update(base_angle_deg="nan"), "4 base_angle_deg: "),
-            (lambda table: table[3].update(error_deg="inf"), "4 error_deg: "),
             (lambda table: table[0].update(base_angle_deg="3"), "stop 1 has two base angles"),
             (lambda table: raised(table, "stop", 1), "not numbered from 1"),
             (lambda table: exchanged(table, "1", "2"), "do not rise from stop to stop"),
             (lambda table: table[3].update(ball=other(table[3]["ball"])), "but its ball is"),
             (lambda table: raised(table, "base_angle_deg", 0.5), "but its ball is"),
-            (lambda table: [row.pop("stop") for row in table], "1 stop: field required"),
             (lambda table: table.clear(), "not numbered from 1|does not show"),
         ],
     )
@@ -389,11 +389,9 @@ class TestReading:
             (lambda balls: balls.clear(), "balls.csv: no balls"),
             (lambda balls: balls.pop(), "names ball 5, allowed is 1 to 4"),
             (lambda balls: balls.reverse(), "ball 1 is out of order"),
-            (lambda balls: balls[2].update(radius_mm="-1"), "row 3 radius_mm: "),
             (lambda balls: balls[2].update(nx="2.0"), "ball 3 has a normal"),
             (lambda balls: balls[1].update(cx="1.0"), "ball 2 has a centre"),
             (lambda balls: balls[1].update(bz="nan"), "row 2 bz: "),
-            (lambda balls: balls[1].update(bz=""), "row 2 bz: "),
         ],
     )
     def test_refused_balls(

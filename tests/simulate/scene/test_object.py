@@ -69,9 +69,8 @@ def test_flat_top_is_lit_by_lamberts_law(tmp_path: Path) -> None:
 
 
 def test_texture_is_shown(tmp_path: Path) -> None:
-    """Left half red, right half green."""
-    picture = np.zeros((8, 16, 3), dtype=np.uint8)
-    picture[:, :8, 0], picture[:, 8:, 1] = 250, 250
+    """At the middle of a texel it is that texel."""
+    picture = np.random.default_rng(4).integers(40, 250, (8, 16, 3), dtype=np.uint8)
     mesh = trimesh.Trimesh(
         [[-10, -10, 0], [10, -10, 0], [10, 10, 0], [-10, 10, 0]], [[0, 1, 2], [0, 2, 3]]
     )
@@ -80,9 +79,10 @@ def test_texture_is_shown(tmp_path: Path) -> None:
     mesh.export(tmp_path / "square.glb")
     subject = load_object(tmp_path / "square.glb", CAPTURE_MM, ObjectOptions(up="z", unit="mm"))
     assert subject.texture is not None
-    left, right = (from_above(subject, x, 1).colour[0] for x in (-5, 5))
-    assert left[0] > 100 > left[1] == 0
-    assert right[1] > 100 > right[0] == 0
+    for column, row in ((3, 1), (12, 6)):
+        x, y = (column + 0.5) / 16 * 20 - 10, 10 - (row + 0.5) / 8 * 20
+        colour, texel = from_above(subject, x, y).colour[0], subject.texture[row, column] / 255
+        assert colour / colour.max() == pytest.approx(texel / texel.max(), abs=0.01)
 
 
 def test_texture_outside_of_its_folder_is_not_read(tmp_path: Path) -> None:
