@@ -214,6 +214,7 @@ def test_planar_mirrors(
         _one_line(capsys, "flat")
 
 
+@pytest.mark.slow
 def test_camera_that_looks_past_the_balls(export: Path, tmp_path: Path) -> None:
     """68 mrad: a camera as mounted (docs/decisions/0007-how-tolerances-are-computed.md)."""
     arguments = ["tolerance", str(export), *FEW, "--set", "camera_tilt_mrad=68"]

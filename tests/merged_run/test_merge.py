@@ -13,9 +13,8 @@ from tbcad.api import merge
 from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
-from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, CameraFrame, exposure_name
-from tbcad.simulate.capture.light_field import CameraFrame as LightFrame
-from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
 from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
@@ -35,7 +34,7 @@ Photographs = dict[str, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def frames(plan: Plan) -> tuple[CameraFrame, ...]:
+def frames(plan: Plan) -> tuple[Frame, ...]:
     return frames_of(plan)
 
 
@@ -61,24 +60,24 @@ def perfect(
     export: ExportedDesign,
     plan: Plan,
     designed: Machine,
-    frames: tuple[CameraFrame, ...],
+    frames: tuple[Frame, ...],
     scene: Scene,
 ) -> Photographs:
     return photographs_of(export, plan, designed, frames, scene)
 
 
 @pytest.fixture
-def calibration(designed: Machine, frames: tuple[CameraFrame, ...], tmp_path: Path) -> Path:
+def calibration(designed: Machine, frames: tuple[Frame, ...], tmp_path: Path) -> Path:
     return calibrated(tmp_path / "calibration", designed, frames)
 
 
-def calibrated(folder: Path, machine: Machine, frames: tuple[CameraFrame, ...]) -> Path:
+def calibrated(folder: Path, machine: Machine, frames: tuple[Frame, ...]) -> Path:
     folder.mkdir()
     write_machine(folder / "machine.json", machine, frames)
     return folder
 
 
-def on_mirrors(frame: LightFrame) -> np.ndarray:
+def on_mirrors(frame: CameraFrame) -> np.ndarray:
     return np.asarray(frame.planes["mirror"]) > 0
 
 
@@ -97,7 +96,7 @@ class TestPerfectMachine:
     def test_same_as_the_simulated_capture(
         self,
         export: ExportedDesign,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         simulated: LightField,
         calibration: Path,
@@ -105,7 +104,7 @@ class TestPerfectMachine:
         suffix: str,
         factor: int,
     ) -> None:
-        def deeper(image: np.ndarray, _frame: CameraFrame, _phase: str) -> np.ndarray:
+        def deeper(image: np.ndarray, _frame: Frame, _phase: str) -> np.ndarray:
             return image if factor == 1 else image.astype(np.uint16) * factor
 
         run = write_run(tmp_path / "run", export, frames, perfect, change=deeper, suffix=suffix)
@@ -128,7 +127,7 @@ class TestPerfectMachine:
     def test_corrections_restore_what_a_camera_does(
         self,
         export: ExportedDesign,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         simulated: LightField,
         calibration: Path,
@@ -141,11 +140,11 @@ class TestPerfectMachine:
         fall = (camera.directions(pixels) @ camera.axes[2])[..., None] ** 4
         stray = np.linspace(1000, 3000, 416)[:, None]
 
-        def taken(image: np.ndarray, frame: CameraFrame, phase: str) -> np.ndarray:
+        def taken(image: np.ndarray, frame: Frame, phase: str) -> np.ndarray:
             light = 100.0 * image * fall if phase == LIT else 0.0 * image
             return np.rint(light * exposure_of(frame) + stray).astype(np.uint16)
 
-        def exposure_of(frame: CameraFrame) -> float:
+        def exposure_of(frame: Frame) -> float:
             return 2.0 if frame.stop == 5 else 1.0
 
         run = write_run(tmp_path / "run", export, frames, perfect, (DARK, LIT), taken)
@@ -160,7 +159,7 @@ class TestPerfectMachine:
     def test_srgb_and_flat_field(
         self,
         export: ExportedDesign,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         simulated: LightField,
         calibration: Path,
@@ -168,7 +167,7 @@ class TestPerfectMachine:
     ) -> None:
         shade = np.linspace(1, 0.5, 416)[:, None]
 
-        def taken(image: np.ndarray, _frame: CameraFrame, _phase: str) -> np.ndarray:
+        def taken(image: np.ndarray, _frame: Frame, _phase: str) -> np.ndarray:
             light = np.where(
                 image <= 10, image / 255 / 12.92, ((image / 255 + 0.055) / 1.055) ** 2.4
             )
@@ -189,14 +188,14 @@ class TestPerfectMachine:
         assert np.median(dark) <= 1
 
 
-def set_exposure(run: Path, frame: CameraFrame, phase: str, seconds: float) -> None:
+def set_exposure(run: Path, frame: Frame, phase: str, seconds: float) -> None:
     path = run / PHOTOGRAPHS / f"{exposure_name(frame, phase)}.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "exposure_s": seconds}))
 
 
 @pytest.fixture
 def run(
-    export: ExportedDesign, frames: tuple[CameraFrame, ...], perfect: Photographs, tmp_path: Path
+    export: ExportedDesign, frames: tuple[Frame, ...], perfect: Photographs, tmp_path: Path
 ) -> Path:
     return write_run(tmp_path / "run", export, frames, perfect)
 
@@ -234,7 +233,7 @@ class TestIncomplete:
         plan: Plan,
         run: Path,
         designed: Machine,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         tmp_path: Path,
     ) -> None:
         stop = int(np.bincount(plan.stop[0]).argmax())
@@ -248,7 +247,7 @@ class TestIncomplete:
     def test_a_dark_photograph_that_is_missing(
         self,
         export: ExportedDesign,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         calibration: Path,
         tmp_path: Path,
@@ -269,7 +268,7 @@ class TestIncomplete:
     def test_a_dark_photograph_of_another_exposure(
         self,
         export: ExportedDesign,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         simulated: LightField,
         calibration: Path,
@@ -280,7 +279,7 @@ class TestIncomplete:
         phase, seconds, without, scaled = case
         stray = 1000.0
 
-        def taken(image: np.ndarray, frame: CameraFrame, taken_in: str) -> np.ndarray:
+        def taken(image: np.ndarray, frame: Frame, taken_in: str) -> np.ndarray:
             own = seconds if (taken_in, frame.stop) == (phase, 3) else 1.0
             light = 50_000 if taken_in == DARK != phase else stray * own
             return np.rint(100.0 * image + light).astype(np.uint16)
@@ -303,7 +302,7 @@ class TestIncomplete:
         self,
         export: ExportedDesign,
         plan: Plan,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         calibration: Path,
         tmp_path: Path,
@@ -352,7 +351,7 @@ class TestRefused:
     def test_no_photograph_of_the_object(
         self,
         export: ExportedDesign,
-        frames: tuple[CameraFrame, ...],
+        frames: tuple[Frame, ...],
         perfect: Photographs,
         calibration: Path,
         tmp_path: Path,
@@ -369,7 +368,7 @@ class TestRefused:
     def test_a_flat_field_of_another_size(
         self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
     ) -> None:
-        frame = CameraFrame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
+        frame = Frame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
         image = np.full((100, 200, 3), 255, dtype=np.uint8)
         write_exposure(tmp_path, frame, LIT, image, "a_0001_lit.png")
         options = {"flat": (tmp_path / "a_0001_lit.png",)}

@@ -236,14 +236,6 @@ class TestValue:
     def test_lists_in_words(self, given: str, said: str) -> None:
         assert said in refusal(None, given)
 
-    def test_lists_of_lists_and_of_text_in_words(self) -> None:
-        """As `tbcad explain` shows them; their errors have words of their own."""
-        fields = dict(dotted_fields(Spec))
-        texts = {key: allowed_text(one.annotation, one.metadata) for key, one in fields.items()}
-        assert texts["prototype.catalogues"] == "texts in brackets"
-        each = "three numbers in brackets, each from -1000 to 1000"
-        assert texts["prototype.stage.leds_mm"] == f"lists in brackets, each with {each}, or auto"
-
     @pytest.mark.parametrize("value", ["''", "'a\\nb'", "'../x'", "7", "'" + "a" * 81 + "'"])
     def test_names_are_plain(self, value: str) -> None:
         assert "name is " in refusal(None, f"name={value}")
@@ -350,10 +342,6 @@ class TestOptions:
     @pytest.mark.parametrize("value", ["4\nname = 'x'", "4]\n[x", "", "[" * 50_000])
     def test_are_one_value(self, value: str) -> None:
         assert refusal(None, f"n={value}").startswith("option: optics.n is ")
-
-    def test_do_not_hide_a_wrong_file(self, file: Path) -> None:
-        file.write_text("optics = 3", encoding="utf-8")
-        assert "optics is 3" in refusal(file, "n=4")
 
     @given(st.text(max_size=40))
     def test_any_text_is_a_spec_or_one_line(self, text: str) -> None:

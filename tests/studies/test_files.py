@@ -27,8 +27,6 @@ from tbcad.studies.capture_area import capture_area
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import elevation
 from tbcad.studies.paper import (
-    balanced_sensors,
-    claims,
     is_table_i,
     with_lens_of_table_i,
 )
@@ -177,12 +175,6 @@ def test_sweeps_refused(first: int, last: int) -> None:
     with pytest.raises(InputError, match="--from or --to"):
         n_range(first, last)
     assert list(n_range(2, 4)) == [2, 3, 4]
-
-
-def test_claims_say_where_in_the_paper() -> None:
-    assert all(claim.where and claim.text for claim in claims().values())
-    assert claims()["virtual_cameras"].value == 1657
-    assert [row.n for row in balanced_sensors()] == [12, 18, 26, 36]
 
 
 def test_which_designs_are_the_papers() -> None:
