@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.simulate.camera_photographs import Geometry, photographed
@@ -237,13 +237,13 @@ def _figures(means: Table) -> tuple[Figure, ...]:
     return (*figures, *contrast)
 
 
-def _panels(means: Table) -> tuple[Panel, ...]:
+def _panels(means: Table) -> tuple[PlotPanel, ...]:
     labels = {
         "ssim": ("Similarity of views to the truth", "mean SSIM"),
         "blur_mm": ("Blur of views", "mean standard deviation at the object, mm"),
     }
     return tuple(
-        Panel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
+        PlotPanel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
         for column, (title, unit) in labels.items()
     )
 

@@ -15,10 +15,10 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.light_field import CameraFrame, LightField, band_arrays
 from tbcad.simulate.capture.photograph import CENTRE, RowBand, seen_by, to_bytes
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulate.scene.rays import MirrorRays, Shift, part_tracer, unit_directions
+from tbcad.simulate.scene.rays import Shift, TracedRays, part_tracer, unit_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 
-PartTracer = Callable[[range, range, Shift], MirrorRays]
+PartTracer = Callable[[range, range, Shift], TracedRays]
 
 
 @dataclass(frozen=True)

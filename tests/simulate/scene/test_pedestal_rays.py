@@ -12,7 +12,7 @@ from tbcad.optics.power_diagram import PLANES
 from tbcad.simulate.capture.photograph import photograph
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulate.scene.rays import MirrorRays, exact_tracer, pixel_directions
+from tbcad.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.tolerance.montecarlo.coverage import mirror_coverage
@@ -42,7 +42,7 @@ def exported(made: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Ex
     return export_with_meshes(tmp_path_factory.mktemp("pedestals"), made)
 
 
-def every_row(at: Reflector) -> MirrorRays:
+def every_row(at: Reflector) -> TracedRays:
     return exact_tracer(at)(range(at.camera.height_px), CENTRE)
 
 

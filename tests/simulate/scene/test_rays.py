@@ -6,14 +6,14 @@ import pytest
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import design
 from tbcad.optics.reflection import miss_distances
-from tbcad.simulate.scene.rays import MirrorRays, exact_tracer, pixel_directions
+from tbcad.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.spec.load import load_spec
 
 Cameras = tuple[Reflector, Reflector]
 
 
-def every_row(at: Reflector) -> MirrorRays:
+def every_row(at: Reflector) -> TracedRays:
     return exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0))
 
 
