@@ -51,6 +51,7 @@ def test_noise_that_is_larger_than_said_is_found(prior: Prior, factor: float) ->
     noisy = every_highlight(machine, 6, factor * NOISE_PX)
     found = estimate(prior, replace(noisy, sigma=np.full(len(noisy), NOISE_PX)))
     assert found.noise_factor == pytest.approx(factor, rel=0.1)
+    assert np.sqrt((found.sigmas_off**2).mean() / 2) == pytest.approx(1, rel=0.15)
     assert found.used.all()
 
 
