@@ -10,8 +10,12 @@ Rows = list[dict[str, str]]
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """The bytes of all files by name."""
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    """The bytes of all files by name, those of folders in it too."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 def edit_json(path: Path, change: Callable[[dict[str, Any]], object]) -> None:

@@ -16,7 +16,7 @@ from tbcad.simulate.scene.exported import read_export
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.led_light import Occluders
-from tbcad.simulated_run.photographs import Chain, SimulatedRun, frames_of
+from tbcad.simulated_run.photographs import ImagingChain, SimulatedRun, frames_of
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.process.process import load_process, process_errors
 from tbcad.types import Floats
@@ -67,7 +67,7 @@ def small_run(
     stops: Sequence[int],
     seed: int = 3,
     errors: Errors | None = None,
-    chain: Chain | None = None,
+    chain: ImagingChain | None = None,
     subject_mm: float = 0.0,
 ) -> Small:
     """A run of an export through some stops, twice.
@@ -94,7 +94,7 @@ def small_run(
         frames,
         scene,
         Occluders(scene.embree if subject_mm else None, None),
-        chain or Chain(led_light=BRIGHT),
+        chain or ImagingChain(led_light=BRIGHT),
         seed,
     )
     series = np.array([frame.object_turn_deg // 180 for frame in frames])

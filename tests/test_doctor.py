@@ -1,6 +1,5 @@
 """The doctor: what it finds wrong, and the commands it gives."""
 
-import platform
 import sys
 from pathlib import Path
 
@@ -85,10 +84,6 @@ class TestOneKernel:
             "uv pip install --python '/my venv/python' \"cadquery-ocp==7.8.1.*\""
         )
 
-    def test_the_same_twice_is_wrong(self) -> None:
-        twice = [("cadquery-ocp", "7.8.1.1"), ("cadquery-ocp", "7.9.3")]
-        assert not one_of("CAD kernel", KERNELS, twice).ok
-
     def test_none_is_wrong(self) -> None:
         finding = one_of("CAD kernel", KERNELS, [("numpy", "2")])
         assert not finding.ok
@@ -108,20 +103,12 @@ class TestVersions:
     def test_names_are_compared_in_one_spelling(self) -> None:
         assert versions([Requirement("ocp_gordon<0.2")], [("ocp-gordon", "0.1.18")]).ok
 
-    def test_of_no_requirements_says_that_tbcad_is_missing(self) -> None:
-        assert not versions([], []).ok
-
 
 class TestPython:
     @pytest.mark.parametrize(("version", "ok"), [("3.10.9", False), ("3.11.0", True)])
     def test_is_compared(self, monkeypatch: pytest.MonkeyPatch, version: str, ok: bool) -> None:
         monkeypatch.setattr(doctor, "metadata", lambda _: {"Requires-Python": ">=3.11,<3.14"})
         assert doctor.python_version(version).ok is ok
-
-    def test_of_a_release_candidate_is_taken(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(doctor, "metadata", lambda _: {"Requires-Python": ">=3.11,<3.14"})
-        assert doctor.python_version("3.13.0rc2").ok
-        assert not doctor.python_version("3.14.0").ok
 
 
 class TestAttempt:
@@ -193,12 +180,6 @@ def test_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free: float, ok: 
     monkeypatch.setattr(doctor.shutil, "disk_usage", usage)
     assert disk(tmp_path / "not" / "yet").ok is ok
     assert asked == [tmp_path]
-
-
-def test_the_pins_allow_this_python() -> None:
-    text = (Path(__file__).parents[1] / "pyproject.toml").read_text()
-    wanted = next(line.split('"')[1] for line in text.splitlines() if "requires-python" in line)
-    assert Requirement(f"python{wanted}").specifier.contains(platform.python_version())
 
 
 def test_libraries_of_the_machine_are_optional() -> None:

@@ -30,7 +30,7 @@ PLANE_COS = 1 - 1e-9
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class RoundFace:
     """Cylindrical faces on one axis, with one radius.
 
     Attributes:
@@ -88,7 +88,7 @@ def distance(shape: TopoDS_Shape, point: Floats) -> float:
     return float(BRepExtrema_DistShapeShape(vertex, shape).Value())
 
 
-def cylinders(shape: TopoDS_Shape) -> list[Cylinder]:
+def cylinders(shape: TopoDS_Shape) -> list[RoundFace]:
     """All cylindrical faces, those with one axis and radius that meet as one."""
     walls = [wall for face in faces(shape) if (wall := _wall(face))]
     found = [_joined(group) for group in _groups(walls)]
@@ -106,7 +106,7 @@ def cylinders(shape: TopoDS_Shape) -> list[Cylinder]:
     ]
 
 
-def _beyond(one: Cylinder) -> tuple[Floats, Floats]:
+def _beyond(one: RoundFace) -> tuple[Floats, Floats]:
     """Points of the axis beyond both ends."""
     return one.start - PROBE_MM * one.axis, one.end + PROBE_MM * one.axis
 
@@ -199,11 +199,11 @@ def _reach(wall: _Wall, point: Floats, direction: Floats) -> tuple[float, float]
     return ends[0], ends[1]
 
 
-def _joined(group: Sequence[_Wall]) -> Cylinder:
+def _joined(group: Sequence[_Wall]) -> RoundFace:
     first = group[0]
     direction = first.direction * (-1.0 if tuple(np.round(first.direction, 6)) < (0, 0, 0) else 1.0)
     reaches = [_reach(wall, first.point, direction) for wall in group]
     low, high = min(one[0] for one in reaches), max(one[1] for one in reaches)
     areas = sum((wall.reach[1] - wall.reach[0]) * wall.turn_deg for wall in group)
     start, end = first.point + low * direction, first.point + high * direction
-    return Cylinder(start, end, first.radius, min(areas / (high - low), FULL_DEG), first.hollow)
+    return RoundFace(start, end, first.radius, min(areas / (high - low), FULL_DEG), first.hollow)

@@ -151,7 +151,7 @@ class Halves:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class MachineCalibration:
     """A calibrated machine."""
 
     setup: Setup
@@ -163,14 +163,14 @@ class Calibration:
 
 def calibrate(
     setup: Setup, detection: Detection, prior: Prior, progress: Progress = lambda _: None
-) -> Calibration:
+) -> MachineCalibration:
     """Estimate the machine, and how well its rays are known."""
     found = estimate(prior, detection.highlights, progress)
     progress("uncertainty of the rays")
     ids, absent, frame, sphere = ray_places(setup)
     known = ray_uncertainty(found, frame, sphere)
     halves = cross_validation(found, frame, sphere, progress)
-    return Calibration(setup, detection, found, MirrorRays(ids, known, absent), halves)
+    return MachineCalibration(setup, detection, found, MirrorRays(ids, known, absent), halves)
 
 
 def ray_places(setup: Setup) -> tuple[tuple[str, ...], tuple[str, ...], Ints, Ints]:

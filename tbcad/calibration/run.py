@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
+from tbcad.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.calibration.detection.detect import detect
 from tbcad.calibration.detection.expected import Room
 from tbcad.calibration.intrinsics.files import read_lens
@@ -45,7 +45,7 @@ class WrittenCalibration:
     """
 
     folder: Path
-    result: Calibration
+    result: MachineCalibration
     verdict: CalibrationVerdict
     text: str
     record: dict[str, Any]
@@ -111,7 +111,7 @@ def _setup(run: Run, export: ExportedDesign, options: CalibrateOptions) -> Setup
 
 
 def _written(
-    result: Calibration,
+    result: MachineCalibration,
     truth: Machine | None,
     out: Path,
     basis: dict[str, Any],

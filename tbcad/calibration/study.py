@@ -30,7 +30,7 @@ from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Machine
 from tbcad.prototype.stage.leds import hidden_by_object
 from tbcad.records.exposure import Frame
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Cell, Record, Table
 from tbcad.simulate.prototype.plan import read_plan
@@ -226,13 +226,13 @@ def _figures(alone: Table, whole: Table) -> tuple[Figure, ...]:
     )
 
 
-def panels(whole: Table, process: str) -> tuple[Panel, ...]:
+def panels(whole: Table, process: str) -> tuple[PlotPanel, ...]:
     """Errors at the object of whole machines, by noise and by number of LEDs."""
     records = whole.records()
     noise = [r for r in records if r["layout"] == "design" and r["process"] == process]
     leds = [r for r in records if r["layout"] == "best"]
     return tuple(
-        Panel(
+        PlotPanel(
             title,
             label,
             "mm at the object's centre",

@@ -1,6 +1,6 @@
 """The command `tbcad`: thin; heavy libraries are imported inside the commands."""
 
-from tbcad.cli import garbage as _garbage  # noqa: F401, I001 - first of all
+from tbcad.cli import memory as _memory  # noqa: F401, I001 - first of all
 
 import gc
 import os

@@ -5,6 +5,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from types import FrameType
 
 INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
@@ -29,20 +30,25 @@ def signals_as_interrupt() -> Iterator[None]:
         numbers = []
     taken = {number: signal.getsignal(number) for number in numbers}
     taken = {number: handler for number, handler in taken.items() if handler in DEFAULTS}
+    again: list[threading.Timer] = []
     for number in taken:
-        signal.signal(number, _interrupt)
+        signal.signal(number, partial(_interrupt, again))
     try:
         yield
     finally:
+        for timer in again:  # the command has ended: its caller is not to be stopped
+            timer.cancel()
         for number, handler in taken.items():
             signal.signal(number, handler)
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
+def _interrupt(again: list[threading.Timer], number: int, frame: FrameType | None) -> None:
     """Stop, but after an import: native modules that are stopped while they load hide the cause."""
     while frame:
         if frame.f_code.co_filename == IMPORTING:
-            threading.Timer(AGAIN_S, os.kill, (os.getpid(), number)).start()
+            timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
+            again.append(timer)
+            timer.start()
             return
         frame = frame.f_back
     raise KeyboardInterrupt

@@ -15,7 +15,7 @@ from tbcad.datasets.pictures import Pictures, default_size, taken_pictures
 from tbcad.datasets.pinholes import pinhole_of
 from tbcad.datasets.ray_table import write_ray_table
 from tbcad.datasets.seed_points import SeedPoints, seed_points
-from tbcad.datasets.virtual_cameras import VirtualCameras, virtual_cameras
+from tbcad.datasets.virtual_cameras import FittedCameras, virtual_cameras
 from tbcad.errors import InputError
 from tbcad.formats.colmap import SparseModel
 from tbcad.formats.csv_table import Row, write_table
@@ -122,7 +122,7 @@ def _check_same_cameras(source: LightField, export: ExportedDesign) -> None:
 def _written(
     folder: Path,
     source: LightField,
-    virtual: VirtualCameras,
+    virtual: FittedCameras,
     scene: Scene | None,
     options: ExportOptions,
 ) -> dict[str, Any]:
@@ -160,7 +160,7 @@ def _of_pictures(size: int, pictures: Pictures, seeds: SeedPoints) -> dict[str, 
     return {**found, "reprojection_error_px": figures}
 
 
-def _fit(virtual: VirtualCameras) -> dict[str, dict[str, float]]:
+def _fit(virtual: FittedCameras) -> dict[str, dict[str, float]]:
     """Median and maximum over the virtual cameras, mm."""
     columns = {
         "rms_distance_from_common_point_mm": virtual.rms_mm,
@@ -178,7 +178,7 @@ def _rounded(value: np.floating[Any]) -> float:
     return round(float(value), DIGITS)
 
 
-def _rows(virtual: VirtualCameras) -> Iterator[Row]:
+def _rows(virtual: FittedCameras) -> Iterator[Row]:
     figures: Iterable[Floats] = np.column_stack(
         [virtual.pitch_mm, virtual.rms_mm, virtual.worst_mm, virtual.central_error_mm]
     )

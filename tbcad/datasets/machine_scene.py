@@ -142,7 +142,7 @@ def _blender_camera(camera: Camera) -> dict[str, Any]:
     }
 
 
-class Mesh(NamedTuple):
+class SceneMesh(NamedTuple):
     """Triangles: points (v, 3), mm, unit normals there (v, 3), faces (f, 3), colours (v, 3)."""
 
     points: Floats
@@ -155,7 +155,7 @@ class Mesh(NamedTuple):
         return mesh_ply(*self)
 
 
-def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[Mesh, Mesh]:
+def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[SceneMesh, SceneMesh]:
     """Mirrors of a camera's shell, with the normals of their spheres; and its walls.
 
     A facet reflects like a flat mirror, but renderers reflect at normals that they interpolate
@@ -173,16 +173,16 @@ def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[Mesh, Me
     return _outward(mirrors, normals), _flat(walls)
 
 
-def _outward(corners: Floats, normals: Floats) -> Mesh:
+def _outward(corners: Floats, normals: Floats) -> SceneMesh:
     """Facets (f, 3, 3) and normals at their corners (3 f, 3), turned as the facets are."""
     across = np.repeat(_facet_normals(corners), 3, axis=0)
     turned = np.where((normals * across).sum(axis=1, keepdims=True) < 0, -normals, normals)
-    return Mesh(corners.reshape(-1, 3), turned, _separate(len(corners)))
+    return SceneMesh(corners.reshape(-1, 3), turned, _separate(len(corners)))
 
 
-def _flat(corners: Floats) -> Mesh:
+def _flat(corners: Floats) -> SceneMesh:
     normals = np.repeat(_facet_normals(corners), 3, axis=0)
-    return Mesh(corners.reshape(-1, 3), normals, _separate(len(corners)))
+    return SceneMesh(corners.reshape(-1, 3), normals, _separate(len(corners)))
 
 
 def _facet_normals(corners: Floats) -> Floats:
@@ -193,7 +193,7 @@ def _separate(count: int) -> Ints:
     return np.arange(3 * count).reshape(-1, 3)
 
 
-def object_mesh(scene: Scene) -> Mesh:
+def object_mesh(scene: Scene) -> SceneMesh:
     """The object with the colours that a capture shows, light included: what it sends out.
 
     Renderers see light on the outside of facets; one that does not enclose a body has a back too.
@@ -203,7 +203,7 @@ def object_mesh(scene: Scene) -> Mesh:
     if is_closed(subject.points, subject.faces):
         return outside
     back = _side(scene, *divided, -1.0)
-    return Mesh(
+    return SceneMesh(
         np.concatenate([outside.points, back.points]),
         np.concatenate([outside.normals, back.normals]),
         np.concatenate([outside.faces, back.faces[:, ::-1] + len(outside.points)]),
@@ -211,14 +211,14 @@ def object_mesh(scene: Scene) -> Mesh:
     )
 
 
-def _side(scene: Scene, facet: Ints, weight: Floats, faces: Ints, side: float) -> Mesh:
+def _side(scene: Scene, facet: Ints, weight: Floats, faces: Ints, side: float) -> SceneMesh:
     """The outside (1), or the back (-1), which is a little behind it."""
     subject = scene.subject
     toward = -side * _facet_normals(subject.points[subject.faces])[facet]
     hits = SurfaceHits(np.arange(len(facet)), np.zeros(len(facet)), facet, weight, toward)
     spots, light = hits.spots(subject), hits.light(subject, scene.shade)
     place = spots.place if side > 0 else spots.place + BEHIND_MM * spots.facet_normal
-    return Mesh(place, spots.normal, faces, hits.albedo(subject) * light[:, None])
+    return SceneMesh(place, spots.normal, faces, hits.albedo(subject) * light[:, None])
 
 
 def _divided(subject: SceneObject) -> tuple[Ints, Floats, Ints]:

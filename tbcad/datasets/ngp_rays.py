@@ -15,7 +15,7 @@ from tbcad.datasets.crops import Crop
 from tbcad.datasets.nerfstudio import IMAGES, TRANSFORMS, mask_png
 from tbcad.datasets.pictures import crop_of
 from tbcad.datasets.pinholes import Pinhole, fitted_pinhole
-from tbcad.datasets.virtual_cameras import VirtualCameras
+from tbcad.datasets.virtual_cameras import FittedCameras
 from tbcad.geometry.vectors import unit
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.image_files import png_bytes
@@ -24,7 +24,7 @@ from tbcad.types import Floats, Progress
 
 
 def write_ngp_rays(
-    folder: Path, source: LightField, virtual: VirtualCameras, progress: Progress
+    folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
 ) -> None:
     """Write the crop of each mirror, right way round, with its rays, masks and about its pose."""
     images = folder / IMAGES

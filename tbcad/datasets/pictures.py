@@ -7,7 +7,7 @@ import numpy as np
 
 from tbcad.compiled import compiled
 from tbcad.datasets.crops import Crop, MirrorId, chosen_mirrors, read_crop, reading_order
-from tbcad.datasets.virtual_cameras import VirtualCameras, at_middle, virtual_cameras
+from tbcad.datasets.virtual_cameras import FittedCameras, at_middle, virtual_cameras
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
@@ -141,14 +141,14 @@ class Pictures:
     reprojection_px: Floats | None
 
 
-def default_size(virtual: VirtualCameras, capture_mm: float) -> int:
+def default_size(virtual: FittedCameras, capture_mm: float) -> int:
     """An even number of pixels, as fine as the finest tenth of the virtual cameras."""
     return 2 * int(np.ceil(capture_mm / np.percentile(virtual.pitch_mm, FINEST) / 2))
 
 
 def taken_pictures(
     source: LightField,
-    virtual: VirtualCameras,
+    virtual: FittedCameras,
     size_px: int,
     scene: Scene | None,
     progress: Progress = lambda _: None,
@@ -233,7 +233,7 @@ def pinhole_pictures(source: LightField, progress: Progress = lambda _: None) ->
     )
 
 
-def _size(virtual: VirtualCameras, capture_mm: float) -> int:
+def _size(virtual: FittedCameras, capture_mm: float) -> int:
     """Width and height of the pictures, smaller where they would take too much memory."""
     if not len(virtual):
         return 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tbcad.datasets.crops import reading_order
 from tbcad.datasets.pictures import crop_of
-from tbcad.datasets.virtual_cameras import VirtualCameras
+from tbcad.datasets.virtual_cameras import FittedCameras
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.light_field_writer import chunked
 from tbcad.types import Progress
@@ -29,7 +29,7 @@ COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
 
 
 def write_ray_table(
-    folder: Path, source: LightField, virtual: VirtualCameras, progress: Progress
+    folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
 ) -> int:
     """Write origin, direction, colour and virtual camera of each ray that meets the sphere.
 
@@ -53,7 +53,7 @@ def write_ray_table(
     return total
 
 
-def _write_h5(path: Path, source: LightField, virtual: VirtualCameras, total: int) -> None:
+def _write_h5(path: Path, source: LightField, virtual: FittedCameras, total: int) -> None:
     """The same arrays, of which programs read parts."""
     with h5py.File(path, "w", libver=("v110", "v110")) as store:
         stored = {
@@ -76,14 +76,12 @@ def _entry(name: str) -> zipfile.ZipInfo:
     return entry
 
 
-def _values(
-    source: LightField, virtual: VirtualCameras, name: str
-) -> Iterator[NDArray[np.generic]]:
+def _values(source: LightField, virtual: FittedCameras, name: str) -> Iterator[NDArray[np.generic]]:
     for k in reading_order(source, virtual.mirrors).tolist():
         crop = crop_of(source, virtual.mirrors[k])
         yield np.full(crop.meets.sum(), k) if name == "camera" else getattr(crop, name)[crop.meets]
 
 
-def _tables(virtual: VirtualCameras) -> dict[str, NDArray[np.generic]]:
+def _tables(virtual: FittedCameras) -> dict[str, NDArray[np.generic]]:
     names = np.array([one.name for one in virtual.mirrors], dtype="<U8")
     return {"name": names, "centre": virtual.centre}

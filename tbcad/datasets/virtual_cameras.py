@@ -29,7 +29,7 @@ MIN_DISTANCE = 1.05
 
 
 @dataclass(frozen=True)
-class VirtualCameras:
+class FittedCameras:
     """m virtual cameras of a light field, and how well each is central.
 
     Attributes:
@@ -63,7 +63,7 @@ class VirtualCameras:
 
 def virtual_cameras(
     source: LightField, mirrors: list[MirrorId], progress: Progress = lambda _: None
-) -> VirtualCameras:
+) -> FittedCameras:
     """Measure the virtual cameras of some mirrors.
 
     Args:
@@ -86,7 +86,7 @@ def virtual_cameras(
     kept = tuple(one for one in mirrors if one.name not in left_out)
     table = np.array([row for row in rows if not isinstance(row, str)]).reshape(-1, 8)
     rays, pitch, rms, worst, error = table[:, 3:].T
-    return VirtualCameras(kept, table[:, :3], rays, pitch, rms, worst, error, left_out)
+    return FittedCameras(kept, table[:, :3], rays, pitch, rms, worst, error, left_out)
 
 
 def _measured(crop: Crop, radius: float) -> Floats | str:

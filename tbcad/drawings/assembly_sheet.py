@@ -24,7 +24,7 @@ from tbcad.drafting.sheet import (
     table,
 )
 from tbcad.drafting.views import as_entities
-from tbcad.drawings.export import Export
+from tbcad.drawings.export import DrawnExport
 from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.report.callouts import EDGE, RADIUS, Callout, place_callouts
@@ -153,7 +153,7 @@ class AssemblyJob:
     title: str
 
 
-def assembly_job(export: Export, machine: Machine) -> AssemblyJob:
+def assembly_job(export: DrawnExport, machine: Machine) -> AssemblyJob:
     """What is needed to draw the assembly.
 
     Raises:

@@ -20,7 +20,7 @@ PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
 
 
 @dataclass(frozen=True)
-class Export:
+class DrawnExport:
     """An export that is drawn.
 
     Attributes:
@@ -78,7 +78,7 @@ class Export:
         return self.manifest.files[name].sha256[:12]
 
 
-def read_export(folder: Path) -> Export:
+def read_export(folder: Path) -> DrawnExport:
     """The export in a folder.
 
     Raises:
@@ -92,10 +92,10 @@ def read_export(folder: Path) -> Export:
     shells = tuple(name for name in SHELLS if f"{name}.step" in manifest.files)
     design = DesignRecord.read(_written(folder, manifest, DESIGN))
     if PROTOTYPE not in manifest.files:
-        return Export(folder, manifest, design, None, shells)
+        return DrawnExport(folder, manifest, design, None, shells)
     for name in PROTOTYPE_FILES:
         _written(folder, manifest, name)
-    return Export(folder, manifest, design, read_machine(folder), shells)
+    return DrawnExport(folder, manifest, design, read_machine(folder), shells)
 
 
 def _written(folder: Path, manifest: Manifest, name: str) -> Path:

@@ -13,7 +13,7 @@ import numpy as np
 from tbcad.cad.features import distance
 from tbcad.cad.projection import Shape
 from tbcad.drafting.sheet import TABLE_ROW_MM, table
-from tbcad.drawings.holes import Hole, is_coaxial, mm
+from tbcad.drawings.holes import DrawnHole, is_coaxial, mm
 from tbcad.formats.entities import Entity, Point
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
@@ -42,7 +42,7 @@ ON_PART_MM = 0.5  # of a pad's place from the part, offset as the coupon asks
 
 
 @dataclass(frozen=True)
-class Table:
+class SheetTable:
     """A table of a column.
 
     Attributes:
@@ -56,7 +56,7 @@ class Table:
     rows: tuple[Row, ...]
 
 
-def in_columns(tables: Sequence[Table], first: int, others: int) -> list[list[Table]]:
+def in_columns(tables: Sequence[SheetTable], first: int, others: int) -> list[list[SheetTable]]:
     """Tables in the first column and those that follow; one longer than a column is cut.
 
     Args:
@@ -64,7 +64,7 @@ def in_columns(tables: Sequence[Table], first: int, others: int) -> list[list[Ta
         first: rows that the first column has room for, heads too.
         others: rows of each other column.
     """
-    columns: list[list[Table]] = [[]]
+    columns: list[list[SheetTable]] = [[]]
     room = first
     for one in tables:
         rest = one
@@ -80,7 +80,7 @@ def in_columns(tables: Sequence[Table], first: int, others: int) -> list[list[Ta
     return columns
 
 
-def drawn(corner: Point, tables: Sequence[Table]) -> Iterator[Entity]:
+def drawn(corner: Point, tables: Sequence[SheetTable]) -> Iterator[Entity]:
     """A column of tables below and right of a corner."""
     x, y = corner
     for one in tables:
@@ -131,13 +131,13 @@ def reamed_to(what: str) -> str:
     return found[1] if found else ""
 
 
-def fits_table(holes: Sequence[tuple[str, Hole]], mates: Sequence[Mate]) -> Table:
+def fits_table(holes: Sequence[tuple[str, DrawnHole]], mates: Sequence[Mate]) -> SheetTable:
     """Holes that take a part, those alike in a row."""
     alike: dict[Row, list[str]] = {}
     for number, hole in holes:
         for cells in sorted({_cells(hole, mate) for mate in mates if _takes(hole, mate)}):
             alike.setdefault(cells, []).append(number)
-    return Table(HEAD, WIDTHS_MM, tuple(_rows(alike)))
+    return SheetTable(HEAD, WIDTHS_MM, tuple(_rows(alike)))
 
 
 def _rows(alike: Mapping[Row, Sequence[str]]) -> Iterator[Row]:
@@ -146,7 +146,7 @@ def _rows(alike: Mapping[Row, Sequence[str]]) -> Iterator[Row]:
             yield " ".join(numbers[start : start + NUMBERS]), *cells
 
 
-def _takes(hole: Hole, mate: Mate) -> bool:
+def _takes(hole: DrawnHole, mate: Mate) -> bool:
     diameter = 2 * hole.cylinder.radius
     return (
         not np.any(hole.slot)
@@ -155,7 +155,7 @@ def _takes(hole: Hole, mate: Mate) -> bool:
     )
 
 
-def _cells(hole: Hole, mate: Mate) -> Row:
+def _cells(hole: DrawnHole, mate: Mate) -> Row:
     diameter = 2 * hole.cylinder.radius
     reamed = mate.reamed and mm(diameter) == mm(mate.size)
     size = f"{mm(diameter)} {mate.reamed}" if reamed else mm(diameter)
@@ -165,7 +165,7 @@ def _cells(hole: Hole, mate: Mate) -> Row:
 
 
 @dataclass(frozen=True)
-class Seat:
+class ListedSeat:
     """A seat.
 
     Attributes:
@@ -187,7 +187,7 @@ class Seat:
     pad: float
 
 
-def seats_table(shape: Shape, seats: Sequence[Seat]) -> Table:
+def seats_table(shape: Shape, seats: Sequence[ListedSeat]) -> SheetTable:
     """The seats whose pads are on a part, places in the part's frame."""
     rows = [
         (
@@ -200,4 +200,4 @@ def seats_table(shape: Shape, seats: Sequence[Seat]) -> Table:
         for one in seats
         if all(distance(shape, contact) < ON_PART_MM for contact in one.contacts)
     ]
-    return Table(SEATS_HEAD, SEATS_WIDTHS_MM, tuple(rows))
+    return SheetTable(SEATS_HEAD, SEATS_WIDTHS_MM, tuple(rows))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.cad.features import HOLE_DEG, SLOT_DEG, Cylinder
+from tbcad.cad.features import HOLE_DEG, SLOT_DEG, RoundFace
 from tbcad.drafting.sheet import is_legible
 from tbcad.drafting.views import ABOVE, FRONT, LEFT
 from tbcad.types import Floats
@@ -18,7 +18,7 @@ PARALLEL_COS, NEAR_MM, SAME_MM = 1 - 1e-6, 0.1, 1e-3
 
 
 @dataclass(frozen=True)
-class Hole:
+class DrawnHole:
     """A hole or slot.
 
     Attributes:
@@ -29,7 +29,7 @@ class Hole:
         takes: name of the part that goes in, empty where none does.
     """
 
-    cylinder: Cylinder
+    cylinder: RoundFace
     mouth: Floats
     view: str
     slot: Floats
@@ -51,8 +51,8 @@ Fastener = tuple[str, Floats, Floats]
 
 
 def numbered_holes(
-    cylinders: Sequence[Cylinder], fasteners: Iterable[Fastener]
-) -> list[tuple[str, Hole]]:
+    cylinders: Sequence[RoundFace], fasteners: Iterable[Fastener]
+) -> list[tuple[str, DrawnHole]]:
     """Holes and slots with their numbers, such as B3: by view, then from left to right.
 
     Args:
@@ -73,7 +73,7 @@ def numbered_holes(
     return numbered
 
 
-def table_rows(number: str, hole: Hole) -> Iterator[tuple[str, ...]]:
+def table_rows(number: str, hole: DrawnHole) -> Iterator[tuple[str, ...]]:
     """The row of a hole in the table, below HEAD, and a second one for what has no room in it."""
     wall = hole.cylinder
     depth = "through" if hole.through else mm(wall.length)
@@ -92,7 +92,7 @@ def mm(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
 
 
-def _remarks(hole: Hole) -> list[str]:
+def _remarks(hole: DrawnHole) -> list[str]:
     """What a slot is, what goes in, and the axis of a tilted hole."""
     found = [hole.takes] if hole.takes else []
     if np.any(hole.slot):
@@ -105,22 +105,22 @@ def _remarks(hole: Hole) -> list[str]:
     return found or [""]
 
 
-def _order(hole: Hole) -> tuple[bool, str, tuple[float, ...]]:
+def _order(hole: DrawnHole) -> tuple[bool, str, tuple[float, ...]]:
     place = VIEWS[hole.view] @ hole.mouth
     return hole.is_tilted, hole.view, tuple(np.round(place, 2).tolist())
 
 
-def _hole(wall: Cylinder, slot: Floats, fasteners: Iterable[Fastener]) -> Hole:
+def _hole(wall: RoundFace, slot: Floats, fasteners: Iterable[Fastener]) -> DrawnHole:
     view = max(VIEWS, key=lambda one: round(abs(float(VIEWS[one][2] @ wall.axis)), 6))
     near_end = float(VIEWS[view][2] @ wall.axis) > 0
     front, back = (wall.end, wall.start) if near_end else (wall.start, wall.end)
     opened = wall.open_end if near_end else wall.open_start
     back_opened = wall.open_start if near_end else wall.open_end
     mouth = front if opened or not back_opened else back
-    return Hole(wall, mouth + slot / 2, view, slot, _for(wall, slot, fasteners))
+    return DrawnHole(wall, mouth + slot / 2, view, slot, _for(wall, slot, fasteners))
 
 
-def is_coaxial(wall: Cylinder, place: Floats, along: Floats, slot: Floats | None = None) -> bool:
+def is_coaxial(wall: RoundFace, place: Floats, along: Floats, slot: Floats | None = None) -> bool:
     """Whether a line is the axis of a hole, or lies between a slot's ends."""
     axis, offset = wall.axis, place - wall.start
     off = offset - (offset @ axis) * axis
@@ -129,13 +129,13 @@ def is_coaxial(wall: Cylinder, place: Floats, along: Floats, slot: Floats | None
     return bool(abs(along @ axis) >= PARALLEL_COS and np.linalg.norm(off) < NEAR_MM)
 
 
-def _for(wall: Cylinder, slot: Floats, fasteners: Iterable[Fastener]) -> str:
+def _for(wall: RoundFace, slot: Floats, fasteners: Iterable[Fastener]) -> str:
     """The part that lies on the axis of a hole or between a slot's ends."""
     names = {part for part, place, along in fasteners if is_coaxial(wall, place, along, slot)}
     return " ".join(sorted(names))
 
 
-def _slots(ends: Sequence[Cylinder]) -> list[tuple[Cylinder, Floats]]:
+def _slots(ends: Sequence[RoundFace]) -> list[tuple[RoundFace, Floats]]:
     """Pairs of half cylinders that are the ends of slots, and the way from one to the other."""
     left, found = list(ends), []
     while left:
@@ -149,7 +149,7 @@ def _slots(ends: Sequence[Cylinder]) -> list[tuple[Cylinder, Floats]]:
     return found
 
 
-def _is_partner(one: Cylinder, other: Cylinder) -> bool:
+def _is_partner(one: RoundFace, other: RoundFace) -> bool:
     """Whether two ends belong to one slot: one radius, side by side."""
     if abs(one.radius - other.radius) > SAME_MM or abs(one.axis @ other.axis) < PARALLEL_COS:
         return False

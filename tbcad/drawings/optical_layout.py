@@ -20,7 +20,7 @@ from tbcad.drafting.sheet import (
     table,
 )
 from tbcad.drafting.views import straight
-from tbcad.drawings.export import Export
+from tbcad.drawings.export import DrawnExport
 from tbcad.formats.checked_files import columns
 from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
 from tbcad.records.design import DesignRecord
@@ -42,7 +42,7 @@ SCALES_NOTE = "In the plane y = 0, x to the right, z up; all is to scale."
 
 
 @dataclass(frozen=True)
-class Mirrors:
+class LayoutMirrors:
     """Mirrors of camera a whose directions are in the plane y = 0, by their angle.
 
     Attributes:
@@ -121,7 +121,7 @@ def layout_sheet(design: DesignRecord, rows: Sequence[MirrorRow], title: str) ->
     return [Sheet(NAME, block.title, NAME, A3, scale, middle, tuple(entities))]
 
 
-def layout_rows(export: Export) -> list[MirrorRow]:
+def layout_rows(export: DrawnExport) -> list[MirrorRow]:
     """Rows of the export's mirrors.csv.
 
     Raises:
@@ -152,12 +152,12 @@ def _text() -> tuple[str, ...]:
     )
 
 
-def _mirrors(rows: Sequence[MirrorRow]) -> Mirrors:
+def _mirrors(rows: Sequence[MirrorRow]) -> LayoutMirrors:
     flat = [row for row in rows if row.camera == "a" and abs(row.uy) < IN_PLANE]
     flat.sort(key=lambda row: math.atan2(row.ux, row.uz))
     apex, normal = columns(flat, "px pz"), columns(flat, "nx nz")
     radius = np.array([row.radius_mm or PLANAR_MM for row in flat])
-    return Mirrors(
+    return LayoutMirrors(
         apex=apex,
         centre=apex - radius[:, np.newaxis] * normal,
         radius=radius,
@@ -183,7 +183,7 @@ def _ellipses(pinhole: Floats, major: float, minor: float) -> Iterator[Entity]:
         yield Line(Layer.CENTRE, (x, z), (right, high))
 
 
-def _mirror_arcs(mirrors: Mirrors) -> Iterator[Entity]:
+def _mirror_arcs(mirrors: LayoutMirrors) -> Iterator[Entity]:
     """Arcs of whole mirrors in the plane, for camera a and mirrored for b."""
     edges = mirrors.edges()
     for k in range(1, len(mirrors.radius) - 1):
@@ -202,7 +202,7 @@ def _mirror_arcs(mirrors: Mirrors) -> Iterator[Entity]:
             yield Arc(Layer.CUT, (x, z), radius, first % 360, last % 360)
 
 
-def _rays(mirrors: Mirrors, pinhole: Floats, capture: float) -> Iterator[Entity]:
+def _rays(mirrors: LayoutMirrors, pinhole: Floats, capture: float) -> Iterator[Entity]:
     """From the pinhole to edges of three mirrors, reflected, and on past the capture sphere."""
     edges = mirrors.edges()
     for k in _traced(mirrors):
@@ -216,14 +216,14 @@ def _rays(mirrors: Mirrors, pinhole: Floats, capture: float) -> Iterator[Entity]
             yield Polyline(Layer.RAYS, ((corners[0]), corners[1], corners[2]), closed=False)
 
 
-def _traced(mirrors: Mirrors) -> list[int]:
+def _traced(mirrors: LayoutMirrors) -> list[int]:
     """The first, the middle and the last whole mirror of the plane."""
     last = len(mirrors.radius) - 2
     return sorted({1, (1 + last) // 2, last}) if last >= 1 else []
 
 
 def _places(
-    mirrors: Mirrors,
+    mirrors: LayoutMirrors,
     pinhole: Floats,
     reach: float,
     middle: Point,
@@ -269,7 +269,7 @@ def _capture_length(
 
 
 def _values(
-    rows: Sequence[MirrorRow], mirrors: Mirrors, optics: OpticsSpec, major: float
+    rows: Sequence[MirrorRow], mirrors: LayoutMirrors, optics: OpticsSpec, major: float
 ) -> list[tuple[str, ...]]:
     """Symbols, what they are, and their values."""
     radii = [row.radius_mm for row in rows if row.radius_mm]

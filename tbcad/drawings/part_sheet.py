@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.cad.features import Cylinder, bounds, cylinders, plane_levels
+from tbcad.cad.features import RoundFace, bounds, cylinders, plane_levels
 from tbcad.cad.projection import Shape, project
 from tbcad.drafting.dimensions import (
     across,
@@ -27,13 +27,13 @@ from tbcad.drafting.sheet import (
     sheet_frame,
 )
 from tbcad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
-from tbcad.drawings.fits import Mate, Table, drawn, fits_table, in_columns
+from tbcad.drawings.fits import Mate, SheetTable, drawn, fits_table, in_columns
 from tbcad.drawings.holes import (
     HEAD,
     VIEWS,
     WIDTHS_MM,
+    DrawnHole,
     Fastener,
-    Hole,
     mm,
     numbered_holes,
     table_rows,
@@ -96,7 +96,7 @@ def part_sheets(
     fasteners: Sequence[Fastener],
     text: PartText,
     mates: Sequence[Mate] = (),
-    others: Sequence[Table] = (),
+    others: Sequence[SheetTable] = (),
 ) -> list[Sheet]:
     """All sheets of a part: views and what fits of the tables, then the rest of the tables.
 
@@ -110,7 +110,7 @@ def part_sheets(
     box, found = bounds(shape), cylinders(shape)
     holes = numbered_holes(found, fasteners)
     rows = tuple(row for number, hole in holes for row in table_rows(number, hole))
-    tables = [Table(HEAD, WIDTHS_MM, rows), fits_table(holes, mates), *others]
+    tables = [SheetTable(HEAD, WIDTHS_MM, rows), fits_table(holes, mates), *others]
     frame = _frame(box, sum(len(one.rows) for one in tables))
     first, pages = _pages(tables, frame.paper)
     block = replace(text.block, sheet=f"1 of {1 + len(pages)}")
@@ -174,7 +174,7 @@ def _view(
     shape: Shape,
     frame: _Frame,
     letter: str,
-    holes: Sequence[tuple[str, Hole]],
+    holes: Sequence[tuple[str, DrawnHole]],
     lines: Sequence[tuple[Point, Point]],
 ) -> Iterator[Entity]:
     """A view with its name and the numbers of its holes, which keep off lines."""
@@ -252,7 +252,7 @@ def _chosen(shape: Shape, frame: _Frame, axis: int) -> list[float]:
     return sorted(chosen)
 
 
-def _overall(frame: _Frame, found: Sequence[Cylinder]) -> Iterator[Entity]:
+def _overall(frame: _Frame, found: Sequence[RoundFace]) -> Iterator[Entity]:
     """Length, depth and height over all; diameters of round parts are marked."""
     width, depth, height = (mm(value) for value in (frame.high - frame.low).tolist())
     round_part = any(
@@ -269,7 +269,9 @@ def _overall(frame: _Frame, found: Sequence[Cylinder]) -> Iterator[Entity]:
     yield upward((right, low), (right, high), right + LENGTH_MM, height)
 
 
-def _pages(tables: Sequence[Table], paper: Point) -> tuple[list[Table], list[list[list[Table]]]]:
+def _pages(
+    tables: Sequence[SheetTable], paper: Point
+) -> tuple[list[SheetTable], list[list[list[SheetTable]]]]:
     """The column of the first sheet, and the columns of the sheets that follow."""
     first, *others = in_columns(tables, _rows(paper), _rows(A4))
     return first, [others[k : k + 2] for k in range(0, len(others), 2)]
@@ -281,13 +283,13 @@ def _rows(paper: Point) -> int:
     return int((high - low - BESIDE_MM) / TABLE_ROW_MM)
 
 
-def _column(paper: Point, tables: Sequence[Table]) -> Iterator[Entity]:
+def _column(paper: Point, tables: Sequence[SheetTable]) -> Iterator[Entity]:
     _, _, right, high = drawing_room(paper)
     yield from drawn((right - sum(WIDTHS_MM), high), tables)
 
 
 def _table_sheet(
-    text: PartText, columns: Sequence[Sequence[Table]], number: int, count: int
+    text: PartText, columns: Sequence[Sequence[SheetTable]], number: int, count: int
 ) -> Sheet:
     """What is left of the tables."""
     block = replace(text.block, sheet=f"{number} of {count}")

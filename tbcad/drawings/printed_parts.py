@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.features import Cylinder, bounds, cylinders
+from tbcad.cad.features import RoundFace, bounds, cylinders
 from tbcad.cad.projection import Shape
 from tbcad.cad.solids import moved
 from tbcad.drafting.sheet import Sheet, TitleBlock
-from tbcad.drawings.export import Export
-from tbcad.drawings.fits import Mate, Seat, purchased_mate, reamed_to, seats_table
+from tbcad.drawings.export import DrawnExport
+from tbcad.drawings.fits import ListedSeat, Mate, purchased_mate, reamed_to, seats_table
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
 from tbcad.formats.step import read_named_solid
@@ -53,10 +53,10 @@ class PartJob:
     lines: tuple[tuple[str, Floats, Floats], ...]
     fasteners: tuple[Fastener, ...]
     mates: tuple[Mate, ...] = ()
-    seats: tuple[Seat, ...] = ()
+    seats: tuple[ListedSeat, ...] = ()
 
 
-def part_job(export: Export, part: PrintedPartRecord) -> PartJob:
+def part_job(export: DrawnExport, part: PrintedPartRecord) -> PartJob:
     """What is needed to draw a printed part.
 
     Raises:
@@ -107,7 +107,7 @@ def _on_axis(
             yield purchased_mate(found, place, along, reamed)
 
 
-def _seats(export: Export, axes: Floats, origin: Floats) -> Iterator[Seat]:
+def _seats(export: DrawnExport, axes: Floats, origin: Floats) -> Iterator[ListedSeat]:
     """All seats, by the balls' list and the record."""
     assert export.machine is not None
     export.file(BallRow.FILE)
@@ -119,10 +119,10 @@ def _seats(export: Export, axes: Floats, origin: Floats) -> Iterator[Seat]:
         contacts = np.array(one.contacts_mm) @ axes + origin
         radius, pad = row.body_radius_mm, one.pad_diameter_mm
         axis = np.array(one.axis) @ axes
-        yield Seat(one.ball, takes, radius, centre, axis, contacts, pad)
+        yield ListedSeat(one.ball, takes, radius, centre, axis, contacts, pad)
 
 
-def _spigots(record: Prototype, seats: Sequence[Seat]) -> Iterator[Mate]:
+def _spigots(record: Prototype, seats: Sequence[ListedSeat]) -> Iterator[Mate]:
     """Spigots of caps in the pockets of their seats, along the seats' axes."""
     for cap in record.caps:
         for seat in seats:
@@ -136,7 +136,7 @@ def _spigots(record: Prototype, seats: Sequence[Seat]) -> Iterator[Mate]:
                 )
 
 
-def _text(export: Export, part: PrintedPartRecord) -> PartText:
+def _text(export: DrawnExport, part: PrintedPartRecord) -> PartText:
     row, name = export.row(part), part.name
     words = str(row["part"]).replace("_", " ")
     block = TitleBlock(
@@ -149,7 +149,7 @@ def _text(export: Export, part: PrintedPartRecord) -> PartText:
     return PartText(name, block, tuple(_notes(export, part, block.material)))
 
 
-def _notes(export: Export, part: PrintedPartRecord, material: str) -> Iterator[str]:
+def _notes(export: DrawnExport, part: PrintedPartRecord, material: str) -> Iterator[str]:
     yield f"{part.what[:1].upper()}{part.what[1:]}."
     process = load_process(RESIN_PROCESS if material == RESIN else FILAMENT_PROCESS)
     expected = MAKERS_SHARE * process.sphere_centre_um.magnitude / 1000
@@ -186,7 +186,7 @@ def _datum(shape: Shape, job: PartJob) -> tuple[Floats, str]:
     return low, CORNER
 
 
-def _is_on(wall: Cylinder, point: Floats, along: Floats) -> bool:
+def _is_on(wall: RoundFace, point: Floats, along: Floats) -> bool:
     """Whether a cylinder's axis is a line."""
     off = np.cross(wall.start - point, along)
     return bool(abs(wall.axis @ along) > PARALLEL_COS and np.linalg.norm(off) < ON_AXIS_MM)

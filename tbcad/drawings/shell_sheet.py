@@ -19,7 +19,7 @@ from tbcad.drafting.sheet import (
     sheet_frame,
 )
 from tbcad.drafting.views import FRONT, as_entities, straight
-from tbcad.drawings.export import Export
+from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.holes import mm
 from tbcad.formats.entities import Circle, Entity, Layer, Line, Point
 from tbcad.formats.step import read_named_solid
@@ -49,7 +49,7 @@ class ShellJob:
     name: str
 
 
-def shell_job(export: Export, name: str) -> ShellJob:
+def shell_job(export: DrawnExport, name: str) -> ShellJob:
     """What is needed to draw a shell.
 
     Raises:
@@ -65,7 +65,7 @@ def shell_job(export: Export, name: str) -> ShellJob:
     return _job(export, name, text)
 
 
-def mandrel_job(export: Export, name: str) -> ShellJob:
+def mandrel_job(export: DrawnExport, name: str) -> ShellJob:
     """What is needed to draw a shell's negative.
 
     Raises:
@@ -89,7 +89,7 @@ def _release(record: MandrelRecord) -> str:
     return f"The shell is drawn along ({pull}), draft {record.draft_deg:.1f} degrees."
 
 
-def _job(export: Export, name: str, notes: tuple[str, ...]) -> ShellJob:
+def _job(export: DrawnExport, name: str, notes: tuple[str, ...]) -> ShellJob:
     step = f"{name}.step"
     block = TitleBlock(
         title=name.replace("_", " "),

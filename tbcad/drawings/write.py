@@ -11,7 +11,7 @@ from typing import Any
 from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.background import background_processes
 from tbcad.drafting.sheet import Sheet, paper_name, scale_text
-from tbcad.drawings.export import Export, read_export
+from tbcad.drawings.export import DrawnExport, read_export
 from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
 from tbcad.errors import InputError
 from tbcad.output.single_files import check_file
@@ -22,7 +22,7 @@ OPTICAL_LAYOUT, ASSEMBLY = "optical_layout", "assembly"
 
 
 @dataclass(frozen=True)
-class Drawing:
+class WrittenSheet:
     """A sheet that was written.
 
     Attributes:
@@ -68,7 +68,7 @@ def write_drawings(
     force: bool = False,
     progress: Progress = lambda _: None,
     workers: int = 1,
-) -> list[Drawing]:
+) -> list[WrittenSheet]:
     """Draw an export.
 
     Args:
@@ -100,7 +100,7 @@ def write_drawings(
     return drawings
 
 
-def drawable(export: Export) -> list[str]:
+def drawable(export: DrawnExport) -> list[str]:
     """Names of all that can be drawn of an export, those that take longest first."""
     parts = sorted(export.parts, key=lambda name: (not name.startswith("carrier"), name))
     whole = [ASSEMBLY] if export.machine else []
@@ -113,7 +113,7 @@ def drawable(export: Export) -> list[str]:
     ]
 
 
-def _chosen(export: Export, only: Sequence[str]) -> list[str]:
+def _chosen(export: DrawnExport, only: Sequence[str]) -> list[str]:
     names = drawable(export)
     if not names:
         raise InputError(
@@ -130,7 +130,7 @@ def _chosen(export: Export, only: Sequence[str]) -> list[str]:
     return [name for name in names if name in only or not only]
 
 
-def _job(export: Export, name: str) -> Job:
+def _job(export: DrawnExport, name: str) -> Job:
     from tbcad.drawings.assembly_sheet import assembly_job, draw_assembly
     from tbcad.drawings.printed_parts import draw_part, part_job
     from tbcad.drawings.shell_sheet import draw_shell, mandrel_job, shell_job
@@ -147,7 +147,9 @@ def _job(export: Export, name: str) -> Job:
     return Job(name, draw_part, (part_job(export, export.parts[name]),))
 
 
-def _drawn(jobs: Sequence[Job], place: Path, progress: Progress, workers: int) -> list[Drawing]:
+def _drawn(
+    jobs: Sequence[Job], place: Path, progress: Progress, workers: int
+) -> list[WrittenSheet]:
     """Drawings in the order of their names."""
     drawings = [
         one for done in _results(jobs, place, progress, min(workers, len(jobs))) for one in done
@@ -157,7 +159,7 @@ def _drawn(jobs: Sequence[Job], place: Path, progress: Progress, workers: int) -
 
 def _results(
     jobs: Sequence[Job], place: Path, progress: Progress, workers: int
-) -> Iterator[list[Drawing]]:
+) -> Iterator[list[WrittenSheet]]:
     if workers == 1:
         for job in jobs:
             yield draw(job, place)
@@ -170,13 +172,13 @@ def _results(
             progress(futures[future])
 
 
-def draw(job: Job, place: Path) -> list[Drawing]:
+def draw(job: Job, place: Path) -> list[WrittenSheet]:
     """Draw and write all sheets of a job into a folder."""
     sheets = job.draw(*job.arguments)
     for sheet in sheets:
         sheet.write(place)
     return [
-        Drawing(
+        WrittenSheet(
             sheet.name,
             sheet.title,
             sheet.part,
@@ -187,7 +189,7 @@ def draw(job: Job, place: Path) -> list[Drawing]:
     ]
 
 
-def record(out: Path, drawings: Sequence[Drawing]) -> dict[str, Any]:
+def record(out: Path, drawings: Sequence[WrittenSheet]) -> dict[str, Any]:
     """What was written, for JSON."""
     sheets = [
         {

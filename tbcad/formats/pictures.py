@@ -47,12 +47,11 @@ _PNG, _PNG_DEPTH, _PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # places of its he
 _JPEG_SCAN, _JPEG_END = 0xDA, b"\xff\xd9"
 
 
-def read_picture(path: Path, ignore_alpha: bool = False) -> Picture:
+def read_picture(path: Path) -> Picture:
     """The picture in a file: (h, w) or (h, w, 3) of uint8, uint16 or float32.
 
     Args:
         path: PNG, TIFF, JPEG, WebP, BMP, GIF, or a camera's raw file.
-        ignore_alpha: take the stored colours of transparent pixels, which else are refused.
 
     Raises:
         InputError: it cannot be read, or not exactly as grey or RGB.
@@ -61,7 +60,7 @@ def read_picture(path: Path, ignore_alpha: bool = False) -> Picture:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}: name another") from None
-    return picture_of(data, str(path), ignore_alpha)
+    return picture_of(data, str(path))
 
 
 def picture_of(data: bytes, name: str, ignore_alpha: bool = False) -> Picture:

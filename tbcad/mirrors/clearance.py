@@ -1,32 +1,42 @@
 """Whether the object stands in its own light, and with which sizes it would not."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from scipy.optimize import brentq
 
 from tbcad.geometry.ellipsoid import Ellipsoid
+from tbcad.optics.cells import Cells
 from tbcad.optics.object_light import closest_passage, passing_distances
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.sizes import MAX_SEMI_MINOR, OpticsSpec
 from tbcad.types import Floats
 
-if TYPE_CHECKING:
-    from tbcad.mirrors.array import MirrorArray
 
-Solve = Callable[[Spec], "MirrorArray"]
-Size = Callable[[OpticsSpec, "MirrorArray", float], float | None]
+class LitMirrors(Protocol):
+    """What is asked of a camera's mirrors."""
+
+    @property
+    def ids(self) -> list[str]: ...  # noqa: D102
+    @property
+    def ellipsoid(self) -> Ellipsoid: ...  # noqa: D102
+    @property
+    def u(self) -> Floats: ...  # noqa: D102
+    @property
+    def cells(self) -> Cells: ...  # noqa: D102
+
+
+Solve = Callable[[Spec], LitMirrors]
+Size = Callable[[OpticsSpec, LitMirrors, float], float | None]
 
 # Sizes are tried until one clears: the first that is computed mostly does.
 TRIES = 5
 STEPS_PER_MM = 10  # of the sizes tried
 
 
-def check_clearance(spec: Spec, array: MirrorArray, solve: Solve) -> None:
+def check_clearance(spec: Spec, array: LitMirrors, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
     Raises:
@@ -43,7 +53,7 @@ def check_clearance(spec: Spec, array: MirrorArray, solve: Solve) -> None:
     )
 
 
-def _remedies(spec: Spec, array: MirrorArray, solve: Solve) -> str:
+def _remedies(spec: Spec, array: LitMirrors, solve: Solve) -> str:
     sizes: dict[str, tuple[Size, str]] = {
         "capture_diameter_mm": (_smaller_sphere, "less"),
         "semi_minor_mm": (_wider_ellipsoid, "more"),
@@ -59,7 +69,7 @@ def _remedies(spec: Spec, array: MirrorArray, solve: Solve) -> str:
 
 
 def _size_that_clears(
-    spec: Spec, array: MirrorArray, solve: Solve, key: str, size: Size
+    spec: Spec, array: LitMirrors, solve: Solve, key: str, size: Size
 ) -> float | None:
     """The size nearest to the spec's that was tried and clears, mm; None where none was found."""
     tried = spec
@@ -77,7 +87,7 @@ def _size_that_clears(
     return None
 
 
-def _passage(optics: OpticsSpec, array: MirrorArray) -> tuple[float, int]:
+def _passage(optics: OpticsSpec, array: LitMirrors) -> tuple[float, int]:
     return closest_passage(array.cells, array.ellipsoid.pinhole, optics.capture_diameter_mm / 2)
 
 
@@ -86,7 +96,7 @@ def _apex_passage(ellipsoid: Ellipsoid, u: Floats) -> float:
     return float(passing_distances(ellipsoid.pinhole, ellipsoid.apices(u)).min())
 
 
-def _spread(optics: OpticsSpec, array: MirrorArray) -> float:
+def _spread(optics: OpticsSpec, array: LitMirrors) -> float:
     """How much closer light in use passes than that of the apices, a mm of capture diameter.
 
     It hardly depends on the sizes, so a size that clears follows from the apices in closed form.
@@ -95,12 +105,12 @@ def _spread(optics: OpticsSpec, array: MirrorArray) -> float:
     return (apices - _passage(optics, array)[0]) / optics.capture_diameter_mm
 
 
-def _smaller_sphere(_: OpticsSpec, array: MirrorArray, spread: float) -> float | None:
+def _smaller_sphere(_: OpticsSpec, array: LitMirrors, spread: float) -> float | None:
     diameter = _apex_passage(array.ellipsoid, array.u) / (0.5 + spread)
     return math.floor(diameter * STEPS_PER_MM) / STEPS_PER_MM or None
 
 
-def _wider_ellipsoid(optics: OpticsSpec, array: MirrorArray, spread: float) -> float | None:
+def _wider_ellipsoid(optics: OpticsSpec, array: LitMirrors, spread: float) -> float | None:
     needed = optics.capture_diameter_mm * (0.5 + spread)
 
     def spare(semi_minor: float) -> float:

@@ -11,7 +11,7 @@ from tbcad.figure_files import PlotFormat
 from tbcad.formats.toml import toml_text
 from tbcad.optimize.candidate import DesignCandidate, Figures, placed
 from tbcad.optimize.search import SearchResult
-from tbcad.results.plots import Panel, Series, plot_file
+from tbcad.results.plots import PlotPanel, Series, plot_file
 from tbcad.results.tables import Table, csv_text
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
@@ -79,7 +79,7 @@ def candidate_table(result: SearchResult) -> Table:
     return Table.of_records("candidates", records, columns=COLUMNS)
 
 
-def panels(result: SearchResult) -> tuple[Panel, ...]:
+def panels(result: SearchResult) -> tuple[PlotPanel, ...]:
     """Candidates by pixels and evenness, by pixels and size, and by SSIM where it was measured."""
     figures = [one.figures for one in result.candidates if one.figures]
     kept = [one for one in figures if result.limits.excess(one) == 0]
@@ -103,7 +103,7 @@ def panels(result: SearchResult) -> tuple[Panel, ...]:
     return tuple(_panel(title, groups, (x, y)) for title, x, y in axes)
 
 
-def _panel(title: str, groups: Groups, axes: tuple[str, str]) -> Panel:
+def _panel(title: str, groups: Groups, axes: tuple[str, str]) -> PlotPanel:
     x, y = axes
     measured = {
         label: ([one for one in some if getattr(one, y) is not None], style)
@@ -113,7 +113,7 @@ def _panel(title: str, groups: Groups, axes: tuple[str, str]) -> Panel:
         Series(label, _column(some, x), _column(some, y), style)
         for label, (some, style) in measured.items()
     )
-    return Panel(title, LABELS[x], LABELS[y], series, logarithmic="xy")
+    return PlotPanel(title, LABELS[x], LABELS[y], series, logarithmic="xy")
 
 
 def _column(some: list[Figures], name: str) -> Floats:

@@ -23,8 +23,8 @@ from typing import (
 from typer.models import ParameterInfo
 
 from tbcad.errors import InputError
+from tbcad.progress import Progress
 
-Progress = Callable[[str], None]
 Keywords = ParamSpec("Keywords")
 Record = TypeVar("Record")
 Asked_contra = TypeVar("Asked_contra", contravariant=True)

@@ -31,7 +31,7 @@ from tbcad.reconstruction.grid import Grid
 from tbcad.reconstruction.marching import GLOSSY, MATT, SOFTNESS, Singles
 from tbcad.simulate.capture.light_field import NAME as LIGHT_FIELD
 from tbcad.simulate.capture.light_field import SCHEMA as LIGHT_FIELD_SCHEMA
-from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-field/1"
@@ -159,7 +159,7 @@ def light_field_fingerprint(source: LightField) -> str:
     return digest.hexdigest()
 
 
-def _content(frame: Frame) -> list[NDArray[np.generic]]:
+def _content(frame: CameraFrame) -> list[NDArray[np.generic]]:
     camera, mirrors = frame.camera, frame.mirrors
     rows = [np.asarray(frame.planes[name][::ROWS_APART]) for name in ("origin", "direction")]
     place = np.stack([camera.pinhole, camera.forward, camera.right])

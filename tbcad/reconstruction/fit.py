@@ -11,7 +11,7 @@ import numpy as np
 
 from tbcad.reconstruction.field import Field
 from tbcad.reconstruction.gradient import (
-    Columns,
+    ColumnSteps,
     Pixels,
     adam,
     add_gradient,
@@ -144,7 +144,7 @@ def _step(settings: Settings, state: State, progress: float, share: float, parts
     state.values = changed
 
 
-def _columns(settings: Settings, state: State, progress: float, share: float) -> Columns:
+def _columns(settings: Settings, state: State, progress: float, share: float) -> ColumnSteps:
     """What holds for the columns of the values."""
     final = state.level + 1 == len(settings.levels)
     slowing = 0.5 * (1 + cos(pi * progress)) if final else 1.0
@@ -154,7 +154,7 @@ def _columns(settings: Settings, state: State, progress: float, share: float) ->
     )
     rest = state.values.shape[1] - 1
     smooth = settings.smooth_colour * share
-    return Columns(
+    return ColumnSteps(
         unbiased_size(_column(number, *[colour] * rest), state.step),
         _column(settings.smooth_density * share, *[smooth] * rest),
         _column(NUMBERS[0], *[COLOURS[0]] * 3, *[SLOPES[0]] * (rest - 3)),

@@ -192,7 +192,7 @@ class Moments(NamedTuple):
     square: Singles
 
 
-class Columns(NamedTuple):
+class ColumnSteps(NamedTuple):
     """Limits and weights of the columns of a field's values, (c,) each.
 
     Attributes:
@@ -222,7 +222,7 @@ def adam(
     parts: Singles,
     moments: Moments,
     neighbours: NDArray[np.int32],
-    columns: Columns,
+    columns: ColumnSteps,
     sparse: float,
 ) -> None:
     """Change some nodes, and empty their gradients.

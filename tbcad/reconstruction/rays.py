@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tbcad.errors import InputError
 from tbcad.reconstruction.marching import Singles
-from tbcad.simulate.capture.light_field import RAY_SIGMAS, Frame, LightField
+from tbcad.simulate.capture.light_field import RAY_SIGMAS, CameraFrame, LightField
 from tbcad.types import Bools, Floats, Ints
 
 LEAST_CHORD_MM = 0.03
@@ -107,7 +107,9 @@ def entries(
     return entry.astype(np.float32), np.maximum(middle + half - start, 0).astype(np.float32)
 
 
-def _of_frame(frame: Frame, before: int, radius: float, footprint: bool) -> list[NDArray[Any]]:
+def _of_frame(
+    frame: CameraFrame, before: int, radius: float, footprint: bool
+) -> list[NDArray[Any]]:
     planes = frame.read(slice(None))
     mirror, direction = planes["mirror"], planes["direction"]
     entry, length = entries(planes["origin"], direction, radius)

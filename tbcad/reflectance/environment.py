@@ -8,7 +8,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
-from tbcad.formats.light_pictures import read_light
+from tbcad.formats import openexr, radiance
+from tbcad.formats.openexr import exr_picture
+from tbcad.formats.pictures import picture_of
+from tbcad.formats.radiance import hdr_picture
 from tbcad.geometry.vectors import norm, unit
 from tbcad.simulate.scene.point_lights import PointLights
 from tbcad.types import Floats, Ints
@@ -36,6 +39,7 @@ _BACK = {
 }
 # So far away light from one direction is parallel: 60 mm apart it differs by 0.003 degrees.
 FAR_MM = 1e6
+GIVE = "give a picture of light: Radiance (.hdr), OpenEXR (.exr) or TIFF in floating point"
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of red, green, blue: ITU-R BT.709
 
@@ -199,3 +203,24 @@ def read_environment(path: Path, turn: float = 0.0, kind: LightFormat | None = N
     if not (found.light > 0).any():
         raise InputError(f"{path} is dark above the horizon: it must have light there")
     return found
+
+
+def read_light(path: Path) -> Floats:
+    """Red, green and blue (h, w, 3), linear, colours of Rec. 709, from the top row down.
+
+    Raises:
+        InputError: it cannot be read, or is no picture of light.
+    """
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; {GIVE}") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}: {GIVE}") from None
+    if data.startswith(radiance.SIGNATURE):
+        return hdr_picture(data, str(path))
+    light = exr_picture(path) if data.startswith(openexr.SIGNATURE) else picture_of(data, str(path))
+    if light.dtype != np.float32:
+        raise InputError(f"{path} has whole numbers, which clip what is bright: {GIVE}")
+    grey = light[..., None] if light.ndim == 2 else light
+    return np.broadcast_to(grey, (*light.shape[:2], 3)).astype(np.float64)

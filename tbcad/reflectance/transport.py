@@ -14,7 +14,7 @@ from tbcad.datasets.crops import MirrorId
 from tbcad.errors import InputError
 from tbcad.reflectance.field_file import NAME, RAYS_PER_CHUNK, SCHEMA
 from tbcad.reflectance.lamp_places import LampPlaces, projectors
-from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands
 from tbcad.simulate.parallel import chunks, in_batches, in_threads
@@ -84,7 +84,7 @@ def write_reflectance(
     return facts
 
 
-def seen_spots(frame: Frame, scene: Scene) -> SeenSpots:
+def seen_spots(frame: CameraFrame, scene: Scene) -> SeenSpots:
     """What the captured rays of a camera see of the object."""
 
     def band(rows: range) -> SeenSpots:

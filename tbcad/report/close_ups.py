@@ -18,7 +18,7 @@ from tbcad.mirrors.seam import cut_images, seam_gaps
 from tbcad.optics.cells import Cells, cells_of
 from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.surfaces import Surfaces
-from tbcad.report.section import Section, section_of
+from tbcad.report.section import EdgeSection, section_of
 from tbcad.report.shell_pictures import coloured
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.simulate.scene.reflector import Reflector
@@ -194,7 +194,7 @@ def _shaded(folder: Path, cameras: str, reflector: Reflector, mirror: int) -> Fl
     return pixels
 
 
-def _draw_section(axes: "Axes", section: Section, ids: list[str]) -> None:
+def _draw_section(axes: "Axes", section: EdgeSection, ids: list[str]) -> None:
     low = section.points[:, 1].min()
     _draw_outline(axes, section.points, low - 0.3)
     for mirror, place in zip(section.mirrors, section.apexes, strict=True):
@@ -225,7 +225,7 @@ def _draw_outline(axes: "Axes", points: Floats, low: float) -> None:
     axes.fill(*np.concatenate([points, below]).T, color="0.9", lw=0)
 
 
-def _draw_inset(axes: "Axes", section: Section) -> None:
+def _draw_inset(axes: "Axes", section: EdgeSection) -> None:
     """One edge in its own scale."""
     x, y = section.edges[1].bottom
     inset = axes.inset_axes((0.3, 0.66, 0.4, 0.32))

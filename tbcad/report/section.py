@@ -34,7 +34,7 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Section:
+class EdgeSection:
     """A section in its own plane: along it, and up toward the light.
 
     Attributes:
@@ -50,7 +50,7 @@ class Section:
     edges: tuple[Edge, Edge]
 
 
-def section_of(export: ExportedDesign, middle: int) -> Section:
+def section_of(export: ExportedDesign, middle: int) -> EdgeSection:
     """The section of camera a's shell through a mirror and two opposite neighbours."""
     reflector = export.reflectors[0]
     first, last = _opposite_neighbours(reflector, middle)
@@ -71,7 +71,7 @@ def section_of(export: ExportedDesign, middle: int) -> Section:
         for k in mirrors
     ]
     edges = [_edge(outline, apexes[k : k + 2], on[k], on[k + 1]) for k in (0, 1)]
-    return Section(mirrors, outline, apexes, (edges[0], edges[1]))
+    return EdgeSection(mirrors, outline, apexes, (edges[0], edges[1]))
 
 
 def _path(points: Floats, lines: Ints, start: int, reach: float) -> Floats:

@@ -37,7 +37,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Panel:
+class PlotPanel:
     """One pair of axes.
 
     Attributes:
@@ -57,7 +57,7 @@ class Panel:
     names: tuple[str, ...] = ()
 
 
-def plot_file(panels: tuple[Panel, ...], kind: PlotFormat = "png") -> bytes:
+def plot_file(panels: tuple[PlotPanel, ...], kind: PlotFormat = "png") -> bytes:
     """Panels side by side as a file; the same panels give the same bytes."""
     width, height = PANEL_INCHES
 
@@ -68,7 +68,7 @@ def plot_file(panels: tuple[Panel, ...], kind: PlotFormat = "png") -> bytes:
     return figure_file(draw, (width * len(panels), height), kind)
 
 
-def _draw(axes: "Axes", panel: Panel) -> None:
+def _draw(axes: "Axes", panel: PlotPanel) -> None:
     for series in panel.series:
         _draw_series(axes, series)
     if panel.names:

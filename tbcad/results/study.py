@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tbcad.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.figure_files import PlotFormat
-from tbcad.results.plots import Panel, plot_file
+from tbcad.results.plots import PlotPanel, plot_file
 from tbcad.results.tables import Cell, Table, csv_text
 
 SUMMARY_COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
@@ -47,7 +47,7 @@ class Study:
     name: str
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
-    panels: tuple[Panel, ...]
+    panels: tuple[PlotPanel, ...]
     notes: tuple[str, ...] = ()
 
     @property

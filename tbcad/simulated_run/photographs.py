@@ -20,8 +20,8 @@ from tbcad.simulated_run.led_light import DOME_MM, FAINT_PX2, Occluders, balls_o
 from tbcad.simulated_run.sensor import (
     Image16,
     PixelMaps,
-    Sensor,
     Signal,
+    SimulatedSensor,
     generator,
     pixel_directions,
     pixel_maps,
@@ -56,7 +56,7 @@ class PointSpread:
 
 
 @dataclass(frozen=True)
-class Chain:
+class ImagingChain:
     """From light to numbers.
 
     Attributes:
@@ -69,7 +69,7 @@ class Chain:
         times: of exposure; `EXPOSURE_S` where they are not said.
     """
 
-    sensor: Sensor = field(default_factory=Sensor)
+    sensor: SimulatedSensor = field(default_factory=SimulatedSensor)
     spread: PointSpread = field(default_factory=PointSpread)
     dome: float = DOME_MM
     led_light: float | tuple[float, ...] = LED_LIGHT
@@ -98,7 +98,7 @@ class SimulatedRun:
     frames: tuple[Frame, ...]
     scene: Scene
     occluders: Occluders
-    chain: Chain
+    chain: ImagingChain
     seed: int
 
     @cached_property

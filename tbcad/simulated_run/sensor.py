@@ -24,7 +24,7 @@ EMPTY = 0.5  # electrons: less light than this is as none
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SimulatedSensor:
     """A sensor; figures as of data sheets of pixels of 3.45 um.
 
     Attributes:
@@ -79,7 +79,9 @@ def pixel_places(camera: LensCamera) -> Floats:
     return np.stack([column, row], axis=-1).astype(np.float64)
 
 
-def pixel_maps(camera: LensCamera, directions: Floats, sensor: Sensor, seed: int) -> PixelMaps:
+def pixel_maps(
+    camera: LensCamera, directions: Floats, sensor: SimulatedSensor, seed: int
+) -> PixelMaps:
     """The maps of one simulated camera, with the directions (h, w, 3) of its pixels."""
     count = camera.width_px * camera.height_px
     random = generator(seed, HOT_STREAM)
@@ -88,7 +90,9 @@ def pixel_maps(camera: LensCamera, directions: Floats, sensor: Sensor, seed: int
     return PixelMaps(_transmission(camera, directions, sensor, seed), hot, electrons)
 
 
-def _transmission(camera: LensCamera, directions: Floats, sensor: Sensor, seed: int) -> Signal:
+def _transmission(
+    camera: LensCamera, directions: Floats, sensor: SimulatedSensor, seed: int
+) -> Signal:
     share = vignetting(camera, directions).astype(np.float32)
     pixels = pixel_places(camera)
     random = generator(seed, DUST_STREAM)
@@ -110,7 +114,7 @@ def generator(seed: int, *stream: int) -> np.random.Generator:
 
 
 def recorded(
-    sensor: Sensor,
+    sensor: SimulatedSensor,
     maps: PixelMaps,
     light: Signal | None,
     random: np.random.Generator,
@@ -147,7 +151,7 @@ def recorded(
     return whole
 
 
-def _lit(sensor: Sensor, light: Signal) -> Ints:
+def _lit(sensor: SimulatedSensor, light: Signal) -> Ints:
     """Numbers of the pixels that light falls on."""
     most = light if light.ndim == 2 else light.max(axis=2)
     return np.flatnonzero(most > EMPTY / sensor.full_electrons)
@@ -158,7 +162,7 @@ def _in_colours(light: Signal, colours: int) -> Signal:
 
 
 def _numbers(
-    sensor: Sensor, electrons: NDArray[np.floating], random: np.random.Generator
+    sensor: SimulatedSensor, electrons: NDArray[np.floating], random: np.random.Generator
 ) -> Image16:
     """Numbers for mean numbers of electrons; shot noise as its normal limit."""
     spread = sensor.noise * np.sqrt(electrons + sensor.read_electrons**2)
@@ -167,13 +171,13 @@ def _numbers(
     return _whole(sensor, share * sensor.largest)
 
 
-def _whole(sensor: Sensor, numbers: NDArray[np.floating]) -> Image16:
+def _whole(sensor: SimulatedSensor, numbers: NDArray[np.floating]) -> Image16:
     kind = np.uint8 if sensor.bits == 8 else np.uint16
     found: Image16 = np.clip(np.rint(numbers), 0, sensor.largest).astype(kind)
     return found
 
 
-def _empty(sensor: Sensor, shape: tuple[int, int], random: np.random.Generator) -> Image16:
+def _empty(sensor: SimulatedSensor, shape: tuple[int, int], random: np.random.Generator) -> Image16:
     """Numbers of pixels without light."""
     spread = sensor.noise * np.sqrt(sensor.dark_electrons + sensor.read_electrons**2)
     step = sensor.full_electrons / sensor.largest

@@ -35,12 +35,12 @@ from tbcad.simulated_run.led_light import Occluders, stage_scene
 from tbcad.simulated_run.photographs import (
     EXPOSURE_S,
     LED_LIGHT,
-    Chain,
+    ImagingChain,
     SimulatedRun,
     frames_of,
     phases_of,
 )
-from tbcad.simulated_run.sensor import Image16, Sensor
+from tbcad.simulated_run.sensor import Image16, SimulatedSensor
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.prototype.draws import read_wind_up
 from tbcad.types import Progress
@@ -83,8 +83,8 @@ def prepare_run(
     phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
     scene = prepared_scene(prepared.scene)
     occluders = Occluders(scene.embree, prepared.stage)
-    chain = Chain(
-        Sensor(bits=options.bits, noise=options.noise),
+    chain = ImagingChain(
+        SimulatedSensor(bits=options.bits, noise=options.noise),
         dome=dome_radius(export),
         led_light=LED_LIGHT * options.led_brightness,
         times=times,

@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.optics.camera import Camera
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
@@ -198,7 +198,7 @@ def _figure(best: Record) -> Figure:
     return Figure(f"{best['object']}: best n", "", best["n"], where="section 6")
 
 
-def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> Panel:
+def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> PlotPanel:
     styles = ("C0o-", "C0s--", "C1o-", "C1s--")
     series = tuple(
         Series(
@@ -211,4 +211,4 @@ def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> Panel:
         for subject, style in zip(seen, styles, strict=True)
     )
     x_label = "virtual cameras per pixel of a virtual camera"
-    return Panel(f"Views by method {method}", x_label, "SSIM on the object", series, "x")
+    return PlotPanel(f"Views by method {method}", x_label, "SSIM on the object", series, "x")

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Cell, Record, Table
 from tbcad.simulate.capture.pixel_counts import virtual_cameras
@@ -55,7 +55,7 @@ def capture_area(
         "capture-area",
         tuple(figure for record in records for figure in _figures(record)),
         (table,),
-        (Panel(title, "subdivision n", "diameter seen whole, mm", tuple(curves)),),
+        (PlotPanel(title, "subdivision n", "diameter seen whole, mm", tuple(curves)),),
     )
 
 

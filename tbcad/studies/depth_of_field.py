@@ -14,7 +14,7 @@ from tbcad.camera.lens import (
 )
 from tbcad.camera.requirements import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.errors import InputError
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.spec.design import Spec
@@ -232,7 +232,7 @@ def _stop_figures(stops: list[Record]) -> list[Figure]:
     ]
 
 
-def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
+def _image_panel(by_rule: dict[str, VirtualImages]) -> PlotPanel:
     series = [
         Series(label, np.degrees(one.array.polar), one.distance[:, place, fan], mark)
         for rule, place, fan, label, mark in IMAGES
@@ -244,10 +244,10 @@ def _image_panel(by_rule: dict[str, VirtualImages]) -> Panel:
         paper = claimed(key)
         series.append(Series(f"the paper: {paper:g} mm", ends, np.full(2, paper), style))
     title = "Virtual images of the capture sphere"
-    return Panel(title, "polar angle, degrees", "distance from the camera, mm", tuple(series))
+    return PlotPanel(title, "polar angle, degrees", "distance from the camera, mm", tuple(series))
 
 
-def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
+def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> PlotPanel:
     series: list[Series] = []
     f_numbers = np.linspace(lens.wide_open, SMALLEST_STOP * lens.wide_open, 60)
     shown = [(name, over) for name, over in ranges.items() if name in RANGES_SHOWN]
@@ -258,4 +258,4 @@ def _blur_panel(ranges: dict[str, DepthRange], lens: Lens) -> Panel:
             Series(f"blur circle, {name}", f_numbers, blur, f"C{k}--"),
             Series(f"with diffraction, {name}", f_numbers, total, f"C{k}-"),
         ]
-    return Panel("Blur at the ends of the range", "F-number", "diameter, pixels", tuple(series))
+    return PlotPanel("Blur at the ends of the range", "F-number", "diameter, pixels", tuple(series))

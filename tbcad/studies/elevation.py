@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from tbcad.geometry.vectors import norm
 from tbcad.mirrors.array import MirrorArray, design
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels
@@ -172,17 +172,17 @@ def _pixel_figures(mirrors: Table) -> tuple[Figure, ...]:
     )
 
 
-def _radius_panel(arrays: dict[str, MirrorArray]) -> Panel:
+def _radius_panel(arrays: dict[str, MirrorArray]) -> PlotPanel:
     series = []
     for rule, (label, style) in CURVES.items():
         radius, polar = arrays[rule].mirrors.radius, arrays[rule].polar
         named = f"{label}: correlation of log radius {correlation(np.log(radius), polar):.3f}"
         series.append(Series(named, np.degrees(polar), radius, style))
     title = "Radius of the mirrors"
-    return Panel(title, "polar angle about the axis, degrees", "radius, mm", tuple(series), "y")
+    return PlotPanel(title, "polar angle about the axis, degrees", "radius, mm", tuple(series), "y")
 
 
-def _pixel_panel(mirrors: Table) -> Panel:
+def _pixel_panel(mirrors: Table) -> PlotPanel:
     elevation, pixels = mirrors.numbers("elevation_deg"), mirrors.numbers("seeing_px")
     bands = Table.of_records("", _bands(mirrors))
     middle = bands.numbers("elevation_from_deg") + BAND_DEG / 2
@@ -190,4 +190,4 @@ def _pixel_panel(mirrors: Table) -> Panel:
         Series("each virtual camera", elevation, pixels, "C0."),
         Series(f"mean of {BAND_DEG:g} degrees", middle, bands.numbers("mean_seeing_px"), "ko-"),
     )
-    return Panel("Pixels that see the object", "elevation, degrees", "pixels", series)
+    return PlotPanel("Pixels that see the object", "elevation, degrees", "pixels", series)

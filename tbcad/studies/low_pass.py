@@ -6,16 +6,17 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.simulate.camera_photographs import Geometry, photographed
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.photograph import Samples, to_bytes
+from tbcad.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.views.ground_truth import lens_picture
+from tbcad.simulate.scene.rays import Shift
+from tbcad.simulate.views.ground_truth import disc_points, lens_picture, pixel_points
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.refocus import ThinLens, refocus
 from tbcad.simulate.views.viewpoints import (
@@ -26,7 +27,6 @@ from tbcad.simulate.views.viewpoints import (
     view_quality,
 )
 from tbcad.studies.paper import claimed
-from tbcad.studies.pixel_response import defocus_shifts, low_pass_shifts
 from tbcad.types import Bytes, Floats, Progress
 
 WHERE = "section 5.3, Fig. 11"
@@ -237,13 +237,13 @@ def _figures(means: Table) -> tuple[Figure, ...]:
     return (*figures, *contrast)
 
 
-def _panels(means: Table) -> tuple[Panel, ...]:
+def _panels(means: Table) -> tuple[PlotPanel, ...]:
     labels = {
         "ssim": ("Similarity of views to the truth", "mean SSIM"),
         "blur_mm": ("Blur of views", "mean standard deviation at the object, mm"),
     }
     return tuple(
-        Panel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
+        PlotPanel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
         for column, (title, unit) in labels.items()
     )
 
@@ -261,3 +261,35 @@ def _bars(means: Table, column: str) -> tuple[Series, ...]:
     ):
         series.append(Series(label, means.where(view=view).numbers(column), place, style))
     return tuple(series)
+
+
+def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
+    """Rays of a pixel behind a birefringent low-pass filter.
+
+    Two crossed plates split every point into four, at the corners of a square. Along rows and
+    columns f cycles a pixel pass by |cos(pi separation f)|, and 1 / (2 separation) not at all
+    (J. E. Greivenkamp, Applied Optics 29, 676, 1990).
+
+    Args:
+        separation_px: side of the square, pixels.
+        samples: each of the four images has samples x samples rays.
+    """
+    ends = (-separation_px / 2, separation_px / 2)
+    return tuple(
+        (x + column, y + row)
+        for x, y in subpixel_shifts(samples)
+        for row in ends
+        for column in ends
+    )
+
+
+def defocus_shifts(diameter_px: float, count: int) -> tuple[Shift, ...]:
+    """Rays of a pixel behind a lens out of focus, each through another point of both.
+
+    Args:
+        diameter_px: of the even blur circle, pixels.
+        count: number of rays.
+    """
+    circle = (disc_points(count) * diameter_px / 2).tolist()
+    pairs = zip(circle, pixel_points(count), strict=True)
+    return tuple((x + column, y + row) for (x, y), (column, row) in pairs)

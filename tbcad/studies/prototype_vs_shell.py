@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import ttest_rel
 
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Table
 from tbcad.simulate.camera_photographs import Geometry, photographed
@@ -105,7 +105,7 @@ def _figures(table: Table) -> tuple[Figure, ...]:
     return tuple(replace(figure, where=WHERE) for figure in figures)
 
 
-def _panels(table: Table) -> tuple[Panel, ...]:
+def _panels(table: Table) -> tuple[PlotPanel, ...]:
     elevation = table.numbers("elevation_deg")
     pairs = (
         Series("shell", elevation - 0.7, table.numbers("shell_ssim"), "C0."),
@@ -113,6 +113,8 @@ def _panels(table: Table) -> tuple[Panel, ...]:
     )
     difference = Series("", elevation, table.numbers("ssim_difference"), "k.")
     return (
-        Panel("Views against the truth", "elevation, degrees", "SSIM", pairs),
-        Panel("Prototype less shell", "elevation, degrees", "difference of SSIM", (difference,)),
+        PlotPanel("Views against the truth", "elevation, degrees", "SSIM", pairs),
+        PlotPanel(
+            "Prototype less shell", "elevation, degrees", "difference of SSIM", (difference,)
+        ),
     )

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
 from tbcad.simulate.capture.pixel_counts import (
@@ -212,7 +212,7 @@ def _balance_figure(record: Record) -> Figure:
     return Figure(names.format(**record), "", record["balanced_n"], record["paper_n"], TABLE_II)
 
 
-def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
+def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> PlotPanel:
     first = counts.where(**asdict(sensors[0]))
     series = [Series("virtual cameras", first.numbers("n"), first.numbers("virtual_cameras"), "k-")]
     for k, sensor in enumerate(sensors):
@@ -226,10 +226,10 @@ def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> Panel:
         values = np.array([row.printed[k] for row in rows], dtype=np.float64)
         series.append(Series(f"{TABLE_II}: '{heading}'", n, values, style))
     title = "Virtual cameras, and pixels of one, over n"
-    return Panel(title, "subdivision n", "number", tuple(series), logarithmic="xy")
+    return PlotPanel(title, "subdivision n", "number", tuple(series), logarithmic="xy")
 
 
-def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> Panel:
+def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> PlotPanel:
     series = []
     for k, ratio in enumerate(ratios):
         for kind, style in (("seeing", "o-"), ("on mirrors", "x--")):
@@ -240,4 +240,4 @@ def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> Panel:
         Series(f"{TABLE_II}, 1:1", megapixels(balanced), balanced.numbers("paper_n"), "k+")
     )
     title = "n that balances virtual cameras and pixels"
-    return Panel(title, "sensor, megapixels", "subdivision n", tuple(series), logarithmic="x")
+    return PlotPanel(title, "sensor, megapixels", "subdivision n", tuple(series), logarithmic="x")

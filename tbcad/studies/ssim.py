@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import linregress
 
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Cell, Record, Table
 from tbcad.simulate.capture.light_field import NAME, LightField
@@ -217,7 +217,7 @@ def _elevation_figures(size: str, rows: Table) -> Iterator[Figure]:
         )
 
 
-def _ssim_panel(means: Table, fits: Table) -> Panel:
+def _ssim_panel(means: Table, fits: Table) -> PlotPanel:
     series = []
     for k, elevation in enumerate(dict.fromkeys(means.column("elevation_deg"))):
         rows = means.where(elevation_deg=elevation)
@@ -229,16 +229,16 @@ def _ssim_panel(means: Table, fits: Table) -> Panel:
         label = "line" if np.isnan(r2) else f"line, R^2 = {r2:.3f}"
         series.append(Series(label, x, slope * np.log10(1e6 * x) + intercept, "k-"))
     title = "Similarity of views to the truth"
-    return Panel(title, "sensor, megapixels", "SSIM", tuple(series), logarithmic="x")
+    return PlotPanel(title, "sensor, megapixels", "SSIM", tuple(series), logarithmic="x")
 
 
-def _elevation_panels(means: Table) -> tuple[Panel, Panel]:
+def _elevation_panels(means: Table) -> tuple[PlotPanel, PlotPanel]:
     labels = {
         "blur_mm": ("Blur of views", "standard deviation at the object, mm"),
         "ssim_on_object": ("Similarity where the object is", "SSIM"),
     }
     blur, on_object = (
-        Panel(
+        PlotPanel(
             title,
             "elevation, degrees",
             unit,

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.results.plots import Panel, Series
+from tbcad.results.plots import PlotPanel, Series
 from tbcad.tolerance.analysis import Analysis
 from tbcad.tolerance.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerance.montecarlo.edge_model import EdgeModel
@@ -17,12 +17,12 @@ LOW_SHARE = 0.05
 MICROMETRE = 1e-3  # mm
 
 
-def panels(analysis: Analysis) -> tuple[Panel, ...]:
+def panels(analysis: Analysis) -> tuple[PlotPanel, ...]:
     """All plots."""
     return (_yield_curve(analysis), _loss_bars(analysis), _coverage_map(analysis))
 
 
-def _yield_curve(analysis: Analysis) -> Panel:
+def _yield_curve(analysis: Analysis) -> PlotPanel:
     worst = np.sort(analysis.result.worst)
     share = 1 - np.arange(len(worst)) / len(worst)
     target = np.array([analysis.target, analysis.target])
@@ -30,26 +30,26 @@ def _yield_curve(analysis: Analysis) -> Panel:
         Series(analysis.process.name, worst, 100 * share, "C0-"),
         Series(f"{analysis.target:g} mm", target, np.array([0.0, 100.0]), "k--"),
     )
-    return Panel("Yield", "minimum coverage of a build, mm", "builds that reach it, %", series)
+    return PlotPanel("Yield", "minimum coverage of a build, mm", "builds that reach it, %", series)
 
 
-def _loss_bars(analysis: Analysis) -> Panel:
+def _loss_bars(analysis: Analysis) -> PlotPanel:
     loss = np.array([effect.loss for effect in analysis.single_errors])
     names = tuple(in_words(effect.kind) for effect in analysis.single_errors)
     bars = Series("", loss, np.arange(len(loss), dtype=np.float64), "bars")
-    return Panel(
+    return PlotPanel(
         "Loss by each kind of error alone", "loss of coverage, mm", "", (bars,), names=names
     )
 
 
-def _coverage_map(analysis: Analysis) -> Panel:
+def _coverage_map(analysis: Analysis) -> PlotPanel:
     u = directions(analysis)
     low = analysis.result.quantiles((LOW_SHARE,))[0]
     from_zenith = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
     horizontal = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
     x, y = from_zenith * u[:, 0] / horizontal, from_zenith * u[:, 1] / horizontal
     dots = Series("", x, y, ".", low, f"coverage that {LOW_SHARE:.0%} do not reach, mm")
-    return Panel(
+    return PlotPanel(
         "Virtual cameras, the zenith in the middle",
         "angle from the zenith along x, degrees",
         "angle from the zenith along y, degrees",

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.calibration.calibrate import Calibration, Setup, calibrate
+from tbcad.calibration.calibrate import MachineCalibration, Setup, calibrate
 from tbcad.calibration.detection.detection import Detection
 from tbcad.calibration.study import designed_setup
 from tbcad.machine.built import BuiltPrototype, random_build
@@ -39,5 +39,5 @@ def detection(built: BuiltPrototype) -> Detection:
 
 
 @pytest.fixture(scope="session")
-def calibrated(setup: Setup, detection: Detection) -> Calibration:
+def calibrated(setup: Setup, detection: Detection) -> MachineCalibration:
     return calibrate(setup, detection, setup.prior(ERRORS))

@@ -11,8 +11,8 @@ import pytest
 from scipy.stats import chi2
 
 import tbcad.calibration.run
-from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
-from tbcad.calibration.detection.detection import Detection, Rejected, Rejection
+from tbcad.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
+from tbcad.calibration.detection.detection import Detection
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.estimate.jacobian import base_slopes
 from tbcad.calibration.estimate.solve import Estimate, estimate
@@ -55,7 +55,9 @@ def _off(found: Estimate, true: Machine) -> np.ndarray:
     return np.column_stack([machine.centre - true.centre, machine.radius - true.radius])
 
 
-def test_injected_errors_are_recovered(calibrated: Calibration, built: BuiltPrototype) -> None:
+def test_injected_errors_are_recovered(
+    calibrated: MachineCalibration, built: BuiltPrototype
+) -> None:
     """Spheres are off together as their covariance says, and rays as far as predicted."""
     found = calibrated.found
     slopes = base_slopes(found.prior, found.values).matrix(found.prior).toarray()
@@ -84,7 +86,7 @@ def test_most_figures_are_within_two_deviations(setup: Setup) -> None:
     assert np.mean(inside) >= 0.93
 
 
-def test_verdict_comes_first_and_fits_the_screen(calibrated: Calibration) -> None:
+def test_verdict_comes_first_and_fits_the_screen(calibrated: MachineCalibration) -> None:
     judged = verdict(calibrated)
     lines = verdict_text(calibrated, judged).splitlines()
     assert judged.answer is Answer.GOOD
@@ -137,21 +139,6 @@ def test_a_few_noisy_highlights_are_not_enough(setup: Setup, detection: Detectio
     assert any("--measured" in step for step in judged.steps)
 
 
-def test_saturated_highlights_are_counted_and_ask_for_a_shorter_exposure(
-    calibrated: Calibration, detection: Detection
-) -> None:
-    most = len(detection.highlights)
-    reasons = [Rejection.SATURATED] * most + [Rejection.HIDDEN] * 3 + [Rejection.OUTSIDE] * 7
-    rejected = tuple(Rejected(0, 0, 0, reason) for reason in reasons)
-    result = replace(calibrated, detection=replace(detection, rejected=rejected))
-    judged = verdict(result)
-    text = " ".join(verdict_text(result, judged).split())
-    assert f"not used ({most + 3}): {most} saturated; 3 hidden, or partly " in text
-    assert (
-        f"next: {most} highlights are saturated: photograph the LEDs again with a shorter" in text
-    )
-
-
 BASIS = {
     **{"run": "run", "exports": "exports", "export_sha256": {}, "source": "camera"},
     **{"geometry": "prototype", "camera": "test", "lens": "estimated", "measured_radii": []},
@@ -160,7 +147,7 @@ BASIS = {
 }
 
 
-def test_files_are_the_same_each_time(calibrated: Calibration, tmp_path: Path) -> None:
+def test_files_are_the_same_each_time(calibrated: MachineCalibration, tmp_path: Path) -> None:
     judged = verdict(calibrated)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()

@@ -4,21 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from scipy.stats import chi2
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.estimate.covariance import Covariance, covariance
 from tbcad.calibration.estimate.solve import estimate
-from tbcad.calibration.report.plots import COLUMNS, draw_recovered
 from tbcad.calibration.report.recovered import (
     BESIDES,
-    SIGMAS,
     Kind,
     place_mm,
     ray_errors,
     recovered_errors,
-    recovered_table,
     turn_mrad,
 )
 from tbcad.calibration.report.tables import angles_table, spheres_table
@@ -33,12 +29,14 @@ MACHINES = 24
 
 
 @pytest.fixture(scope="module")
-def known(calibrated: Calibration) -> Covariance:
+def known(calibrated: MachineCalibration) -> Covariance:
     return covariance(calibrated.found.prior, calibrated.found.information)
 
 
 @pytest.fixture(scope="module")
-def kinds(calibrated: Calibration, known: Covariance, built: BuiltPrototype) -> tuple[Kind, ...]:
+def kinds(
+    calibrated: MachineCalibration, known: Covariance, built: BuiltPrototype
+) -> tuple[Kind, ...]:
     return recovered_errors(calibrated, known, built.machine)
 
 
@@ -47,7 +45,10 @@ def _named(kinds: tuple[Kind, ...], name: str) -> Kind:
 
 
 def test_centres_and_angles_are_those_of_the_tables(
-    kinds: tuple[Kind, ...], calibrated: Calibration, known: Covariance, built: BuiltPrototype
+    kinds: tuple[Kind, ...],
+    calibrated: MachineCalibration,
+    known: Covariance,
+    built: BuiltPrototype,
 ) -> None:
     rows, centres = spheres_table(calibrated, known).records(), _named(kinds, "centres")
     for figure, name in (("recovered", "difference"), ("sigma", "sigma")):
@@ -69,7 +70,7 @@ def test_errors_are_as_large_as_their_deviations(kinds: tuple[Kind, ...]) -> Non
 
 
 def test_a_motion_and_growth_of_all_centres_is_taken_off(
-    calibrated: Calibration, known: Covariance, built: BuiltPrototype
+    calibrated: MachineCalibration, known: Covariance, built: BuiltPrototype
 ) -> None:
     """A build that is moved, turned and larger has other errors, but not besides that."""
     true = built.machine
@@ -86,7 +87,7 @@ def test_a_motion_and_growth_of_all_centres_is_taken_off(
 
 
 def test_a_machine_that_is_another_shows(
-    calibrated: Calibration, known: Covariance, built: BuiltPrototype
+    calibrated: MachineCalibration, known: Covariance, built: BuiltPrototype
 ) -> None:
     """One radius that is wrong by 1 mm is that figure's error, and no other's."""
     radius = built.machine.radius + np.eye(len(built.machine.radius))[0]
@@ -104,31 +105,16 @@ def test_a_machine_that_is_another_shows(
     assert changed[0][1] == pytest.approx(1000)
 
 
-def test_the_picture_shows_what_the_table_says(kinds: tuple[Kind, ...]) -> None:
-    figure = Figure()
-    draw_recovered(figure, kinds)
-    rows = recovered_table(kinds).records()
-    for axes, kind in zip(figure.axes, kinds, strict=False):
-        mine = [row for row in rows if row["kind"] == kind.name]
-        points = axes.containers[0][0].get_xydata()
-        assert points[:, 0] == pytest.approx([row["injected"] for row in mine])
-        assert points[:, 1] == pytest.approx([row["recovered"] for row in mine])
-        bars = np.array([one[:, 1] for one in axes.containers[0][2][0].get_segments()])
-        sigma = np.array([row["sigma"] for row in mine])
-        assert np.diff(bars)[:, 0] == pytest.approx(2 * SIGMAS * sigma)
-        assert kind.name.split()[0] in axes.get_title()
-    assert len(figure.axes) % COLUMNS == 0
-    assert len(rows) == sum(len(kind.sigma) for kind in kinds)
-
-
-def test_rays_of_the_machine_itself_are_right(calibrated: Calibration) -> None:
+def test_rays_of_the_machine_itself_are_right(calibrated: MachineCalibration) -> None:
     rays = calibrated.rays.known
     errors = ray_errors(calibrated.found, calibrated.found.machine, rays.frame, rays.sphere)
     for one in (errors.whole, errors.relative, errors.in_run):
         assert one == pytest.approx(0, abs=1e-9)
 
 
-def test_errors_of_rays_are_those_predicted(calibrated: Calibration, built: BuiltPrototype) -> None:
+def test_errors_of_rays_are_those_predicted(
+    calibrated: MachineCalibration, built: BuiltPrototype
+) -> None:
     rays = calibrated.rays.known
     errors = ray_errors(calibrated.found, built.machine, rays.frame, rays.sphere)
     for found, place, turn in (
@@ -140,7 +126,7 @@ def test_errors_of_rays_are_those_predicted(calibrated: Calibration, built: Buil
 
 
 def test_a_rotation_of_the_whole_machine_is_not_an_error_within_a_run(
-    calibrated: Calibration,
+    calibrated: MachineCalibration,
 ) -> None:
     """But it is between both, where it is about a level axis: the object turns about z."""
     found, rays = calibrated.found, calibrated.rays.known
@@ -170,7 +156,7 @@ def _turned(machine: Machine, angle: float) -> Machine:
 
 
 @pytest.mark.slow
-def test_errors_of_many_machines_are_normal(calibrated: Calibration) -> None:
+def test_errors_of_many_machines_are_normal(calibrated: MachineCalibration) -> None:
     """Machines drawn from the prior: every kind's errors, in their deviations, are as wide as 1.
 
     Figures of one machine share errors, so a kind's mean square varies as that of a few figures.

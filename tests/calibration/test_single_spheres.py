@@ -48,18 +48,6 @@ def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: Exported
     assert mrad == pytest.approx(rays.whole.turn_mrad, rel=1e-6)
 
 
-def test_known_radius_helps_and_so_do_more_leds(export: ExportedDesign) -> None:
-    leds = read_leds(export.folder)
-    information = shell_information(export, with_partners(leds))
-    few, many = [*range(len(leds))], [*range(2 * len(leds))]
-    free, _ = ray_errors(information, many, NOISE_PX, (1.0, 1.0))
-    known, _ = ray_errors(information, many, NOISE_PX, (1.0, 0.0))
-    fewer, _ = ray_errors(information, few, NOISE_PX, (1.0, 1.0))
-    assert (known <= free * (1 + 1e-6)).all()
-    assert (free <= fewer * (1 + 1e-6)).all()
-    assert np.median(free) < np.median(fewer)
-
-
 def test_best_layout_beats_others_and_keeps_to_the_room(export: ExportedDesign) -> None:
     room = led_room(export)
     places = room.places()

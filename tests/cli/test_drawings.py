@@ -23,31 +23,12 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return shown.err
 
 
-def test_a_folder_that_is_no_export_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = refused([str(tmp_path), "--out", str(tmp_path / "out")], capsys)
-    assert "name a folder that tbcad build wrote" in words
-    (tmp_path / "design.json").write_text("{}")
-    words = refused([str(tmp_path), "--out", str(tmp_path / "out")], capsys)
-    assert "manifest.json is missing or no manifest" in words
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_changed_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     export = shutil.copytree(SAMPLE, tmp_path / "exports")
     design = json.loads((export / "design.json").read_text())
     (export / "design.json").write_text(json.dumps(design))
     words = refused([str(export), "--out", str(tmp_path / "out")], capsys)
     assert "design.json is not as tbcad wrote it" in words
-
-
-def test_an_unknown_part_is_refused_with_the_nearest(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = refused([str(SAMPLE), "--only", "optical_lay", "--out", str(tmp_path / "out")], capsys)
-    assert "optical_layout" in words
-    assert not (tmp_path / "out").exists()
 
 
 def test_the_section_of_the_samples_shell(tmp_path: Path) -> None:

@@ -39,22 +39,6 @@ def test_does_not_overwrite_unless_told_to(capsys: pytest.CaptureFixture[str]) -
     assert "[optics]" in Path("my.toml").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        ([], "FILE is missing"),
-        (["."], "is a folder"),
-        (["no/such/folder.toml"], "cannot be written"),
-        (["x" * 300], "cannot be written"),
-        (["my.toml", "--from", "turtle"], "allowed is one of turtleback, afternoon-print"),
-        (["my.toml", "--json"], "--json is about --list"),
-    ],
-)
-def test_bad_input(words: list[str], reason: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert reason in refusal(capsys, *words)
-    assert not list(Path().iterdir())
-
-
 def test_lists_the_designs(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["init", "--list"]) == 0
     text = capsys.readouterr().out

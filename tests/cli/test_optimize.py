@@ -80,21 +80,3 @@ def test_what_exists_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert file.read_text(encoding="utf-8") == "mine"
     assert "better.toml exists" in capsys.readouterr().err
     assert run(words(tmp_path, "--force")) == 0
-
-
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        (("--candidates", "3"), "--candidates is 3, allowed is 80 to 100000: change it"),
-        (("--for", "beauty"), "--for is 'beauty', allowed is one of minimum"),
-        (("--set", "n=1"), "optics.n"),
-        (("--max-size-mm", "-1"), "--max-size-mm is -1, allowed is more than 0: change it"),
-        (("--max-view-angle-deg", "nan"), "--max-view-angle-deg is nan"),
-    ],
-)
-def test_refused(
-    tmp_path: Path, option: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(words(tmp_path, *option)) == 2
-    assert message in capsys.readouterr().err
-    assert not list((tmp_path).rglob("*.*"))

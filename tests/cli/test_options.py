@@ -17,7 +17,6 @@ from tbcad.cli.examples import EXAMPLES
 from tbcad.doctor import Finding
 from tests.cli.commands import Words, leaves, long_name, options
 
-EXPORT = Path(__file__).parents[2] / "docs" / "sample"
 # Write files or pictures that are their result, and print no figures.
 WITHOUT_FIGURES = {"picture", "report", "simulate-run", "view", "refocus"}
 # One name for one thing; where the values differ, it is said why.
@@ -120,15 +119,3 @@ def test_a_study_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert record["study"] == "elevation"
     assert {Path(file) for file in record["files"]} == set(tmp_path.iterdir())
     assert {"quantity", "unit", "value", "paper", "where"} == set(record["figures"][0])
-
-
-def test_a_plot_for_papers(tmp_path: Path) -> None:
-    words = ["study", "elevation", "--set", "n=4", "--format", "svg", "--out", str(tmp_path)]
-    assert run(words) == 0
-    assert (tmp_path / "elevation.svg").read_bytes().startswith(b"<?xml")
-    assert not (tmp_path / "elevation.png").exists()
-
-
-def test_json_without_dry_run_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", str(EXPORT), "--json"]) == 2
-    assert "--json is about --dry-run" in capsys.readouterr().err

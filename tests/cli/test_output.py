@@ -78,32 +78,6 @@ def test_outputs_of_verify(
     assert "parts can be made" in full
 
 
-@pytest.mark.parametrize("command", [["verify", "x"], ["build"]])
-@pytest.mark.parametrize("options", [["--full", "--json"], ["-q", "--full"], ["--quiet", "--json"]])
-def test_outputs_exclude_each_other(
-    command: list[str],
-    options: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run([*command, *options]) == 2
-    shown = capsys.readouterr()
-    assert (shown.out, len(shown.err.splitlines())) == ("", 1)
-    assert "exclude each other" in shown.err
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("option", ["--full", "--json"])
-def test_without_a_verification_there_is_nothing_to_show(
-    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run([*SMALL, "--no-verify", option, "--out", str(tmp_path / "x")]) == 2
-    assert "leave --no-verify out" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_doctor_fits_and_shows_every_word(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -232,16 +206,12 @@ def test_an_interrupted_build_leaves_the_old_export(
     assert [path.name for path in tmp_path.iterdir()] == ["exports"]
 
 
-@pytest.mark.parametrize("program", ["tbcad", "tbcad_verify"])
-def test_an_interrupted_verification_ends_and_writes_nothing(
-    program: str, built: Path, tmp_path: Path
-) -> None:
+def test_an_interrupted_verification_ends_and_writes_nothing(built: Path, tmp_path: Path) -> None:
     out = shutil.copytree(built, tmp_path / "exports", ignore=lambda *_: ["verify.json"])
     before = contents(out)
-    command = [program, *(["verify"] if program == "tbcad" else []), str(out)]
-    shown, errors, seconds = interrupted(command, "reading")
+    shown, errors, seconds = interrupted(["tbcad_verify", str(out)], "reading")
     assert shown == ""
-    assert errors.splitlines()[-1] == f"{program}: stopped; nothing was changed"
+    assert errors.splitlines()[-1] == "tbcad_verify: stopped; nothing was changed"
     assert "Traceback" not in errors
     assert seconds < PATIENCE_S
     assert contents(out) == before

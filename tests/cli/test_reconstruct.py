@@ -83,45 +83,6 @@ def test_a_stop_says_how_to_go_on(
     assert (capture / ".field.npz.part").is_file()
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--out", "{}/field.txt"), "field.txt: name a file that ends in .npz"),
-        (("--out", "{}/none/field.npz"), "field.npz: its folder does not exist"),
-        (("--out", "{}/lightfield.npz"), "lightfield.npz is read by this command"),
-        (("--out", "{}/object.npz", "--force"), "object.npz belongs to "),
-        (("--mesh", "{}/a.obj"), "a.obj: name a file that ends in .glb or .ply or .stl"),
-        (("--mesh", "{}/a.ply", "--mesh", "{}/b/../a.ply"), "is named twice"),
-        (("--volume", "{}/a.vdb"), "a.vdb: name a file that ends in .vti"),
-        (("--preview", "{}/a.jpg"), "a.jpg: name a file that ends in .png"),
-        (("--nodes", "8"), "--nodes is 8, allowed is 16 to 512: change it"),
-        (("--nodes", "1000"), "--nodes is 1000, allowed is 16 to 512: change it"),
-        (("--epochs", "0"), "--epochs is 0, allowed is 1 to 100: change it"),
-        (("--rays", "0"), "--rays is 0, allowed is 1 to 64: change it"),
-        (("--rays", "12"), "--rays 12: a pixel of this light field is a single ray: leave it out"),
-        (("--blur", "0.4"), "--blur 0.4 is for several rays a pixel: add --rays 12"),
-        (("--blur", "nan"), "--blur is nan, allowed is 0 to 5: change it"),
-        (("--seed", "-1"), "--seed is -1, allowed is 0 to"),
-        (("--frame", "2"), "--frame 2 is not in the sequence: allowed is 0 to 1"),
-        (("--frame", "0", "--all-frames"), "--frame and --all-frames exclude each other"),
-        (("--resume", "--force"), "--force and --resume exclude each other"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
-)
-def test_refused(
-    words: tuple[str, ...],
-    message: str,
-    capture: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    (capture / "b").mkdir()
-    (capture / "lightfield.npz").hardlink_to(capture / "lightfield.h5")
-    before = {file: file.read_bytes() for file in capture.rglob("*") if file.is_file()}
-    assert run(["reconstruct", str(capture), *(word.format(capture) for word in words)]) == 2
-    assert message in capsys.readouterr().err.splitlines()[-1]
-    assert {file: file.read_bytes() for file in capture.rglob("*") if file.is_file()} == before
-
-
 def test_what_exists_is_kept(capture: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (capture / "field.npz").write_text("mine", encoding="utf-8")
     assert run(["reconstruct", str(capture)]) == 2

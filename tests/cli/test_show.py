@@ -60,39 +60,9 @@ def refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
     assert error.count("\n") == 1
 
 
-def test_an_export_without_a_report(record: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    refused([str(record)], f"no such file; write it with `tbcad report {record}`", capsys)
-
-
 def test_a_report_of_somebody_else(export: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (export / "report.html").write_text("<!doctype html>mine", encoding="utf-8")
     refused([str(export)], "report.html is not by tbcad: move it", capsys)
-
-
-def test_nothing_to_show(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for folder in (tmp_path, tmp_path / "none"):
-        refused([str(folder)], "has neither report.html nor lightfield.h5: give a folder", capsys)
-    refused(
-        [str(tmp_path), "--turntable", str(tmp_path / "t.html")],
-        "no such file; --turntable is for a light field",
-        capsys,
-    )
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--elevation", "100"], "elevation 100 is not allowed: 0 to 90"),
-        (["--distance", "20"], "distance 20 is not allowed: 45 to 5000"),
-        (["--width", "4000"], "width 4000 is not allowed: 16 to 2048"),
-        (["--turntable", "knot.png"], "knot.png: give a file that ends in .html"),
-        (["--turntable", "none/knot.html"], "in a folder that exists"),
-    ],
-)
-def test_bad_values(
-    captured: Path, options: list[str], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    refused([str(captured), "--no-open", *options], words, capsys)
 
 
 def test_a_light_field_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -104,48 +104,6 @@ def test_capture_says_how_a_file_was_taken(
     assert json.loads((tmp_path / "out/capture.json").read_text())["object_file"] == wanted
 
 
-@pytest.mark.parametrize("command", [["capture"], ["simulate-run"], ["study", "prototype"],
-                                     ["study", "low-pass"], ["tolerance"]])  # fmt: skip
-def test_unit_and_axis_are_of_a_file(
-    command: list[str], record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run([*command, str(record), "--unit", "cm", "--out", str(tmp_path / "out")]) == 2
-    assert "give --object too, or leave them out" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_capture_of_a_mesh_that_is_too_large(
-    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trimesh.creation.box((100, 10, 10)).export(tmp_path / "box.stl")
-    arguments = ["capture", str(record), "--object", str(tmp_path / "box.stl")]
-    assert run([*arguments, "--out", str(tmp_path / "out")]) == 2
-    assert "100 x 10 x 10 mm" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-    assert run([*arguments, "--fit", "--out", str(tmp_path / "out")]) == 0
-
-
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        (["--mesh"], "shell_a.stl"),
-        (["--prototype"], "prototype.json"),
-        (["--mesh", "--prototype"], "exclude each other"),
-        (["--samples", "0"], "samples"),
-        (["--object", "absent.ply"], "absent.ply"),
-        (["--paint", "gold"], "paint"),
-    ],
-)
-def test_captures_that_cannot_be(
-    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
-) -> None:
-    assert run(["capture", str(record), "--out", str(tmp_path / "out"), *more]) == 2
-    said = capsys.readouterr().err
-    assert wrong in said
-    assert "Traceback" not in said
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("more", [[], ["--surface", "plane"], ["--method", "blend", "--surface",
                                                                "object"]])  # fmt: skip
 def test_view(
@@ -171,34 +129,6 @@ def test_depth_of_a_view(captured: Path, tmp_path: Path) -> None:
     first = png.read_bytes(), ply.read_bytes()
     assert run([*words, "--depth", str(png), "--depth", str(ply), "--force"]) == 0
     assert (png.read_bytes(), ply.read_bytes()) == first
-
-
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        (["--method", "nearest", "--depth", "d.png"], "add --method depth"),
-        (["--surface", "plane", "--depth", "d.png"], "add --method depth"),
-        (["--method", "nearest", "--surface", "depth"], "leave out --surface depth"),
-        (["--method", "depth", "--surface", "object"], "leave out --surface object"),
-        (["--method", "depth", "--depth", "d.gif"], "ends in .png or .ply"),
-        (["--method", "depth", "--depth", "view.png"], "choose another name"),
-        (["--method", "depth", "--depth", "d.png", "--depth", "d.png"], "choose another name"),
-    ],
-)
-def test_depth_that_cannot_be(
-    captured: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    more: list[str],
-    wrong: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run(["view", str(captured), *more]) == 2
-    error = capsys.readouterr().err
-    assert wrong in error
-    assert error.count("\n") == 1
-    assert not list(tmp_path.iterdir())
 
 
 def test_pictures_that_exist_are_replaced_on_force_only(
@@ -249,29 +179,6 @@ def test_the_method_and_why(
         assert any(line.startswith(expected) for line in lines)
 
 
-@pytest.mark.parametrize(
-    ("size_mm", "more", "warned"),
-    [(0.04, [], "--unit m"), (1.5, [], "--unit in"), (0.04, ["--fit"], ""), (20, [], "")],
-)
-def test_an_object_in_another_unit_is_warned_of(
-    record: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    size_mm: float,
-    more: list[str],
-    warned: str,
-) -> None:
-    trimesh.creation.box([size_mm] * 3).export(tmp_path / "box.stl")
-    arguments = ["capture", str(record), "--object", str(tmp_path / "box.stl"), *more]
-    assert run([*arguments, "--out", str(tmp_path / "out")]) == 0
-    lines = [one for one in capsys.readouterr().err.splitlines() if "warning" in one]
-    assert len(lines) == bool(warned)
-    if warned:
-        assert lines[0].startswith(f"tbcad: warning: box.stl is {size_mm:g} mm large")
-        assert warned in lines[0]
-        assert "--fit" in lines[0]
-
-
 def test_a_lens_wider_than_its_distance_is_warned_of(
     captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -293,25 +200,6 @@ def test_view_without_an_object_has_no_truth(captured: Path, tmp_path: Path) -> 
     assert run(["view", str(alone), *small]) == 0
     assert not (tmp_path / "view-truth.png").exists()
     assert run(["view", str(alone), *small, "--method", "blend", "--surface", "object"]) == 2
-
-
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        (["--elevation", "-3"], "--elevation -3"),
-        (["--distance", "10"], "--distance 10"),
-        (["--fov", "180"], "--fov 180"),
-        (["--out", "view.jpg"], ".png"),
-        (["--width", "1"], "width"),
-    ],
-)
-def test_views_that_cannot_be(
-    captured: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
-) -> None:
-    before = contents(captured)
-    assert run(["view", str(captured), *more]) == 2
-    assert wrong in capsys.readouterr().err
-    assert contents(captured) == before
 
 
 def test_refocus_and_sweep(

@@ -20,31 +20,6 @@ def test_no_numbers(text: str) -> None:
         numbers(text)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--bits", "12"], "--bits 12 is not written: allowed is 8 or 16"),
-        (["--stops", "1-x"], "--stops '1-x'"),
-        (["--object", "no.ply"], "no.ply: no such file"),
-        (["--process", "clay"], "process 'clay' is neither built in"),
-        (["--stops", "999"], "stop 999 is not in the plan: allowed is 1 to"),
-        (["--phases", "led_7"], "phase led_7 is not photographed"),
-    ],
-)
-def test_refused_in_one_line(
-    options: list[str],
-    message: str,
-    export_with_wind_up: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    out = tmp_path / "run"
-    assert run(["simulate-run", str(export_with_wind_up), "-o", str(out), *options]) == 2
-    last = capsys.readouterr().err.splitlines()[-1]
-    assert message in last
-    assert not out.exists()
-
-
 def test_a_run_by_the_command(
     export_with_wind_up: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -188,40 +188,6 @@ class TestWritten:
         assert lines[told].split("] ")[1] in " ".join(shown.out.split())
 
 
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        (["--process", "woodwork"], "process 'woodwork'"),
-        (["--process", "slaa"], "did you mean sla?"),
-        (["--yield", "2"], "--yield 2"),
-        (["--yield", "nan"], "--yield nan"),
-        (["--builds", "1"], "--builds 1: allowed is 10 to"),
-        (["--builds", "many"], "builds"),
-        (["--seed", "-1"], "--seed -1"),
-        (["--calibrated-mrad", "-2"], "--calibrated-mrad -2"),
-        (["--set", "nonsense"], "'nonsense' is not kind=value"),
-        (["--set", "nonsense=3"], "unknown key nonsense"),
-        (["--set", "seat_um=-3"], "seat_um"),
-        (["--object", "absent.ply"], "absent.ply"),
-        (["--scheduler", "tcp://127.0.0.1:9"], "--scheduler tcp://127.0.0.1:9: no Dask scheduler"),
-        (["--scheduler", "nowhere"], "--scheduler nowhere: no Dask scheduler"),
-    ],
-)
-def test_what_cannot_be(
-    bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
-) -> None:
-    pytest.importorskip("distributed") if "--scheduler" in more else None
-    assert run(["tolerance", str(bare), *FEW, *more, "--out", str(tmp_path / "out")]) == 2
-    _one_line(capsys, wrong)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_folder_that_is_no_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["tolerance", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    _one_line(capsys, "design.json is not there: name a folder that tbcad build wrote")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_target_that_is_a_file_is_refused_at_once(
     bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -248,6 +214,7 @@ def test_planar_mirrors(
         _one_line(capsys, "flat")
 
 
+@pytest.mark.slow
 def test_camera_that_looks_past_the_balls(export: Path, tmp_path: Path) -> None:
     """68 mrad: a camera as mounted (docs/decisions/0007-how-tolerances-are-computed.md)."""
     arguments = ["tolerance", str(export), *FEW, "--set", "camera_tilt_mrad=68"]

@@ -100,40 +100,6 @@ def test_a_field_of_another_capture(folder: Path, capsys: pytest.CaptureFixture[
     assert "method depth: a blend at the depth that is found" in printed.out
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (["--method", "field", "--surface", "plane"], "leave out --surface plane"),
-        (["--method", "field", "--light", "sky.hdr"], "a field has its own light"),
-        (["--method", "depth", "--normals", "n.png"], "only a field has that"),
-        (["--surface", "plane", "--opacity", "o.png"], "only a field has that"),
-        (["--opacity", "o.jpg"], "name a file that ends in .png"),
-        (["--opacity", "o.png", "--normals", "o.png"], "another file of this command"),
-    ],
-)
-def test_what_a_field_does_not_do(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    more: list[str],
-    words: str,
-) -> None:
-    monkeypatch.chdir(folder.parent)
-    refused(folder, words, capsys, *more)
-
-
-@pytest.mark.parametrize("more", [["--method", "field"], ["--normals", "n.png"]])
-def test_without_a_field(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    more: list[str],
-) -> None:
-    monkeypatch.chdir(folder.parent)
-    (folder / "field.npz").unlink()
-    refused(folder, "no such file; write it with `tbcad reconstruct`", capsys, *more)
-
-
 def test_turntables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By a field beside the capture, and by a field alone: the same pictures and title."""
     pages = []

@@ -17,11 +17,15 @@ LEAKS = re.compile(
 )
 VALUES = ("", "-1", "nan", "\N{SNOWMAN}\x07\n")
 NUMBERS = (int, float)
+# Options that are declared alike are one case, of the first command that has them.
 CASES = {
     f"tbcad {' '.join(words)} {long_name(option)}": (words, option)
-    for words, command in leaves().items()
-    for option in options(command)
-    if option.nargs and not option.is_flag
+    for (words, option) in {
+        (long_name(option), option.help, str(option.type_descriptor.annotation)): (words, option)
+        for words, command in reversed(leaves().items())
+        for option in options(command)
+        if option.nargs and not option.is_flag
+    }.values()
 }
 STAGE = "tbcad: light field\n"
 ONE_LINE = re.compile(r"tbcad: [^\n]+\n")

@@ -16,10 +16,8 @@ from scipy.spatial.transform import Rotation
 from tbcad.datasets.crops import MirrorId, read_crop
 from tbcad.optics.camera import Camera
 from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.simulate.scene.viewpoint import view_directions
-from tbcad.simulate.views.ground_truth import pinhole_picture
 
 Document = dict[str, Any]
 
@@ -114,26 +112,6 @@ class TestNerfstudio:
             low, high = opengl_pixels(transforms, frame, np.array([[0, 0, -5.0], [0, 0, 5.0]]))
             assert high[1] <= low[1] + 1e-6
 
-    def test_pictures_are_those_of_a_ray_traced_pinhole(
-        self, transforms: Document, exported: dict[str, Path], scene: Scene
-    ) -> None:
-        """Truth through the exported poses; at a neighbour's pose it is another picture."""
-        frames, size = transforms["frames"], transforms["w"]
-        right, wrong = [], []
-        for k in range(0, len(frames), 12):
-            picture, mask = (
-                picture_of(exported["nerfstudio"] / frames[k][key]).astype(float)
-                for key in ("file_path", "mask_path")
-            )
-            for place, found in ((k, right), ((k + 1) % len(frames), wrong)):
-                matrix = np.array(frames[place]["transform_matrix"])
-                hfov = 2 * np.arctan(size / 2 / frames[place]["fl_x"])
-                camera = Camera(matrix[:3, 3], -matrix[:3, 2], matrix[:3, 0], size, size, hfov)
-                truth = to_bytes(pinhole_picture(scene, camera))
-                found.append(((truth - picture) ** 2)[mask > 0].mean())
-        assert np.median(right) < 0.5 * np.median(wrong)
-        assert 10 * np.log10(255**2 / np.median(right)) > 20
-
     def test_pictures_are_centred_to_a_part_of_a_pixel(
         self, transforms: Document, exported: dict[str, Path], scene: Scene
     ) -> None:
@@ -158,35 +136,6 @@ class TestNerfstudio:
             )
         centred, *aside = np.median(errors, axis=0)
         assert centred < min(aside)
-
-    def test_a_held_out_view_from_the_other_pictures(
-        self, transforms: Document, exported: dict[str, Path], scene: Scene
-    ) -> None:
-        """A camera's picture from those of its neighbours, by depth and the exported poses."""
-        frames, size = transforms["frames"], transforms["w"]
-        centres = np.array([frame["transform_matrix"] for frame in frames])[:, :3, 3]
-        held = 40
-        matrix, focal = np.array(frames[held]["transform_matrix"]), frames[held]["fl_x"]
-        hfov = 2 * np.arctan(size / 2 / focal)
-        camera = Camera(matrix[:3, 3], -matrix[:3, 2], matrix[:3, 0], size, size, hfov)
-        truth = pinhole_picture(scene, camera)
-        grid = np.stack(np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5), axis=2)
-        slope = (grid.reshape(-1, 2) - size / 2) / focal
-        way = slope[:, :1] * matrix[:3, 0] - slope[:, 1:] * matrix[:3, 1] - matrix[:3, 2]
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        start = np.broadcast_to(matrix[:3, 3], way.shape)
-        depth = cast_rays(scene, start, way).depth
-        hit = np.isfinite(depth)
-        points = start[hit] + depth[hit, None] * way[hit]
-        nearest = np.argsort(np.linalg.norm(centres - centres[held], axis=1))[1:5]
-        parts = []
-        for k in nearest:
-            picture = picture_of(exported["nerfstudio"] / frames[k]["file_path"])
-            parts.append(looked_up(picture, opengl_pixels(transforms, frames[k], points)))
-        view = np.median(parts, axis=0)
-        error = ((view - truth.reshape(-1, 3)[hit]) ** 2).mean()
-        constant = truth.reshape(-1, 3)[hit].var(axis=0).mean()
-        assert error < 0.2 * constant
 
     def test_seed_points_lie_on_the_object_or_in_it(
         self, transforms: Document, exported: dict[str, Path], scene: Scene

@@ -180,35 +180,3 @@ def test_patterns_are_sampled_finely() -> None:
     assert np.linalg.norm(sides, axis=2).max() <= 1.0
     cloud = trimesh.load(io.BytesIO(mesh.ply()), file_type="ply", process=False)
     assert len(cloud.faces) == len(mesh.faces)
-
-
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        ([], "give its folder by --exports"),
-        (["--exports", "RECORD", "--size", "8"], "leave out --size"),
-        (["--exports", "absent"], "design.json"),
-        (["--exports", "RECORD"], "shell_a.stl"),
-    ],
-)
-def test_scenes_that_cannot_be(
-    record: Path,
-    captured: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    more: list[str],
-    wrong: str,
-) -> None:
-    words = [str(record) if word == "RECORD" else word for word in more]
-    out = tmp_path / "out"
-    assert run(["export", str(captured), "--to", "mitsuba", *words, "--out", str(out)]) == 2
-    assert wrong in capsys.readouterr().err
-    assert not out.exists()
-
-
-def test_exports_without_a_scene_are_refused(
-    record: Path, captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["export", str(captured), "--to", "rays", "--exports", str(record)]
-    assert run([*words, "--out", str(tmp_path / "out")]) == 2
-    assert "leave it out" in capsys.readouterr().err

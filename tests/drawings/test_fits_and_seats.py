@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 
 from tbcad.cad.brep import Solid
-from tbcad.cad.features import Cylinder, distance
+from tbcad.cad.features import RoundFace, distance
 from tbcad.cad.solids import cut, cylinder, faces, one_solid, polygon, prism
-from tbcad.drawings.export import Export
+from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.fits import (
+    ListedSeat,
     Mate,
-    Seat,
-    Table,
+    SheetTable,
     fits_table,
     in_columns,
     purchased_mate,
     reamed_to,
     seats_table,
 )
-from tbcad.drawings.holes import Hole, numbered_holes, table_rows
+from tbcad.drawings.holes import DrawnHole, numbered_holes, table_rows
 from tbcad.drawings.printed_parts import draw_part, part_job
 from tbcad.formats.csv_table import Row, write_table
 from tbcad.formats.step import write_step
@@ -42,8 +42,8 @@ ORIGIN = np.zeros(3)
 WHAT = "carrier of the balls, turns about the axis; ream its bore 8 H7"
 
 
-def hole(place: Floats, diameter: float, along: Floats = Z) -> Cylinder:
-    return Cylinder(place, place + 6 * along, diameter / 2, 360.0, hollow=True, open_start=True)
+def hole(place: Floats, diameter: float, along: Floats = Z) -> RoundFace:
+    return RoundFace(place, place + 6 * along, diameter / 2, 360.0, hollow=True, open_start=True)
 
 
 def mate(name: str, place: Floats = ORIGIN, reamed: str = "") -> Mate:
@@ -52,7 +52,7 @@ def mate(name: str, place: Floats = ORIGIN, reamed: str = "") -> Mate:
     return found
 
 
-def rows(holes: list[Cylinder], *mates: Mate) -> list[tuple[str, ...]]:
+def rows(holes: list[RoundFace], *mates: Mate) -> list[tuple[str, ...]]:
     return [*fits_table(numbered_holes(holes, ()), mates).rows]
 
 
@@ -99,15 +99,15 @@ def test_a_tilted_hole_has_a_second_row_rather_than_tiny_text() -> None:
     axis = np.array([math.sin(0.5), 0.0, math.cos(0.5)])
     wall = hole(ORIGIN, 4.0, axis)
     for takes, count in (("", 1), ("MAGNET-6x3", 1), ("INSERT-M3 SET-M3x16", 2)):
-        found = [*table_rows("T1", Hole(wall, ORIGIN, "B", np.zeros(3), takes))]
+        found = [*table_rows("T1", DrawnHole(wall, ORIGIN, "B", np.zeros(3), takes))]
         assert len(found) == count
         assert " ".join(row[-1] for row in found) == f"{takes} (0.479 0.000 0.878)".strip()
         assert {len(row) for row in found} == {7}
 
 
 def test_tables_go_on_in_the_next_column() -> None:
-    def of(name: str, count: int) -> Table:
-        return Table((name,), (10.0,), tuple((str(k),) for k in range(count)))
+    def of(name: str, count: int) -> SheetTable:
+        return SheetTable((name,), (10.0,), tuple((str(k),) for k in range(count)))
 
     columns = in_columns([of("a", 6), of("b", 0), of("c", 4), of("d", 30)], 10, 20)
     shown = [[(one.head[0], len(one.rows)) for one in column] for column in columns]
@@ -139,13 +139,15 @@ def test_distance(carrier: Solid) -> None:
 
 def test_seats_are_listed_on_the_part_that_has_their_pads(carrier: Solid) -> None:
     contacts = np.array([[20.0, 10.0, 10.0], [30.0, 10.0, 10.0], [25.0, 15.0, 10.0]])
-    here = Seat(7, "ball 16 mm", 8.0, np.array([25.0, 10.0, 15.0]), Z, contacts, 3.0)
-    there = Seat(8, "ball 17 mm", 8.5, np.array([25.0, 10.0, 35.0]), Z, contacts + 20 * Z, 3.0)
+    here = ListedSeat(7, "ball 16 mm", 8.0, np.array([25.0, 10.0, 15.0]), Z, contacts, 3.0)
+    there = ListedSeat(
+        8, "ball 17 mm", 8.5, np.array([25.0, 10.0, 35.0]), Z, contacts + 20 * Z, 3.0
+    )
     table = seats_table(carrier.shape, [here, there])
     assert table.rows == (("7", "ball 16 mm", "8.000", "25.00", "10.00", "15.00", "Ø3"),)
 
 
-def export(folder: Path, carrier: Solid) -> Export:
+def export(folder: Path, carrier: Solid) -> DrawnExport:
     """A machine that is the plate with a cap and a ball, on a shaft of 8 mm."""
     write_step(folder / "carrier.step", carrier, pcurves=False)
     ball: Row = {
@@ -203,7 +205,7 @@ def export(folder: Path, carrier: Solid) -> Export:
     design = DesignRecord.model_construct(spec=load_spec(None, ["n=6"]))
     manifest = read_manifest(folder)
     assert manifest is not None
-    return Export(folder, manifest, design, machine, ())
+    return DrawnExport(folder, manifest, design, machine, ())
 
 
 def test_the_carriers_sheet_has_its_fits_and_seats(carrier: Solid, tmp_path: Path) -> None:

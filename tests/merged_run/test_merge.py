@@ -14,8 +14,7 @@ from tbcad.errors import InputError
 from tbcad.machine.machine import Machine
 from tbcad.machine.record import write_machine
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
-from tbcad.simulate.capture.light_field import Frame as LightFrame
-from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
 from tbcad.simulate.prototype.merge import merge_run
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.prototype.run import ball_reflector, prototype_runs
@@ -78,7 +77,7 @@ def calibrated(folder: Path, machine: Machine, frames: tuple[Frame, ...]) -> Pat
     return folder
 
 
-def on_mirrors(frame: LightFrame) -> np.ndarray:
+def on_mirrors(frame: CameraFrame) -> np.ndarray:
     return np.asarray(frame.planes["mirror"]) > 0
 
 

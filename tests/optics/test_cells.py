@@ -56,7 +56,7 @@ def contains(cells: Cells, mirror: int, point: np.ndarray) -> bool:
 RULES = ["traced", "paper", "flat"]
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 9])
+@pytest.mark.parametrize("n", [2, 9])
 @pytest.mark.parametrize("rule", RULES)
 def test_every_ray_meets_the_cell_that_contains_it(n: int, rule: str) -> None:
     cells = mirror_array(f"n={n}", f"radius_rule={rule}").cells
@@ -67,7 +67,7 @@ def test_every_ray_meets_the_cell_that_contains_it(n: int, rule: str) -> None:
     assert np.mean(in_cell) > 0.995  # outlines are sampled: a ray beside an arc may miss its cell
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 7, 18])
+@pytest.mark.parametrize("n", [2, 18])
 @pytest.mark.parametrize("rule", RULES)
 def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
     cells = mirror_array(f"n={n}", f"radius_rule={rule}").cells
@@ -78,7 +78,7 @@ def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
     assert lowest_value(cells.surfaces, points.reshape(-1, 3)) > -1e-9
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 7, 12, 18, 25])
+@pytest.mark.parametrize("n", [2, 7, 25])
 def test_euler_characteristic(n: int) -> None:
     """V - E + F = 1 for a disc of cells (DESIGN.md section 4)."""
     cells = mirror_array(f"n={n}").cells

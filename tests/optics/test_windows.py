@@ -25,7 +25,7 @@ def test_own_spheres_cover_what_the_shell_covers(paper_array: MirrorArray, seen:
     assert seen.coverage(*own_spheres(paper_array)) == pytest.approx(expected, abs=2e-4)
 
 
-@pytest.mark.parametrize("i", [0, 7, 300, 846])
+@pytest.mark.parametrize("i", [0, 300])
 def test_turned_windows_against_brute_force(
     paper_array: MirrorArray, seen: Windows, i: int
 ) -> None:

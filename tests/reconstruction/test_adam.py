@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tbcad.reconstruction.gradient import CORNER, MEMORY, Columns, Moments, adam, unbiased_size
+from tbcad.reconstruction.gradient import CORNER, MEMORY, ColumnSteps, Moments, adam, unbiased_size
 from tbcad.reconstruction.grid import Grid
 
 GRID = Grid(3, 2.0, np.argwhere(np.ones((3, 3, 3), bool)).astype(np.uint16))
 V = len(GRID)
 
 
-def columns(smooth: float = 0.0, size: float = 0.1, limit: float = 9.0) -> Columns:
+def columns(smooth: float = 0.0, size: float = 0.1, limit: float = 9.0) -> ColumnSteps:
     values = (size, smooth, -limit, limit)
-    return Columns(*[np.full(4, value, np.float32) for value in values])
+    return ColumnSteps(*[np.full(4, value, np.float32) for value in values])
 
 
 def step(
-    values: NDArray[np.float32], parts: NDArray[np.float32], how: Columns, sparse: float = 0.0
+    values: NDArray[np.float32], parts: NDArray[np.float32], how: ColumnSteps, sparse: float = 0.0
 ) -> tuple[NDArray[np.float32], Moments]:
     moments = Moments(np.zeros_like(values), np.zeros_like(values))
     changed = np.empty_like(values)

@@ -32,7 +32,7 @@ def choose(
     return found, len(trials)
 
 
-@pytest.mark.parametrize("power", [-2, -1, 0, 1, 2])
+@pytest.mark.parametrize("power", [-2, 0, 1])
 def test_weights_are_those_of_the_least_loss(monkeypatch: pytest.MonkeyPatch, power: int) -> None:
     found, _ = choose(monkeypatch, power, 2.0)
     expected = weighted(BEGUN, FACTOR**power)

@@ -13,7 +13,7 @@ from tbcad.errors import InputError
 from tbcad.reconstruction.checkpoint import part_file
 from tbcad.reconstruction.field import read_field
 from tbcad.reconstruction.fitted import Told, levels, reconstruction, used_rays
-from tbcad.reconstruction.options import EPOCHS, NODES, Options
+from tbcad.reconstruction.options import Options
 from tbcad.reconstruction.rays import captured_rays
 from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tests.ball_captures import RADIUS_MM, ball, four, quick_choice, without_trials  # noqa: F401 - fixtures
@@ -53,20 +53,18 @@ def test_a_ball_is_where_it_is(made: Path) -> None:
     assert facts["unexplained_light"] < 0.01
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_same_bytes_on_any_number_of_threads(
-    threads: int,
+def test_same_bytes_on_another_number_of_threads(
     ball: Path,  # noqa: F811
     made: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tbcad.simulate.parallel.THREADS", threads)
+    monkeypatch.setattr("tbcad.simulate.parallel.THREADS", 3)
     reconstruct(ball, out=tmp_path / "again.npz", options=SMALL)
     assert (tmp_path / "again.npz").read_bytes() == made.read_bytes()
 
 
-@pytest.mark.parametrize("epochs", [1, 2, 6])
+@pytest.mark.parametrize("epochs", [1, 6])
 def test_same_bytes_after_a_stop(
     epochs: int,
     ball: Path,  # noqa: F811
@@ -86,19 +84,14 @@ def test_same_bytes_after_a_stop(
     assert len(told) == sum(level.epochs for level in levels(SMALL)) - epochs
 
 
-@pytest.mark.parametrize("epochs", [2, 3, 4])
-def test_same_bytes_after_a_stop_where_pixels_have_an_area(
-    epochs: int,
-    ball: Path,  # noqa: F811
-    tmp_path: Path,
-) -> None:
+def test_same_bytes_after_a_stop_where_pixels_have_an_area(ball: Path, tmp_path: Path) -> None:  # noqa: F811
     """The grids before the last have single rays: also where the stop is between them."""
     options = Options(nodes=16, epochs=2, order="1", rays=4, blur_px=0.4)
     whole, out = tmp_path / "whole.npz", tmp_path / "field.npz"
     reconstruct(ball, out=whole, options=options)
     assert read_field(whole).facts["rays_a_pixel"] == 4
     with pytest.raises(KeyboardInterrupt):
-        reconstruct(ball, out=out, options=options, detail=stopped_after(epochs))
+        reconstruct(ball, out=out, options=options, detail=stopped_after(3))
     reconstruct(ball, out=out, options=options, resume=True)
     assert out.read_bytes() == whole.read_bytes()
 
@@ -119,12 +112,6 @@ def test_a_checkpoint_of_other_options_is_refused(ball: Path, tmp_path: Path) ->
         reconstruct(ball, out=out, options=SMALL, resume=True)
 
 
-def test_another_seed_is_another_field(ball: Path, made: Path, tmp_path: Path) -> None:  # noqa: F811
-    out = tmp_path / "field.npz"
-    reconstruct(ball, out=out, options=Options(nodes=24, epochs=3, order="0", seed=1))
-    assert not np.array_equal(read_field(out).values, read_field(made).values)
-
-
 def test_frames_start_from_the_one_before(ball: Path, tmp_path: Path) -> None:  # noqa: F811
     stages: list[str] = []
     out = tmp_path / "turn.npz"
@@ -139,12 +126,6 @@ def test_frames_start_from_the_one_before(ball: Path, tmp_path: Path) -> None:  
     (tmp_path / "turn-1.npz").unlink()
     reconstruct(ball, out=out, options=SMALL, frame="all", resume=True)
     assert (tmp_path / "turn-1.npz").read_bytes() == whole
-
-
-def test_grids_are_in_proportion() -> None:
-    assert levels(Options())[-1].nodes == NODES
-    assert levels(Options())[-1].epochs == EPOCHS
-    assert [level.nodes for level in levels(Options(nodes=72))] == [30, 50, 72]
 
 
 def test_mirrors_left_out_are_whole_and_few(ball: Path) -> None:  # noqa: F811

@@ -9,7 +9,7 @@ from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.reconstruction.rays import CapturedRays, captured_rays, entries
-from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.simulate.capture.light_field import CameraFrame, LightField
 from tests.ray_fields import RADIUS, Ball, lines, rays_of
 
 PINHOLES = np.array([[0.0, 3.0, 50.0], [40.0, -5.0, 20.0]])
@@ -17,7 +17,7 @@ PITCH = 0.004  # of a pixel at unit distance
 SIDE = 20  # pixels of a mirror
 
 
-def frame(shift: int = 0) -> Frame:
+def frame(shift: int = 0) -> CameraFrame:
     """Two virtual pinhole cameras side by side that look at the origin, in one picture."""
     origin, direction = np.zeros((2, SIDE, 2 * SIDE, 3), np.float32)
     mirror = np.zeros((SIDE, 2 * SIDE), np.uint16)
@@ -35,7 +35,7 @@ def frame(shift: int = 0) -> Frame:
     planes = {"colour": colour, "mirror": mirror, "origin": origin, "direction": direction}
     camera = Camera(np.zeros(3), np.array([0, 0, 1.0]), np.array([1.0, 0, 0]), 2 * SIDE, SIDE, 0.5)
     mirrors = Surfaces(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2))
-    return Frame(camera, PINHOLES, mirrors, np.zeros((2, 4), np.int64), planes)
+    return CameraFrame(camera, PINHOLES, mirrors, np.zeros((2, 4), np.int64), planes)
 
 
 def axes(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

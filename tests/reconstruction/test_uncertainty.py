@@ -9,7 +9,7 @@ from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.reconstruction.rays import captured_rays, pixel_areas, with_weights
-from tbcad.simulate.capture.light_field import RAY_SIGMAS, Frame, LightField
+from tbcad.simulate.capture.light_field import RAY_SIGMAS, CameraFrame, LightField
 
 PIXEL_MM = 0.5
 
@@ -28,7 +28,7 @@ def parallel() -> LightField:
     up = np.tile([0.0, 0.0, 1.0], (3, 1))
     camera = Camera(np.array([0.0, 0, 90]), np.array([0.0, 0, -1]), np.array([1.0, 0, 0]), 12, 8, 1)
     boxes = np.array([[4 * k, 4 * k + 4, 0, 8] for k in range(3)])
-    frame = Frame(camera, up, Surfaces(50 * up, up, np.zeros(3)), boxes, planes)
+    frame = CameraFrame(camera, up, Surfaces(50 * up, up, np.zeros(3)), boxes, planes)
     return LightField({"a": frame}, 60.0, {})
 
 

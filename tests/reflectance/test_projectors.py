@@ -120,8 +120,3 @@ def test_the_command_writes_projectors_and_relights(
     text = capsys.readouterr().out
     assert "SSIM" in text
     assert "same lamps" not in text
-
-
-def test_the_prototype_is_refused(record: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["capture", str(record), "--lights", "projectors", "--prototype"]) == 2
-    assert "leave out --prototype" in capsys.readouterr().err

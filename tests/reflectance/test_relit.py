@@ -101,48 +101,6 @@ def test_the_same_bytes_each_time(
         assert (again / name).read_bytes() == (captured / name).read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("text", "more", "wrong"),
-    [
-        (None, [], "lamps.csv"),
-        ("x_mm,y_mm,z_mm\n", [], "has no lamps"),
-        ("x_mm,y_mm,z_mm\n1,2,3\n", [], "lamps.csv, line 2: a lamp in the capture sphere"),
-        ("x,y,z\n1,2,300\n", [], "x_mm"),
-        ("x_mm,y_mm,z_mm\n1,2,300\n", ["--samples", "2"], "leave out --samples"),
-        ("x_mm,y_mm,z_mm\n1,2,300\n", ["--every", "2"], "--every chooses"),
-    ],
-)
-def test_lamps_that_cannot_be(
-    record: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    text: str | None,
-    more: list[str],
-    wrong: str,
-) -> None:
-    table, out = tmp_path / "lamps.csv", tmp_path / "out"
-    if text is not None:
-        table.write_text(text, encoding="utf-8")
-    assert run(["capture", str(record), "--lights", str(table), "--out", str(out), *more]) == 2
-    assert wrong in capsys.readouterr().err
-    assert not out.exists()
-
-
-def test_captures_without_lamps_and_other_lights_are_refused(
-    record: Path, hdr: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    plain = tmp_path / "plain"
-    assert run(["capture", str(record), "--out", str(plain)]) == 0
-    words = ["view", str(plain), *SMALL, "--out", str(tmp_path / "v.png")]
-    for more, wrong in (
-        (["--light", str(hdr)], "capture again with --lights"),
-        (["--light", str(tmp_path / "no.hdr")], "no such file"),
-        (["--light-turn", "9"], "add --light"),
-    ):
-        assert run([*words, *more]) == 2
-        assert wrong in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("name", ["lamps/place", "a/transport", "lamps/name"])
 def test_damaged_files_are_refused(captured: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / "reflectance.h5").write_bytes((captured / "reflectance.h5").read_bytes())

@@ -71,13 +71,6 @@ def test_a_picture_that_exists_is_kept(export: Path, capsys: pytest.CaptureFixtu
     assert out.read_text() == "mine"
 
 
-def test_an_export_without_a_prototype_has_no_picture_of_it(
-    export: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["picture", str(export), "--of", "rig", "-o", str(export.parent / "r.png")]) == 2
-    assert "prototype.json is missing" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(
     sys.platform == "linux" and not (shutil.which("xvfb-run") or os.environ.get("DISPLAY")),

@@ -9,10 +9,9 @@ import pytest
 from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.output.build import Export, write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, design_mandrel, mandrel_solid
+from tbcad.shell.mandrel_files import design_mandrel
 from tbcad.spec.load import load_spec
 from tests.exported_files import contents
-from tests.helpers import check_step, read_mesh
 
 KINDS = ("step", "stl", "3mf")
 
@@ -61,47 +60,6 @@ def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
     """Of shells, too."""
     write_export(with_mandrels(), tmp_path, [SHELL])
     assert contents(tmp_path) == contents(exported)
-
-
-@pytest.mark.parametrize("which", [0, 1])
-def test_step_round_trip(exported: Path, mirrors: MirrorDesign, which: int) -> None:
-    array = mirrors.arrays[which]
-    built = mandrel_solid(mirrors, array)
-    content = check_step(exported / f"mandrel_{array.camera_id}.step", built)
-    assert content.kinds["StepGeom_SphericalSurface"] == len(array)
-
-
-def test_step_has_each_mirrors_sphere_turned(exported: Path, mirrors: MirrorDesign) -> None:
-    """Read by a parser that is no CAD kernel: sphere and sense of each named face."""
-    from steputils import p21
-
-    spheres, senses = {}, set()
-    file = p21.readfile(str(exported / "mandrel_a.step"))
-    for instance in file.data[0].instances.values():
-        if not hasattr(instance, "entity") or instance.entity.name != "ADVANCED_FACE":
-            continue
-        name, _, surface, sense = instance.entity.params
-        sphere = file[surface].entity
-        if sphere.name == "SPHERICAL_SURFACE":
-            placement = file[sphere.params[1]].entity
-            point = file[placement.params[1]].entity.params[1]
-            spheres[name] = (*point, sphere.params[2])
-            senses.add(str(sense))
-    array = mirrors.arrays[0]
-    assert list(spheres) == array.ids
-    expected = np.column_stack([array.mirrors.centre, array.mirrors.radius])
-    assert np.array(list(spheres.values())) == pytest.approx(expected, abs=1e-9)
-    assert senses == {".F."}
-
-
-@pytest.mark.parametrize("kind", ["stl", "3mf"])
-@pytest.mark.parametrize("camera", ["a", "b"])
-def test_mesh_round_trip(exported: Path, mirrors: MirrorDesign, camera: str, kind: str) -> None:
-    mesh, read = camera_a_mandrel_mesh(mirrors), read_mesh(exported / f"mandrel_{camera}.{kind}")
-    assert len(read.faces) == len(mesh.triangles)
-    assert read.is_watertight
-    assert read.is_winding_consistent
-    assert read.volume == pytest.approx(mesh.volume, rel=1e-6)
 
 
 def exported_note(tmp_path: Path, *options: str) -> Export:

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-import trimesh
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign
@@ -8,30 +7,6 @@ from tbcad.optics.reflection import miss_distances
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.shell.files import camera_a_mesh, shell_envelope
 from tests.mirror_arrays import mirror_design
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ["n=2"],
-        ["n=3"],
-        ["n=4", "radius_rule=flat"],
-        ["n=8", "radius_rule=paper"],
-        ["n=13"],
-        ["n=5", "camera_mm=[120, 15, -90]"],
-        ["n=5", "coating_um=100"],
-        ["n=5", "shell.seam_flange.dowels=0"],
-    ],
-    ids=str,
-)
-def test_mesh_is_closed_and_oriented(options: list[str]) -> None:
-    mesh = camera_a_mesh(mirror_design(*options))
-    every = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
-    assert every.is_watertight
-    assert every.is_winding_consistent
-    assert mesh.volume > 0
-    assert mesh.areas.min() > 0
-    assert mesh.mirrored().volume == pytest.approx(mesh.volume)
 
 
 def facets_of(mirrors: MirrorDesign) -> Facets:

@@ -1,36 +1,16 @@
 import numpy as np
 import pytest
-from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line, GeomAbs_Plane, GeomAbs_Sphere
+from OCP.TopAbs import TopAbs_EDGE
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS
 
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.shell.files import camera_a_mesh, camera_solid, shell_envelope
+from tbcad.shell.files import camera_solid, shell_envelope
 from tbcad.spec.load import load_spec
-from tests.helpers import area, volume
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ["n=2"],
-        ["n=5"],
-        ["n=6"],
-        ["n=4", "radius_rule=flat"],
-        ["n=9", "radius_rule=paper"],
-        ["n=5", "coating_um=100"],
-        ["n=5", "camera_mm=[120, 15, -90]"],
-        ["n=5", "shell.seam_flange.dowels=0", "shell.foot_flange.bolts=12"],
-    ],
-    ids=str,
-)
-def test_solid_is_valid_and_has_the_volume_of_its_mesh(options: list[str]) -> None:
-    """The mesh is built without the kernel: two ways to one volume."""
-    fine = [*options, "structure_error_mm=0.002", "chord_error_mm=0.001"]
-    mirrors = design(load_spec(None, fine))
-    expected = pytest.approx(camera_a_mesh(mirrors).volume, rel=3e-4)
-    for array in mirrors.arrays:
-        solid = camera_solid(mirrors, array)
-        assert BRepCheck_Analyzer(solid.shape).IsValid()
-        assert volume(solid.shape) == expected
+from tests.helpers import area
+from tests.pedestal_designs import pedestal_design
 
 
 @pytest.mark.parametrize("rule", ["traced", "paper", "flat"])
@@ -40,12 +20,6 @@ def test_each_face_has_its_cells_area(rule: str) -> None:
     for array in mirrors.arrays:
         faces = camera_solid(mirrors, array).faces[: len(array)]
         assert [area(face) for _, face in faces] == pytest.approx(array.area, rel=1e-6)
-
-
-def test_paper_design_areas(paper_design: MirrorDesign) -> None:
-    array = paper_design.arrays[0]
-    faces = camera_solid(paper_design, array).faces[: len(array)]
-    assert sum(area(face) for _, face in faces) == pytest.approx(array.area.sum(), rel=1e-6)
 
 
 def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> None:
@@ -69,3 +43,23 @@ def test_holes_go_through(small_design: MirrorDesign) -> None:
         for k, radius in enumerate(holes.radius):
             wall = area(faces[f"{kind}_hole_{k + 1:02d}"])
             assert wall == pytest.approx(2 * np.pi * radius * thickness, rel=1e-9)
+
+
+def test_faces_are_spheres_and_planes_between_lines_and_circles_with_their_own_names() -> None:
+    mirrors = pedestal_design("n=5")
+    array = mirrors.arrays[1]
+    solid = camera_solid(mirrors, array)
+    names, faces = zip(*solid.faces, strict=True)
+    assert len(set(names)) == len(names)
+    count = len(array) + len(array.cells.walls)
+    walls = [f"{array.ids[i]}_{array.ids[j]}" for i, j in mirrors.arrays[0].cells.walls.tolist()]
+    assert list(names[len(array) : count]) == walls
+    for k, face in enumerate(faces[:count]):
+        kind = GeomAbs_Sphere if k < len(array) else GeomAbs_Plane
+        assert BRepAdaptor_Surface(face).GetType() == kind
+        explorer = TopExp_Explorer(face, TopAbs_EDGE)
+        while explorer.More():
+            curve = BRepAdaptor_Curve(TopoDS.Edge_s(explorer.Current())).GetType()
+            assert curve in (GeomAbs_Line, GeomAbs_Circle)
+            explorer.Next()
+    assert [area(face) for face in faces[: len(array)]] == pytest.approx(array.area, rel=1e-6)

@@ -12,8 +12,8 @@ from tbcad.simulate.prototype.ball_rays import camera_colours, trace_balls
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run.led_light import DOME_MM, balls_of_frame
-from tbcad.simulated_run.photographs import Chain, object_light, phases_of
-from tbcad.simulated_run.sensor import Sensor, pixel_directions
+from tbcad.simulated_run.photographs import ImagingChain, object_light, phases_of
+from tbcad.simulated_run.sensor import SimulatedSensor, pixel_directions
 from tests.simulated_runs import BRIGHT, Small, photograph_centroid, small_run
 
 STOPS = (20, 40)
@@ -39,7 +39,9 @@ def test_photographs_of_one_frame_have_noise_of_their_own(small: Small) -> None:
 
 
 def test_highlights_are_where_the_machine_shows_them(export_folder: Path) -> None:
-    exact = Chain(Sensor(noise=0.0, grains=0, hot_share=0.0, bits=16), led_light=BRIGHT)
+    exact = ImagingChain(
+        SimulatedSensor(noise=0.0, grains=0, hot_share=0.0, bits=16), led_light=BRIGHT
+    )
     run = small_run(export_folder, STOPS, chain=exact).run
     images = run.frame_photographs(0, ("led_1", "led_2"))
     expected = expected_highlights(run.built.machine, DOME_MM)
@@ -76,12 +78,14 @@ def test_the_lit_object_is_what_a_capture_traces(export_folder: Path) -> None:
 
 
 def test_an_led_that_is_off_leaves_darkness(export_folder: Path) -> None:
-    dead = Chain(Sensor(noise=0.0, hot_share=0.0), led_light=(BRIGHT, 0.0, BRIGHT, BRIGHT))
+    dead = ImagingChain(
+        SimulatedSensor(noise=0.0, hot_share=0.0), led_light=(BRIGHT, 0.0, BRIGHT, BRIGHT)
+    )
     images = small_run(export_folder, STOPS, chain=dead).run.frame_photographs(0, phases_of(4))
     assert images["led_2"].max() == 0
     assert images["led_1"].max() > 50
 
 
 def test_light_saturates(small: Small) -> None:
-    bright = replace(small.run, chain=Chain(led_light=50.0))
+    bright = replace(small.run, chain=ImagingChain(led_light=50.0))
     assert bright.frame_photographs(0, ("led_1",))["led_1"].max() == 255

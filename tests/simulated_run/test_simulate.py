@@ -17,6 +17,7 @@ from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run import simulate
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.prototype.draws import read_wind_up
+from tests.exported_files import contents
 from tests.prototype_records import printed_part, write_prototype
 from tests.simulated_runs import Small, fdm_errors, small_run
 
@@ -26,14 +27,6 @@ PHASES = ("dark", "led_1", "lit")
 @pytest.fixture(scope="module")
 def small(export_folder: Path) -> Small:
     return small_run(export_folder, (3, 6))
-
-
-def digests(folder: Path) -> dict[str, str]:
-    return {
-        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def test_a_folder_that_is_read_back(small: Small, export_folder: Path, tmp_path: Path) -> None:
@@ -64,7 +57,7 @@ def test_the_same_bytes_with_any_number_of_threads(
         monkeypatch.setattr(simulate, "THREADS", threads)
         out = tmp_path / str(threads)
         simulate.write_run((small.run,), PHASES, export_folder, out, lambda _: None)
-    assert digests(tmp_path / "1") == digests(tmp_path / "3")
+    assert contents(tmp_path / "1") == contents(tmp_path / "3")
 
 
 def test_photographs_are_not_replaced(small: Small, export_folder: Path, tmp_path: Path) -> None:
@@ -145,19 +138,6 @@ def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) ->
     wind_up = read_wind_up(export, plan)
     assert wind_up.max() > 0
     assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (options_of(stops="500"), "stop 500 is not in the plan: allowed is 1 to"),
-        (options_of(phases="led_9"), "phase led_9 is not photographed: allowed is dark, led_1"),
-    ],
-)
-def test_refused(export_with_wind_up: Path, options: SimulateRunOptions, message: str) -> None:
-    export = read_export(export_with_wind_up)
-    with pytest.raises(InputError, match=message):
-        simulate.prepare_run(export, fdm_errors(), simulate.run_object(export, None), options)
 
 
 def test_the_stage_hides_leds_as_it_stands(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.results.study import Study
 from tbcad.simulate.scene.object import patterned_ball
@@ -71,11 +70,6 @@ def test_subdivisions() -> None:
     for wrong in (1, 61):
         with pytest.raises(InputError, match=f"--n is {wrong}, allowed is 2 to 60"):
             parse_subdivisions([4, wrong])
-
-
-def test_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["study", "balance", "--n", "1"]) == 2
-    assert "--n is 1" in capsys.readouterr().err
 
 
 def test_viewpoints_are_even_over_the_hemisphere() -> None:

@@ -4,16 +4,13 @@ import csv
 import math
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pytest
 
 from tbcad import schedule
 from tbcad.cli import run
 from tbcad.errors import InputError
-from tbcad.figure_files import PlotFormat
 from tbcad.mirrors import radii
-from tbcad.results.plots import Panel, Series, plot_file
 from tbcad.results.study import (
     SUMMARY_COLUMNS,
     Study,
@@ -28,10 +25,8 @@ from tbcad.spec.design import FIT
 from tbcad.spec.load import load_spec
 from tbcad.studies.capture_area import capture_area
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
-from tbcad.studies.elevation import correlation, elevation
+from tbcad.studies.elevation import elevation
 from tbcad.studies.paper import (
-    balanced_sensors,
-    claims,
     is_table_i,
     with_lens_of_table_i,
 )
@@ -127,12 +122,6 @@ def test_elevation_of_the_paper_design() -> None:
     assert bands.where(elevation_from_deg=15.0).numbers("mean_seeing_px")[0] == pytest.approx(mean)
 
 
-def test_correlation_is_pearsons() -> None:
-    x = np.arange(10.0)
-    assert correlation(x, 3 - 2 * x) == pytest.approx(-1, rel=1e-12)
-    assert correlation(x, (x - 4.5) ** 2) == pytest.approx(0, abs=1e-12)
-
-
 def test_elevation_of_few_mirrors() -> None:
     study = elevation(load_spec(None, ["n=2"]))
     assert len(study.tables[0].rows) == 15
@@ -162,19 +151,6 @@ def test_csv_keeps_every_digit() -> None:
     assert table.numbers("b") == pytest.approx([math.nan, 3], nan_ok=True)
 
 
-@pytest.mark.parametrize(
-    ("kind", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
-)
-def test_pictures_repeat_whatever_the_user_has_set(kind: PlotFormat, begin: bytes) -> None:
-    line = Series("line", np.arange(1.0, 5), np.array([1, 2, np.nan, 400.0]))
-    panels = (Panel("one", "x", "y", (line,), "y"), Panel("two", "x", "y", (line,)))
-    first = plot_file(panels, kind)
-    with matplotlib.rc_context({"figure.facecolor": "red", "font.size": 20.0}):
-        assert plot_file(panels, kind) == first
-    assert plot_file(panels[:1], kind) != first
-    assert first.startswith(begin)
-
-
 def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
     out = tmp_path / "new" / "studies"
     study = elevation(load_spec(None, ["n=4"]))
@@ -184,14 +160,6 @@ def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
     assert write_study(study, out) == files
     assert {path.name for path in out.iterdir()} == {"mine.txt", *(path.name for path in files)}
     assert (out / "elevation.csv").read_bytes() == study_files(study)["elevation.csv"]
-
-
-def test_nothing_is_left_when_a_file_cannot_be_replaced(tmp_path: Path) -> None:
-    study = elevation(load_spec(None, ["n=4"]))
-    (tmp_path / "elevation.png").mkdir()
-    with pytest.raises(InputError, match="cannot be written"):
-        write_study(study, tmp_path)
-    assert not list(tmp_path.glob(".tbcad-*"))
 
 
 def test_study_folders_refused(tmp_path: Path) -> None:
@@ -207,12 +175,6 @@ def test_sweeps_refused(first: int, last: int) -> None:
     with pytest.raises(InputError, match="--from or --to"):
         n_range(first, last)
     assert list(n_range(2, 4)) == [2, 3, 4]
-
-
-def test_claims_say_where_in_the_paper() -> None:
-    assert all(claim.where and claim.text for claim in claims().values())
-    assert claims()["virtual_cameras"].value == 1657
-    assert [row.n for row in balanced_sensors()] == [12, 18, 26, 36]
 
 
 def test_which_designs_are_the_papers() -> None:
@@ -238,28 +200,3 @@ def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "21.2 mm" in shown.out
     assert "capture-area.csv" in shown.out
     assert (out / "capture-area.png").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["resolution", "--sensor", "12"],
-        ["resolution", "--ratio", "0:1"],
-        ["resolution", "--from", "9", "--to", "3"],
-        ["capture-area", "--to", "61"],
-        ["elevation", "--set", "optics.m=3"],
-        ["elevation", "missing.toml"],
-        ["depth-of-field", "--blur-px", "0"],
-        ["depth-of-field", "--pixel-um", "nan"],
-        ["low-pass", "missing", "--filter-px", "0"],
-        ["low-pass", "missing", "--lens-px", "17"],
-    ],
-)
-def test_bad_input_is_one_line(
-    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["study", *arguments, "--out", str(tmp_path / "out")]) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert len(shown.err.splitlines()) == 1
-    assert not (tmp_path / "out").exists()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_rel
 
-from tbcad.cli import run
 from tbcad.errors import InputError
 from tbcad.mirrors import radii
 from tbcad.mirrors.array import design
@@ -41,13 +40,6 @@ def test_sensors_of_table_ii_have_its_n() -> None:
     assert sensor_n(paper, Sensor(3664, 2748)) == 24
 
 
-def test_n_proportionate_to_the_sensor() -> None:
-    """Four times the sides: sixteen times the pixels, twice the n (design sensor-10mp)."""
-    sensors = (Sensor(2080, 1552), Sensor(8320, 6208), Sensor(3664, 2748))
-    assert [proportionate_n(load_spec(None), sensor) for sensor in sensors] == [18, 36, 24]
-    assert proportionate_n(load_spec(None, SMALL), Sensor(16, 16)) == 2
-
-
 class SmallViews(Viewpoints):
     """With a quarter of the pixels: how blurred views are is searched for, which takes long."""
 
@@ -70,15 +62,6 @@ def test_more_pixels_make_better_views(study: Study) -> None:
     assert every[0] < every[1] < every[2] < 1
 
 
-def test_means(study: Study) -> None:
-    views, means = study.tables[:2]
-    assert len(views.rows) == 3 * 4
-    mine = views.where(width_px=416, elevation_deg=60.0).numbers("ssim")
-    (mean,) = means.where(width_px=416, elevation_deg=60.0).records()
-    assert mean["views"] == len(mine) == 2
-    assert mean["ssim"] == pytest.approx(np.mean(mine))
-
-
 def test_more_pixels_make_sharper_views(study: Study) -> None:
     rows = study.tables[1].where(elevation_deg="all")
     blur, share = rows.numbers("blur_mm"), rows.numbers("object_share")
@@ -97,23 +80,6 @@ def test_elevations_of_the_sharpest_and_most_similar_views(study: Study) -> None
     blur = {elevation: row.numbers("blur_mm")[0] for elevation, row in at.items()}
     assert found.value == min(blur, key=lambda elevation: blur[elevation])
     assert (found.paper, found.where) == (15, "section 4.4")
-
-
-def test_fit(study: Study) -> None:
-    means, fits = study.tables[1:]
-    rows = means.where(elevation_deg="all")
-    x, y = np.log10(rows.numbers("width_px") * rows.numbers("height_px")), rows.numbers("ssim")
-    slope, intercept = np.polyfit(x, y, 1)
-    (fit,) = fits.where(elevation_deg="all").records()
-    assert (fit["slope"], fit["intercept"]) == pytest.approx((slope, intercept))
-    rest = y - slope * x - intercept
-    assert fit["r2"] == pytest.approx(1 - (rest**2).sum() / ((y - y.mean()) ** 2).sum())
-
-
-def test_the_same_study_gives_the_same_files(study: Study) -> None:
-    files = study_files(study)
-    assert {"ssim.csv", "ssim-means.csv", "ssim-fits.csv", "ssim.png"} <= set(files)
-    assert study_files(study) == files
 
 
 def test_a_sensor_whose_mirrors_cannot_be_made_has_a_reason(
@@ -201,16 +167,3 @@ def test_viewpoints_around_the_object() -> None:
     assert at[4:, 2] == pytest.approx(np.full(4, 500 * np.sqrt(0.5)))
     with pytest.raises(InputError, match="--azimuths 0"):
         viewpoints_around((0.0,), 0, 500.0)
-
-
-def test_bad_input_of_the_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in (
-        ["ssim", "--sensor", "abc"],
-        ["ssim", "--azimuths", "0"],
-        ["ssim", "--distance", "5"],
-        ["prototype", str(tmp_path)],
-    ):
-        assert run(["study", *arguments, "--out", str(tmp_path / "out")]) == 2
-        said = capsys.readouterr().err.splitlines()
-        assert said[-1].startswith("tbcad: ")
-    assert not (tmp_path / "out").exists()

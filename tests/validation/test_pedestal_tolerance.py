@@ -56,7 +56,7 @@ def drawn(halves: EdgeModels, errors: Errors, builds: range) -> tuple[ShellDraws
 
 @pytest.mark.parametrize(
     "settings",
-    [("n=2",), ("n=5",), ("n=9",), ("n=6", "shell.groove_mm=0.5"), ("n=4", "radius_rule=flat")],
+    [("n=2",), ("n=9",), ("n=6", "shell.groove_mm=0.5"), ("n=4", "radius_rule=flat")],
 )
 def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
     made = pedestal_design(*settings)
@@ -132,8 +132,8 @@ def bisected_coverage(half: EdgeModel, draws: ShellDraws, mirror: int, ways: int
     return float(2 * miss_distances(half.view.pinhole, x, built).min())
 
 
-@pytest.mark.parametrize("mirror", [3, 30, 55])
-def test_moved_walls_and_uneven_scale_against_brute_force(halves: EdgeModels, mirror: int) -> None:
+def test_moved_walls_and_uneven_scale_against_brute_force(halves: EdgeModels) -> None:
+    mirror = 30
     errors = Errors(sphere_centre=Error(0.03), sphere_radius=Error(0.03), scale_axis=Error(0.01))
     one = drawn(halves, errors, range(1))[1]
     moved = np.random.default_rng(2).normal(0, 0.1, one.wall.shape)
@@ -176,7 +176,7 @@ def test_same_bits_as_with_every_edge(halves: EdgeModels, size: float) -> None:
 
 def test_warped_builds_against_displaced_material(halves: EdgeModels, small: MirrorDesign) -> None:
     """Halves whose every point is displaced: walls go along with the mirrors that they end."""
-    length, builds = SLA.warp.length, 3
+    length, builds = SLA.warp.length, 1
     chosen = pivots(halves[0].apex, length)
     fields = [smooth_field(half.apex, length, chosen) for half in halves]
     shapes = shell_error_shapes(len(halves[0]), len(chosen))
@@ -203,16 +203,13 @@ def record(small: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Exp
     return read_record(folder)
 
 
-@pytest.mark.parametrize(
-    "first", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (5, 10, 15))]
-)
 def test_random_builds_against_the_verification_of_their_meshes(
-    halves: EdgeModels, small: MirrorDesign, record: Export, first: int
+    halves: EdgeModels, small: MirrorDesign, record: Export
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured by rays: within 0.05 mm."""
-    draws = drawn(halves, scaled(COARSE, 0.5), range(first, first + 5))
+    draws = drawn(halves, scaled(COARSE, 0.5), range(2))
     fast, _ = coverage(halves, draws)
-    for k in range(5):
+    for k in range(2):
         write_meshes(small, draws, k, record.folder)
         shifts = {name: one.camera_shift[k] for name, one in zip("ab", draws, strict=True)}
         assert np.abs(fast[k] - verified_coverage(record, shifts)).max() < 0.05

@@ -62,7 +62,7 @@ def row(*vector: float) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "settings",
-    [("n=4",), ("n=5",), ("n=6",), ("n=4", "radius_rule=flat"), ("n=6", "radius_rule=flat")],
+    [("n=5",), ("n=6",), ("n=4", "radius_rule=flat")],
 )
 def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
     """To the accuracy of the design's own samples, 1e-5 mm; the next test goes farther."""
@@ -235,7 +235,7 @@ def test_coat_too_thick_is_radii_too_large(halves: EdgeModels) -> None:
 # Random builds
 
 
-@pytest.mark.parametrize("share", [0.1, 1.0, 4.0])
+@pytest.mark.parametrize("share", [0.1, 4.0])
 def test_random_builds_against_slow_tracing(
     halves: EdgeModels, small_design: MirrorDesign, share: float
 ) -> None:
@@ -250,21 +250,10 @@ def test_random_builds_against_slow_tracing(
         assert np.abs(found - half.coverage).max() > 5 * share  # it is no small thing
 
 
-def test_random_paper_builds_against_slow_tracing(paper_design: MirrorDesign) -> None:
-    halves = halves_of(paper_design)
-    drawn, _ = draw(POSED, 7, range(3), len(halves[0]))
-    found = mirror_coverage(halves[0], drawn).diameter
-    slow = np.stack([traced_coverage(paper_design.arrays[0], drawn, k) for k in range(3)])
-    assert np.abs(found - slow).max() < 1e-6
-
-
-@pytest.mark.parametrize("mirror", [3, 30, 55])
-def test_uneven_scale_against_brute_force(
-    halves: EdgeModels, small_design: MirrorDesign, mirror: int
-) -> None:
+def test_uneven_scale_against_brute_force(halves: EdgeModels, small_design: MirrorDesign) -> None:
     """Spheres become ellipsoids of up to 1 % out of round."""
     errors = replace(COARSE, camera_shift=Error(), scale_axis=Error(0.01))
-    _, drawn = draw(errors, 3, range(1), len(halves[0]))
+    mirror, (_, drawn) = 30, draw(errors, 3, range(1), len(halves[0]))
     assert np.ptp(drawn.scale) > 0.005
     found = mirror_coverage(halves[1], drawn).diameter[0, mirror]
     assert found == pytest.approx(
@@ -287,9 +276,8 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
 @pytest.mark.parametrize(
     ("errors", "builds"),
     [
-        (COARSE, range(4)),
-        pytest.param(COARSE, range(4, 20), marks=pytest.mark.slow),
-        (POSED, range(20, 24)),
+        (COARSE, range(2)),
+        (POSED, range(20, 22)),
     ],
 )
 def test_random_builds_against_the_verification_of_their_meshes(

@@ -1,5 +1,7 @@
 """A ball as a field, made by hand."""
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,14 @@ def ball() -> Field:
     colour = np.broadcast_to(COLOUR, (len(grid), 3))
     values = np.column_stack([np.maximum(inside, -3.0), colour])
     return Field(grid, values.astype(np.float32))
+
+
+def data_of(page: str) -> dict[str, object]:
+    """What the scripts of a page read."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page)
+    assert found
+    record: dict[str, object] = json.loads(found[1])
+    return record
 
 
 def write_ball(source: LightField, folder: Path, frame: int | None = None) -> Path:

@@ -1,8 +1,6 @@
 """Views of a field: moving, at rest, by a lens, as a turntable and in Python."""
 
 import base64
-import json
-import re
 from io import BytesIO
 from pathlib import Path
 
@@ -18,7 +16,7 @@ from tbcad.viewer.page import Query
 from tbcad.viewer.render import FieldRenderer, Renderer
 from tbcad.viewer.server import ViewServer
 from tbcad.viewer.turntable import Turntable, write_turntable
-from tests.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, ball
+from tests.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, ball, data_of
 
 SMALL = Query(azimuth=40, elevation=20, width=160, height=120, still=1)
 COLOUR_8 = np.rint(255 * np.array(COLOUR))
@@ -53,13 +51,6 @@ def test_a_lens_is_of_the_light_field(renderer: Renderer) -> None:
     assert np.array_equal(with_lens.picture(query), expected)
     with pytest.raises(InputError, match="aperture 200: a field alone has none"):
         FieldRenderer(ball()).picture(query)
-
-
-def data_of(page: str) -> dict[str, object]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page)
-    assert found
-    record: dict[str, object] = json.loads(found[1])
-    return record
 
 
 @pytest.mark.parametrize("lens", [True, False])

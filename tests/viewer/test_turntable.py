@@ -1,8 +1,6 @@
 """Turntables: one file, bounded, with the views that it says it has."""
 
 import base64
-import json
-import re
 from io import BytesIO
 from pathlib import Path
 
@@ -21,20 +19,13 @@ from tbcad.viewer.turntable import (
     KIND,
     WEBP_QUALITIES,
     Turntable,
-    even_elevations,
     smallest_loss,
     turntable_page,
     write_turntable,
 )
+from tests.viewer.fields import data_of
 
 TABLE = Turntable(4, (20.0, 60.0), 640.0, (160, 120), "nearest")
-
-
-def data_of(page: str) -> dict[str, object]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page)
-    assert found
-    record: dict[str, object] = json.loads(found[1])
-    return record
 
 
 def test_views_are_those_of_the_library(renderer: Renderer, tmp_path: Path) -> None:
@@ -85,8 +76,3 @@ def test_pictures_lose_detail_until_they_fit() -> None:
         assert len(smallest_loss(pictures, TABLE, "knot", size)) == size
     with pytest.raises(InputError, match="4 x 1 views do not fit into"):
         smallest_loss(pictures, TABLE, "knot", sizes[-1] - 1)
-
-
-def test_elevations_of_rows() -> None:
-    assert even_elevations(1, 42) == (42,)
-    assert even_elevations(3, 42) == (15, 45, 75)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.estimate.covariance import covariance
 from tbcad.calibration.report.plots import INCHES, draw_recovered, plots
 from tbcad.calibration.report.record import calibration_record, covariance_bytes
@@ -42,7 +42,7 @@ COVARIANCE = "covariance.npz"
 
 def write_calibration(
     folder: Path,
-    result: Calibration,
+    result: MachineCalibration,
     judged: CalibrationVerdict,
     basis: dict[str, Any],
     plot: PlotFormat = "png",
@@ -68,7 +68,7 @@ def write_calibration(
 
 
 def write_recovered(
-    folder: Path, result: Calibration, truth: Machine, plot: PlotFormat = "png"
+    folder: Path, result: MachineCalibration, truth: Machine, plot: PlotFormat = "png"
 ) -> str:
     """Write recovered.csv and its plot of a simulated run, and return what they say."""
     kinds = recovered_errors(
@@ -83,7 +83,7 @@ def write_recovered(
 
 
 def _recovered_text(
-    result: Calibration, truth: Machine, kinds: tuple[Kind, ...], plot: PlotFormat
+    result: MachineCalibration, truth: Machine, kinds: tuple[Kind, ...], plot: PlotFormat
 ) -> str:
     figures = sum(len(kind.sigma) for kind in kinds)
     within = sum(kind.within * len(kind.sigma) for kind in kinds) / figures

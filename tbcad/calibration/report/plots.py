@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.report.recovered import SIGMAS, Kind
 from tbcad.figure_files import PlotFormat, figure_file, legend_below
 from tbcad.types import Floats
@@ -28,7 +28,9 @@ PANEL_RANGE, PANEL_BINS = 4.0, 32  # of the histogram, in standard deviations
 TITLE_LINE = 26  # letters
 
 
-def plots(result: Calibration, spheres: Floats, kind: PlotFormat = "png") -> dict[str, bytes]:
+def plots(
+    result: MachineCalibration, spheres: Floats, kind: PlotFormat = "png"
+) -> dict[str, bytes]:
     """All plots by the names of their files; covariances of spheres in mm^2, (k, 4, 4)."""
     drawings: dict[str, Callable[[Figure], None]] = {
         "residuals": lambda figure: _residual_arrows(figure, result),
@@ -39,7 +41,7 @@ def plots(result: Calibration, spheres: Floats, kind: PlotFormat = "png") -> dic
     return {f"{name}.{kind}": figure_file(draw, INCHES, kind) for name, draw in drawings.items()}
 
 
-def _residual_arrows(figure: "Figure", result: Calibration) -> None:
+def _residual_arrows(figure: "Figure", result: MachineCalibration) -> None:
     """Where in the picture highlights are off, and which way."""
     found, camera = result.found, result.setup.designed.camera
     axes = figure.add_subplot()
@@ -69,7 +71,7 @@ def _residual_arrows(figure: "Figure", result: Calibration) -> None:
     legend_below(axes)
 
 
-def _histogram(figure: "Figure", result: Calibration) -> None:
+def _histogram(figure: "Figure", result: MachineCalibration) -> None:
     """Residuals in standard deviations, next to the normal law."""
     found = result.found
     sigma = found.highlights.sigma * found.noise_factor
@@ -90,7 +92,7 @@ def _histogram(figure: "Figure", result: Calibration) -> None:
     axes.grid(True, alpha=0.25)
 
 
-def _shifts(figure: "Figure", result: Calibration, spheres: Floats) -> None:
+def _shifts(figure: "Figure", result: MachineCalibration, spheres: Floats) -> None:
     """Spheres on the base along its axis, with enlarged shifts and error ellipses."""
     prior = result.found.prior
     designed = result.setup.designed.centre @ prior.across.T
@@ -125,7 +127,7 @@ def _ellipse(covariance: Floats) -> Floats:
     return np.asarray(vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * ring))
 
 
-def _rays(figure: "Figure", result: Calibration) -> None:
+def _rays(figure: "Figure", result: MachineCalibration) -> None:
     """How well rays are known over the hemisphere, the zenith in the middle."""
     known = result.rays.known
     turned = np.array([result.setup.frames[i].object_turn_deg for i in known.frame]) == 180

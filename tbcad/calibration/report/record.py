@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.report.tables import sphere_covariances
 from tbcad.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
@@ -24,7 +24,7 @@ DIGITS = 6
 
 
 def calibration_record(
-    result: Calibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
+    result: MachineCalibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
 ) -> CalibrationRecord:
     """What calibration.json says.
 
@@ -82,7 +82,7 @@ def calibration_record(
     )
 
 
-def covariance_bytes(result: Calibration, known: Covariance) -> bytes:
+def covariance_bytes(result: MachineCalibration, known: Covariance) -> bytes:
     """covariance.npz: the same calibration gives the same bytes.
 
     Arrays: parameter (q,) names of the free ones; value and prior_sigma (q,), in prior standard
@@ -110,7 +110,7 @@ def covariance_bytes(result: Calibration, known: Covariance) -> bytes:
     return file.getvalue()
 
 
-def _parameters(result: Calibration, known: Covariance) -> dict[str, ParameterBlock]:
+def _parameters(result: MachineCalibration, known: Covariance) -> dict[str, ParameterBlock]:
     """Each block's priors and results: deviations before and after, median of its parameters."""
     prior = result.found.prior
     after = np.zeros(len(prior.flat_sigma))
@@ -131,7 +131,7 @@ def _median(values: Floats) -> float | None:
     return _short(float(np.median(free))) if len(free) else None
 
 
-def _counts(result: Calibration) -> dict[str, int]:
+def _counts(result: MachineCalibration) -> dict[str, int]:
     reasons = [rejected.reason.value for rejected in result.detection.rejected]
     return {reason: reasons.count(reason) for reason in sorted(set(reasons))}
 

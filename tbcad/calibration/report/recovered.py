@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block
@@ -55,7 +55,9 @@ class Kind:
         return float((np.abs(self.sigmas_off) <= SIGMAS).mean())
 
 
-def recovered_errors(result: Calibration, known: Covariance, truth: Machine) -> tuple[Kind, ...]:
+def recovered_errors(
+    result: MachineCalibration, known: Covariance, truth: Machine
+) -> tuple[Kind, ...]:
     """Errors by kind, against the true machine with the same frames; none that are fixed."""
     kinds = (*_of_spheres(result, known, truth), *_of_base(result, known, truth))
     return tuple(
@@ -85,7 +87,7 @@ def _kind(name: str, unit: str, factor: float, *values: Floats) -> Kind:
     return Kind(name, unit, true - designed, found - designed, sigma)
 
 
-def _of_spheres(result: Calibration, known: Covariance, truth: Machine) -> list[Kind]:
+def _of_spheres(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
     """Centres, also besides a motion and growth of all of them, and radii of balls and of caps."""
     designed, found = result.setup.designed, result.found.machine
     slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
@@ -120,7 +122,7 @@ def _besides_motion(centre: Floats) -> Floats:
     return np.asarray(np.eye(place.size) - basis @ basis.T)
 
 
-def _of_base(result: Calibration, known: Covariance, truth: Machine) -> list[Kind]:
+def _of_base(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
     """Angles, the axis's direction, and where the base is in each frame beside its rotation."""
     designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
     machines = designed, truth, found
@@ -142,7 +144,7 @@ def _base_places(machine: Machine, across: Floats) -> Floats:
     return np.asarray((point - turned + shift) @ across.T)
 
 
-def _place_sigmas(result: Calibration, known: Covariance) -> Floats:
+def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
     frames = np.arange(len(angle))
@@ -163,7 +165,7 @@ def _place_sigmas(result: Calibration, known: Covariance) -> Floats:
     return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
 
 
-def _of_camera(result: Calibration, known: Covariance, truth: Machine) -> list[Kind]:
+def _of_camera(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
     """The camera's place and direction, its lens in deviations of the process, and LEDs."""
     designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
     machines = designed, truth, found
@@ -204,7 +206,7 @@ def _lens(machine: Machine) -> Floats:
     return np.concatenate([focal, camera.principal, camera.distortion])
 
 
-def _sigma(result: Calibration, known: Covariance, block: str) -> Floats:
+def _sigma(result: MachineCalibration, known: Covariance, block: str) -> Floats:
     prior = result.found.prior
     every = np.zeros(len(prior.flat_sigma))
     every[prior.free] = known.sigma() * prior.flat_sigma[prior.free]

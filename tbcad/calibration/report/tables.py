@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.estimate.covariance import Covariance
 from tbcad.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.calibration.estimate.parameters import Block, Prior
@@ -16,7 +16,7 @@ AXES = ("x", "y", "z")
 SPHERE = ("x_mm", "y_mm", "z_mm", "radius_mm")
 
 
-def spheres_table(result: Calibration, known: Covariance) -> Table:
+def spheres_table(result: MachineCalibration, known: Covariance) -> Table:
     """Centres at base angle zero and radii: designed, estimated, difference, deviation."""
     designed, found = result.setup.designed, result.found.machine
     before = np.column_stack([designed.centre, designed.radius])
@@ -40,13 +40,13 @@ def spheres_table(result: Calibration, known: Covariance) -> Table:
     return Table.of_columns("spheres", columns)
 
 
-def sphere_covariances(result: Calibration, known: Covariance) -> Floats:
+def sphere_covariances(result: MachineCalibration, known: Covariance) -> Floats:
     """Of each sphere's centre at base angle zero and radius, mm^2, (k, 4, 4)."""
     prior = result.found.prior
     return known.of(base_slopes(prior, result.found.values).matrix(prior), 4)
 
 
-def angles_table(result: Calibration, known: Covariance) -> Table:
+def angles_table(result: MachineCalibration, known: Covariance) -> Table:
     """Of each frame: planned and estimated angle, deviation, and where the base is shifted to."""
     found, planned = result.found, np.degrees(result.setup.designed.angle)
     machine, frames = found.machine, result.setup.frames
@@ -67,7 +67,7 @@ def angles_table(result: Calibration, known: Covariance) -> Table:
     return Table.of_columns("angles", columns)
 
 
-def rays_table(result: Calibration) -> Table:
+def rays_table(result: MachineCalibration) -> Table:
     """How well the middle ray of each mirror is known."""
     known, frames = result.rays.known, result.setup.frames
     columns: dict[str, ArrayLike] = {
@@ -87,7 +87,7 @@ def rays_table(result: Calibration) -> Table:
     return Table.of_columns("rays", columns)
 
 
-def residuals_table(result: Calibration) -> Table:
+def residuals_table(result: MachineCalibration) -> Table:
     """Every highlight: where it is, how far from where the machine would show it."""
     found, h = result.found, result.found.highlights
     frames = result.setup.frames

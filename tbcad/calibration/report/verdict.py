@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from tbcad.calibration.calibrate import Calibration
+from tbcad.calibration.calibrate import MachineCalibration
 from tbcad.calibration.detection.detection import Detection, Rejection
 from tbcad.calibration.estimate.parameters import Block, Prior
 from tbcad.records.exposure import exposure_name
@@ -63,7 +63,7 @@ class CalibrationVerdict:
     steps: tuple[str, ...]
 
 
-def verdict(result: Calibration) -> CalibrationVerdict:
+def verdict(result: MachineCalibration) -> CalibrationVerdict:
     """Judge a calibration."""
     known = result.rays.known
     short = float((known.relative.place_mm > NEEDED_PIXELS * known.pixel_mm).mean())
@@ -86,7 +86,7 @@ def verdict(result: Calibration) -> CalibrationVerdict:
     )
 
 
-def verdict_text(result: Calibration, judged: CalibrationVerdict) -> str:
+def verdict_text(result: MachineCalibration, judged: CalibrationVerdict) -> str:
     """The verdict as it is printed: first the answer, at most 80 columns."""
     found = result.found
     place, turn = judged.place_mm, judged.turn_mrad
@@ -125,7 +125,7 @@ def verdict_text(result: Calibration, judged: CalibrationVerdict) -> str:
     return "\n".join(textwrap.fill(line, WIDTH, subsequent_indent="  ") for line in lines)
 
 
-def outliers(result: Calibration) -> list[tuple[str, int, int, float]]:
+def outliers(result: MachineCalibration) -> list[tuple[str, int, int, float]]:
     """Photograph, ball and LED from 1, and deviations, of highlights left out, the worst first."""
     found, h = result.found, result.found.highlights
     wrong = np.flatnonzero(~found.used)
@@ -156,7 +156,7 @@ def _median_and_most(values: Floats) -> tuple[float, float]:
     return float(median), float(most)
 
 
-def _doubts(result: Calibration) -> tuple[str, ...]:
+def _doubts(result: MachineCalibration) -> tuple[str, ...]:
     found = result.found
     share = float((~found.used).mean())
     doubts = []
@@ -175,7 +175,7 @@ def _doubts(result: Calibration) -> tuple[str, ...]:
     return tuple(doubts)
 
 
-def _pulled(result: Calibration) -> tuple[tuple[str, float], ...]:
+def _pulled(result: MachineCalibration) -> tuple[tuple[str, float], ...]:
     """Parameters that are farther from their prior means than the process explains."""
     found = result.found
     names = parameter_names(found.prior)
@@ -187,7 +187,9 @@ def _pulled(result: Calibration) -> tuple[tuple[str, float], ...]:
     )
 
 
-def _steps(result: Calibration, enough: bool, doubted: bool, pulled: bool) -> tuple[str, ...]:
+def _steps(
+    result: MachineCalibration, enough: bool, doubted: bool, pulled: bool
+) -> tuple[str, ...]:
     steps = []
     if result.detection.faults:
         steps.append("photograph what is missing again: tbcad run --resume")

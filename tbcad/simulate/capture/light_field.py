@@ -47,7 +47,7 @@ MIRROR_ARRAYS = ("u", "apex", "normal", "curvature", "boxes")
 
 
 @dataclass(frozen=True)
-class Frame:
+class CameraFrame:
     """One camera's share of a light field; its arrays may lie in a file and are read by slices.
 
     Attributes:
@@ -83,7 +83,7 @@ class LightField:
         facts: how it was made: name of the object, geometry, samples a pixel ...
     """
 
-    frames: dict[str, Frame]
+    frames: dict[str, CameraFrame]
     capture_mm: float
     facts: dict[str, Any]
 
@@ -162,7 +162,7 @@ def light_field_in_memory(
     for reflector, bands in photographs:
         parts = [band_arrays(band) for band in bands]
         planes = {name: np.concatenate([part[name] for part in parts]) for name in PIXEL_ARRAYS}
-        frames[reflector.camera_id] = Frame(
+        frames[reflector.camera_id] = CameraFrame(
             reflector.camera, reflector.u, reflector.mirrors, reflector.boxes(), planes
         )
     return LightField(frames, capture_mm, dict(facts))
@@ -176,7 +176,7 @@ def _read(store: StoredGroup) -> LightField:
     return LightField(frames, capture_mm, store.facts)
 
 
-def _frame(group: StoredGroup) -> Frame:
+def _frame(group: StoredGroup) -> CameraFrame:
     planes = {name: group.array(name) for name in PIXEL_ARRAYS}
     height, width = planes["mirror"].shape
     for name, (last, kind) in PIXEL_ARRAYS.items():
@@ -196,7 +196,9 @@ def _frame(group: StoredGroup) -> Frame:
     inside = (boxes >= 0) & (boxes <= np.repeat([width, height], 2))
     if boxes.shape != (m, 4) or boxes.dtype != np.int64 or not inside.all():
         raise ValueError("boxes of mirrors lie outside of the picture")
-    return Frame(Camera(pinhole, forward, right, width, height, hfov), u, mirrors, boxes, planes)
+    return CameraFrame(
+        Camera(pinhole, forward, right, width, height, hfov), u, mirrors, boxes, planes
+    )
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Floats:

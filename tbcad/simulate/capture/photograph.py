@@ -11,11 +11,11 @@ from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
 from tbcad.simulate.parallel import chunks, in_batches
 from tbcad.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
-from tbcad.simulate.scene.rays import ReflectedRays, Shift, unit_directions
+from tbcad.simulate.scene.rays import Shift, TracedRays, unit_directions
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Bytes, Colours, Floats, Progress
 
-Tracer = Callable[[range, Shift], ReflectedRays]
+Tracer = Callable[[range, Shift], TracedRays]
 Samples = int | tuple[Shift, ...]
 """Rays whose mean is a pixel: k x k over its area, or these places from its centre, pixels."""
 
@@ -34,7 +34,7 @@ class RowBand:
     """
 
     rows: range
-    rays: ReflectedRays
+    rays: TracedRays
     colour: Bytes
 
 
@@ -97,15 +97,15 @@ def subpixel_shifts(samples: int) -> list[Shift]:
 
 def _through(
     view: Camera, trace: Tracer, scene: Scene, rows: range, shift: Shift
-) -> tuple[ReflectedRays, Colours]:
+) -> tuple[TracedRays, Colours]:
     """Rays after the mirrors, and what they see; the object may hide mirrors from the camera."""
     rays = trace(rows, shift)
     return seen_by(view, rays, unit_directions(view, rows, shift), scene)
 
 
 def seen_by(
-    view: Camera, rays: ReflectedRays, direction: Floats, scene: Scene
-) -> tuple[ReflectedRays, Colours]:
+    view: Camera, rays: TracedRays, direction: Floats, scene: Scene
+) -> tuple[TracedRays, Colours]:
     """What rays after the mirrors see, (h, w, 3), and those that the object itself does not hide.
 
     Args:

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.errors import InputError
 from tbcad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.optics.camera import Camera
-from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.simulate.capture.light_field_writer import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.simulate.parallel import chunks, in_threads
@@ -88,7 +88,7 @@ def create_sequence(
         yield SequenceWriter(pixel, colour)
 
 
-def kept_pixels(frame: Frame, radius: float) -> Ints:
+def kept_pixels(frame: CameraFrame, radius: float) -> Ints:
     """Numbers (r,) of the pixels whose rays meet the capture sphere, ascending."""
 
     def band(rows: range) -> Ints:
@@ -140,7 +140,7 @@ def _opened(folder: Path, read: Callable[[StoredGroup], Found]) -> AbstractConte
     return open_hdf5(file, SCHEMA, "sequence", AGAIN, read)
 
 
-def _frames(store: StoredGroup, source: LightField, number: int) -> dict[str, Frame]:
+def _frames(store: StoredGroup, source: LightField, number: int) -> dict[str, CameraFrame]:
     groups = {name: store.group(name) for name in source.frames}
     pixel = {name: group.array("pixel") for name, group in groups.items()}
     colour = {name: group.array("colour") for name, group in groups.items()}
@@ -153,7 +153,7 @@ def _frames(store: StoredGroup, source: LightField, number: int) -> dict[str, Fr
     }
 
 
-def _coloured(frame: Frame, pixel: Ints, colour: Bytes) -> Frame:
+def _coloured(frame: CameraFrame, pixel: Ints, colour: Bytes) -> CameraFrame:
     shape = frame.camera.height_px, frame.camera.width_px
     picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
     picture[pixel] = colour

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.simulate.capture.light_field import Frame, LightField, band_arrays
+from tbcad.simulate.capture.light_field import CameraFrame, LightField, band_arrays
 from tbcad.simulate.capture.photograph import CENTRE, RowBand, seen_by, to_bytes
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulate.scene.rays import ReflectedRays, Shift, part_tracer, unit_directions
+from tbcad.simulate.scene.rays import Shift, TracedRays, part_tracer, unit_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 
-PartTracer = Callable[[range, range, Shift], ReflectedRays]
+PartTracer = Callable[[range, range, Shift], TracedRays]
 
 
 @dataclass(frozen=True)
-class TracedFrame(Frame):
+class TracedFrame(CameraFrame):
     """A frame without arrays: its pixels are those of a photograph with one ray a pixel.
 
     Attributes:
@@ -45,7 +45,9 @@ class TracedFrame(Frame):
 
 def traced_light_field(design: MirrorDesign, scene: Scene) -> LightField:
     """The light field of a design whose pixels are traced when they are read."""
-    frames: dict[str, Frame] = {one.camera_id: _frame(one, scene) for one in reflectors(design)}
+    frames: dict[str, CameraFrame] = {
+        one.camera_id: _frame(one, scene) for one in reflectors(design)
+    }
     return LightField(frames, design.spec.optics.capture_diameter_mm, {})
 
 

@@ -27,7 +27,7 @@ LIKELY_UNITS_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 
 
 @dataclass(frozen=True)
-class Part:
+class ObjectPart:
     """Triangles with colours of one kind.
 
     Attributes:
@@ -48,7 +48,7 @@ class Part:
     picture: Bytes | None = None
     source: str = ""
 
-    def moved(self, matrix: Floats) -> "Part":
+    def moved(self, matrix: Floats) -> "ObjectPart":
         """The part moved by a matrix (4, 4); normals follow its inverse."""
         points = self.points @ matrix[:3, :3].T + matrix[:3, 3]
         if self.normals is None:
@@ -57,7 +57,7 @@ class Part:
                               for k in range(3)])  # fmt: skip
         return replace(self, points=points, normals=self.normals @ cofactors.T)
 
-    def flat(self) -> "Part":
+    def flat(self) -> "ObjectPart":
         """The part with corners of their own for each facet, which is then shaded flat."""
         faces = np.arange(self.faces.size).reshape(-1, 3)
         return replace(self, points=self.points[self.faces].reshape(-1, 3), faces=faces)
@@ -73,7 +73,7 @@ class ObjectFile(NamedTuple):
         up: the axis that points up; None where the file does not say.
     """
 
-    parts: Sequence[Part]
+    parts: Sequence[ObjectPart]
     notes: Sequence[str] = ()
     unit: str | None = None
     up: Up | None = None

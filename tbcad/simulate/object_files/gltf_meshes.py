@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import Part, even, texture, uri_bytes
+from tbcad.simulate.object_files.contents import ObjectPart, even, texture, uri_bytes
 from tbcad.srgb import srgb, srgb_light
 from tbcad.types import Bytes, Floats, Ints
 
@@ -89,7 +89,7 @@ class Accessors:
 
 def primitive_part(
     primitive: dict[str, Any], accessors: Accessors, materials: "Materials", notes: list[str]
-) -> Part | None:
+) -> ObjectPart | None:
     """The triangles of a primitive with their colours; None where it is points or lines."""
     mode = primitive.get("mode", TRIANGLES)
     if mode in OTHER_MODES:
@@ -105,7 +105,7 @@ def primitive_part(
     faces = _faces(index, mode)
     if len(faces) and faces.max() >= len(points):
         raise InputError("its facets name corners that do not exist: it is damaged")
-    part = Part(points, faces, attributes.get("NORMAL"))
+    part = ObjectPart(points, faces, attributes.get("NORMAL"))
     part = materials.coloured(part, primitive.get("material"), attributes)
     return part if part.normals is not None else part.flat()
 
@@ -155,7 +155,9 @@ class Materials:
         self._accessors, self._notes = accessors, notes
         self._pictures = dict[Any, Bytes | None]()
 
-    def coloured(self, part: Part, number: int | None, attributes: dict[str, Floats]) -> Part:
+    def coloured(
+        self, part: ObjectPart, number: int | None, attributes: dict[str, Floats]
+    ) -> ObjectPart:
         """A part with the colours of a material and of its corners, multiplied."""
         material = {} if number is None else self._document["materials"][number]
         factor, texture_of = self._base(material)
@@ -238,7 +240,7 @@ class Materials:
         return texture(data, name, self._notes)
 
     def _coordinates(
-        self, reference: dict[str, Any], attributes: dict[str, Floats], part: Part
+        self, reference: dict[str, Any], attributes: dict[str, Floats], part: ObjectPart
     ) -> Floats | None:
         """Places (f, 3, 2) on a picture, from its lower left."""
         transform = reference.get("extensions", {}).get(TRANSFORM, {})

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.contents import (
     ObjectFile,
-    Part,
+    ObjectPart,
     shown_shares,
     text_of,
     triangles,
@@ -58,11 +58,13 @@ def _contents(
     faces = flat[cut]
     if coloured:
         shares = _shares([row[at : at + 3] for row in vertices])
-        return ObjectFile([Part(numbers, faces, normals, shares[faces], source="vertex colours")])
+        return ObjectFile(
+            [ObjectPart(numbers, faces, normals, shares[faces], source="vertex colours")]
+        )
     own = [row[1 + k :] for row, k in zip(polygons, counts, strict=True)]
     colours, notes = _face_colours(own, polygon)
     source = "face colours" if colours is not None else ""
-    return ObjectFile([Part(numbers, faces, normals, colours, source=source)], notes)
+    return ObjectFile([ObjectPart(numbers, faces, normals, colours, source=source)], notes)
 
 
 def _shares(rows: list[list[str]]) -> Floats:

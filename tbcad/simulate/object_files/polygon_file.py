@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.simulate.object_files.contents import (
     ObjectFile,
-    Part,
+    ObjectPart,
     shown_shares,
     texture_beside,
     triangles,
@@ -51,7 +51,7 @@ def _contents(path: Path, tables: dict[str, dict[str, Any]], textures: list[str]
     normals = _stack(vertex, ("nx", "ny", "nz")) if "nz" in vertex else None
     colours, source = _colours(vertex, face, faces, polygon, notes)
     uv = _coordinates(vertex, face, corners.counts, cut, faces)
-    whole = Part(points, faces, normals, colours, source=source)
+    whole = ObjectPart(points, faces, normals, colours, source=source)
     number = face.get("texnumber", np.zeros(len(corners.counts)))[polygon].astype(np.int64)
     parts = _textured(path, whole, uv, number, textures, notes)
     if not any(part.source for part in parts) and (unknown := sorted({*vertex, *face} - KNOWN)):
@@ -101,9 +101,9 @@ def _coordinates(
 
 
 def _textured(
-    path: Path, whole: Part, uv: Floats | None, number: Ints, textures: list[str],
+    path: Path, whole: ObjectPart, uv: Floats | None, number: Ints, textures: list[str],
     notes: list[str],
-) -> list[Part]:  # fmt: skip
+) -> list[ObjectPart]:  # fmt: skip
     """The mesh by its textures; colours stay where there is none."""
     if uv is None or not textures:
         if uv is not None:
@@ -118,12 +118,14 @@ def _textured(
         picture: Bytes | None = texture_beside(path, name, notes)
         part = _some(whole, own)
         if picture is not None:
-            part = Part(part.points, part.faces, part.normals, None, uv[own], picture,
+            part = ObjectPart(part.points, part.faces, part.normals, None, uv[own], picture,
                         f"texture {Path(name).name}")  # fmt: skip
         parts.append(part)
     return parts
 
 
-def _some(whole: Part, facets: NDArray[np.bool_]) -> Part:
+def _some(whole: ObjectPart, facets: NDArray[np.bool_]) -> ObjectPart:
     colours = None if whole.colours is None else whole.colours[facets]
-    return Part(whole.points, whole.faces[facets], whole.normals, colours, source=whole.source)
+    return ObjectPart(
+        whole.points, whole.faces[facets], whole.normals, colours, source=whole.source
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part, without_facets
+from tbcad.simulate.object_files.contents import ObjectFile, ObjectPart, without_facets
 from tbcad.types import Floats
 
 MAX_FILE_BYTES = 1 << 30  # bytes
@@ -100,12 +100,14 @@ def read_stl(path: Path) -> ObjectFile:
     return ObjectFile(parts)
 
 
-def _part(header: bytes, solid: dict[str, Any]) -> Part:
+def _part(header: bytes, solid: dict[str, Any]) -> ObjectPart:
     points = np.asarray(solid["vertices"], dtype=np.float64)
     faces = np.asarray(solid["faces"], dtype=np.int64)
     words = solid.get("face_attributes", {}).get("stl")
     colours = None if words is None else _colours(header, np.asarray(words, dtype=np.int64))
-    return Part(points, faces, None, colours, source="" if colours is None else "face colours")
+    return ObjectPart(
+        points, faces, None, colours, source="" if colours is None else "face colours"
+    )
 
 
 def _colours(header: bytes, words: NDArray[np.int64]) -> Floats | None:

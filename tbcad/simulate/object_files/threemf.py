@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part
+from tbcad.simulate.object_files.contents import ObjectFile, ObjectPart
 from tbcad.types import Floats
 
 UNITS = ("um", "mm", "cm", "in", "ft", "m")  # in the order of lib3mf's ModelUnit
@@ -51,7 +51,9 @@ def _matrix(transform: Any) -> Floats:
     return matrix
 
 
-def _parts(model: Any, found: Any, matrix: Floats, notes: list[str], deep: int = 0) -> list[Part]:
+def _parts(
+    model: Any, found: Any, matrix: Floats, notes: list[str], deep: int = 0
+) -> list[ObjectPart]:
     """Meshes of an object, or of its components."""
     if deep > MOST_DEEP:
         raise InputError("its components hold each other")
@@ -69,14 +71,14 @@ def _parts(model: Any, found: Any, matrix: Floats, notes: list[str], deep: int =
     return parts
 
 
-def _part(model: Any, mesh: Any, notes: list[str]) -> Part:
+def _part(model: Any, mesh: Any, notes: list[str]) -> ObjectPart:
     points = np.array([list(one.Coordinates) for one in mesh.GetVertices()], dtype=np.float64)
     faces = np.array([list(one.Indices) for one in mesh.GetTriangleIndices()], dtype=np.int64)
-    part = Part(points.reshape(-1, 3), faces.reshape(-1, 3))
+    part = ObjectPart(points.reshape(-1, 3), faces.reshape(-1, 3))
     colours = _colours(model, mesh, len(faces), notes)
     if colours is None:
         return part
-    return Part(part.points, part.faces, None, colours, source="colours of triangles")
+    return ObjectPart(part.points, part.faces, None, colours, source="colours of triangles")
 
 
 def _colours(model: Any, mesh: Any, facets: int, notes: list[str]) -> Floats | None:

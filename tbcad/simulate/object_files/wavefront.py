@@ -10,7 +10,7 @@ from tbcad.errors import InputError
 from tbcad.simulate.object_files.contents import (
     ROUNDING,
     ObjectFile,
-    Part,
+    ObjectPart,
     even,
     file_beside,
     shown_shares,
@@ -144,13 +144,13 @@ def _index(tokens: list[str]) -> Ints:
 def _part(
     path: Path, lines: _Lines, points: Floats, colours: Floats | None, index: Ints, name: str,
     materials: dict[str, _Material] | None, notes: list[str],
-) -> Part:  # fmt: skip
+) -> ObjectPart:  # fmt: skip
     """Facets of one material; index (f, 3, 3) by corner, and vertex, texture place and normal."""
     key = index[..., 0].ravel() * (len(lines.vn) + 1) + index[..., 2].ravel() + 1
     own, faces = np.unique(key, return_inverse=True)
     vertex, normal = np.divmod(own, len(lines.vn) + 1)
     normals = np.concatenate([np.zeros((1, 3)), _table(lines.vn, "vn", 3)[:, :3]])[normal]
-    part = Part(points[vertex], faces.reshape(-1, 3), normals if lines.vn else None)
+    part = ObjectPart(points[vertex], faces.reshape(-1, 3), normals if lines.vn else None)
     uv = _coordinates(lines, index)
     return _coloured(path, part, uv, colours, vertex, name, materials, notes)
 
@@ -162,9 +162,9 @@ def _coordinates(lines: _Lines, index: Ints) -> Floats | None:
 
 
 def _coloured(
-    path: Path, part: Part, uv: Floats | None, colours: Floats | None, own: Ints, name: str,
+    path: Path, part: ObjectPart, uv: Floats | None, colours: Floats | None, own: Ints, name: str,
     materials: dict[str, _Material] | None, notes: list[str],
-) -> Part:  # fmt: skip
+) -> ObjectPart:  # fmt: skip
     """The part with its texture, else colours of its corners, else its material's."""
     material = (materials or {}).get(name, _Material())
     if name and materials is not None and name not in materials:

@@ -20,7 +20,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Lamps:
+class RectangularLamps:
     """Equal rectangular lamps, upright or level, with Lambertian faces.
 
     Attributes:
@@ -49,7 +49,7 @@ class Lamps:
         return middles.reshape(-1, 3), np.repeat(self.inward, len(x), axis=0)
 
 
-def read_lamps(folder: Path) -> Lamps | None:
+def read_lamps(folder: Path) -> RectangularLamps | None:
     """The lamps of an export's prototype; None where it has none.
 
     Raises:
@@ -61,10 +61,12 @@ def read_lamps(folder: Path) -> Lamps | None:
     places = np.array([place.position_mm for place in found.places])
     inward = np.array([place.direction for place in found.places])
     sides = found.width_mm, found.length_mm
-    return Lamps(places, inward, *(sides[::-1] if found.level else sides), found.lumen_each)
+    return RectangularLamps(
+        places, inward, *(sides[::-1] if found.level else sides), found.lumen_each
+    )
 
 
-def irradiance(lamps: Lamps, points: Floats, normals: Floats) -> Floats:
+def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floats:
     """Irradiance (n,) of surfaces at points (n, 3) with unit normals (n, 3), lux.
 
     A tile that gives F lumen in all, Lambertian, gives F / pi cos cos' / r^2 at a distance r.
@@ -81,7 +83,7 @@ def irradiance(lamps: Lamps, points: Floats, normals: Floats) -> Floats:
     return total
 
 
-def lit_by(lamps: Lamps, subject: SceneObject) -> SceneObject:
+def lit_by(lamps: RectangularLamps, subject: SceneObject) -> SceneObject:
     """An object with the light of lamps at its corners, as bright as a good exposure shows it.
 
     The exposure is that of the outside, or of an open surface whose normals are away from the lamps

@@ -33,7 +33,7 @@ from tbcad.simulate.prototype.ball_rays import (
 )
 from tbcad.simulate.prototype.run import PrototypeRun
 from tbcad.simulate.scene.ray_casting import Scene, object_in_front
-from tbcad.simulate.scene.rays import ReflectedRays, Shift, exact_tracer, pixel_directions
+from tbcad.simulate.scene.rays import Shift, TracedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import MARGIN_PX
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
@@ -234,7 +234,7 @@ def _pixels_of(mirror: NDArray[np.uint16], box: Ints, number: int) -> Ints:
 def _band(plan: MergePlan, colours: Callable[[range, Bools], Bytes], rows: range) -> RowBand:
     mirror, hits, front, _ = merged_pixels(plan, rows)
     shape = (len(rows), plan.run.reflector.camera.width_px)
-    rays = ReflectedRays(
+    rays = TracedRays(
         mirror.astype(np.int32).reshape(shape),
         hits.origin.reshape(*shape, 3),
         hits.direction.reshape(*shape, 3),

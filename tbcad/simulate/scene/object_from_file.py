@@ -13,7 +13,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.simulate.object_files.contents import (
     UNITS_MM,
     ObjectFile,
-    Part,
+    ObjectPart,
     Up,
     units_that_fit,
     warn_of_left_out,
@@ -127,7 +127,7 @@ def load_object(
     return SceneObject(path.name, points, mesh.faces, mesh.normals, reading=reading, **colours)
 
 
-def _in_frame(part: Part, unit_mm: float, up: str) -> Part:
+def _in_frame(part: ObjectPart, unit_mm: float, up: str) -> ObjectPart:
     """The part in millimetres, z up."""
     turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) if up == "y" else np.eye(3)
     matrix = np.eye(4)
@@ -154,7 +154,7 @@ class _Mesh:
     turned: Any
 
     @classmethod
-    def of(cls, path: Path, parts: Sequence[Part]) -> "_Mesh":
+    def of(cls, path: Path, parts: Sequence[ObjectPart]) -> "_Mesh":
         """The mesh of some parts."""
         _check(path, parts)
         points = np.concatenate([part.points for part in parts])
@@ -182,7 +182,7 @@ class _Mesh:
         return np.asarray(np.where(turned, own[:, ::-1], own), dtype=np.float64)
 
 
-def _check(path: Path, parts: Sequence[Part]) -> None:
+def _check(path: Path, parts: Sequence[ObjectPart]) -> None:
     count = sum(len(part.faces) for part in parts)
     if count == 0:
         points = sum(len(part.points) for part in parts)
@@ -259,7 +259,7 @@ def _painted(
             **_textures(path, mesh, found.parts)}, notes  # fmt: skip
 
 
-def _albedo(mesh: _Mesh, parts: Sequence[Part], plain: Floats) -> Floats:
+def _albedo(mesh: _Mesh, parts: Sequence[ObjectPart], plain: Floats) -> Floats:
     albedo = plain.copy()
     for k, part in enumerate(parts):
         facets = np.flatnonzero(mesh.part == k)
@@ -270,7 +270,7 @@ def _albedo(mesh: _Mesh, parts: Sequence[Part], plain: Floats) -> Floats:
     return albedo
 
 
-def _textures(path: Path, mesh: _Mesh, parts: Sequence[Part]) -> dict[str, Any]:
+def _textures(path: Path, mesh: _Mesh, parts: Sequence[ObjectPart]) -> dict[str, Any]:
     """Fields uv, texture and tiles: each picture once, one below the other."""
     pictures = list({id(p.picture): p.picture for p in parts if p.picture is not None}.values())
     if not pictures:

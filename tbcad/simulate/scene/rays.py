@@ -22,7 +22,7 @@ ROUNDING_MM = 1e-9
 
 
 @dataclass(frozen=True)
-class ReflectedRays:
+class TracedRays:
     """Rays after the mirrors, of a band of h rows and w columns.
 
     Attributes:
@@ -41,12 +41,12 @@ class ReflectedRays:
         meets = meets_sphere(self.origin.reshape(-1, 3), self.direction.reshape(-1, 3), radius)
         return (self.mirror > 0) & meets.reshape(self.mirror.shape)
 
-    def without(self, removed: Bools) -> "ReflectedRays":
+    def without(self, removed: Bools) -> "TracedRays":
         """These rays without those of some pixels (h, w)."""
         if not removed.any():
             return self
         none = removed[..., None]
-        return ReflectedRays(
+        return TracedRays(
             np.where(removed, np.int32(0), self.mirror),
             np.where(none, 0.0, self.origin),
             np.where(none, 0.0, self.direction),
@@ -106,13 +106,13 @@ def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floa
     return result
 
 
-def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], ReflectedRays]:
+def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], TracedRays]:
     """A function that traces rows of a camera's pixels off its exact mirrors (`part_tracer`)."""
     trace, columns = part_tracer(reflector), range(reflector.camera.width_px)
     return lambda rows, shift: trace(rows, columns, shift)
 
 
-def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], ReflectedRays]:
+def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], TracedRays]:
     """A function that traces some rows and columns of a camera's pixels off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
@@ -124,7 +124,7 @@ def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], Reflect
     table = _table(reflector.mirrors, camera.pinhole)
     walls = reflector.walls.of_mirrors(len(reflector))
 
-    def trace(rows: range, columns: range, shift: Shift) -> ReflectedRays:
+    def trace(rows: range, columns: range, shift: Shift) -> TracedRays:
         direction = pixel_directions(camera, rows, shift)[:, columns.start : columns.stop]
         in_part = boxes - np.repeat([columns.start, rows.start], 2)
         in_part[:, :2] = np.clip(in_part[:, :2], 0, len(columns))
@@ -140,11 +140,11 @@ def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], Reflect
 
 def reflect_pixels(
     pinhole: Floats, direction: Floats, mirrors: Surfaces, mirror: MirrorNumbers
-) -> ReflectedRays:
+) -> TracedRays:
     """Rays along (h, w, 3) from the pinhole after mirrors of given numbers (h, w)."""
     origin, reflected = np.zeros_like(direction), np.zeros_like(direction)
     _reflect(pinhole, direction, _table(mirrors, pinhole), mirror, origin, reflected)
-    return ReflectedRays(mirror, origin, reflected)
+    return TracedRays(mirror, origin, reflected)
 
 
 def _table(mirrors: Surfaces, pinhole: Floats) -> Floats:

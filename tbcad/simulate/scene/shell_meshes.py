@@ -20,7 +20,7 @@ from tbcad.geometry.vectors import unit
 from tbcad.optics.surfaces import Surfaces
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.ray_casting import embree_scene
-from tbcad.simulate.scene.rays import MirrorNumbers, ReflectedRays, pixel_directions, reflect_pixels
+from tbcad.simulate.scene.rays import MirrorNumbers, TracedRays, pixel_directions, reflect_pixels
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.types import Floats, Ints
 
@@ -72,13 +72,13 @@ def read_shell_meshes(export: ExportedDesign) -> ShellMeshes:
 
 def mesh_tracer(
     shells: ShellMeshes, reflector: Reflector
-) -> Callable[[range, tuple[float, float]], ReflectedRays]:
+) -> Callable[[range, tuple[float, float]], TracedRays]:
     """A function that traces rows of a camera's pixels off the mirrors of the mesh."""
     sign, surfaces = (
         (1, shells.surfaces[0]) if reflector.camera_id == "a" else (-1, shells.surfaces[1])
     )
 
-    def trace(rows: range, shift: tuple[float, float]) -> ReflectedRays:
+    def trace(rows: range, shift: tuple[float, float]) -> TracedRays:
         direction = pixel_directions(reflector.camera, rows, shift)
         start = np.empty((direction.shape[0] * direction.shape[1], 3), dtype=np.float32)
         start[:] = reflector.camera.pinhole

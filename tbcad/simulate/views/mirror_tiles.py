@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.geometry.vectors import dot, norm
-from tbcad.simulate.capture.light_field import Frame, LightField
+from tbcad.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.types import Bools, Bytes, Floats, Ints
 
 NEIGHBOURS = 6
@@ -58,7 +58,7 @@ class MirrorTiles:
     apex: Floats = field(init=False)
     width: Floats = field(init=False)
     _read: dict[int, MirrorTile | None] = field(init=False, default_factory=dict)
-    _mirrors: list[tuple[Frame, int]] = field(init=False)
+    _mirrors: list[tuple[CameraFrame, int]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Number the mirrors of all frames."""
@@ -104,7 +104,7 @@ def _widths(apex: Floats) -> Floats:
     return np.reshape(distance, (len(apex), -1))[:, -1]
 
 
-def mirror_pixels(frame: Frame, index: int) -> tuple[Bools, list[NDArray[Any]]] | None:
+def mirror_pixels(frame: CameraFrame, index: int) -> tuple[Bools, list[NDArray[Any]]] | None:
     """The smallest rectangle with all pixels of a mirror; None where it has none.
 
     Returns:
@@ -120,7 +120,7 @@ def mirror_pixels(frame: Frame, index: int) -> tuple[Bools, list[NDArray[Any]]] 
     return valid[cut], [pixels[name][cut] for name in ("colour", "origin", "direction")]
 
 
-def _tile(frame: Frame, index: int) -> MirrorTile | None:
+def _tile(frame: CameraFrame, index: int) -> MirrorTile | None:
     found = mirror_pixels(frame, index)
     if found is None:
         return None

@@ -14,7 +14,7 @@ from tbcad.mirrors.array import design
 from tbcad.optics.camera import Camera
 from tbcad.optics.pedestals.walls import GrooveWalls
 from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.capture.light_field import Frame, LightField, light_field_in_memory
+from tbcad.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
 from tbcad.simulate.parallel import chunks, in_threads
 from tbcad.simulate.scene.object import built_in_object
@@ -179,7 +179,9 @@ def _with_residual(built: LightField, residual: float, seed: tuple[int, int]) ->
     return replace(built, frames=frames)
 
 
-def _rotated(frame: Frame, residual: float, generator: np.random.Generator) -> dict[str, object]:
+def _rotated(
+    frame: CameraFrame, residual: float, generator: np.random.Generator
+) -> dict[str, object]:
     """Planes of a frame whose mirrors' rays are turned by small random angles."""
     rotation = np.vstack([np.zeros(3), residual * generator.standard_normal((len(frame.u), 3))])
     mirror, direction = frame.planes["mirror"], frame.planes["direction"]

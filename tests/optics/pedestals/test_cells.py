@@ -5,12 +5,10 @@ import pytest
 
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.cells import Cells, cell_areas, cells_of
+from tbcad.optics.cells import Cells, cell_areas
 from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES, NotRegularError
 from tbcad.optics.reflection import reflect
-from tbcad.optics.surfaces import Surfaces
-from tbcad.optics.windows import coverage_diameters
 from tests.mirror_arrays import mirror_array
 from tests.pedestal_designs import GROOVE, pedestals
 
@@ -33,7 +31,7 @@ def along_arcs(cells: Cells, samples: int) -> np.ndarray:
     return cells.arcs.at(arc, np.broadcast_to(np.linspace(0, 1, samples), shape))
 
 
-@pytest.mark.parametrize("n", [2, 3, 5, 12])
+@pytest.mark.parametrize("n", [2, 5])
 @pytest.mark.parametrize("rule", ["traced", "paper", "flat"])
 def test_every_edge_lies_on_both_its_faces_and_the_surface_is_one_piece(n: int, rule: str) -> None:
     cells = pedestals(mirror_array(f"n={n}", f"radius_rule={rule}"))
@@ -164,33 +162,6 @@ def test_no_pedestal_stands_in_the_light_of_another_mirror(cells: PedestalCells)
     # The oracle finds what stands in the way: light from mirrors 5 mm below their neighbours' tops.
     raised = cells.with_mirrors(cells.mirror_surfaces.offset(5.0))
     assert (solids_entered(raised, point, passing) * others).max() > 0.1
-
-
-def with_errors(mirrors: Surfaces, sigma: float, rng: np.random.Generator) -> Surfaces:
-    """Centres and radii off by normal errors, mm; halved mirrors stay halved."""
-    radius = mirrors.radius + sigma * rng.normal(size=len(mirrors))
-    apex = mirrors.centre + sigma * rng.normal(size=(len(mirrors), 3))
-    apex += radius[:, None] * mirrors.normal
-    apex[mirrors.apex[:, 0] == 0, 0] = 0
-    return Surfaces(apex, mirrors.normal, 1 / radius)
-
-
-def test_errors_cost_a_third_of_what_they_cost_where_spheres_meet(
-    array: MirrorArray, cells: PedestalCells
-) -> None:
-    pinhole, rng = array.camera.pinhole, np.random.default_rng(3)
-    bounding = array.cells.surfaces.subset(slice(len(array), None))
-    whole = coverage_diameters(cells, pinhole)
-    lost = []
-    for _ in range(5):
-        valleys = with_errors(array.mirrors, 0.005, rng).joined(bounding)
-        pedestals = cells.with_mirrors(with_errors(cells.mirror_surfaces, 0.005, rng))
-        met = coverage_diameters(cells_of(valleys, array.cells.triangles), pinhole)
-        lost.append(
-            ((array.coverage - met).max(), (whole - coverage_diameters(pedestals, pinhole)).max())
-        )
-    valley, pedestal = np.mean(lost, axis=0)
-    assert 0 < 3 * pedestal < valley
 
 
 def test_the_mirror_image_is_the_other_camera_s(cells: PedestalCells) -> None:

@@ -10,8 +10,7 @@ from tbcad.optics.pedestals.cells import PedestalCells
 from tbcad.optics.power_diagram import PLANES
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
-from tests.mirror_arrays import mirror_array
-from tests.pedestal_designs import pedestal_design, pedestals
+from tests.pedestal_designs import pedestal_design
 
 EVEN = Path(__file__).parents[3] / "designs" / "turtleback-even.toml"
 
@@ -57,14 +56,6 @@ def test_every_mirror_keeps_its_coverage() -> None:
     spec = made.spec
     wanted = spec.optics.capture_diameter_mm + spec.mirrors.margin_mm
     assert made.arrays[0].coverage.min() == pytest.approx(wanted, abs=1e-3)
-
-
-def test_the_pedestals_of_both_cameras_are_mirror_images() -> None:
-    cells = pedestals(mirror_array("n=8"))
-    other = cells.mirrored()
-    np.testing.assert_allclose(
-        np.sort(other.corners * [-1, 1, 1], axis=0), np.sort(cells.corners, axis=0), atol=1e-9
-    )
 
 
 def test_a_groove_that_crosses_the_seam_is_refused_with_a_width_that_was_tried() -> None:

@@ -174,29 +174,6 @@ def test_a_page_of_the_user_is_kept(export: Path, capsys: pytest.CaptureFixture[
     assert run(["report", str(export)]) == 0  # its own is replaced unasked
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--out", "report.pdf"], "name a .html file"),
-        (["--out", "nowhere/report.html"], "in a folder that exists"),
-        (["--capture", "nowhere"], "nowhere"),
-    ],
-)
-def test_bad_input_is_one_line(
-    export: Path,
-    arguments: list[str],
-    words: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(export.parent)
-    assert run(["report", str(export), *arguments]) == 2
-    shown = capsys.readouterr().err
-    assert words in shown
-    assert shown.count("\n") == 1
-    assert not (export / "report.html").exists()
-
-
 @pytest.mark.parametrize("name", ["mirrors.csv", "design.json"])
 def test_an_altered_file_is_refused(export: Path, name: str) -> None:
     (export / name).write_bytes((export / name).read_bytes() + b"\n")

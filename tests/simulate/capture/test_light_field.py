@@ -62,17 +62,6 @@ def test_boxes_hold_all_of_each_mirror(light_field: LightField) -> None:
         assert ((rows >= box[:, 2]) & (rows < box[:, 3])).all()
 
 
-def test_rays_are_unit_and_leave_their_mirror(light_field: LightField) -> None:
-    frame = light_field.frames["a"]
-    on = frame.planes["mirror"] > 0
-    way = frame.planes["direction"][on].astype(float)
-    assert np.linalg.norm(way, axis=1) == pytest.approx(np.ones(len(way)), abs=1e-6)
-    owner = frame.planes["mirror"][on].astype(int) - 1
-    off = frame.mirrors.value(owner, frame.planes["origin"][on].astype(float))
-    assert np.abs(off).max() < 1e-4
-    assert not frame.planes["origin"][~on].any()
-
-
 def test_compressed_and_the_same_each_time(
     file: Path, tmp_path: Path, cameras: Cameras, knot: Scene
 ) -> None:
@@ -146,16 +135,6 @@ def _changed(store: h5py.File, change: str) -> None:
 def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="give a light field"), LightField.open(tmp_path):
         pass
-
-
-def test_the_reader_is_found_where_the_documentation_has_it(file: Path) -> None:
-    import tbcad
-
-    with tbcad.LightField.open(file) as source:
-        part = source.frames["a"].read(slice(100, 120), slice(100, 140))
-    assert part["origin"].shape == (20, 40, 3)
-    with pytest.raises(AttributeError, match="Nothing"):
-        tbcad.Nothing  # noqa: B018
 
 
 def test_notebooks_show_both_photographs(light_field: LightField) -> None:

@@ -4,15 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from tbcad.formats.stl import write_stl
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.shell.files import camera_a_mesh
 from tbcad.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import Scene, cast_rays, prepared_scene
+from tbcad.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
@@ -87,13 +85,6 @@ def test_subpixel_shifts_are_even() -> None:
     assert np.mean(subpixel_shifts(5), axis=0) == pytest.approx([0, 0])
 
 
-def test_progress(cameras: Cameras, knot: Scene) -> None:
-    messages: list[str] = []
-    list(photograph(cameras[0].camera, exact_tracer(cameras[0]), knot, 1, messages.append))
-    assert messages[0] == "row 0 of 310"
-    assert len(messages) > 1
-
-
 @pytest.fixture(scope="module")
 def with_meshes(
     low_resolution_design: MirrorDesign,
@@ -125,25 +116,3 @@ def test_spheres_and_meshes_agree(with_meshes: ExportedDesign, knot: Scene) -> N
             for trace in (exact_tracer(at), mesh_tracer(shells, at))
         ]
         assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
-
-
-def test_facets_of_a_mirror_have_its_area(
-    with_meshes: ExportedDesign, low_resolution_design: MirrorDesign
-) -> None:
-    """Facets of the wall whose corners all lie on a mirror's rim are none of the mirror's."""
-    corners = trimesh.load_mesh(with_meshes.folder / "shell_a.stl", process=False).triangles
-    shells = read_shell_meshes(with_meshes)
-    owner = shells.mirror[: len(corners)]
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.bincount(
-        np.maximum(owner, 0), weights=np.linalg.norm(sides, axis=1) / 2, minlength=len(owner)
-    )[1 : len(low_resolution_design.arrays[0]) + 1]
-    assert area == pytest.approx(low_resolution_design.arrays[0].area, rel=2e-3)
-
-
-def test_an_object_of_another_size_fills_less(cameras: Cameras, knot: Scene) -> None:
-    small = prepared_scene(built_in_object(30.0))
-    large_seen, small_seen = (
-        (picture(cameras[0], scene)[0].any(axis=2)).sum() for scene in (knot, small)
-    )
-    assert small_seen < 0.5 * large_seen

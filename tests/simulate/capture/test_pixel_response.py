@@ -7,7 +7,7 @@ from tbcad.simulate.capture.photograph import photograph, subpixel_shifts
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
-from tbcad.studies.pixel_response import defocus_shifts, low_pass_shifts
+from tbcad.studies.low_pass import defocus_shifts, low_pass_shifts
 
 
 def contrast(shifts: tuple[tuple[float, float], ...], frequency: float) -> float:
@@ -23,16 +23,6 @@ def test_low_pass_filter_passes_its_cosine(separation: float, frequency: float) 
     pixel = contrast(tuple(subpixel_shifts(3)), frequency)
     expected = abs(np.cos(np.pi * separation * frequency)) * pixel
     assert contrast(low_pass_shifts(separation, 3), frequency) == pytest.approx(expected, abs=1e-12)
-
-
-def test_nothing_passes_at_the_zero() -> None:
-    assert contrast(low_pass_shifts(2.0, 2), 0.25) < 1e-12
-    assert contrast(low_pass_shifts(1.0, 2), 0.5) < 1e-12
-
-
-def test_filter_of_one_pixel_averages_four_pixels() -> None:
-    """Four images of a square pixel, a pixel apart, are one square of two pixels."""
-    assert sorted(low_pass_shifts(1.0, 2)) == sorted((2 * x, 2 * y) for x, y in subpixel_shifts(4))
 
 
 def test_defocus_fills_its_circle() -> None:

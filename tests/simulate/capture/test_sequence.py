@@ -57,42 +57,6 @@ def test_a_frame_is_a_capture_of_the_turned_object(
             assert (apart > 1).mean() < 2e-3  # float32 rays past an edge
 
 
-def test_views_of_frames(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The truth turns with the object: as good as the view of the first frame."""
-    found = []
-    for number in ("0", "2"):
-        words = ["view", str(captured), *SMALL, "--frame", number, "--method", "nearest"]
-        assert run([*words, "--out", str(tmp_path / f"{number}.png")]) == 0
-        found.append(float(capsys.readouterr().out.split("SSIM ")[1].split()[0]))
-    assert abs(found[1] - found[0]) < 0.03
-    first, other = (tmp_path / f"{number}.png" for number in "02")
-    assert first.read_bytes() != other.read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("more", "wrong"),
-    [
-        (["--frame", "4"], "allowed is 0 to 3"),
-        (["--frame", "1", "--surface", "object"], "leave out --light and --surface"),
-    ],
-)
-def test_frames_that_cannot_be(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], wrong: str
-) -> None:
-    assert run(["view", str(captured), *SMALL, *more, "--out", str(tmp_path / "v.png")]) == 2
-    assert wrong in capsys.readouterr().err
-
-
-def test_captures_that_cannot_have_frames(
-    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["capture", str(record), "--frames", "2", "--samples", "2"]
-    assert run([*words, "--out", str(tmp_path / "out")]) == 2
-    assert "leave out --samples" in capsys.readouterr().err
-
-
 def test_damaged_sequences_are_refused(captured: Path, tmp_path: Path) -> None:
     with LightField.open(captured) as source:
         with pytest.raises(InputError, match="one frame only"):

@@ -6,9 +6,6 @@ from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.capture.light_field import PIXEL_ARRAYS, LightField
 from tbcad.simulate.capture.traced_frame import traced_light_field
 from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
 
 
 def test_every_part_is_that_of_the_photograph(
@@ -24,13 +21,3 @@ def test_every_part_is_that_of_the_photograph(
             for plane in PIXEL_ARRAYS:
                 assert np.array_equal(got[plane], expected[plane]), plane
                 assert got[plane].dtype == expected[plane].dtype
-
-
-def test_a_view_is_that_of_the_photographs(
-    low_resolution_design: MirrorDesign, knot: Scene, tiles: MirrorTiles
-) -> None:
-    view = camera_around_object(0.4, 0.7, 640.0, 60.0, (96, 72))
-    traced = MirrorTiles(traced_light_field(low_resolution_design, knot))
-    expected = synthesise(tiles, view).image
-    assert expected.any()
-    assert np.array_equal(synthesise(traced, view).image, expected)

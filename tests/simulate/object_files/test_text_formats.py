@@ -9,7 +9,7 @@ import trimesh
 from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.simulate.object_files.contents import ObjectFile, Part
+from tbcad.simulate.object_files.contents import ObjectFile, ObjectPart
 from tbcad.simulate.object_files.read import read_object_file
 
 CORNERS = ("-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0")
@@ -44,12 +44,12 @@ def obj(*lines: str) -> str:
     return "\n".join([*(f"v {corner}" for corner in CORNERS), *lines]) + "\n"
 
 
-def only(found: ObjectFile) -> Part:
+def only(found: ObjectFile) -> ObjectPart:
     (part,) = found.parts
     return part
 
 
-def area(part: Part) -> float:
+def area(part: ObjectPart) -> float:
     return float(trimesh.Trimesh(part.points, part.faces, process=False).area)
 
 
@@ -219,6 +219,7 @@ def test_stl_with_colours(tmp_path: Path, header: bytes, word: int, wanted: list
         ("a.dae", "<COLLADA/>", "export it as GLB"),
         ("a.pcd", "# .PCD", "cloud of points"),
         ("a.stl.gz", "", "unpack it"),
+        ("a.unknown", "?", "cannot be read"),
         ("a.ply", "\x1f\x8b", "no header"),
         ("a.ply", ply()[:-12], "cut off"),
         ("a.ply", ply(faces=("3 0 1 7",)), "corners that do not exist"),

@@ -15,7 +15,6 @@ from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
-from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.simulate.capture.photograph import CENTRE, RowBand, sample_shifts, to_bytes
 from tbcad.simulate.capture.photograph import photograph as shell_photograph
 from tbcad.simulate.prototype.ball_rays import (
@@ -23,6 +22,7 @@ from tbcad.simulate.prototype.ball_rays import (
     reflected_colours,
     resampled_photograph,
     trace_balls,
+    trace_own_ball,
 )
 from tbcad.simulate.prototype.merge import (
     MergePlan,
@@ -119,6 +119,9 @@ class TestGeometry:
             assert (seen.ball == run.ball + 1).all()
             assert np.abs(seen.origin - run.ball_surfaces.apex).max() < 1e-9
             assert np.abs(seen.direction + unit(run.ball_surfaces.apex)).max() < 1e-9
+            alone = trace_own_ball(run, turned, run.stop, run.ball + 1)
+            for mine, found in zip(vars(alone).values(), vars(seen).values(), strict=True):
+                assert mine == pytest.approx(found)
 
     def test_direction_errors_of_balls_are_those_of_the_plan(
         self, runs: Runs, layout: PrototypeLayout
@@ -129,12 +132,6 @@ class TestGeometry:
         assert a == pytest.approx(layout.stops.error, abs=1e-9)
         assert b[layout.twin] == pytest.approx(layout.stops.error, abs=1e-9)
         assert a.max() > np.radians(1)
-
-    def test_window_rotations_are_rotations(self, runs: Runs) -> None:
-        for run in runs:
-            eye = np.einsum("mxy,mzy->mxz", run.window_rotation, run.window_rotation)
-            assert np.abs(eye - np.eye(3)).max() < 1e-12
-            assert np.linalg.det(run.window_rotation) == pytest.approx(1)
 
     def test_rays_at_the_windows_edge_pass_by_half_the_recorded_coverage(
         self, runs: Runs, layout: PrototypeLayout
@@ -157,12 +154,6 @@ class TestGeometry:
                 mirror = np.repeat(mine[counted], len(t))
                 np.minimum.at(least, mirror, misses(run, mirror, direction))
             assert 2 * least[order] == pytest.approx(layout.fit.coverage, abs=2e-3)
-
-    def test_windows_stay_where_the_plan_does_not_move_them(
-        self, layout: PrototypeLayout, cameras: tuple[Reflector, ...]
-    ) -> None:
-        still = prototype_runs(cameras, replace(plan_of(layout), moved=False))
-        assert still[0].window_rotation == pytest.approx(np.tile(np.eye(3), (103, 1, 1)), abs=1e-12)
 
     def test_a_caps_body_hides_and_shows_nothing(self, runs: Runs) -> None:
         """Body about (0, 0, 10) of radius 3, its front cut off by a ball of 10 whose apex is 8."""
@@ -216,11 +207,6 @@ class TestPhotographs:
         found = resampled_photograph(runs[0], knot, 2, 2, places + np.array([0, 0.5]))
         assert np.abs(found - (whole[row, column] + under) / 2).max() <= 0.5
 
-    def test_resampling_at_the_last_pixel(self, runs: Runs, knot: Scene) -> None:
-        last = np.array([[415.0, 309.0]])
-        whole = stop_photograph(runs[0], knot, 0)
-        assert (resampled_photograph(runs[0], knot, 0, 1, last) == whole[-1, -1]).all()
-
 
 class TestMerged:
     @pytest.mark.parametrize("merge", [traced_merge, merge_run])
@@ -256,27 +242,18 @@ class TestMerged:
             off = np.abs(planes["colour"].astype(int) - picture).max(axis=2)
             assert (off[whole] > 1).mean() < 5e-4
 
-    def test_a_mirrors_rays_come_from_its_ball(self, merged: LightField, runs: Runs) -> None:
-        for run in runs:
-            frame = merged.frames[run.reflector.camera_id]
-            mirror = frame.planes["mirror"].astype(int)
-            on = mirror > 0
-            row = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1]]
-            away = norm(frame.planes["origin"][on] - row[:, :3]) - row[:, 3]
-            assert np.abs(away).max() < 1e-4
-            assert norm(frame.planes["direction"][on]) == pytest.approx(1, abs=1e-6)
-            assert not frame.planes["origin"][~on].any()
-
     def test_light_obeys_the_law_of_reflection(self, merged: LightField, runs: Runs) -> None:
         """The ray in and the ray out have the ball's normal for their bisector."""
         for run in runs:
             frame = merged.frames[run.reflector.camera_id]
             mirror = frame.planes["mirror"].astype(int)
             on = mirror > 0
-            centre = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1], :3]
+            ball = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1]]
             origin = frame.planes["origin"][on].astype(float)
             both_ways = unit(run.camera.pinhole - origin) + frame.planes["direction"][on]
-            assert np.abs(unit(both_ways) - unit(origin - centre)).max() < 1e-4
+            assert np.abs(unit(both_ways) - unit(origin - ball[:, :3])).max() < 1e-4
+            assert np.abs(norm(origin - ball[:, :3]) - ball[:, 3]).max() < 1e-4
+            assert not frame.planes["origin"][~on].any()
 
     def test_share_of_rays_kept_is_that_of_the_layout(
         self, merged: LightField, layout: PrototypeLayout, cameras: tuple[Reflector, Reflector]
@@ -318,14 +295,6 @@ class TestMerged:
             assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
             assert not np.concatenate([band.colour for band in bands])[lost].any()
 
-    def test_more_samples_smooth(self, runs: Runs, knot: Scene) -> None:
-        for merge in (traced_merge, merge_run):
-            one, many = (
-                np.concatenate([b.colour for b in merge(runs[0], knot, n)]) for n in (1, 2)
-            )
-            rough = [np.abs(np.diff(image.astype(float), axis=1)).mean() for image in (one, many)]
-            assert rough[1] < 0.95 * rough[0]
-
     def test_same_bytes_on_one_thread(
         self, merged: LightField, runs: Runs, knot: Scene, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -334,31 +303,6 @@ class TestMerged:
         for camera, frame in merged.frames.items():
             for name, plane in frame.planes.items():
                 assert (plane == again.frames[camera].planes[name]).all()
-
-    def test_written_as_a_file(
-        self, merged: LightField, runs: Runs, knot: Scene, tmp_path: Path
-    ) -> None:
-        with create_light_field(
-            tmp_path / "field.h5", CAPTURE_MM, {"machine": "prototype"}
-        ) as store:
-            for run in runs:
-                write_camera(store, ball_reflector(run), merge_run(run, knot))
-        with LightField.open(tmp_path / "field.h5") as found:
-            for run in runs:
-                frame, other = (
-                    found.frames[run.reflector.camera_id],
-                    merged.frames[run.reflector.camera_id],
-                )
-                assert (frame.image() == other.image()).all()
-                assert (frame.mirrors.apex == run.ball_surfaces.apex).all()
-                assert 1 / frame.mirrors.curvature == pytest.approx(run.balls[0, run.ball, 3])
-                assert frame.u == pytest.approx(unit(run.ball_surfaces.apex))
-
-    def test_progress(self, runs: Runs, knot: Scene) -> None:
-        messages: list[str] = []
-        list(merge_run(runs[0], knot, progress=messages.append))
-        assert messages[0] == f"stop 1 of {len(runs[0])}"
-        assert any(one.startswith("row ") for one in messages)
 
 
 RAYS = ("mirror", "origin", "direction")
@@ -405,18 +349,14 @@ class TestReading:
             (lambda table: table.append(table[7]), "a second time"),
             (lambda table: table[3].update(mirror="b0001"), "row 4 shows b0001"),
             (lambda table: table[3].update(mirror="a9999"), "allowed .* is a0001 to a0103"),
-            (lambda table: table[3].update(mirror="a1"), "4 mirror: "),
             (lambda table: table[3].update(ball="6"), "names ball 6, allowed is 1 to 5"),
-            (lambda table: table[3].update(ball="1.5"), "4 ball: "),
             (lambda table: table[3].update(object_turn_deg="90"), "object_turn_deg 90"),
             (lambda table: table[3].update(base_angle_deg="nan"), "4 base_angle_deg: "),
-            (lambda table: table[3].update(error_deg="inf"), "4 error_deg: "),
             (lambda table: table[0].update(base_angle_deg="3"), "stop 1 has two base angles"),
             (lambda table: raised(table, "stop", 1), "not numbered from 1"),
             (lambda table: exchanged(table, "1", "2"), "do not rise from stop to stop"),
             (lambda table: table[3].update(ball=other(table[3]["ball"])), "but its ball is"),
             (lambda table: raised(table, "base_angle_deg", 0.5), "but its ball is"),
-            (lambda table: [row.pop("stop") for row in table], "1 stop: field required"),
             (lambda table: table.clear(), "not numbered from 1|does not show"),
         ],
     )
@@ -449,11 +389,9 @@ class TestReading:
             (lambda balls: balls.clear(), "balls.csv: no balls"),
             (lambda balls: balls.pop(), "names ball 5, allowed is 1 to 4"),
             (lambda balls: balls.reverse(), "ball 1 is out of order"),
-            (lambda balls: balls[2].update(radius_mm="-1"), "row 3 radius_mm: "),
             (lambda balls: balls[2].update(nx="2.0"), "ball 3 has a normal"),
             (lambda balls: balls[1].update(cx="1.0"), "ball 2 has a centre"),
             (lambda balls: balls[1].update(bz="nan"), "row 2 bz: "),
-            (lambda balls: balls[1].update(bz=""), "row 2 bz: "),
         ],
     )
     def test_refused_balls(

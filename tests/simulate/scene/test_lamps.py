@@ -8,7 +8,7 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.simulate.capture.files import read_object, write_object
-from tbcad.simulate.prototype.lamps import Lamps, irradiance, lit_by, read_lamps
+from tbcad.simulate.prototype.lamps import RectangularLamps, irradiance, lit_by, read_lamps
 from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tests.exported_files import edit_json
@@ -17,18 +17,18 @@ from tests.prototype_records import LAMP_SECTION, write_prototype
 PLACE = np.array([108.0, 52.0, -87.5])
 SIGNS = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])
 INWARD = -SIGNS * [1, 0, 0]
-LAMPS = Lamps(SIGNS * PLACE, INWARD, 16.0, 50.0, 90.0)
+LAMPS = RectangularLamps(SIGNS * PLACE, INWARD, 16.0, 50.0, 90.0)
 
 
 def test_a_distant_lamp_follows_the_square_of_the_distance() -> None:
-    one = Lamps(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), 16.0, 50.0, 90.0)
+    one = RectangularLamps(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), 16.0, 50.0, 90.0)
     way = np.array([np.cos(0.3), np.sin(0.3), 0.0])
     found = irradiance(one, np.array([5000 * way]), -way[None])
     assert found[0] == pytest.approx(90 / np.pi * np.cos(0.3) / 5.0**2, rel=1e-4)
 
 
 def test_all_light_of_a_lamp_falls_on_a_sphere_round_it() -> None:
-    one = Lamps(np.zeros((1, 3)), np.array([[0.0, 1, 0]]), 16.0, 50.0, 90.0)
+    one = RectangularLamps(np.zeros((1, 3)), np.array([[0.0, 1, 0]]), 16.0, 50.0, 90.0)
     z, turn = np.meshgrid((np.arange(200) + 0.5) / 100 - 1, np.arange(400) * np.pi / 200)
     out = np.sqrt(1 - z**2)
     ways = np.stack([out * np.cos(turn), out * np.sin(turn), z], -1).reshape(-1, 3)

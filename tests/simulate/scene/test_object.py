@@ -69,9 +69,8 @@ def test_flat_top_is_lit_by_lamberts_law(tmp_path: Path) -> None:
 
 
 def test_texture_is_shown(tmp_path: Path) -> None:
-    """Left half red, right half green."""
-    picture = np.zeros((8, 16, 3), dtype=np.uint8)
-    picture[:, :8, 0], picture[:, 8:, 1] = 250, 250
+    """At the middle of a texel it is that texel."""
+    picture = np.random.default_rng(4).integers(40, 250, (8, 16, 3), dtype=np.uint8)
     mesh = trimesh.Trimesh(
         [[-10, -10, 0], [10, -10, 0], [10, 10, 0], [-10, 10, 0]], [[0, 1, 2], [0, 2, 3]]
     )
@@ -80,9 +79,10 @@ def test_texture_is_shown(tmp_path: Path) -> None:
     mesh.export(tmp_path / "square.glb")
     subject = load_object(tmp_path / "square.glb", CAPTURE_MM, ObjectOptions(up="z", unit="mm"))
     assert subject.texture is not None
-    left, right = (from_above(subject, x, 1).colour[0] for x in (-5, 5))
-    assert left[0] > 100 > left[1] == 0
-    assert right[1] > 100 > right[0] == 0
+    for column, row in ((3, 1), (12, 6)):
+        x, y = (column + 0.5) / 16 * 20 - 10, 10 - (row + 0.5) / 8 * 20
+        colour, texel = from_above(subject, x, y).colour[0], subject.texture[row, column] / 255
+        assert colour / colour.max() == pytest.approx(texel / texel.max(), abs=0.01)
 
 
 def test_texture_outside_of_its_folder_is_not_read(tmp_path: Path) -> None:
@@ -133,29 +133,6 @@ def test_off_centre_does_not_fit_but_can_be_fitted(tmp_path: Path) -> None:
         load_object(tmp_path / "box.stl", CAPTURE_MM)
     fitted = load_object(tmp_path / "box.stl", CAPTURE_MM, ObjectOptions(fit=True))
     assert fitted.points.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-3)
-
-
-HEAD = "ply\nformat ascii 1.0\nelement vertex {v}\nproperty float x\nproperty float y\n\
-property float z\nelement face {f}\nproperty list uchar int vertex_indices\nend_header\n"
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "wrong"),
-    [
-        ("none.ply", HEAD.format(v=0, f=0), "empty|cannot be read"),
-        ("points.ply", HEAD.format(v=3, f=0) + "0 0 0\n1 0 0\n0 1 0\n", "facets|cannot be read"),
-        ("nan.ply", HEAD.format(v=3, f=1) + "0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n", "not finite"),
-        ("one.ply", HEAD.format(v=3, f=1) + "1 1 1\n" * 3 + "3 0 1 2\n", "no extent"),
-        ("rubbish.ply", "this is no mesh", "cannot be read"),
-        ("rubbish.stl", "\0\1\2", "cannot be read|empty|facets"),
-        ("mesh.unknown", "?", "cannot be read"),
-    ],
-)
-def test_bad_meshes(tmp_path: Path, name: str, text: str, wrong: str) -> None:
-    (tmp_path / name).write_text(text)
-    with pytest.raises(InputError, match=wrong) as error:
-        load_object(tmp_path / name, CAPTURE_MM)
-    assert "\n" not in str(error.value)
 
 
 def test_no_such_file(tmp_path: Path) -> None:

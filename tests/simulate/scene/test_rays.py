@@ -6,14 +6,14 @@ import pytest
 from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import design
 from tbcad.optics.reflection import miss_distances
-from tbcad.simulate.scene.rays import ReflectedRays, exact_tracer, pixel_directions
+from tbcad.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.spec.load import load_spec
 
 Cameras = tuple[Reflector, Reflector]
 
 
-def every_row(at: Reflector) -> ReflectedRays:
+def every_row(at: Reflector) -> TracedRays:
     return exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0))
 
 
@@ -59,13 +59,6 @@ def points_in_cells(at: Reflector) -> tuple[np.ndarray, np.ndarray]:
     value = points @ at.mirrors.gradient_at_origin.T + at.mirrors.value_at_origin
     value += at.mirrors.curvature / 2 * dot(points, points)[:, None]
     return value[np.arange(len(owner)), owner], value.min(axis=1)
-
-
-def test_points_lie_in_their_own_cell(cameras: Cameras) -> None:
-    """On their own surface, and in no other ball: what a cell is (DESIGN.md section 2)."""
-    own, least = points_in_cells(cameras[0])
-    assert np.abs(own).max() < 1e-9
-    assert least.min() > -1e-9
 
 
 def test_nothing_is_seen_inside_the_wall_beyond_the_foot() -> None:
@@ -116,13 +109,6 @@ def test_bands_and_shifts_are_parts_of_one_picture(cameras: Cameras) -> None:
     assert np.array_equal(part.direction, whole.direction[100:140])
     shifted = trace(range(100, 140), (1.0, 2.0))
     assert np.array_equal(shifted.mirror[:-2, :-1], part.mirror[2:, 1:])
-
-
-def test_both_cameras_are_mirror_images(cameras: Cameras) -> None:
-    a, b = (every_row(at) for at in cameras)  # b's rows run the other way
-    same = a.mirror == b.mirror[:, ::-1]
-    assert same.mean() > 0.9999  # but for pixel centres on an edge
-    assert a.origin[same] * [-1, 1, 1] == pytest.approx(b.origin[:, ::-1][same], abs=1e-9)
 
 
 def test_planar_mirrors() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
@@ -41,7 +41,10 @@ def targets_of(view: Camera) -> tuple[TwoPlane, Rays]:
     elevation=st.floats(0, 90),
     distance=st.floats(60, 2000),
 )
-@settings(max_examples=12)
+# Along the seam most rays end at the edge of a mirror, whose halves must not hide nearer ones.
+@example(azimuth=92, elevation=40, distance=120)
+@example(azimuth=-90, elevation=40, distance=120)
+@settings(max_examples=6)
 def test_equals_a_k_d_tree_over_all_rays(
     light_field: LightField, tiles: MirrorTiles, azimuth: float, elevation: float, distance: float
 ) -> None:
@@ -70,15 +73,6 @@ def exact_share(
     beyond = nearest > bundle.limit
     assert (found[beyond] < 0).all()
     return float(np.where(beyond, True, exact & (found >= 0)).mean())
-
-
-@pytest.mark.parametrize(("azimuth", "distance"), [(92, 120), (90, 60), (-90, 120)])
-def test_halved_mirrors_of_the_seam_do_not_hide_nearer_rays(
-    light_field: LightField, tiles: MirrorTiles, azimuth: float, distance: float
-) -> None:
-    """These views along the seam have the most rays whose descent ends at the edge of a mirror."""
-    share = exact_share(light_field, tiles, azimuth, 40, distance)
-    assert share > EXACT
 
 
 def test_distance_in_two_plane_coordinates_is_that_of_the_rays_in_the_capture_sphere() -> None:

@@ -11,7 +11,7 @@ import tifffile
 from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.formats.light_pictures import read_light
+from tbcad.reflectance.environment import read_light
 
 LIGHT = np.random.default_rng(3).uniform(0, 50, (8, 16, 3)).astype(np.float32)
 GREY = np.ascontiguousarray(LIGHT[..., 0])
