@@ -138,12 +138,12 @@ def _typed(parameter: Parameter) -> Parameter:
 
 
 def _written(kind: Any) -> Any:
-    """The type of what is written on a command line: a path, or a text, of several that fit."""
+    """The type of what is written on a command line: of several, a path, text or number."""
     if get_origin(kind) is Sequence:
         return list[_written(get_args(kind)[0])]  # type: ignore[misc]
     if get_origin(kind) not in (Union, UnionType):
         return kind
-    for word in (Path, str):
+    for word in (Path, str, int):
         if word in get_args(kind):
             return word | None if NoneType in get_args(kind) else word
     return kind
@@ -165,7 +165,7 @@ def _check(name: str, value: object, kind: Any, option: ParameterInfo) -> None:
     low, high = option.min, option.max
     try:
         _reader(kind).validate_python(value, strict=True)
-        number = cast("float", value if value is not None else low or 0)
+        number = value if isinstance(value, int | float) else low or 0
         inside = (low is None or low <= number) and (high is None or number <= high)
     except ValidationError:
         inside = False

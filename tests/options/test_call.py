@@ -15,6 +15,8 @@ from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
 
+ONLY_WRITTEN, ONLY_PYTHON = {"all_frames", "json"}, {"progress", "detail", "answer"}
+
 
 @dataclass(frozen=True)
 class Polish(Call):
@@ -88,13 +90,15 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
     assert shown["exports"].annotation.__origin__ is Path
 
 
-@pytest.mark.parametrize("name", ["calibrate", "export", "intrinsics", "merge", "simulate_run"])
+@pytest.mark.parametrize(
+    "name", ["calibrate", "export", "intrinsics", "merge", "reconstruct", "simulate_run"]
+)
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     from tests.cli.commands import leaves
 
     command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
     python = set(inspect.signature(getattr(tbcad, name)).parameters)
-    assert command - {"json"} == python - {"progress", "detail", "answer"}
+    assert command - ONLY_WRITTEN == python - ONLY_PYTHON
 
 
 def test_what_is_wanted_is_said_in_one_line(tmp_path: Path) -> None:
