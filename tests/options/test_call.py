@@ -15,7 +15,8 @@ from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
 
-ONLY_WRITTEN, ONLY_PYTHON = {"all_frames", "json"}, {"progress", "detail", "answer"}
+ONLY_WRITTEN = {"all_frames", "json", "no_preflight", "preflight_only", "yes", "dry_run"}
+ONLY_PYTHON = {"progress", "detail", "answer", "ask", "show", "preflight"}
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["calibrate", "export", "intrinsics", "merge", "reconstruct", "simulate_run"]
+    "name", ["calibrate", "export", "intrinsics", "merge", "reconstruct", "run", "simulate_run"]
 )
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     from tests.cli.commands import leaves
