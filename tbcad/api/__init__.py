@@ -7,8 +7,6 @@ bad input is refused before they are loaded.
 from tbcad.api.builds import Build, as_made, build, report_page
 from tbcad.api.captures import (
     Photographs,
-    WantedFrames,
-    WantedLamps,
     capture,
     photograph,
     relight,
@@ -26,8 +24,6 @@ __all__ = [
     "Build",
     "Photographs",
     "Views",
-    "WantedFrames",
-    "WantedLamps",
     "analyse",
     "as_built",
     "as_made",

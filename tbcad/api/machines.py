@@ -34,12 +34,6 @@ if TYPE_CHECKING:
 def run(options: RunOptions) -> Outcome:
     """Drive the prototype of a build through its stops and photograph it under each light.
 
-    `ask` is called with what a person must do, such as turn the object, and says whether it is
-    done; `show` shows stages with their expected seconds, as `tbcad.screen.stages`; `progress` is
-    called with the expected duration, and what the operator should know. `preflight` is "first":
-    one stop is looked at under each light before a new run; "only": and nothing is photographed;
-    "off": it is not.
-
     Returns:
         What was photographed, what is missing, and why the run stopped if it did.
 

@@ -56,7 +56,7 @@ class Call:
         Raises:
             InputError: as said.
         """
-        for name, option in declared(type(self)).items():
+        for name, option in _annotated(type(self)).items():
             _check(name, getattr(self, name), *get_args(option))
 
     def json(self) -> dict[str, Any]:
@@ -98,6 +98,15 @@ def keywords(
 
 def declared(record: type) -> dict[str, Any]:
     """The options of a record by name: types with what typer makes an option of."""
+    return {
+        name: kind
+        for name, kind in _annotated(record).items()
+        if isinstance(get_args(kind)[1], ParameterInfo)
+    }
+
+
+def _annotated(record: type) -> dict[str, Any]:
+    """Types of the fields that have an option, or a text: those are keywords of Python alone."""
     kinds = get_type_hints(record, include_extras=True)
     return {
         one.name: kinds[one.name]
@@ -118,7 +127,7 @@ def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
 
 def _signature(record: type[Call], returned: object) -> Signature:
     """Keywords as a person reads them: options in the order of the command, then callbacks."""
-    options, every = declared(record), signature(record).parameters.values()
+    options, every = _annotated(record), signature(record).parameters.values()
     own = [
         one.replace(annotation=get_args(options[one.name])[0])
         for one in every
@@ -156,13 +165,13 @@ def _reader(kind: Any) -> Any:
     return TypeAdapter(kind)
 
 
-def _check(name: str, value: object, kind: Any, option: ParameterInfo) -> None:
+def _check(name: str, value: object, kind: Any, option: ParameterInfo | str) -> None:
     from annotated_types import Ge, Le
     from pydantic import ValidationError
 
     from tbcad.spec.errors import short_text
 
-    low, high = option.min, option.max
+    low, high = getattr(option, "min", None), getattr(option, "max", None)
     try:
         _reader(kind).validate_python(value, strict=True)
         number = value if isinstance(value, int | float) else low or 0
@@ -191,7 +200,7 @@ def _allowed(kind: Any, limits: Sequence[object]) -> str:
 
 def _with_arguments(text: str, record: type[Call]) -> str:
     """A docstring with the record's help texts as its arguments."""
-    options = declared(record)
-    told = [f"    {name}: {get_args(kind)[1].help}" for name, kind in options.items()]
+    texts = {name: get_args(kind)[1] for name, kind in _annotated(record).items()}
+    told = [f"    {name}: {getattr(text, 'help', text)}" for name, text in texts.items()]
     summary, *sections = text.rstrip().split("\n\n    ")
     return "\n\n    ".join([summary, "Args:\n    " + "\n    ".join(told), *sections]) + "\n    "

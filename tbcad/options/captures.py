@@ -1,4 +1,4 @@
-"""Calls about light fields: reconstructed, written for other programs."""
+"""Calls about light fields: simulated, reconstructed, written for other programs."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
@@ -9,7 +9,18 @@ import typer
 
 from tbcad.errors import InputError
 from tbcad.options.call import Call
-from tbcad.options.shared import AnyPath, Capture, Force, ForceFile, OutReplaced
+from tbcad.options.shared import (
+    AnyPath,
+    Capture,
+    Exports,
+    Force,
+    ForceFile,
+    ObjectFile,
+    OutReplaced,
+    PaintOption,
+    UnitOption,
+    UpOption,
+)
 
 Target = Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"]
 AS_CAPTURED: tuple[Target, ...] = ("ngp-rays", "rays")
@@ -190,3 +201,85 @@ class ReconstructOptions(Call):
         ),
     ] = False
     force: ForceFile = False
+
+
+@dataclass(frozen=True)
+class CaptureOptions(Call):
+    """An export, an object before it, and how its photographs are traced."""
+
+    exports: Exports[AnyPath]
+    object_file: ObjectFile[AnyPath] = None
+    _: KW_ONLY
+    up: UpOption = None
+    unit: UnitOption = None
+    out: Annotated[
+        AnyPath | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for all files; replaced as a whole or not at all. By default captures/ "
+            "with the name of the object, such as captures/knot; from Python none.",
+        ),
+    ] = None
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
+    ] = False
+    paint: PaintOption = "own"
+    samples: Annotated[
+        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
+    ] = 1
+    geometry: Annotated[
+        Literal["spheres", "mesh", "prototype"],
+        "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
+        "stop by stop.",
+    ] = "spheres"
+    lights: Annotated[
+        AnyPath | None,
+        typer.Option(
+            metavar="FILE",
+            help="Also write a reflectance field, a photograph for each lamp: FILE is a table with "
+            "the columns x_mm,y_mm,z_mm; the word mirrors is a lamp in the place of each virtual "
+            "camera, projectors what each mirror throws of a projector in its camera's place.",
+        ),
+    ] = None
+    every: Annotated[
+        int,
+        typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors or projectors."),
+    ] = 1
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=10_000,
+            help="Also photograph the object N times while it turns about z, as one file.",
+            metavar="N",
+        ),
+    ] = None
+    turn: Annotated[
+        float, typer.Option(help="How far the object turns during all frames, degrees.")
+    ] = 360.0
+    force: Force = False
+
+    def check(self) -> None:
+        """Refuse what does not go together.
+
+        Raises:
+            InputError: as said.
+        """
+        lights, single = str(self.lights), self.samples == 1
+        if self.lights is not None and not single:
+            raise InputError("--lights follows one ray a pixel: leave out --samples")
+        if self.every > 1 and lights not in ("mirrors", "projectors"):
+            raise InputError(
+                "--every chooses among the lamps of --lights mirrors or projectors: leave it out"
+            )
+        if lights == "projectors" and self.geometry == "prototype":
+            raise InputError(
+                "--lights projectors is light from the mirrors of shells: leave out --prototype"
+            )
+        if self.frames is not None and (not single or self.geometry == "prototype"):
+            raise InputError(
+                "--frames follows one ray a pixel: leave out --samples and --prototype"
+            )
+        if self.out is None and (self.lights, self.frames) != (None, None):
+            raise InputError("lamps and frames are written beside the light field: give out")

@@ -26,13 +26,7 @@ Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
 
 @dataclass(frozen=True)
 class RunOptions(Call):
-    """What is photographed of a prototype, by which controller and camera.
-
-    Attributes:
-        preflight: whether one stop is looked at before a new run, and whether the run follows.
-        ask: called with what a person must do, such as turn the object; whether it is done.
-        show: shows stages with their expected seconds.
-    """
+    """What is photographed of a prototype, by which controller and camera."""
 
     exports: Exports[AnyPath]
     out: Annotated[
@@ -106,9 +100,18 @@ class RunOptions(Call):
             help="Send the controller the settings of grbl_settings.txt that differ.",
         ),
     ] = False
-    preflight: Preflight = "first"
-    ask: Ask | None = None
-    show: Show | None = None
+    preflight: Annotated[
+        Preflight,
+        "first: one stop is looked at under each light before a new run; only: and nothing is "
+        "photographed; off: it is not.",
+    ] = "first"
+    ask: Annotated[
+        Ask | None,
+        "Called with what a person must do, such as turn the object; says whether it is done.",
+    ] = None
+    show: Annotated[
+        Show | None, "Shows stages with their expected seconds, as tbcad.screen.stages does."
+    ] = None
 
     def size(self) -> tuple[int, int] | None:
         """Columns and rows of a photograph.

@@ -4,7 +4,7 @@ import inspect
 import json
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import pytest
 import typer
@@ -15,8 +15,11 @@ from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
 
-ONLY_WRITTEN = {"all_frames", "json", "no_preflight", "preflight_only", "yes", "dry_run"}
-ONLY_PYTHON = {"progress", "detail", "answer", "ask", "show", "preflight"}
+ONLY_WRITTEN = {
+    *("json", "all_frames", "mesh", "prototype"),
+    *("no_preflight", "preflight_only", "yes", "dry_run"),
+}
+ONLY_PYTHON = {"progress", "detail", "answer", "ask", "show", "preflight", "geometry"}
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Polish(Call):
     _: KW_ONLY
     passes: Annotated[int, typer.Option(min=1, max=9, help="How often.")] = 2
     grits: Annotated[tuple[float, ...], typer.Option(help="One after the other.")] = ()
+    side: Annotated[Literal["back", "front"], "Which is polished."] = "front"
 
 
 @keywords(Polish)
@@ -47,7 +51,15 @@ def test_fields_are_keywords() -> None:
     assert shown.parameters["passes"].default == 2
     assert shown.parameters["passes"].kind is inspect.Parameter.KEYWORD_ONLY
     assert shown.parameters["passes"].annotation is int
-    assert [*shown.parameters] == ["mirror", "passes", "grits", "progress", "detail", "answer"]
+    assert [*shown.parameters] == [
+        "mirror",
+        "passes",
+        "grits",
+        "side",
+        "progress",
+        "detail",
+        "answer",
+    ]
     assert shown.return_annotation is str
     with pytest.raises(TypeError, match="passs"):
         polish("m.step", passs=3)  # type: ignore[call-overload]
@@ -56,7 +68,8 @@ def test_fields_are_keywords() -> None:
 def test_help_texts_are_the_arguments() -> None:
     assert inspect.getdoc(polish) == (
         "Polish a mirror.\n\nArgs:\n    mirror: File of the mirror.\n    passes: How often.\n"
-        "    grits: One after the other.\n\nReturns:\n    What was done."
+        "    grits: One after the other.\n    side: Which is polished.\n\n"
+        "Returns:\n    What was done."
     )
 
 
@@ -66,6 +79,7 @@ def test_help_texts_are_the_arguments() -> None:
         ({"passes": 10}, "passes is 10, allowed is a whole number from 1 to 9: change it"),
         ({"passes": "2"}, "passes is '2', allowed is a whole number from 1 to 9: change it"),
         ({"mirror": 3}, "mirror is 3, allowed is a path: change it"),
+        ({"side": "left"}, "side is 'left', allowed is back or front: change it"),
     ],
 )
 def test_wrong_values_are_one_line(given: dict[str, object], message: str) -> None:
@@ -92,7 +106,8 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["calibrate", "export", "intrinsics", "merge", "reconstruct", "run", "simulate_run"]
+    "name",
+    ["calibrate", "capture", "export", "intrinsics", "merge", "reconstruct", "run", "simulate_run"],
 )
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     from tests.cli.commands import leaves
