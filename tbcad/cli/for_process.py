@@ -24,7 +24,7 @@ def asked_process(name: str | None, share: float | None) -> "tuple[Process | Non
     """
     if name is None and share is None:
         return None, DEFAULT_YIELD
-    from tbcad.tolerance.options import check_yield
+    from tbcad.options.tolerances import check_yield
     from tbcad.tolerance.process.process import load_process
 
     if name is None:

@@ -45,7 +45,7 @@ def reconstruct(
     numbers = checked_frames(asked)
     try:
         with stages(expected_seconds(asked, numbers)) as screen:
-            done = reconstructed(replace(asked, progress=screen.stage, detail=screen.detail))
+            done = reconstructed(asked.on(screen))
     except KeyboardInterrupt:
         parts = [str(part) for n in numbers if (part := part_of(asked, n)).exists()]
         if not parts:

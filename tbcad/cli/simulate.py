@@ -9,7 +9,7 @@ import typer
 from tbcad.cli.app import command
 from tbcad.cli.output_mode import print_json
 from tbcad.errors import InputError
-from tbcad.options.captures import CaptureOptions
+from tbcad.options.captures import CaptureOptions, Geometry
 from tbcad.options.shared import JsonResult
 from tbcad.screen import stages
 
@@ -44,15 +44,9 @@ def capture(
 
     name = Path(options.object_file).stem if options.object_file else BUILT_IN
     lights, frames, out = options.lights, options.frames, Path(options.out or CAPTURES / name)
+    geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
     with stages(3 + (lights is not None) + (frames is not None)) as screen:
-        asked = replace(
-            options,
-            out=out,
-            geometry="mesh" if mesh else "prototype" if prototype else "spheres",
-            progress=screen.stage,
-            detail=screen.detail,
-            answer=screen.note,
-        )
+        asked = replace(options, out=out, geometry=geometry).on(screen)
         photographs = photograph(asked)
         record = write_photographs(photographs, asked)
     if json:

@@ -1,7 +1,7 @@
 """Records of calls, and what follows from them: Python's keywords, the command's options, JSON."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache, wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import (
     Any,
     ParamSpec,
     Protocol,
+    Self,
     TypeVar,
     Union,
     cast,
@@ -23,6 +24,7 @@ from typing import (
 from typer.models import ParameterInfo
 
 from tbcad.errors import InputError
+from tbcad.screen import Stages
 
 Progress = Callable[[str], None]
 Keywords = ParamSpec("Keywords")
@@ -58,6 +60,10 @@ class Call:
         """
         for name, option in _annotated(type(self)).items():
             _check(name, getattr(self, name), *get_args(option))
+
+    def on(self, screen: Stages) -> Self:
+        """The call, with its progress on a screen."""
+        return replace(self, progress=screen.stage, detail=screen.detail, answer=screen.note)
 
     def json(self) -> dict[str, Any]:
         """The options by name, for a file of JSON."""
@@ -152,6 +158,8 @@ def _written(kind: Any) -> Any:
         return list[_written(get_args(kind)[0])]  # type: ignore[misc]
     if get_origin(kind) not in (Union, UnionType):
         return kind
+    for several in (one for one in get_args(kind) if get_origin(one) is Sequence):
+        return _written(several)
     for word in (Path, str, int):
         if word in get_args(kind):
             return word | None if NoneType in get_args(kind) else word

@@ -23,6 +23,7 @@ from tbcad.options.shared import (
 )
 
 Target = Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"]
+Geometry = Literal["spheres", "mesh", "prototype"]
 AS_CAPTURED: tuple[Target, ...] = ("ngp-rays", "rays")
 SIZES_PX = (8, 4096)
 
@@ -229,7 +230,7 @@ class CaptureOptions(Call):
         int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
     ] = 1
     geometry: Annotated[
-        Literal["spheres", "mesh", "prototype"],
+        Geometry,
         "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
         "stop by stop.",
     ] = "spheres"

@@ -1,5 +1,6 @@
 """Options that several commands share; those of places by what the place may be."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -7,6 +8,7 @@ import typer
 
 Place = TypeVar("Place")
 AnyPath = Path | str
+Changes = Mapping[str, str] | Sequence[str]
 
 Design = Annotated[
     Place | None,

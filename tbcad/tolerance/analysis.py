@@ -7,6 +7,7 @@ from typing import Any
 
 from tbcad import schedule
 from tbcad.errors import InputError
+from tbcad.options.tolerances import ToleranceOptions
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
@@ -33,7 +34,6 @@ from tbcad.tolerance.montecarlo.sensitivity import (
     shell_kinds,
 )
 from tbcad.tolerance.montecarlo.sharpness import Sharpness, reference_views, sharpness
-from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import BUILT_IN, Process, load_process, process_errors
 from tbcad.tolerance.prototype.draws import read_wind_up
 from tbcad.tolerance.prototype.windows import PrototypeCase, PrototypeResult, prototype_model
@@ -45,7 +45,7 @@ from tbcad.tolerance.stages import (
     SINGLE_ERRORS,
     builds_stage,
 )
-from tbcad.types import Floats, Progress
+from tbcad.types import Floats
 
 # Simulated builds in each step of a search; the process itself has as many as asked for.
 SEARCH_BUILDS = 100
@@ -107,45 +107,36 @@ class Analysis:
 
 
 def analyse(
-    export: ExportedDesign,
-    process: Process,
-    scene_object: SceneObject,
-    options: ToleranceOptions,
-    progress: Progress,
-    detail: Progress,
-    answer: Progress = lambda _: None,
+    export: ExportedDesign, process: Process, scene_object: SceneObject, options: ToleranceOptions
 ) -> Analysis:
     """Simulate many builds of an export by a process, and find what limits their yield.
-
-    Progress is called with each stage, detail with the steps of a stage, answer with the yield, in
-    words, as soon as it is known.
 
     Raises:
         InputError: mirrors are planar, or the scheduler cannot be reached.
     """
     _refuse_planar(export)
     errors = process_errors(process, export.spec.mirrors.coating_um)
-    simulator = _Simulator(export, options, edge_models(export.reflectors), detail)
-    progress(builds_stage(options.builds, process.name))
+    simulator = _Simulator(export, options, edge_models(export.reflectors))
+    options.progress(builds_stage(options.builds, process.name))
     result = simulator.all_builds(MonteCarloCase(simulator.edge_models, errors, options.seed))
-    answer(yield_sentence(process, result.worst, export.capture_mm))
-    progress(SINGLE_ERRORS)
+    options.answer(yield_sentence(process, result.worst, export.capture_mm))
+    options.progress(SINGLE_ERRORS)
     # All searches share the builds without errors, and each begins with the builds of its loss.
     worst = cache(simulator.worst_coverage)
-    single_errors = _single_errors(simulator, errors, worst, detail)
+    single_errors = _single_errors(simulator, errors, worst)
     chosen = ProcessOption(
         process.name, estimate_yield(result.worst, export.capture_mm), None, options.builds
     )
-    process_options = _process_options(simulator, chosen, worst, progress)
+    process_options = _process_options(simulator, chosen, worst)
     own_margin = None
     if options.margins:
-        progress(MARGINS)
+        options.progress(MARGINS)
         process_options, own_margin = _margins(simulator, process, process_options)
-    progress(PICTURES)
-    sharp = _sharpness(simulator, errors, scene_object, detail)
+    options.progress(PICTURES)
+    sharp = _sharpness(simulator, errors, scene_object)
     prototype = None
     if (export.folder / "prototype.json").is_file():
-        progress(PROTOTYPES)
+        options.progress(PROTOTYPES)
         plan = read_plan(export)
         model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
         prototype = simulator.all_builds(PrototypeCase(model, errors, options.seed))
@@ -170,7 +161,6 @@ class _Simulator:
     export: ExportedDesign
     options: ToleranceOptions
     edge_models: EdgeModels
-    detail: Progress
 
     def all_builds(self, case: Case[AnyResult]) -> AnyResult:
         """Result of as many builds as asked for."""
@@ -179,7 +169,7 @@ class _Simulator:
         def report(batch: range) -> None:
             nonlocal done
             done += len(batch)
-            self.detail(f"{done} of {total}")
+            self.options.detail(f"{done} of {total}")
 
         return simulate(case, total, partial(self._run_batches, report=report))
 
@@ -195,26 +185,26 @@ class _Simulator:
 
 
 def _single_errors(
-    simulator: _Simulator, errors: Errors, worst: WorstCoverage, detail: Progress
+    simulator: _Simulator, errors: Errors, worst: WorstCoverage
 ) -> tuple[SingleErrorEffect, ...]:
     wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
     effects = []
     for kind in shell_kinds(errors, len(simulator.edge_models[0].walls)):
-        detail(kind)
+        simulator.options.detail(kind)
         effects.append(one_at_a_time(errors, kind, wanted, target, worst))
     return tuple(sorted(effects, key=lambda one: -one.loss))
 
 
 def _process_options(
-    simulator: _Simulator, chosen: ProcessOption, worst: WorstCoverage, progress: Progress
+    simulator: _Simulator, chosen: ProcessOption, worst: WorstCoverage
 ) -> tuple[ProcessOption, ...]:
     """Every process with its yield, or the one that was asked for."""
-    if not simulator.options.every_process:
+    if simulator.options.process is not None:
         return (chosen,)
-    progress(EVERY_PROCESS)
+    simulator.options.progress(EVERY_PROCESS)
     export, options = simulator.export, []
     for name in BUILT_IN:
-        simulator.detail(name)
+        simulator.options.detail(name)
         errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
         options.append(ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None))
     return tuple(options)
@@ -225,7 +215,7 @@ def _margins(
 ) -> tuple[tuple[ProcessOption, ...], Margin]:
     """The same processes with the margins that they need, and the margin of the one asked for."""
     designs = solved_designs()
-    if not simulator.options.every_process:
+    if simulator.options.process is not None:
         chosen = _margin(simulator, process, designs)
         return tuple(replace(option, margin=chosen) for option in compared), chosen
     options = tuple(
@@ -239,22 +229,20 @@ def _margins(
 def _margin(simulator: _Simulator, process: Process, designs: SolvedDesigns) -> Margin:
     spec, wanted = simulator.export.spec, simulator.options.wanted_yield
     errors = process_errors(process, spec.mirrors.coating_um)
-    detail = simulator.detail
+    detail = simulator.options.detail
     return margin(
         spec, errors, wanted, simulator.worst_coverage,
         lambda text: detail(f"{process.name}: {text}"), designs,
     )  # fmt: skip
 
 
-def _sharpness(
-    simulator: _Simulator, errors: Errors, scene_object: SceneObject, detail: Progress
-) -> Sharpness:
+def _sharpness(simulator: _Simulator, errors: Errors, scene_object: SceneObject) -> Sharpness:
     export, options = simulator.export, simulator.options
     scene = prepared_scene(scene_object)
-    reference = reference_views(scene, export.capture_mm, detail)
+    reference = reference_views(scene, export.capture_mm, options.detail)
     case = MonteCarloCase(simulator.edge_models, errors, options.seed)
     builds = case.draws(range(PHOTOGRAPHED_BUILDS))
-    residual = options.calibration_residual
+    residual = options.calibrated_mrad / 1000
     return sharpness(
-        export.reflectors, builds, scene, reference, residual, options.seed, progress=detail
+        export.reflectors, builds, scene, reference, residual, options.seed, progress=options.detail
     )

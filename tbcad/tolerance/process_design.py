@@ -6,6 +6,7 @@ import numpy as np
 
 from tbcad import schedule
 from tbcad.errors import InputError
+from tbcad.options.tolerances import check_yield
 from tbcad.spec.design import EdgeKind, Spec, spec_with
 from tbcad.spec.errors import SpecError
 from tbcad.tolerance.margin import (
@@ -20,7 +21,6 @@ from tbcad.tolerance.montecarlo.builds import CoverageCase, simulate
 from tbcad.tolerance.montecarlo.edge_model import EdgeModels
 from tbcad.tolerance.montecarlo.error_kinds import Errors
 from tbcad.tolerance.montecarlo.sharpness import view_ssims
-from tbcad.tolerance.options import check_yield
 from tbcad.tolerance.own_margins import own_margins, with_own_margins
 from tbcad.tolerance.process.process import Process, process_errors
 from tbcad.types import Floats, Progress

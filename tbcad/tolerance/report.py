@@ -176,7 +176,7 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
             "designed": float(sharp.designed.mean()),
             "uncalibrated": float(sharp.uncalibrated.mean()),
             "calibrated": float(sharp.calibrated.mean()),
-            "calibration_residual_mrad": 1000 * analysis.options.calibration_residual,
+            "calibration_residual_mrad": analysis.options.calibrated_mrad,
         },
         "ray_spread_mm": spread_dict(analysis),
         "prototype": prototype

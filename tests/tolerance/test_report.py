@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.options.tolerances import ToleranceOptions
 from tbcad.results.study import SUMMARY_COLUMNS, study_files
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
@@ -27,7 +28,6 @@ from tbcad.tolerance.montecarlo.edge_model import edge_models
 from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerance.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerance.montecarlo.sharpness import Sharpness
-from tbcad.tolerance.options import ToleranceOptions
 from tbcad.tolerance.process.process import ErrorSpec, load_process
 from tbcad.tolerance.prototype.windows import PrototypeResult
 from tbcad.tolerance.report import UNITS, json_text, report_dict, summary_text, tolerance_study
@@ -61,7 +61,7 @@ def analysis(little: MirrorDesign) -> Analysis:
     errors = Errors(sphere_centre=Error(0.012))
     return Analysis(
         process=load_process("sla"),
-        options=ToleranceOptions(builds=BUILDS, seed=4),
+        options=ToleranceOptions("", builds=BUILDS, seed=4),
         target=TARGET,
         cameras=cameras,
         edge_models=models,
