@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.spec.design import Spec
     from tbcad.spec.load import load_spec
-    from tbcad.tolerance.analysis import Analysis
+    from tbcad.tolerancing.analysis import Analysis
     from tbcad.whole_design import Design
 
 __all__ = [
@@ -78,7 +78,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Analysis": "tbcad.tolerance.analysis",
+    "Analysis": "tbcad.tolerancing.analysis",
     "Design": "tbcad.whole_design",
     "InputError": "tbcad.errors",
     "LightField": "tbcad.simulate.capture.light_field",

@@ -15,8 +15,8 @@ from tbcad.spec.load import option_texts
 if TYPE_CHECKING:
     from tbcad.simulate.object_files.contents import Up
     from tbcad.simulate.scene.object_from_file import Unit
-    from tbcad.tolerance.analysis import Analysis
-    from tbcad.tolerance.options import ToleranceOptions
+    from tbcad.tolerancing.analysis import Analysis
+    from tbcad.tolerancing.options import ToleranceOptions
     from tbcad.types import Progress
 
 
@@ -54,10 +54,10 @@ def analyse(
     """
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
-    from tbcad.tolerance.analysis import analyse as analyse_export
-    from tbcad.tolerance.options import ToleranceOptions
-    from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
-    from tbcad.tolerance.stages import RECORD
+    from tbcad.tolerancing.analysis import analyse as analyse_export
+    from tbcad.tolerancing.options import ToleranceOptions
+    from tbcad.tolerancing.process.process import DEFAULT_PROCESS, load_process
+    from tbcad.tolerancing.stages import RECORD
 
     asked = options or ToleranceOptions()
     asked = asked if process else replace(asked, every_process=True)
@@ -84,12 +84,12 @@ def inspect(options: InspectionOptions) -> dict[str, Any]:
     check_is_export(exports)
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
-    from tbcad.tolerance.options import check_yield
+    from tbcad.tolerancing.options import check_yield
 
     check_yield(options.wanted)
     check_replaceable(out, "inspection", options.force, (exports,))
-    from tbcad.inspection.inspect import checked_export
-    from tbcad.inspection.inspect import inspect as write_files
+    from tbcad.mirror_limits.inspect import checked_export
+    from tbcad.mirror_limits.inspect import inspect as write_files
 
     export = checked_export(exports)
     with replacing(out, "inspection", options.force, (exports,)) as folder:

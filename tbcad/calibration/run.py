@@ -23,7 +23,7 @@ from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, files_named
 from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.tolerance.process.process import Process, load_process, process_errors
+from tbcad.tolerancing.process.process import Process, load_process, process_errors
 
 DEFAULT_PROCESS = "fdm"
 """A prototype is printed; its design does not say how."""

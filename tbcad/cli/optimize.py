@@ -13,7 +13,7 @@ from tbcad.options.shared import ForceFile, JsonResult, PlotFormatOption, Schedu
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
-    from tbcad.optimize.search import SearchResult
+    from tbcad.optimizing.search import SearchResult
 
 OUT = Path("better.toml")
 DEFAULTS = ("minimum", "pixels", "evenness")
@@ -86,8 +86,8 @@ def optimize(
     mirrors are solved by exact rays, and pixels counted one by one. Object, sensor, number of
     mirrors and all else stay.
     """
-    from tbcad.optimize.files import search_files
-    from tbcad.optimize.search import Search, parse_objectives, search
+    from tbcad.optimizing.files import search_files
+    from tbcad.optimizing.search import Search, parse_objectives, search
     from tbcad.spec.load import load_spec
 
     store = _store(out)
@@ -165,7 +165,7 @@ def _record(result: "SearchResult", files: list[Path]) -> dict[str, object]:
 
 
 def _show(result: "SearchResult", out: Path, files: list[Path]) -> None:
-    from tbcad.optimize.files import comparison
+    from tbcad.optimizing.files import comparison
 
     if result.best.place == result.start.place:
         typer.echo(f"No better one among {len(result.candidates)} candidates within the limits.")

@@ -85,8 +85,8 @@ def tolerance(
                 "--as-built is about no process: leave out --process, --margins and --set"
             )
         return _as_built(folder, as_built, builds, seed, out, json)
-    from tbcad.tolerance.options import ToleranceOptions
-    from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
+    from tbcad.tolerancing.options import ToleranceOptions
+    from tbcad.tolerancing.process.process import DEFAULT_PROCESS, load_process
 
     changes = list(settings or [])
     load_process(process or DEFAULT_PROCESS, changes)  # or refuse it
@@ -97,8 +97,8 @@ def tolerance(
     check_is_object(object_file, up, unit)  # as all before, before heavy libraries are loaded
     from tbcad.api import analyse
     from tbcad.results.study import check_study_folder, write_study
-    from tbcad.tolerance.report import json_text, summary_text, tolerance_study
-    from tbcad.tolerance.stages import TABLES
+    from tbcad.tolerancing.report import json_text, summary_text, tolerance_study
+    from tbcad.tolerancing.stages import TABLES
 
     check_study_folder(out)
     with stages(6 + (process is None) + margins) as screen:
@@ -134,13 +134,13 @@ def _as_built(
     check_is_calibration(calibration)
     from json import dumps
 
-    from tbcad.as_built.tolerance import (
+    from tbcad.atomic_files import replace_files
+    from tbcad.calibrated_solids.tolerance import (
         as_built_tolerance,
         summary,
         tolerance_record,
         tolerance_table,
     )
-    from tbcad.atomic_files import replace_files
     from tbcad.results.study import check_study_folder
     from tbcad.results.tables import csv_text
 

@@ -41,8 +41,8 @@ from tbcad.simulated_run.photographs import (
     phases_of,
 )
 from tbcad.simulated_run.sensor import Image16, Sensor
-from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.draws import read_wind_up
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
 from tbcad.types import Progress
 
 CAMERA = "simulated"

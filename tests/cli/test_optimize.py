@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tbcad.cli import run
-from tbcad.optimize import search as search_module
-from tbcad.optimize.candidate import DesignCandidate, Figures, MachineLimits, Place
+from tbcad.optimizing import search as search_module
+from tbcad.optimizing.candidate import DesignCandidate, Figures, MachineLimits, Place
 from tbcad.spec.design import Spec
 from tests.exported_files import read_csv
 
