@@ -15,7 +15,7 @@ from tbcad.api.captures import (
     write_photographs,
 )
 from tbcad.api.datasets import export
-from tbcad.api.designs import design, to_cadquery
+from tbcad.api.designs import design, optimize, to_cadquery
 from tbcad.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.api.reconstructions import reconstruct
 from tbcad.api.tolerances import analyse, inspect
@@ -39,6 +39,7 @@ __all__ = [
     "inspect",
     "intrinsics",
     "merge",
+    "optimize",
     "photograph",
     "reconstruct",
     "relight",

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.figure_files import PlotFormat
+from tbcad.atomic_files import write_errors_as_input_errors
+from tbcad.errors import InputError
 from tbcad.formats.toml import toml_text
 from tbcad.optimizing.candidate import DesignCandidate, Figures, placed
 from tbcad.optimizing.search import SearchResult
+from tbcad.options.designs import OptimizeOptions
+from tbcad.output.single_files import check_file
 from tbcad.results.plots import Panel, Series, plot_file
 from tbcad.results.tables import Table, csv_text
 from tbcad.spec.design import Spec
@@ -35,15 +38,36 @@ Groups = dict[str, tuple[list[Figures], str]]
 """By label: what is drawn, and in which style."""
 
 
-def search_files(
-    result: SearchResult, spec: Spec, out: Path, plot: PlotFormat = "png"
-) -> dict[str, bytes]:
-    """The files of a search, beside out, by name: the same search gives the same bytes."""
-    return {
-        out.name: design_text(result, spec).encode(),
-        f"{out.stem}-candidates.csv": csv_text(candidate_table(result)).encode(),
-        f"{out.stem}.{plot}": plot_file(panels(result), plot),
-    }
+def check_files(asked: OptimizeOptions) -> Path:
+    """Refuse, before any work, what would be lost; where candidates are kept for `--resume`.
+
+    Raises:
+        InputError: a file exists or cannot be written.
+    """
+    out, table, plot = asked.files
+    store = table.with_suffix(".jsonl")
+    begun = Path(asked.design) if isinstance(asked.design, Path | str) else None
+    with write_errors_as_input_errors(out):
+        if out.is_dir():
+            raise InputError(f"{out} is a folder: name a TOML file with --out")
+        for file in (out, table, plot):
+            check_file(file, asked.force or asked.resume, (begun,))
+        if store.exists() and not (asked.resume or asked.force):
+            raise InputError(f"{store} exists: go on with --resume, or begin anew with --force")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if not asked.resume:
+            store.unlink(missing_ok=True)
+    return store
+
+
+def search_files(result: SearchResult, spec: Spec, asked: OptimizeOptions) -> dict[str, bytes]:
+    """The files of a search by name: the same search gives the same bytes."""
+    contents = (
+        design_text(result, spec).encode(),
+        csv_text(candidate_table(result)).encode(),
+        plot_file(panels(result), asked.plot),
+    )
+    return {file.name: data for file, data in zip(asked.files, contents, strict=True)}
 
 
 def design_text(result: SearchResult, spec: Spec) -> str:

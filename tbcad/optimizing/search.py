@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
@@ -25,14 +24,11 @@ from tbcad.optimizing.candidate import (
     rounded,
     store_bytes,
 )
-from tbcad.optimizing.views import ViewsBy
+from tbcad.options.designs import Objective, OptimizeOptions
 from tbcad.schedule import run_units
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
-from tbcad.types import Floats, Progress
-
-Objective: TypeAlias = Literal["minimum", "pixels", "evenness", "ssim", "size"]
-OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
+from tbcad.types import Floats
 
 POPULATION = 40  # places of a generation: eight for each variable
 SEED = 0
@@ -53,41 +49,6 @@ LOSSES: dict[Objective, Callable[[Figures], float]] = {
 
 
 @dataclass(frozen=True)
-class Search:
-    """What a search is asked.
-
-    Attributes:
-        objectives: what is made better; all count alike, as ratios to the first design.
-        budget: number of places that are judged at most.
-        max_size_mm: longest side of the machine; None: of the first design's.
-        max_view_angle_deg: of the lens; None: what the first design needs.
-        front: whether places are searched, too, where one of several objectives counts most.
-        method: of the views that are compared, where SSIM is an objective.
-    """
-
-    spec: Spec
-    objectives: tuple[Objective, ...]
-    budget: int
-    max_size_mm: float | None = None
-    max_view_angle_deg: float | None = None
-    front: bool = False
-    method: ViewsBy = "nearest"
-
-    def limits(self, start: Figures) -> MachineLimits:
-        """What candidates must keep, by the figures of the first design."""
-        return MachineLimits(
-            self.max_size_mm or start.size_mm, self.max_view_angle_deg or start.view_angle_deg
-        )
-
-    def key(self) -> str:
-        """What judgements depend on: those of another design are of no use."""
-        text = json.dumps(spec_dict(self.spec), sort_keys=True)
-        if self.method != "nearest":
-            text += self.method
-        return sha256(text.encode()).hexdigest()
-
-
-@dataclass(frozen=True)
 class SearchResult:
     """What a search found.
 
@@ -103,21 +64,7 @@ class SearchResult:
     on_front: tuple[bool, ...]
 
 
-def parse_objectives(names: Sequence[str]) -> tuple[Objective, ...]:
-    """Objectives from their names, each once."""
-    for name in names:
-        if name not in OBJECTIVES:
-            known = ", ".join(OBJECTIVES)
-            raise InputError(f"--for is {name!r}, allowed is one of {known}: change it")
-    return tuple(one for one in OBJECTIVES if one in names)
-
-
-def search(
-    asked: Search,
-    store: Path | None = None,
-    scheduler: str | None = None,
-    progress: Progress = lambda _: None,
-) -> SearchResult:
+def search(spec: Spec, asked: OptimizeOptions, store: Path | None = None) -> SearchResult:
     """Search a better place of camera and ellipsoid.
 
     The store, a file of judgements (JSON lines), is read when it exists, and written after every
@@ -126,27 +73,31 @@ def search(
     Raises:
         InputError: the first design cannot be made; the store is of another design.
     """
-    judged = read_store(store, asked.key()) if store else {}
-    judge = partial(_judge, asked, judged, store, scheduler, progress)
-    start = judge(ANY_SIZE, [place_of(asked.spec)])[0]
+    judged = read_store(store, _key(spec, asked)) if store else {}
+    judge = partial(_judge, spec, asked, judged, store)
+    start = judge(ANY_SIZE, [place_of(spec)])[0]
     if start.figures is None:
         raise InputError(f"the design to begin from cannot be made: {start.reason}")
-    limits = asked.limits(start.figures)
-    value = partial(_value, asked.objectives, limits, start.figures)
-    every = weightings(len(asked.objectives)) if asked.front else [_even(len(asked.objectives))]
-    generations = asked.budget // len(every) // POPULATION
-    for weights in every:
-        _evolve(asked, limits, start.place, max(1, generations - 1), judge, partial(value, weights))
-    candidates = tuple(judged.values())
-    losses = _losses(asked.objectives, limits, start.figures, candidates)
-    best = min(candidates, key=partial(value, _even(len(asked.objectives))))
-    return SearchResult(
-        start,
-        limits,
-        best,
-        candidates,
-        _front(losses),
+    limits = MachineLimits(
+        asked.max_size_mm or start.figures.size_mm,
+        asked.max_view_angle_deg or start.figures.view_angle_deg,
     )
+    value = partial(_value, asked.aims, limits, start.figures)
+    every = weightings(len(asked.aims)) if asked.front else [_even(len(asked.aims))]
+    generations = max(1, asked.candidates // len(every) // POPULATION - 1)
+    box = Bounds(*np.transpose(bounds(spec, limits.size_mm)))
+    for weights in every:
+        _evolve(box, start.place, generations, partial(judge, limits), partial(value, weights))
+    candidates = tuple(judged.values())
+    losses = _losses(asked.aims, limits, start.figures, candidates)
+    best = min(candidates, key=partial(value, _even(len(asked.aims))))
+    return SearchResult(start, limits, best, candidates, _front(losses))
+
+
+def _key(spec: Spec, asked: OptimizeOptions) -> str:
+    """What judgements depend on: those of another design are of no use."""
+    text = json.dumps(spec_dict(spec), sort_keys=True)
+    return sha256((text + ("field" if asked.method == "field" else "")).encode()).hexdigest()
 
 
 def weightings(objectives: int) -> list[Floats]:
@@ -166,17 +117,16 @@ def _even(objectives: int) -> Floats:
 
 
 def _evolve(
-    asked: Search,
-    limits: MachineLimits,
+    box: Bounds,
     start: Place,
     generations: int,
-    judge: Callable[[MachineLimits, Sequence[Place]], list[DesignCandidate]],
+    judge: Callable[[Sequence[Place]], list[DesignCandidate]],
     value: Callable[[DesignCandidate], float],
 ) -> None:
     """Judge generations of places, each nearer to the lowest value."""
     differential_evolution(
         _never_called,
-        Bounds(*np.transpose(bounds(asked.spec, limits.size_mm))),
+        box,
         x0=np.array(start),
         maxiter=generations,
         popsize=POPULATION // len(start),
@@ -184,9 +134,7 @@ def _evolve(
         rng=np.random.default_rng(SEED),
         polish=False,
         updating="deferred",
-        workers=lambda _, places: [
-            *map(value, judge(limits, [rounded(np.array(p)) for p in places]))
-        ],
+        workers=lambda _, places: [*map(value, judge([rounded(np.array(p)) for p in places]))],
     )
 
 
@@ -218,24 +166,22 @@ def objective_losses(objectives: Sequence[Objective], start: Figures, one: Figur
 
 
 def _judge(
-    asked: Search,
+    spec: Spec,
+    asked: OptimizeOptions,
     judged: dict[Place, DesignCandidate],
     store: Path | None,
-    scheduler: str | None,
-    progress: Progress,
     limits: MachineLimits,
     places: Sequence[Place],
 ) -> list[DesignCandidate]:
     """Candidates at places, of which only those are worked out that the store does not have."""
-    wanted = limits if "ssim" in asked.objectives else None
-    new = [p for p in dict.fromkeys(places) if _is_open(asked.objectives, limits, judged.get(p))]
-    for one in run_units(
-        partial(evaluate, asked.spec, wanted, method=asked.method), new, scheduler
-    ):
+    wanted = limits if "ssim" in asked.aims else None
+    new = [p for p in dict.fromkeys(places) if _is_open(asked.aims, limits, judged.get(p))]
+    work = partial(evaluate, spec, wanted, method=asked.method or "nearest")
+    for one in run_units(work, new, asked.scheduler):
         judged[one.place] = one
     if store and new:
-        replace_files(store.parent, {store.name: store_bytes(asked.key(), judged)})
-    progress(f"{len(judged)} of about {asked.budget} candidates")
+        replace_files(store.parent, {store.name: store_bytes(_key(spec, asked), judged)})
+    asked.detail(f"{len(judged)} of about {asked.candidates} candidates")
     return [judged[place] for place in places]
 
 

@@ -15,13 +15,12 @@ from tbcad.optimizing import search as search_module
 from tbcad.optimizing.candidate import STEP_MM, DesignCandidate, Figures, MachineLimits, Place
 from tbcad.optimizing.files import comparison, design_text, search_files
 from tbcad.optimizing.search import (
-    Search,
     SearchResult,
     _front,
-    parse_objectives,
     search,
     weightings,
 )
+from tbcad.options.designs import OptimizeOptions
 from tbcad.spec.design import Spec
 from tbcad.spec.load import load_spec
 
@@ -47,19 +46,21 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search_module, "evaluate", closed_form)
 
 
-def asked(budget: int = 1600, size_mm: float | None = 400.0) -> Search:
-    return Search(SPEC, ("minimum", "evenness"), budget, size_mm)
+def asked(budget: int = 1600, size_mm: float | None = 400.0) -> OptimizeOptions:
+    return OptimizeOptions(
+        objectives=("minimum", "evenness"), candidates=budget, max_size_mm=size_mm
+    )
 
 
 def test_the_best_place_is_found() -> None:
-    best = search(asked()).best
+    best = search(SPEC, asked()).best
     assert np.abs(np.subtract(best.place, BEST))[:3].max() <= 4 * STEP_MM
     assert np.abs(np.subtract(best.place, BEST))[3:].max() <= 0.1
 
 
 def test_limits_hold() -> None:
     """By default the machine may be no larger than the first one: x stays at 100."""
-    result = search(asked(size_mm=None))
+    result = search(SPEC, asked(size_mm=None))
     assert result.limits.size_mm == 300
     assert result.best.figures is not None
     assert result.best.figures.size_mm <= 300
@@ -71,24 +72,24 @@ def test_limits_hold() -> None:
 def test_the_start_where_none_is_better() -> None:
     places = ["camera_mm=[123, 0, -140]", "semi_minor_mm=111.5", "stretch=[1.3, 1.15]"]
     spec = load_spec(None, ["n=4", *places])
-    result = search(Search(spec, ("minimum",), 80))
+    result = search(spec, OptimizeOptions(objectives=("minimum",), candidates=80))
     assert result.best == result.start
 
 
 def test_a_search_that_was_stopped_ends_like_one_that_was_not(tmp_path: Path) -> None:
     whole, parted = tmp_path / "whole.jsonl", tmp_path / "parted.jsonl"
-    expected = search(asked(280), whole)
-    search(asked(120), parted)
+    expected = search(SPEC, asked(280), whole)
+    search(SPEC, asked(120), parted)
     assert parted.read_bytes() != whole.read_bytes()
-    assert search(asked(280), parted) == expected
+    assert search(SPEC, asked(280), parted) == expected
     assert parted.read_bytes() == whole.read_bytes()
-    assert search_files(expected, SPEC, Path("x.toml")) == search_files(
-        search(asked(280)), SPEC, Path("x.toml")
+    assert search_files(expected, SPEC, OptimizeOptions()) == search_files(
+        search(SPEC, asked(280)), SPEC, OptimizeOptions()
     )
 
 
 def test_judgements_are_not_made_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = search(asked(120), tmp_path / "store.jsonl")
+    expected = search(SPEC, asked(120), tmp_path / "store.jsonl")
 
     def never(
         spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
@@ -96,16 +97,15 @@ def test_judgements_are_not_made_twice(tmp_path: Path, monkeypatch: pytest.Monke
         raise AssertionError(place)
 
     monkeypatch.setattr(search_module, "evaluate", never)
-    assert search(asked(120), tmp_path / "store.jsonl") == expected
+    assert search(SPEC, asked(120), tmp_path / "store.jsonl") == expected
 
 
 def test_a_store_of_another_design_is_refused(tmp_path: Path) -> None:
     store = tmp_path / "store.jsonl"
-    search(asked(80), store)
+    search(SPEC, asked(80), store)
     before = store.read_bytes()
-    other = Search(load_spec(None, ["n=5"]), ("minimum",), 80)
     with pytest.raises(InputError, match="another design"):
-        search(other, store)
+        search(load_spec(None, ["n=5"]), asked(80), store)
     assert store.read_bytes() == before
 
 
@@ -117,19 +117,18 @@ def test_a_broken_store_is_refused(tmp_path: Path, text: str) -> None:
     store = tmp_path / "store.jsonl"
     store.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"store.jsonl: (no list of candidates|of another)"):
-        search(asked(80), store)
+        search(SPEC, asked(80), store)
 
 
 def test_a_first_design_that_cannot_be_made() -> None:
     spec = load_spec(None, ["n=4", "capture_diameter_mm=10", "semi_minor_mm=50"])
     with pytest.raises(InputError, match="cannot be made: the ellipsoid is too small"):
-        search(Search(spec, ("size",), 80))
+        search(spec, OptimizeOptions(objectives=("size",), candidates=80))
 
 
-def test_objectives_by_name() -> None:
-    assert parse_objectives(["size", "minimum", "size"]) == ("minimum", "size")
-    with pytest.raises(InputError, match="--for is 'beauty', allowed is one of minimum, pixels"):
-        parse_objectives(["beauty"])
+def test_objectives_once_and_in_one_order() -> None:
+    assert OptimizeOptions(objectives=["size", "minimum", "size"]).aims == ("minimum", "size")
+    assert OptimizeOptions().aims == ("minimum", "pixels", "evenness")
 
 
 @given(arrays(float, st.tuples(st.integers(1, 8), st.integers(1, 3)), elements=st.floats(-2, 2)))
@@ -141,7 +140,7 @@ def test_front_against_brute_force(losses: np.ndarray) -> None:
 
 
 def test_the_design_that_is_written_is_the_best_one(tmp_path: Path) -> None:
-    result: SearchResult = search(asked(120))
+    result: SearchResult = search(SPEC, asked(120))
     file = tmp_path / "better.toml"
     file.write_text(design_text(result, SPEC), encoding="utf-8")
     spec = load_spec(file)
@@ -158,7 +157,7 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
 ) -> None:
     """What that search judged beyond the limits, or found impossible, is not judged again."""
     store = tmp_path / "store.jsonl"
-    search(asked(80), store)
+    search(SPEC, asked(80), store)
     again: list[Place] = []
 
     def with_ssim(
@@ -173,8 +172,8 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
         return one
 
     monkeypatch.setattr(search_module, "evaluate", with_ssim)
-    views = Search(SPEC, ("ssim",), 280, 400.0)
-    result = search(views, store)
+    views = OptimizeOptions(objectives=("ssim",), candidates=280, max_size_mm=400.0)
+    result = search(SPEC, views, store)
     within = [one for one in result.candidates if one.figures and one.figures.ssim]
     assert all(one.figures and one.figures.size_mm <= 400 for one in within)
     assert len(within) > 20
@@ -183,7 +182,7 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
     kept = [one for one, on in zip(result.candidates, result.on_front, strict=True) if on]
     assert {one.place[3] for one in kept} == {result.best.place[3]}
     assert any("SSIM of views" in line for line in comparison(result))
-    assert search(views, store) == result
+    assert search(SPEC, views, store) == result
 
 
 def test_weights_of_a_front() -> None:
@@ -197,8 +196,11 @@ def test_weights_of_a_front() -> None:
 
 def test_a_front_reaches_farther_towards_each_aim() -> None:
     """Pixels are most at x = 123, the machine is smallest at the smallest x."""
-    one = Search(SPEC, ("minimum", "size"), 480, 600.0)
-    searches = [search(one), search(replace(one, budget=3 * one.budget, front=True))]
+    one = OptimizeOptions(objectives=("minimum", "size"), max_size_mm=600.0)
+    searches = [
+        search(SPEC, each)
+        for each in (one, replace(one, candidates=3 * one.candidates, front=True))
+    ]
     fronts = [
         [c.figures for c, on in zip(r.candidates, r.on_front, strict=True) if on and c.figures]
         for r in searches
