@@ -5,6 +5,7 @@ import inspect
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,11 @@ def test_public_names_are_there_and_documented(name: str) -> None:
     if name != "__version__":
         assert len(inspect.getdoc(value) or "") > 40
     assert name in dir(tbcad)
+
+
+@pytest.mark.parametrize("name", sorted({*tbcad.__all__} - {"__version__"}))
+def test_no_module_takes_the_place_of_a_public_name(name: str) -> None:
+    assert find_spec(f"tbcad.{name}") is None
 
 
 def test_an_unknown_name_is_refused() -> None:

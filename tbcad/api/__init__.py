@@ -14,7 +14,7 @@ from tbcad.api.captures import (
     relight,
     write_photographs,
 )
-from tbcad.api.datasets import export
+from tbcad.api.datasets import dataset, export
 from tbcad.api.designs import design, optimize, to_cadquery
 from tbcad.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.api.reconstructions import reconstruct
@@ -34,6 +34,7 @@ __all__ = [
     "build",
     "calibrate",
     "capture",
+    "dataset",
     "design",
     "export",
     "inspect",
