@@ -1,7 +1,18 @@
-"""Examples at the end of each command's help: one record, tried by the tests."""
+"""Help: commands in the order of the work, under headings, with examples that the tests try."""
 
 import typer
+from typer.models import CommandInfo
 
+HEADINGS = {
+    "Design and build": (
+        *("init", "optimize", "build", "verify", "report", "picture", "camera"),
+        *("explain", "doctor"),
+    ),
+    "Order and assemble": ("inspection", "parts", "drawings", "assembly"),
+    "Run the machine": ("run", "intrinsics", "calibrate", "merge", "as-built"),
+    "Simulate and analyse": ("capture", "simulate-run", "tolerance", "study"),
+    "Look at light fields": ("reconstruct", "show", "view", "refocus", "export"),
+}
 # By the words that call the command: what is typed behind them, and what it gives.
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "init": (
@@ -134,11 +145,25 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
 }
 
 
+def order_help(app: typer.Typer) -> None:
+    """Put every command under its heading; one without a heading is a fault of tbcad."""
+    heading = {name: title for title, names in HEADINGS.items() for name in names}
+    place = list(heading)
+    for command in app.registered_commands:
+        command.rich_help_panel = heading[_name(command)]
+    for group in app.registered_groups:
+        group.rich_help_panel = heading[str(group.name)]
+    app.registered_commands.sort(key=lambda one: place.index(_name(one)))
+
+
+def _name(command: CommandInfo) -> str:
+    return str(command.name or getattr(command.callback, "__name__", ""))
+
+
 def add_examples(app: typer.Typer, words: tuple[str, ...] = ()) -> None:
     """Put its examples at the end of the help of every command; one without is a fault of tbcad."""
     for command in app.registered_commands:
-        name = str(command.name or getattr(command.callback, "__name__", ""))
-        command.epilog = examples_text(" ".join((*words, name)))
+        command.epilog = examples_text(" ".join((*words, _name(command))))
     for group in app.registered_groups:
         if group.typer_instance is not None:
             add_examples(group.typer_instance, (*words, str(group.name)))
