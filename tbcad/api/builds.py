@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import chosen_spec
 from tbcad.api.verification import verify as verification
+from tbcad.atomic_files import InFolder
 from tbcad.errors import InputError
 from tbcad.options.call import silent
 from tbcad.spec.design import Spec
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Build:
+class Build(InFolder):
     """What a build wrote.
 
     Attributes:

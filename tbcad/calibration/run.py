@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tbcad.atomic_files import InFolder
 from tbcad.calibration.calibrate import Calibration, Setup, calibrate, prepared_setup
 from tbcad.calibration.detection.detect import detect
 from tbcad.calibration.detection.expected import Room
@@ -37,7 +38,7 @@ READING, DETECTING, ESTIMATING, WRITING = (
 
 
 @dataclass(frozen=True)
-class WrittenCalibration:
+class WrittenCalibration(InFolder):
     """A calibration whose files are written.
 
     Attributes:
@@ -50,6 +51,9 @@ class WrittenCalibration:
     text: str
     record: dict[str, Any]
     others: tuple["WrittenCalibration", ...] = ()
+
+    def __fspath__(self) -> str:
+        return str(self.folder.parent if self.others else self.folder)
 
     @property
     def every(self) -> tuple["WrittenCalibration", ...]:

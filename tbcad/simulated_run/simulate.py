@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from io import BytesIO
+from os import PathLike
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -250,7 +251,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
 
 def run_object(
     export: ExportedDesign,
-    file: Path | str | None,
+    file: str | PathLike[str] | None,
     options: ObjectOptions | None = None,
     told: Progress | None = None,
 ) -> SceneObject:
