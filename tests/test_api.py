@@ -107,6 +107,16 @@ def test_bad_input_is_one_line() -> None:
         tbcad.design(n=99)
 
 
+@pytest.mark.parametrize(
+    "name", ["calibrate", "dataset", "intrinsics", "merge", "optimize", "simulate_run", "view"]
+)
+def test_a_function_says_in_one_line_what_it_wants(name: str) -> None:
+    with pytest.raises(InputError, match=r"\w+ is 3, allowed is [^\n]+: change it$"):
+        getattr(tbcad, name)(3)
+    with pytest.raises(InputError, match=r"(?i)^[^\n]+(no such f|is not there|is missing)[^\n]+$"):
+        getattr(tbcad, name)("absent")
+
+
 def test_a_mandrel_is_a_part() -> None:
     part = tbcad.design(n=2).mandrel("b")
     assert part.label == "mandrel_b"
