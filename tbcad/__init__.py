@@ -28,10 +28,12 @@ if TYPE_CHECKING:
         build,
         calibrate,
         capture,
+        dataset,
         design,
         export,
         intrinsics,
         merge,
+        optimize,
         reconstruct,
         relight,
         run,
@@ -45,7 +47,7 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.spec.design import Spec
     from tbcad.spec.load import load_spec
-    from tbcad.tolerance.analysis import Analysis
+    from tbcad.tolerancing.analysis import Analysis
     from tbcad.whole_design import Design
 
 __all__ = [
@@ -63,11 +65,13 @@ __all__ = [
     "build",
     "calibrate",
     "capture",
+    "dataset",
     "design",
     "export",
     "intrinsics",
     "load_spec",
     "merge",
+    "optimize",
     "reconstruct",
     "relight",
     "run",
@@ -78,7 +82,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Analysis": "tbcad.tolerance.analysis",
+    "Analysis": "tbcad.tolerancing.analysis",
     "Design": "tbcad.whole_design",
     "InputError": "tbcad.errors",
     "LightField": "tbcad.simulate.capture.light_field",

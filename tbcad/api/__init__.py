@@ -12,8 +12,8 @@ from tbcad.api.captures import (
     relight,
     write_photographs,
 )
-from tbcad.api.datasets import export
-from tbcad.api.designs import design, to_cadquery
+from tbcad.api.datasets import dataset, export
+from tbcad.api.designs import design, optimize, to_cadquery
 from tbcad.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.api.reconstructions import reconstruct
 from tbcad.api.tolerances import analyse, inspect
@@ -30,11 +30,13 @@ __all__ = [
     "build",
     "calibrate",
     "capture",
+    "dataset",
     "design",
     "export",
     "inspect",
     "intrinsics",
     "merge",
+    "optimize",
     "photograph",
     "reconstruct",
     "relight",

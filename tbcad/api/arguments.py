@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tbcad.errors import InputError
 from tbcad.spec.design import Spec
+from tbcad.spec.errors import short_text
 from tbcad.spec.load import load_spec, option_texts
 
 Settings = Mapping[str, str] | Sequence[str]
@@ -22,5 +23,10 @@ def chosen_spec(spec: Spec | Path | str | None, n: int | None, settings: Setting
         if settings or n is not None:
             raise InputError("n and settings go with a design file: give them to load_spec")
         return spec
+    if spec is not None and not isinstance(spec, Path | str):
+        raise InputError(
+            f"design is {short_text(spec)}, allowed is a spec, a design file (TOML) or the name of "
+            "a design: change it"
+        )
     options = option_texts(settings) + ([f"optics.n={n}"] if n is not None else [])
     return load_spec(None if spec is None else Path(spec), options)

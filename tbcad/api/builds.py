@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import chosen_spec
 from tbcad.api.verification import verify as verification
+from tbcad.atomic_files import InFolder
 from tbcad.errors import InputError
 from tbcad.options.call import silent
 from tbcad.spec.design import Spec
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Build:
+class Build(InFolder):
     """What a build wrote.
 
     Attributes:
@@ -143,13 +144,13 @@ def _build_files(
 
 def _load_libraries() -> None:
     """Load what the background process works with."""
-    import tbcad.tolerance.as_made  # noqa: F401
+    import tbcad.tolerancing.as_made  # noqa: F401
 
 
 def _as_made(mirrors: MirrorDesign) -> AsMade:
     """Simulate a few builds of a design by every built-in process."""
     from tbcad.simulate.scene.reflector import reflectors
-    from tbcad.tolerance.as_made import as_made
+    from tbcad.tolerancing.as_made import as_made
 
     spec = mirrors.spec
     target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
@@ -165,7 +166,7 @@ def as_made(
         Their yields; None where no shell was built, or its record cannot be read.
     """
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.tolerance.as_made import as_made as simulated
+    from tbcad.tolerancing.as_made import as_made as simulated
 
     folder = Path(exports)
     if not (folder / "shell_a.stl").is_file():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tbcad.options.call import keywords
 from tbcad.options.captures import CaptureOptions
 from tbcad.options.checks import check_is_export, check_is_object
+from tbcad.options.shared import AnyPath
 
 if TYPE_CHECKING:
     from tbcad.reflectance.environment import LightFormat
@@ -55,7 +56,7 @@ class Photographs:
     subject: SceneObject
     capture_mm: float
     facts: dict[str, Any]
-    sources: tuple[Path | str | None, ...] = ()
+    sources: tuple[AnyPath | None, ...] = ()
 
 
 def photograph(options: CaptureOptions) -> Photographs:

@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import Settings, chosen_spec
-from tbcad.options.call import silent
+from tbcad.options.call import keywords, silent
+from tbcad.options.designs import OptimizeOptions
 from tbcad.spec.design import Spec
 
 if TYPE_CHECKING:
     from build123d import Part
     from cadquery import Workplane
 
+    from tbcad.optimizing.search import SearchResult
     from tbcad.types import Progress
     from tbcad.whole_design import Design
 
@@ -44,6 +46,30 @@ def design(
 
     mirrors = mirror_design(chosen_spec(spec, n, settings), detail)
     return Design(mirrors.spec, mirrors.arrays)
+
+
+@keywords(OptimizeOptions)
+def optimize(options: OptimizeOptions) -> SearchResult:
+    """Search better places of cameras and mirrors for the same sensor and number of mirrors.
+
+    Returns:
+        The first design and the best one with their figures, and all candidates.
+
+    Raises:
+        InputError: the design is not allowed or cannot be made, or a file exists.
+    """
+    from tbcad.atomic_files import replace_files
+    from tbcad.optimizing.files import check_files, search_files
+    from tbcad.optimizing.search import search
+
+    options.check()
+    spec = chosen_spec(options.design, None, options.settings)
+    store = check_files(options)
+    options.progress("optimize: candidates")
+    result = search(spec, options, store)
+    options.progress("optimize: files")
+    replace_files(store.parent, search_files(result, spec, options))
+    return result
 
 
 def to_cadquery(part: Part) -> Workplane:

@@ -66,7 +66,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object_from_file import ObjectOptions
     from tbcad.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
-    from tbcad.tolerance.process.process import load_process, process_errors
+    from tbcad.tolerancing.process.process import load_process, process_errors
 
     check_is_free(folder, (exports, file, *files_named(options.process)))
     errors = process_errors(load_process(options.process))
@@ -97,7 +97,7 @@ def calibrate(options: CalibrateOptions) -> WrittenCalibration:
         raise InputError(
             f"{options.intrinsics}: no such file; give the one that `tbcad intrinsics` wrote"
         )
-    from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerancing.process.process import load_process
 
     if options.process is not None:
         load_process(options.process, options.settings)  # before what is heavy is loaded
@@ -187,7 +187,7 @@ def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     built = export_of(known) if options.exports is None else Path(options.exports)
     check_replaceable(out, "as-built", options.force, (known, built))
     options.progress("solids")
-    from tbcad.as_built.files import as_built as write_files
+    from tbcad.calibrated_solids.files import as_built as write_files
 
     with replacing(out, "as-built", options.force, (known, built)) as folder:
         record = write_files(known, built, folder)

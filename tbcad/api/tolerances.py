@@ -12,8 +12,8 @@ from tbcad.options.tolerances import InspectionOptions, ToleranceOptions, check_
 from tbcad.spec.load import option_texts
 
 if TYPE_CHECKING:
-    from tbcad.tolerance.analysis import Analysis
-    from tbcad.tolerance.process.process import Process
+    from tbcad.tolerancing.analysis import Analysis
+    from tbcad.tolerancing.process.process import Process
 
 LEAST_BUILDS = 10  # of random ones
 
@@ -28,8 +28,8 @@ def analyse(options: ToleranceOptions) -> Analysis:
     process, exports = checked_process(options), Path(options.exports)
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
-    from tbcad.tolerance.analysis import analyse as analyse_export
-    from tbcad.tolerance.stages import RECORD
+    from tbcad.tolerancing.analysis import analyse as analyse_export
+    from tbcad.tolerancing.stages import RECORD
 
     options.progress(RECORD)
     export = read_export(exports)
@@ -40,7 +40,7 @@ def analyse(options: ToleranceOptions) -> Analysis:
 
 def checked_process(options: ToleranceOptions) -> Process:
     """The process, when all that can be refused at once has been."""
-    from tbcad.tolerance.process.process import DEFAULT_PROCESS, load_process
+    from tbcad.tolerancing.process.process import DEFAULT_PROCESS, load_process
 
     process = load_process(options.process or DEFAULT_PROCESS, option_texts(options.settings))
     if options.builds < LEAST_BUILDS:
@@ -70,8 +70,8 @@ def inspect(options: InspectionOptions) -> dict[str, Any]:
 
     check_yield(options.wanted)
     check_replaceable(out, "inspection", options.force, (exports,))
-    from tbcad.inspection.inspect import checked_export
-    from tbcad.inspection.inspect import inspect as write_files
+    from tbcad.mirror_limits.inspect import checked_export
+    from tbcad.mirror_limits.inspect import inspect as write_files
 
     export = checked_export(exports)
     with replacing(out, "inspection", options.force, (exports,)) as folder:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tbcad.errors import InputError
@@ -26,25 +27,53 @@ class Views:
     """
 
     def __init__(
-        self, source: LightField | Field, *, quick: bool = False, progress: Progress = silent
+        self,
+        source: LightField | Field | Path | str,
+        *,
+        quick: bool = False,
+        progress: Progress = silent,
     ) -> None:
         """Read nothing yet.
 
         Args:
-            source: a light field, in memory or in a file that stays open; or a field.
+            source: a light field, in memory or in a file that stays open; a field; or the folder
+                of a capture, which is shown by the field in it, if there is one.
             quick: look for the depth of a light field on fewer planes and at fewer points: a sixth
                 of the time.
             progress: called with the state of what is made once.
         """
-        self._source, self._quick, self._progress = source, quick, progress
+        self._source = Path(source) if isinstance(source, str) else source
+        self._quick, self._progress = quick, progress
+
+    @cached_property
+    def _light_field(self) -> LightField:
+        from tbcad.simulate.capture.light_field import LightField
+
+        if isinstance(self._source, LightField):
+            return self._source
+        if not isinstance(self._source, Path):
+            raise InputError(
+                f"source is {self._source!r:.60}, allowed is a light field, a field, or the folder "
+                "of a capture: change it"
+            )
+        return LightField.open(self._source)
+
+    @cached_property
+    def _field(self) -> Field | None:
+        """What is shown by default, if there is one."""
+        from tbcad.reconstruction.field import Field, wanted_field
+
+        if isinstance(self._source, Field):
+            return self._source
+        if not isinstance(self._source, Path):
+            return None
+        return wanted_field(None, self._source, self._light_field)
 
     @cached_property
     def _tiles(self) -> MirrorTiles:
-        from tbcad.reconstruction.field import Field
         from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
-        assert not isinstance(self._source, Field)
-        return MirrorTiles(self._source)
+        return MirrorTiles(self._light_field)
 
     @cached_property
     def _depths(self) -> DepthViews:
@@ -73,14 +102,15 @@ class Views:
         from tbcad.reconstruction.field import Field
         from tbcad.simulate.scene.viewpoint import camera_around_object
 
-        source, angles = self._source, (radians(azimuth_deg), radians(elevation_deg))
-        capture_mm = source.grid.width_mm if isinstance(source, Field) else source.capture_mm
+        made = self._field if method is None or isinstance(self._source, Field) else None
+        angles = radians(azimuth_deg), radians(elevation_deg)
+        capture_mm = self._light_field.capture_mm if made is None else made.grid.width_mm
         camera = camera_around_object(*angles, distance_mm, capture_mm, size)
-        if not isinstance(source, Field):
+        if made is None:
             return self._of_light_field(camera, method or "depth")
         if method is not None:
             raise InputError(f"method {method!r} is for a light field: leave it out for a field")
-        return _of_field(source, camera)
+        return _of_field(made, camera)
 
     def _of_light_field(self, camera: Camera, method: Method | Literal["depth"]) -> SynthesisedView:
         from tbcad.simulate.views.synthesis import synthesise
@@ -101,7 +131,7 @@ def _of_field(made: Field, camera: Camera) -> SynthesisedView:
 
 
 def view(
-    source: LightField | Field,
+    source: LightField | Field | Path | str,
     azimuth_deg: float = 0.0,
     elevation_deg: float = 30.0,
     *,
@@ -112,8 +142,8 @@ def view(
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
     Args:
-        source: a light field, in memory or in an open file; or the field of `tbcad.reconstruct`,
-            the best where there is one.
+        source: a light field, in memory or in an open file; the field of `tbcad.reconstruct`, the
+            best where there is one; or the folder of a capture, with or without such a field.
         azimuth_deg: of the camera about z, from x.
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.

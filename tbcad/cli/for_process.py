@@ -7,7 +7,7 @@ from tbcad.errors import InputError
 if TYPE_CHECKING:
     from tbcad.screen import Stages
     from tbcad.spec.design import Spec
-    from tbcad.tolerance.process.process import Process
+    from tbcad.tolerancing.process.process import Process
 
 DEFAULT_YIELD = 0.99
 
@@ -25,7 +25,7 @@ def asked_process(name: str | None, share: float | None) -> "tuple[Process | Non
     if name is None and share is None:
         return None, DEFAULT_YIELD
     from tbcad.options.tolerances import check_yield
-    from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerancing.process.process import load_process
 
     if name is None:
         raise InputError(
@@ -39,7 +39,7 @@ def asked_process(name: str | None, share: float | None) -> "tuple[Process | Non
 
 def design_for(spec: "Spec", process: "Process", wanted: float, screen: "Stages") -> "Spec":
     """The design with edges and margins for a process and a yield; notes say what they cost."""
-    from tbcad.tolerance.process_design import (
+    from tbcad.tolerancing.process_design import (
         costs_text,
         edges_for_process,
         edges_text,

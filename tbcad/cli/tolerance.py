@@ -46,8 +46,8 @@ def tolerance(
 
     checked_process(options)  # before heavy libraries are loaded
     from tbcad.results.study import check_study_folder, write_study
-    from tbcad.tolerance.report import json_text, summary_text, tolerance_study
-    from tbcad.tolerance.stages import TABLES
+    from tbcad.tolerancing.report import json_text, summary_text, tolerance_study
+    from tbcad.tolerancing.stages import TABLES
 
     check_study_folder(out)
     with stages(6 + (options.process is None) + options.margins) as screen:
@@ -69,13 +69,13 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
     check_is_calibration(calibration)
     from json import dumps
 
-    from tbcad.as_built.tolerance import (
+    from tbcad.atomic_files import replace_files
+    from tbcad.calibrated_solids.tolerance import (
         as_built_tolerance,
         summary,
         tolerance_record,
         tolerance_table,
     )
-    from tbcad.atomic_files import replace_files
     from tbcad.results.study import check_study_folder
     from tbcad.results.tables import csv_text
 

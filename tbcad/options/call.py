@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, wraps
 from inspect import Parameter, Signature, signature
+from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
@@ -53,12 +54,15 @@ class Call:
     answer: Progress = silent
 
     def __post_init__(self) -> None:
-        """Refuse values of another type, or out of range.
+        """Refuse values of another type, or out of range; what lies in a folder stands for it.
 
         Raises:
             InputError: as said.
         """
         for name, option in _annotated(type(self)).items():
+            value = getattr(self, name)
+            if isinstance(value, PathLike) and not isinstance(value, Path):
+                object.__setattr__(self, name, Path(value))
             _check(name, getattr(self, name), *get_args(option))
 
     def on(self, screen: Stages) -> Self:

@@ -2,18 +2,22 @@
 
 import inspect
 import json
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
+from itertools import repeat
 from pathlib import Path
 from typing import Annotated, Literal
+from unittest.mock import Mock
 
 import pytest
 import typer
 
 import tbcad
+from tbcad.calibration.run import WrittenCalibration
 from tbcad.errors import InputError
 from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
+from tbcad.runs.photographs import Run
 
 ONLY_WRITTEN = {
     *("json", "all_frames", "mesh", "prototype"),
@@ -63,6 +67,14 @@ def test_fields_are_keywords() -> None:
     assert shown.return_annotation is str
     with pytest.raises(TypeError, match="passs"):
         polish("m.step", passs=3)  # type: ignore[call-overload]
+
+
+def test_what_lies_in_a_folder_stands_for_its_path() -> None:
+    run = Run(Path("runs/first"), *repeat(Mock(), 3))
+    assert Polish(run).mirror == Path("runs/first")
+    halves = [WrittenCalibration(Path(f"c/{name}"), *repeat(Mock(), 4)) for name in "ab"]
+    assert Path(halves[0]) == Path("c/a")
+    assert Path(replace(halves[0], others=(halves[1],))) == Path("c")
 
 
 def test_help_texts_are_the_arguments() -> None:

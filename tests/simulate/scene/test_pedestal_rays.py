@@ -22,11 +22,11 @@ from tbcad.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.simulate.views.synthesis import synthesise
 from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import mirror_coverage
-from tbcad.tolerance.montecarlo.draws import draw
-from tbcad.tolerance.montecarlo.edge_model import edge_model
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sharpness import built_reflector
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_model
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sharpness import built_reflector
 from tests.pedestal_designs import pedestal_design
 from tests.shell_meshes import export_with_meshes
 
