@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from tbcad.reconstruction.field import Field
     from tbcad.simulate.capture.light_field import LightField
 
-PREVIEW_DEG, PREVIEW_MM, PREVIEW_PX = (30.0, 30.0), 640.0, (480, 360)
 # Bytes at the most, as measured (docs/reconstruct.md): of each pixel of all photographs, and of
 # each node of the finest cube.
 PIXEL_BYTES, NODE_BYTES = 300, 110
@@ -134,37 +133,24 @@ def _reconstructed(
     from tbcad.reconstruction.field import read_field, write_field
     from tbcad.reconstruction.files import volume_file
     from tbcad.reconstruction.fitted import asked_for, reconstruction
+    from tbcad.reconstruction.picture import write_preview
 
     file, part = field_of(options, number), part_of(options, number)
     kept = options.resume and file.exists()
+    show = partial(write_preview, Path(options.preview)) if options.preview else lambda _: None
     if kept:
         made = read_field(file)
         check_same(file, made.facts, asked_for(source, options, last))
     else:
         if not options.resume:
             part.unlink(missing_ok=True)
-        made = reconstruction(source, options, part, last, partial(_show, options.preview))
+        made = reconstruction(source, options, part, last, show)
         write_field(file, made)
     part.unlink(missing_ok=True)
     for volume in _numbered(options, number, [options.volume]):
         if options.force or not volume.exists():
             replace_files(volume.parent, {volume.name: volume_file(made)})
     return Reconstructed(file, made, kept, _meshes(made, source, options, number))
-
-
-def _show(preview: AnyPath | None, made: Field) -> None:
-    """Write how the object looks now."""
-    if preview is None:
-        return
-    from math import radians
-
-    from tbcad.reconstruction.picture import field_picture
-    from tbcad.simulate.image_files import write_images
-    from tbcad.simulate.scene.viewpoint import camera_around_object
-
-    azimuth, elevation = map(radians, PREVIEW_DEG)
-    at = camera_around_object(azimuth, elevation, PREVIEW_MM, made.grid.width_mm, PREVIEW_PX)
-    write_images({Path(preview): field_picture(made, at).image})
 
 
 def checked_frames(options: ReconstructOptions) -> list[int | None]:
