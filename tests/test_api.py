@@ -108,7 +108,18 @@ def test_bad_input_is_one_line() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["calibrate", "dataset", "intrinsics", "merge", "optimize", "simulate_run", "view"]
+    "name",
+    [
+        "calibrate",
+        "dataset",
+        "intrinsics",
+        "merge",
+        "optimize",
+        "refocus",
+        "simulate_run",
+        "tolerance",
+        "view",
+    ],
 )
 def test_a_function_says_in_one_line_what_it_wants(name: str) -> None:
     with pytest.raises(InputError, match=r"\w+ is 3, allowed is [^\n]+: change it$"):
