@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tbcad.errors import InputError
+from tbcad.options.designs import AnyDesign
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import short_text
 from tbcad.spec.load import load_spec, option_texts
@@ -13,7 +14,7 @@ from tbcad.spec.load import load_spec, option_texts
 Settings = Mapping[str, str] | Sequence[str]
 
 
-def chosen_spec(spec: Spec | Path | str | None, n: int | None, settings: Settings) -> Spec:
+def chosen_spec(spec: AnyDesign | None, n: int | str | None, settings: Settings) -> Spec:
     """Return a spec as it is, or read a design file; None: the design of the paper.
 
     Raises:

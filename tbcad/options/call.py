@@ -162,11 +162,11 @@ def _written(kind: Any) -> Any:
         return list[_written(get_args(kind)[0])]  # type: ignore[misc]
     if get_origin(kind) not in (Union, UnionType):
         return kind
-    for several in (one for one in get_args(kind) if get_origin(one) is Sequence):
-        return _written(several)
     for word in (Path, str, int):
         if word in get_args(kind):
             return word | None if NoneType in get_args(kind) else word
+    for several in (one for one in get_args(kind) if get_origin(one) is Sequence):
+        return _written(several)
     return kind
 
 

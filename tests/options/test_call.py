@@ -21,7 +21,7 @@ from tbcad.runs.photographs import Run
 
 ONLY_WRITTEN = {
     *("json", "all_frames", "mesh", "prototype"),
-    *("no_preflight", "preflight_only", "yes", "dry_run"),
+    *("no_preflight", "preflight_only", "yes", "dry_run", "full", "quiet", "as_built"),
 }
 ONLY_PYTHON = {"progress", "detail", "answer", "ask", "show", "preflight", "geometry"}
 
@@ -119,7 +119,10 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["calibrate", "capture", "export", "intrinsics", "merge", "reconstruct", "run", "simulate_run"],
+    [
+        *("build", "calibrate", "capture", "export", "intrinsics", "merge", "reconstruct"),
+        *("run", "simulate_run", "verify"),
+    ],
 )
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     from tests.cli.commands import leaves
