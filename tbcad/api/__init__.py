@@ -16,9 +16,9 @@ from tbcad.api.datasets import dataset, export
 from tbcad.api.designs import design, optimize, to_cadquery
 from tbcad.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.api.reconstructions import reconstruct
-from tbcad.api.tolerances import analyse, inspect
+from tbcad.api.tolerances import analyse, inspect, tolerance
 from tbcad.api.verification import verify, verify_as_built
-from tbcad.api.views import Views, view
+from tbcad.api.views import Views, refocus, view
 
 __all__ = [
     "Build",
@@ -39,11 +39,13 @@ __all__ = [
     "optimize",
     "photograph",
     "reconstruct",
+    "refocus",
     "relight",
     "report_page",
     "run",
     "simulate_run",
     "to_cadquery",
+    "tolerance",
     "verify",
     "verify_as_built",
     "view",

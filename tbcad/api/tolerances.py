@@ -19,7 +19,7 @@ LEAST_BUILDS = 10  # of random ones
 
 
 @keywords(ToleranceOptions)
-def analyse(options: ToleranceOptions) -> Analysis:
+def tolerance(options: ToleranceOptions) -> Analysis:
     """Simulate many builds by a manufacturing process, and find what limits their yield.
 
     Raises:
@@ -36,6 +36,9 @@ def analyse(options: ToleranceOptions) -> Analysis:
     taken = ObjectOptions(up=options.up, unit=options.unit)
     subject = load_or_built_in(options.object_file, export.capture_mm, taken, options.answer)
     return analyse_export(export, process, subject, options)
+
+
+analyse = tolerance  # as it was called at first
 
 
 def checked_process(options: ToleranceOptions) -> Process:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tbcad.reconstruction.field import Field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.simulate.views.refocus import ThinLens
     from tbcad.simulate.views.synthesis import Method, SynthesisedView
     from tbcad.types import Progress
 
@@ -46,15 +47,16 @@ class Views:
         self._quick, self._progress = quick, progress
 
     @cached_property
-    def _light_field(self) -> LightField:
+    def light_field(self) -> LightField:
+        """The light field; a file stays open."""
         from tbcad.simulate.capture.light_field import LightField
 
         if isinstance(self._source, LightField):
             return self._source
         if not isinstance(self._source, Path):
             raise InputError(
-                f"source is {self._source!r:.60}, allowed is a light field, a field, or the folder "
-                "of a capture: change it"
+                f"source is {self._source!r:.60}, allowed is a light field, the folder of a "
+                "capture, or for views a field: change it"
             )
         return LightField.open(self._source)
 
@@ -67,20 +69,21 @@ class Views:
             return self._source
         if not isinstance(self._source, Path):
             return None
-        return wanted_field(None, self._source, self._light_field)
+        return wanted_field(None, self._source, self.light_field)
 
     @cached_property
-    def _tiles(self) -> MirrorTiles:
+    def tiles(self) -> MirrorTiles:
+        """Its mirrors, as views need them."""
         from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
-        return MirrorTiles(self._light_field)
+        return MirrorTiles(self.light_field)
 
     @cached_property
     def _depths(self) -> DepthViews:
         from tbcad.depth.depth_map import depth_views
         from tbcad.depth.plane_sweep import FINE, QUICK
 
-        return depth_views(self._tiles, QUICK if self._quick else FINE, self._progress)
+        return depth_views(self.tiles, QUICK if self._quick else FINE, self._progress)
 
     def view(
         self,
@@ -104,7 +107,7 @@ class Views:
 
         made = self._field if method is None or isinstance(self._source, Field) else None
         angles = radians(azimuth_deg), radians(elevation_deg)
-        capture_mm = self._light_field.capture_mm if made is None else made.grid.width_mm
+        capture_mm = self.light_field.capture_mm if made is None else made.grid.width_mm
         camera = camera_around_object(*angles, distance_mm, capture_mm, size)
         if made is None:
             return self._of_light_field(camera, method or "depth")
@@ -117,7 +120,7 @@ class Views:
 
         if method == "depth":
             return self._depths.of(camera)[0]
-        return synthesise(self._tiles, camera, method)
+        return synthesise(self.tiles, camera, method)
 
 
 def _of_field(made: Field, camera: Camera) -> SynthesisedView:
@@ -159,3 +162,60 @@ def view(
     return Views(source).view(
         azimuth_deg, elevation_deg, distance_mm=distance_mm, size=size, method=method
     )
+
+
+def refocused(
+    tiles: MirrorTiles, at: Camera, lens: ThinLens, all_in_focus: bool, progress: Progress = silent
+) -> SynthesisedView:
+    """The picture of a lens, sharp at its focus or everywhere."""
+    from tbcad.datasets.pictures import pinhole_pictures
+    from tbcad.depth.depth_map import depth_map
+    from tbcad.simulate.views.refocus import refocus, refocus_everywhere
+
+    if not all_in_focus:
+        return refocus(tiles, at, lens)
+    depth = depth_map(pinhole_pictures(tiles.source, progress), at)
+    return refocus_everywhere(tiles, at, lens.aperture_mm, depth.along_rays)
+
+
+def refocus(
+    source: LightField | Path | str,
+    azimuth_deg: float = 0.0,
+    elevation_deg: float = 30.0,
+    *,
+    aperture_mm: float = 300.0,
+    focus_mm: float = 0.0,
+    all_in_focus: bool = False,
+    distance_mm: float = 640.0,
+    size: tuple[int, int] = (640, 480),
+) -> SynthesisedView:
+    """Refocus a light field as `tbcad refocus`: the picture of a large lens, of 69 pinhole views.
+
+    Args:
+        source: a light field, in memory or in an open file, or the folder of a capture.
+        azimuth_deg: of the lens about z, from x.
+        elevation_deg: of the lens above the plane z = 0, 0 to 90.
+        aperture_mm: diameter of the lens.
+        focus_mm: position of the focal plane, from the centre of the object toward the lens.
+        all_in_focus: each pixel is sharp at its own depth, which is found in the light field.
+        distance_mm: of the lens from the centre of the object.
+        size: columns and rows of the picture.
+
+    Raises:
+        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object;
+            there is no such lens, or its focus is far from the object.
+    """
+    from math import radians
+
+    from tbcad.simulate.scene.viewpoint import camera_around_object
+    from tbcad.simulate.views.refocus import ThinLens
+
+    views = Views(source)
+    angles, capture_mm = (
+        (radians(azimuth_deg), radians(elevation_deg)),
+        views.light_field.capture_mm,
+    )
+    at = camera_around_object(*angles, distance_mm, capture_mm, size)
+    lens = ThinLens(aperture_mm, focus_mm)
+    lens.check(at, capture_mm)
+    return refocused(views.tiles, at, lens, all_in_focus)

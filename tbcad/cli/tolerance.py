@@ -42,7 +42,8 @@ def tolerance(
                 "--as-built is about no process: leave out --process, --margins and --set"
             )
         return _as_built(options, as_built, out, json)
-    from tbcad.api.tolerances import analyse, checked_process
+    from tbcad.api.tolerances import checked_process
+    from tbcad.api.tolerances import tolerance as analyse
 
     checked_process(options)  # before heavy libraries are loaded
     from tbcad.results.study import check_study_folder, write_study

@@ -2,18 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tbcad.atomic_files import write_errors_as_input_errors
-from tbcad.errors import InputError
 from tbcad.formats.toml import toml_text
 from tbcad.optimizing.candidate import DesignCandidate, Figures, placed
 from tbcad.optimizing.search import SearchResult
 from tbcad.options.designs import OptimizeOptions
-from tbcad.output.single_files import check_file
 from tbcad.results.plots import Panel, Series, plot_file
 from tbcad.results.tables import Table, csv_text
 from tbcad.spec.design import Spec
@@ -36,28 +32,6 @@ LABELS = {
 
 Groups = dict[str, tuple[list[Figures], str]]
 """By label: what is drawn, and in which style."""
-
-
-def check_files(asked: OptimizeOptions) -> Path:
-    """Refuse, before any work, what would be lost; where candidates are kept for `--resume`.
-
-    Raises:
-        InputError: a file exists or cannot be written.
-    """
-    out, table, plot = asked.files
-    store = table.with_suffix(".jsonl")
-    begun = Path(asked.design) if isinstance(asked.design, Path | str) else None
-    with write_errors_as_input_errors(out):
-        if out.is_dir():
-            raise InputError(f"{out} is a folder: name a TOML file with --out")
-        for file in (out, table, plot):
-            check_file(file, asked.force or asked.resume, (begun,))
-        if store.exists() and not (asked.resume or asked.force):
-            raise InputError(f"{store} exists: go on with --resume, or begin anew with --force")
-        out.parent.mkdir(parents=True, exist_ok=True)
-        if not asked.resume:
-            store.unlink(missing_ok=True)
-    return store
 
 
 def search_files(result: SearchResult, spec: Spec, asked: OptimizeOptions) -> dict[str, bytes]:

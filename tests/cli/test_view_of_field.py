@@ -51,7 +51,7 @@ def test_by_its_path_in_python(folder: Path, captured: Path) -> None:
     knot = tbcad.view(light_field, size=size, method="nearest").image
     assert np.array_equal(views.view(size=size, method="nearest").image, knot)
     assert np.array_equal(tbcad.view(captured, size=size, method="nearest").image, knot)
-    with pytest.raises(InputError, match="source is 3, allowed is a light field, a field, or"):
+    with pytest.raises(InputError, match="source is 3, allowed is a light field, the folder"):
         tbcad.view(3)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="no such file; give a light field"):
         tbcad.view(folder.parent)
