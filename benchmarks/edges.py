@@ -13,9 +13,9 @@ from tbcad.shell.files import camera_solid, shell_envelope, write_shell_solids
 from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.builds import MonteCarloCase, simulate
-from tbcad.tolerance.montecarlo.edge_model import edge_models
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.edge_model import edge_models
+from tbcad.tolerancing.process.process import load_process, process_errors
 
 BUILDS, SEED = 1000, 1
 KINDS = ("valley", "pedestal")

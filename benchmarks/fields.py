@@ -21,9 +21,9 @@ from scipy import ndimage
 
 from tbcad.depth.depth_map import depth_views
 from tbcad.optics.camera import Camera
+from tbcad.options.captures import ReconstructOptions
 from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fitted import Told, reconstruction
-from tbcad.reconstruction.options import Options
+from tbcad.reconstruction.fitted import reconstruction
 from tbcad.reconstruction.picture import field_picture
 from tbcad.simulate.camera_photographs import camera_photographs
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
@@ -168,7 +168,7 @@ def viewpoints(count: int) -> list[Camera]:
 def fitted(source: LightField) -> tuple[Field, float]:
     """A field as `tbcad reconstruct` makes it, and the seconds of all of it on the clock."""
     start = time.monotonic()
-    made = reconstruction(source, Options(), Told(lambda _: None, lambda _: None))
+    made = reconstruction(source, ReconstructOptions(""))
     return made, time.monotonic() - start
 
 

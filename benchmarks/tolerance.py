@@ -27,11 +27,11 @@ from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
-from tbcad.tolerance.montecarlo.coverage import coverage
-from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, edge_model
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.coverage import coverage
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, edge_model
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 
 COUNTS = (100, 300, 1000)
 MESHED = 10

@@ -28,15 +28,19 @@ if TYPE_CHECKING:
         build,
         calibrate,
         capture,
+        dataset,
         design,
         export,
         intrinsics,
         merge,
+        optimize,
         reconstruct,
+        refocus,
         relight,
         run,
         simulate_run,
         to_cadquery,
+        tolerance,
         verify,
         view,
     )
@@ -45,7 +49,7 @@ if TYPE_CHECKING:
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.spec.design import Spec
     from tbcad.spec.load import load_spec
-    from tbcad.tolerance.analysis import Analysis
+    from tbcad.tolerancing.analysis import Analysis
     from tbcad.whole_design import Design
 
 __all__ = [
@@ -63,22 +67,26 @@ __all__ = [
     "build",
     "calibrate",
     "capture",
+    "dataset",
     "design",
     "export",
     "intrinsics",
     "load_spec",
     "merge",
+    "optimize",
     "reconstruct",
+    "refocus",
     "relight",
     "run",
     "simulate_run",
     "to_cadquery",
+    "tolerance",
     "verify",
     "view",
 ]
 
 _MODULES = {
-    "Analysis": "tbcad.tolerance.analysis",
+    "Analysis": "tbcad.tolerancing.analysis",
     "Design": "tbcad.whole_design",
     "InputError": "tbcad.errors",
     "LightField": "tbcad.simulate.capture.light_field",

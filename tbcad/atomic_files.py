@@ -8,6 +8,15 @@ from pathlib import Path
 from tbcad.errors import InputError
 
 
+class InFolder:
+    """What lies in a folder, such as a build or a run: wherever its path is wanted, it will do."""
+
+    folder: Path
+
+    def __fspath__(self) -> str:
+        return str(self.folder)
+
+
 def replace_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
     """Write files into a folder that exists, each replaced as a whole; others are left alone.
 

@@ -12,7 +12,7 @@ from tbcad.records.exposure import Frame
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
 
-# Standard deviations, about those of tbcad/tolerance/process/fdm.toml.
+# Standard deviations, about those of tbcad/tolerancing/process/fdm.toml.
 SEAT_MM, RADIUS_MM, CAMERA_MM, RUNOUT_MM = 0.15, 0.005, 0.14, 0.05
 CAMERA_RAD, AXIS_RAD, ANGLE_RAD = 2.4e-3, 1.5e-3, 0.5e-3
 

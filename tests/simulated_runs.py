@@ -17,8 +17,8 @@ from tbcad.simulate.scene.object import built_in_object
 from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulated_run.led_light import Occluders
 from tbcad.simulated_run.photographs import ImagingChain, SimulatedRun, frames_of
-from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.types import Floats
 
 FINER = 2  # pixels for one of the export's: highlights of few pixels are hard to see

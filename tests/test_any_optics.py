@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
+from tbcad_verify.run.verify import verify
 
 import tbcad
 from tbcad.errors import InputError
@@ -68,7 +69,7 @@ def test_any_optics(options: list[str], tmp_path: Path) -> None:
     except InputError as error:
         message = str(error)
     else:
-        report = tbcad.verify(out, IN_PROCESS)
+        report = verify(out, options=IN_PROCESS)
         assert report.passed, (options, report)
     assert message.isprintable()
     assert len(message) < MESSAGE

@@ -5,8 +5,10 @@ import inspect
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tbcad
@@ -31,6 +33,11 @@ def test_public_names_are_there_and_documented(name: str) -> None:
     if name != "__version__":
         assert len(inspect.getdoc(value) or "") > 40
     assert name in dir(tbcad)
+
+
+@pytest.mark.parametrize("name", sorted({*tbcad.__all__} - {"__version__"}))
+def test_no_module_takes_the_place_of_a_public_name(name: str) -> None:
+    assert find_spec(f"tbcad.{name}") is None
 
 
 def test_an_unknown_name_is_refused() -> None:
@@ -99,6 +106,37 @@ def test_bad_input_is_one_line() -> None:
         tbcad.design(n=3).mandrel("c")  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"optics\.n is 99"):
         tbcad.design(n=99)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "calibrate",
+        "dataset",
+        "intrinsics",
+        "merge",
+        "optimize",
+        "refocus",
+        "simulate_run",
+        "tolerance",
+        "view",
+    ],
+)
+def test_a_function_says_in_one_line_what_it_wants(name: str) -> None:
+    with pytest.raises(InputError, match=r"\w+ is 3, allowed is [^\n]+: change it$"):
+        getattr(tbcad, name)(3)
+    with pytest.raises(InputError, match=r"(?i)^[^\n]+(no such f|is not there|is missing)[^\n]+$"):
+        getattr(tbcad, name)("absent")
+
+
+def test_from_a_design_to_a_view(tmp_path: Path) -> None:
+    small = ("camera.width_px=208", "camera.height_px=155")
+    built = tbcad.build(n=3, settings=small, out=tmp_path / "e", parts=["shell"], verify=False)
+    assert built.design.spec.optics.n == 3
+    knot = tbcad.capture(built, out=tmp_path / "knot")
+    asked = {"size": (64, 48), "method": "nearest"}
+    view = tbcad.view(tmp_path / "knot", **asked)  # type: ignore[arg-type]
+    assert np.array_equal(view.image, tbcad.view(knot, **asked).image)  # type: ignore[arg-type]
 
 
 def test_a_mandrel_is_a_part() -> None:

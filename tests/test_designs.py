@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from tbcad.optimize.candidate import figures_of, size_of
-from tbcad.optimize.views import mean_ssim
+from tbcad.optimizing.candidate import figures_of, size_of
+from tbcad.optimizing.views import mean_ssim
 from tbcad.simulate.capture.pixel_counts import virtual_cameras
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import dotted_fields, section_of

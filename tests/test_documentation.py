@@ -214,8 +214,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         "PHOTOGRAPHED_BUILDS": 1,
         "BUILT_IN": ("diamond",),
     }.items():
-        monkeypatch.setattr(f"tbcad.tolerance.analysis.{name}", value)
-    monkeypatch.setattr("tbcad.tolerance.montecarlo.sharpness.VIEWPOINTS", ((60.0,), 1, 640.0))
+        monkeypatch.setattr(f"tbcad.tolerancing.analysis.{name}", value)
+    monkeypatch.setattr("tbcad.tolerancing.montecarlo.sharpness.VIEWPOINTS", ((60.0,), 1, 640.0))
 
 
 def smaller(shown: Command) -> list[str]:

@@ -50,7 +50,7 @@ def test_has_designs_data_and_types(wheel: zipfile.ZipFile) -> None:
         "tbcad_verify/py.typed",
         "tbcad/reference/terms.toml",
         "tbcad_verify/report/checks.toml",
-        "tbcad/tolerance/process/fdm.toml",
+        "tbcad/tolerancing/process/fdm.toml",
         "tbcad/prototype/balls/catalogues/metric.csv",
     } <= names
     assert not [name for name in names if "test" in Path(name).parts[0]]

@@ -15,7 +15,7 @@ from tbcad_verify.record.prototype_tables import PlateHoles
 
 import tbcad
 from tbcad.cli.app import app
-from tbcad.cli.help_order import HEADINGS
+from tbcad.cli.help_texts import HEADINGS
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files import bom_csv
 from tbcad.records.calibration import CalibrationRecord

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
@@ -10,21 +9,27 @@ from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import chosen_spec
 from tbcad.api.verification import verify as verification
+from tbcad.atomic_files import InFolder
 from tbcad.errors import InputError
-from tbcad.options.call import silent
+from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions
+from tbcad.options.call import keywords, silent
+from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
+from tbcad.options.tolerances import check_yield
 from tbcad.spec.design import Spec
+from tbcad.spec.load import option_texts
 
 if TYPE_CHECKING:
     from tbcad_verify.report.as_made import AsMade
     from tbcad_verify.report.report import Report
 
     from tbcad.mirrors.array import MirrorDesign
+    from tbcad.tolerancing.process.process import Process
     from tbcad.types import Progress
     from tbcad.whole_design import Design
 
 
 @dataclass(frozen=True)
-class Build:
+class Build(InFolder):
     """What a build wrote.
 
     Attributes:
@@ -52,59 +57,107 @@ class Build:
         return self.report is not None and self.report.passed
 
 
-def build(
-    spec: Spec | Path | str | None = None,
-    out: Path | str = "exports",
-    *,
-    parts: Sequence[str] | None = None,
-    verify: bool = True,
-    force: bool = False,
-    progress: Progress = silent,
-    detail: Progress = silent,
-) -> Build:
+@dataclass(frozen=True)
+class Plan:
+    """A build that can be begun.
+
+    Attributes:
+        spec: as asked for, before a process changes it.
+        parts: that are built, but no prototype where it is not asked for and cannot be.
+        process: that edges and margins are chosen for.
+    """
+
+    spec: Spec
+    parts: tuple[str, ...]
+    process: Process | None
+
+
+def planned(options: BuildOptions) -> Plan:
+    """Refuse, before any work, what cannot be built or replaced.
+
+    Raises:
+        InputError: as said.
+    """
+    from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import design_files, files_named
+    from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
+
+    asked = parse_parts(options.parts) if isinstance(options.parts, str) else options.parts
+    changes = option_texts(options.settings)
+    changes += [f"mirrors.radius_rule={options.radius_rule}"] if options.radius_rule else []
+    spec = chosen_spec(options.spec, options.n, changes)
+    process = _asked_process(options)
+    if asked is not None:
+        check_parts(spec, asked)
+    parts = default_parts(spec) if asked is None else tuple(asked)
+    check_lists(spec, parts)
+    file = None if isinstance(options.spec, Spec) else options.spec
+    inputs = [*design_files(spec, file), *files_named(options.for_process)]
+    check_replaceable(Path(options.out), "build", options.force, inputs)
+    return Plan(spec, parts, process)
+
+
+@keywords(BuildOptions)
+def build(options: BuildOptions) -> Build:
     """Compute the mirrors, write all files into a folder, verify them, and write report.html.
 
-    The folder is replaced as a whole or not at all.
-
-    Args:
-        spec: a spec, a design file (TOML), or None for the design of the paper.
-        out: folder to write.
-        parts: "shell", "prototype" or both; None: both, but no prototype where none can be made.
-        verify: verify the files before they replace those of an earlier build.
-        force: replace a build that a run photographed, and keep files that tbcad did not write.
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
+    The folder is replaced as a whole or not at all. A design may also be a spec.
 
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
-    from tbcad.output.folder import check_replaceable
-    from tbcad.output.inputs import design_files
-    from tbcad.output.parts import check_lists, default_parts
-
-    chosen, out = chosen_spec(spec, None, ()), Path(out)
-    asked = tuple(parts) if parts is not None else default_parts(chosen)
-    inputs = design_files(chosen, None if isinstance(spec, Spec) else spec)
-    check_replaceable(out, "build", force, inputs)
-    check_lists(chosen, asked)
-    started = monotonic()
-    progress("mirrors: radii and cells")
-    finished = _build_files(chosen, out, asked, verify, force, parts is None, progress, detail)
+    started, plan = monotonic(), planned(options)
+    plan = replace(plan, spec=spec_for_process(plan, options))
+    options.progress("mirrors: radii and cells")
+    finished = _build_files(plan, options)
     if finished.report is None:
         return finished
     return replace(finished, report=replace(finished.report, seconds=monotonic() - started))
 
 
-def _build_files(
-    spec: Spec,
-    out: Path,
-    parts: Sequence[str],
-    verify: bool,
-    force: bool,
-    optional_prototype: bool,
-    progress: Progress,
-    detail: Progress,
-) -> Build:
+def _asked_process(options: BuildOptions) -> Process | None:
+    """The process whose margins are wanted: checked before anything takes long."""
+    from tbcad.tolerancing.process.process import load_process
+
+    if options.wanted_yield is not None:
+        if options.for_process is None:
+            raise InputError(
+                f"--yield {options.wanted_yield:g} is of no use without --for-process: name a "
+                "process, or leave --yield out"
+            )
+        check_yield(options.wanted_yield)
+    return None if options.for_process is None else load_process(options.for_process)
+
+
+def spec_for_process(plan: Plan, options: BuildOptions) -> Spec:
+    """The design with edges and margins for its process; the answer says what they cost."""
+    spec, process = plan.spec, plan.process
+    if process is None:
+        return spec
+    from tbcad.tolerancing.process_design import (
+        costs_text,
+        edges_for_process,
+        edges_text,
+        margins_text,
+        pixel_costs,
+        ssim_costs,
+        ssim_text,
+    )
+
+    options.progress(f"edges and margins for {process.name}")
+    wanted = DEFAULT_YIELD if options.wanted_yield is None else options.wanted_yield
+    choice = edges_for_process(spec, process, wanted, options.detail)
+    found = choice.made
+    options.answer(edges_text(choice))
+    options.answer(f"{margins_text(found)}, for {wanted:.1%} by {process.name}")
+    options.detail("pixels")
+    options.answer(costs_text(pixel_costs(found, choice.pixels)))
+    options.detail("views")
+    options.answer(ssim_text(ssim_costs(found)))
+    return found.spec
+
+
+def _build_files(plan: Plan, options: BuildOptions) -> Build:
     """Write all files, verify them, write report.html, and replace the folder.
 
     The files are read back before they replace the old ones.
@@ -112,17 +165,19 @@ def _build_files(
     from tbcad.background import background_processes
     from tbcad.output.folder import replacing
 
-    with replacing(out, "build", force) as folder:
+    out, verify, progress = Path(options.out), options.verify, options.progress
+    with replacing(out, "build", options.force) as folder:
         with background_processes() as submit:
             submit(_load_libraries)  # while the mirrors are computed here
             from tbcad.mirrors.array import design
 
-            mirrors = design(spec, detail)
-            simulated = submit(_as_made, mirrors) if verify and "shell" in parts else None
+            mirrors = design(plan.spec, options.detail)
+            simulated = submit(_as_made, mirrors) if verify and "shell" in plan.parts else None
             from tbcad.output.build import write_export
 
+            optional = options.parts is None
             export = write_export(
-                mirrors, folder, parts, progress, submit, optional_prototype=optional_prototype
+                mirrors, folder, plan.parts, progress, submit, optional_prototype=optional
             )
         report = None
         if verify:
@@ -143,13 +198,13 @@ def _build_files(
 
 def _load_libraries() -> None:
     """Load what the background process works with."""
-    import tbcad.tolerance.as_made  # noqa: F401
+    import tbcad.tolerancing.as_made  # noqa: F401
 
 
 def _as_made(mirrors: MirrorDesign) -> AsMade:
     """Simulate a few builds of a design by every built-in process."""
     from tbcad.simulate.scene.reflector import reflectors
-    from tbcad.tolerance.as_made import as_made
+    from tbcad.tolerancing.as_made import as_made
 
     spec = mirrors.spec
     target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
@@ -165,7 +220,7 @@ def as_made(
         Their yields; None where no shell was built, or its record cannot be read.
     """
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.tolerance.as_made import as_made as simulated
+    from tbcad.tolerancing.as_made import as_made as simulated
 
     folder = Path(exports)
     if not (folder / "shell_a.stl").is_file():
@@ -179,25 +234,9 @@ def as_made(
     return simulated(export.reflectors, export.capture_mm, coat, detail)
 
 
-def report_page(
-    exports: Path | str,
-    out: Path | str | None = None,
-    *,
-    capture: Path | str | None = None,
-    force: bool = False,
-    progress: Progress = silent,
-    detail: Progress = silent,
-) -> Path:
+@keywords(ReportOptions)
+def report_page(options: ReportOptions) -> Path:
     """Write the page that shows an export: one HTML file with its verdict, 3D view and tables.
-
-    Args:
-        exports: folder that `build` wrote.
-        out: file to write; None: report.html in the folder.
-        capture: folder that `capture` or `merge` wrote for this export; the page then shows what
-            each mirror photographs.
-        force: replace a file that tbcad did not write, instead of refusing.
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
 
     Returns:
         The file.
@@ -205,11 +244,17 @@ def report_page(
     Raises:
         InputError: the export or the capture cannot be read, or the file may not be written.
     """
+    folder = Path(options.exports)
+    file, light_field = (
+        None if one is None else Path(one) for one in (options.out, options.capture)
+    )
+    check_is_folder(folder)
+    check_is_export(folder)
+    if light_field is not None:
+        check_is_capture(light_field)
     from tbcad.report.page.write import check_writable, write_report
 
-    folder, file = Path(exports), Path(out) if out is not None else None
-    check_writable(file or folder / "report.html", force)
-    simulated = as_made(folder, progress, detail)
-    progress("report")
-    light_field = None if capture is None else Path(capture)
-    return write_report(folder, file, simulated, light_field, force=force)
+    check_writable(file or folder / "report.html", options.force)
+    simulated = as_made(folder, options.progress, options.detail)
+    options.progress("report")
+    return write_report(folder, file, simulated, light_field, force=options.force)

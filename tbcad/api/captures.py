@@ -7,59 +7,21 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tbcad.errors import InputError
-from tbcad.options.call import silent
+from tbcad.options.call import keywords
+from tbcad.options.captures import CaptureOptions
+from tbcad.options.checks import check_is_export, check_is_object
+from tbcad.options.shared import AnyPath
 
 if TYPE_CHECKING:
     from tbcad.reflectance.environment import LightFormat
-    from tbcad.simulate.camera_photographs import Geometry
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.photograph import CameraPhotographs
-    from tbcad.simulate.object_files.contents import Up
     from tbcad.simulate.scene.object import SceneObject
-    from tbcad.simulate.scene.object_from_file import ObjectOptions, Paint, Unit
-    from tbcad.types import Progress
 
 
-def capture(
-    exports: Path | str,
-    object_file: Path | str | None = None,
-    *,
-    out: Path | str | None = None,
-    geometry: Geometry = "spheres",
-    fit: bool = False,
-    paint: Paint = "own",
-    up: Up | None = None,
-    unit: Unit | None = None,
-    samples: int = 1,
-    lights: Path | str | None = None,
-    every: int = 1,
-    force: bool = False,
-    progress: Progress = silent,
-    detail: Progress = silent,
-    answer: Progress = silent,
-) -> LightField:
+@keywords(CaptureOptions)
+def capture(options: CaptureOptions) -> LightField:
     """Simulate the photographs of both cameras through the mirrors of a build.
-
-    Args:
-        exports: folder that `build` wrote.
-        object_file: triangle mesh about the origin; None for a built-in knot.
-        up: axis of that file that points up, "y" or "z"; None: y for glTF, else z.
-        unit: of that file, "mm", "cm", "m" or "in"; None: m for glTF, what a 3MF says, else mm.
-        out: folder to write photographs and light field to, as `tbcad capture` does; None: none.
-        geometry: mirrors of the record ("spheres"), of the exported meshes ("mesh"), or the
-            prototype's balls, stop by stop ("prototype").
-        fit: move and scale the object into the capture sphere.
-        paint: colours of the file ("own"), a pattern, or plain grey.
-        samples: a pixel is the mean of samples x samples rays.
-        lights: also write a reflectance field to `out`: a table of lamps with the columns x_mm,
-            y_mm, z_mm; "mirrors" for a lamp in the place of each virtual camera; or "projectors"
-            for the light that each mirror throws of a projector in its camera's place.
-        every: one lamp of so many, of "mirrors" or "projectors".
-        force: replace an earlier capture, and keep files that tbcad did not write.
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
-        answer: called with a line that says how the object's file was taken.
 
     Returns:
         The light field, in memory: for every pixel the ray it sees along and its colour.
@@ -67,25 +29,13 @@ def capture(
     Raises:
         InputError: export, object or lamps cannot be read, or the folder cannot be replaced.
     """
-    from tbcad.output.folder import check_replaceable
-    from tbcad.output.inputs import files_named
+    photographs = photograph(options)
     from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
-    from tbcad.simulate.scene.object_from_file import ObjectOptions
 
-    if lights is not None and out is None:
-        raise InputError("a reflectance field is written beside the light field: give out")
-    if out is not None:
-        check_replaceable(Path(out), "capture", force, (exports, object_file, *files_named(lights)))
-
-    options = ObjectOptions(fit, paint, up, unit)
-    photographs = photograph(
-        exports, object_file, geometry, options, samples, progress, detail, answer
-    )
-    if out is not None:
-        lamps = None if lights is None else WantedLamps(lights, every)
-        write_photographs(photographs, Path(out), force, progress, detail, lamps)
-        return LightField.read(Path(out))
-    progress("photographs and light field")
+    if options.out is not None:
+        write_photographs(photographs, options)
+        return LightField.read(Path(options.out))
+    options.progress("photographs and light field")
     bands = ((reflector, bands()) for reflector, bands in photographs.cameras)
     return light_field_in_memory(bands, photographs.capture_mm, photographs.facts)
 
@@ -106,89 +56,57 @@ class Photographs:
     subject: SceneObject
     capture_mm: float
     facts: dict[str, Any]
-    sources: tuple[Path | str | None, ...] = ()
+    sources: tuple[AnyPath | None, ...] = ()
 
 
-def photograph(
-    exports: Path | str,
-    object_file: Path | str | None,
-    geometry: Geometry,
-    options: ObjectOptions,
-    samples: int,
-    progress: Progress,
-    detail: Progress,
-    answer: Progress = silent,
-) -> Photographs:
-    """Prepare both photographs; arguments as for `capture`."""
+def photograph(options: CaptureOptions) -> Photographs:
+    """Prepare both photographs, when all that can be refused at once has been."""
+    options.check()
+    exports, file = Path(options.exports), options.object_file
+    check_is_export(exports)
+    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import files_named
     from tbcad.simulate.camera_photographs import camera_photographs
     from tbcad.simulate.prototype.lamps import lit_by, read_lamps
     from tbcad.simulate.scene.exported import read_export
-    from tbcad.simulate.scene.object_from_file import load_or_built_in
+    from tbcad.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
-    progress("object and scene")
-    export = read_export(Path(exports))
-    subject = load_or_built_in(object_file, export.capture_mm, options, answer)
-    lamps = read_lamps(export.folder) if geometry == "prototype" else None
+    sources = (exports, file, *files_named(options.lights))
+    if options.out is not None:
+        check_replaceable(Path(options.out), "capture", options.force, sources)
+    options.progress("object and scene")
+    export = read_export(exports)
+    taken = ObjectOptions(options.fit, options.paint, options.up, options.unit)
+    subject = load_or_built_in(file, export.capture_mm, taken, options.answer)
+    lamps = read_lamps(export.folder) if options.geometry == "prototype" else None
     subject = lit_by(lamps, subject) if lamps else subject
-    cameras = camera_photographs(export, prepared_scene(subject), geometry, samples, detail)
+    cameras = camera_photographs(
+        export, prepared_scene(subject), options.geometry, options.samples, options.detail
+    )
     facts = {
         "object": subject.name,
         "design": export.spec.name,
         "n": export.spec.optics.n,
-        "geometry": geometry,
-        "samples": samples,
+        "geometry": options.geometry,
+        "samples": options.samples,
     } | ({"light": "lamps of the prototype"} if lamps else {})
     if subject.reading is not None:
         facts["object_file"] = asdict(subject.reading)
-    return Photographs(cameras, subject, export.capture_mm, facts, (exports, object_file))
+    return Photographs(cameras, subject, export.capture_mm, facts, sources)
 
 
-@dataclass(frozen=True)
-class WantedLamps:
-    """The lamps of a reflectance field.
-
-    Attributes:
-        lights: table of their places, "mirrors" for virtual cameras, or "projectors".
-        every: one virtual camera of so many.
-    """
-
-    lights: Path | str
-    every: int = 1
-
-
-@dataclass(frozen=True)
-class WantedFrames:
-    """Photographs of the object while it turns about z.
-
-    Attributes:
-        count: of frames.
-        turn_deg: of the object from the first frame to the one after the last.
-    """
-
-    count: int
-    turn_deg: float
-
-
-def write_photographs(
-    photographs: Photographs,
-    out: Path,
-    force: bool,
-    progress: Progress,
-    detail: Progress = silent,
-    lamps: WantedLamps | None = None,
-    frames: WantedFrames | None = None,
-) -> dict[str, Any]:
+def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:
     """Take both photographs and replace a folder by their files; return the record of them."""
     from tbcad.output.folder import replacing
-    from tbcad.output.inputs import files_named
     from tbcad.output.manifest import write_manifest
     from tbcad.simulate.capture.files import write_capture
 
-    write_field = None if lamps is None else _field_writer(photographs, lamps)
-    sources = (*photographs.sources, *files_named(lamps.lights if lamps else None))
-    progress("photographs and light field")
-    with replacing(out, "capture", force, sources) as folder:
+    write_field = None if options.lights is None else _field_writer(photographs, options)
+    options.progress("photographs and light field")
+    out = Path(options.out or "")
+    with replacing(out, "capture", options.force, photographs.sources) as folder:
         record = write_capture(
             folder,
             photographs.cameras,
@@ -197,17 +115,17 @@ def write_photographs(
             photographs.facts,
         )
         if write_field is not None:
-            progress("a photograph for each lamp")
-            record["reflectance"] = write_field(folder, detail)
-        if frames is not None:
-            progress("a photograph for each frame")
-            record["sequence"] = _write_frames(folder, photographs, frames, detail)
+            options.progress("a photograph for each lamp")
+            record["reflectance"] = write_field(folder)
+        if options.frames is not None:
+            options.progress("a photograph for each frame")
+            record["sequence"] = _write_frames(folder, photographs, options.frames, options)
         write_manifest(folder, "capture")
     return record
 
 
 def _write_frames(
-    folder: Path, photographs: Photographs, wanted: WantedFrames, detail: Progress
+    folder: Path, photographs: Photographs, count: int, options: CaptureOptions
 ) -> dict[str, Any]:
     from math import radians
 
@@ -215,14 +133,14 @@ def _write_frames(
     from tbcad.simulate.capture.sequence import turns, write_turning
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
-    angles = turns(wanted.count, radians(wanted.turn_deg))
+    angles, scene = turns(count, radians(options.turn)), prepared_scene(photographs.subject)
     with LightField.open(folder) as source:
-        return write_turning(folder, source, prepared_scene(photographs.subject), angles, detail)
+        return write_turning(folder, source, scene, angles, options.detail)
 
 
 def _field_writer(
-    photographs: Photographs, wanted: WantedLamps
-) -> Callable[[Path, Progress], dict[str, Any]]:
+    photographs: Photographs, options: CaptureOptions
+) -> Callable[[Path], dict[str, Any]]:
     """What writes the reflectance field; a table of lamps is read at once, before long work."""
     from tbcad.reflectance.lamp_places import (
         MIRRORS,
@@ -234,20 +152,16 @@ def _field_writer(
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.scene.ray_casting import prepared_scene
 
-    table, thrown = None, str(wanted.lights) == PROJECTORS
-    if thrown and photographs.facts["geometry"] == "prototype":
-        raise InputError(
-            "--lights projectors is light from the mirrors of shells: leave out --prototype, or "
-            "give --lights mirrors"
-        )
-    if str(wanted.lights) not in (MIRRORS, PROJECTORS):
-        table = read_lamp_places(Path(wanted.lights), photographs.capture_mm)
+    table, lights = None, str(options.lights)
+    if lights not in (MIRRORS, PROJECTORS):
+        table = read_lamp_places(Path(lights), photographs.capture_mm)
 
-    def write(folder: Path, detail: Progress) -> dict[str, Any]:
+    def write(folder: Path) -> dict[str, Any]:
         with LightField.open(folder) as source:
-            lamps = table or lamps_of_mirrors(source, wanted.every)
+            lamps = table or lamps_of_mirrors(source, options.every)
             scene = prepared_scene(photographs.subject)
-            return write_reflectance(folder, source, scene, lamps, detail, thrown)
+            thrown = lights == PROJECTORS
+            return write_reflectance(folder, source, scene, lamps, options.detail, thrown)
 
     return write
 

@@ -11,7 +11,7 @@ from tbcad.options.checks import check_is_capture
 
 
 @keywords(ExportOptions)
-def export(options: ExportOptions) -> dict[str, Any]:
+def dataset(options: ExportOptions) -> dict[str, Any]:
     """Write the light field of a capture as data that another program reads.
 
     Returns:
@@ -46,3 +46,6 @@ def export(options: ExportOptions) -> dict[str, Any]:
             record = write_dataset(folder, source, scene, options)
         write_manifest(folder, "dataset")
     return record
+
+
+export = dataset  # as it was called at first

@@ -6,13 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tbcad.api.arguments import Settings, chosen_spec
-from tbcad.options.call import silent
+from tbcad.errors import InputError
+from tbcad.options.call import keywords, silent
+from tbcad.options.designs import OptimizeOptions
 from tbcad.spec.design import Spec
 
 if TYPE_CHECKING:
     from build123d import Part
     from cadquery import Workplane
 
+    from tbcad.optimizing.search import SearchResult
     from tbcad.types import Progress
     from tbcad.whole_design import Design
 
@@ -44,6 +47,55 @@ def design(
 
     mirrors = mirror_design(chosen_spec(spec, n, settings), detail)
     return Design(mirrors.spec, mirrors.arrays)
+
+
+@keywords(OptimizeOptions)
+def optimize(options: OptimizeOptions) -> SearchResult:
+    """Search better places of cameras and mirrors for the same sensor and number of mirrors.
+
+    Returns:
+        The first design and the best one with their figures, and all candidates.
+
+    Raises:
+        InputError: the design is not allowed or cannot be made, or a file exists.
+    """
+    from tbcad.atomic_files import replace_files
+    from tbcad.optimizing.files import search_files
+    from tbcad.optimizing.search import search
+
+    options.check()
+    spec = chosen_spec(options.design, None, options.settings)
+    store = _checked_store(options)
+    options.progress("optimize: candidates")
+    result = search(spec, options, store)
+    options.progress("optimize: files")
+    replace_files(store.parent, search_files(result, spec, options))
+    return result
+
+
+def _checked_store(asked: OptimizeOptions) -> Path:
+    """Refuse, before any work, what would be lost; where candidates are kept for `--resume`.
+
+    Raises:
+        InputError: a file exists or cannot be written.
+    """
+    from tbcad.atomic_files import write_errors_as_input_errors
+    from tbcad.output.single_files import check_file
+
+    out, table, plot = asked.files
+    store = table.with_suffix(".jsonl")
+    begun = Path(asked.design) if isinstance(asked.design, Path | str) else None
+    with write_errors_as_input_errors(out):
+        if out.is_dir():
+            raise InputError(f"{out} is a folder: name a TOML file with --out")
+        for file in (out, table, plot):
+            check_file(file, asked.force or asked.resume, (begun,))
+        if store.exists() and not (asked.resume or asked.force):
+            raise InputError(f"{store} exists: go on with --resume, or begin anew with --force")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if not asked.resume:
+            store.unlink(missing_ok=True)
+    return store
 
 
 def to_cadquery(part: Part) -> Workplane:

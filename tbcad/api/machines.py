@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.errors import InputError
-from tbcad.options.call import keywords, silent
+from tbcad.options.call import keywords
 from tbcad.options.checks import (
     check_is_any_calibration,
     check_is_calibration,
@@ -22,59 +21,18 @@ from tbcad.options.machines import (
     MergeOptions,
     SimulateRunOptions,
 )
+from tbcad.options.runs import RunOptions
 
 if TYPE_CHECKING:
     from tbcad.calibration.intrinsics.checkerboard import SolvedLens
     from tbcad.calibration.run import WrittenCalibration
     from tbcad.control.outcome import Outcome
-    from tbcad.control.selection import Preflight
-    from tbcad.control.session import Ask, Show
     from tbcad.runs.photographs import Run
-    from tbcad.types import Progress
 
 
-def run(
-    exports: Path | str,
-    out: Path | str,
-    *,
-    port: str,
-    ask: Ask,
-    camera: str = "gphoto2",
-    phases: str | None = None,
-    stops: str | None = None,
-    runs: str | None = None,
-    size_px: tuple[int, int] | None = None,
-    exposure_leds_s: float | None = None,
-    exposure_lit_s: float | None = None,
-    preflight: Preflight = "first",
-    resume: bool = False,
-    send_settings: bool = False,
-    timeout_s: float = 30.0,
-    show: Show | None = None,
-    progress: Progress = silent,
-) -> Outcome:
+@keywords(RunOptions)
+def run(options: RunOptions) -> Outcome:
     """Drive the prototype of a build through its stops and photograph it under each light.
-
-    Args:
-        exports: folder that `build` wrote.
-        out: folder of the run: new, or with `resume` the one to go on with.
-        port: serial port of the controller, with GRBL 1.1 or grblHAL, or "moonraker:" and the URL
-            of Moonraker, for Klipper.
-        ask: called with what a person must do, such as turn the object; whether it is done.
-        camera: "gphoto2", "command:PROGRAM ... {output}" or "folder:PATH".
-        phases: names of the lights with commas between, "leds" for all LEDs; None: all.
-        stops: numbers and ranges such as "1-10,40"; None: all.
-        runs: "a", object straight, "b", turned by 180 degrees, or "ab"; None: both.
-        size_px: columns and rows of a photograph; None: those of the design.
-        exposure_leds_s: exposure time by LEDs and in the dark, s; None: see the next.
-        exposure_lit_s: of the lit object, s; one alone is for all, none leaves the camera's own.
-        preflight: "first": one stop is looked at under each light before a new run; "only": and
-            nothing is photographed; "off": it is not.
-        resume: take what is missing in the folder.
-        send_settings: send the controller the settings that differ from the export's.
-        timeout_s: how long one photograph may take.
-        show: shows stages with their expected seconds, as `tbcad.screen.stages`; None: nothing.
-        progress: called with the expected duration, and what the operator should know.
 
     Returns:
         What was photographed, what is missing, and why the run stopped if it did.
@@ -82,24 +40,9 @@ def run(
     Raises:
         InputError: something was wrong before the first photograph of the run, also an exposure.
     """
-    from tbcad.control.run import RunRequest, run_machine
-    from tbcad.records.exposure import PhaseTimes
-    from tbcad.screen import stages
+    from tbcad.control.run import run_machine
 
-    times = PhaseTimes(exposure_leds_s, exposure_lit_s)
-    request = RunRequest(
-        Path(exports), Path(out), phases, stops, runs, size_px, resume, times, preflight
-    )
-    return run_machine(
-        request,
-        port,
-        camera,
-        ask,
-        show or partial(stages, silent=True),
-        progress,
-        send_settings=send_settings,
-        timeout_s=timeout_s,
-    )
+    return run_machine(options)
 
 
 @keywords(SimulateRunOptions)
@@ -123,7 +66,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     from tbcad.simulate.scene.exported import read_export
     from tbcad.simulate.scene.object_from_file import ObjectOptions
     from tbcad.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
-    from tbcad.tolerance.process.process import load_process, process_errors
+    from tbcad.tolerancing.process.process import load_process, process_errors
 
     check_is_free(folder, (exports, file, *files_named(options.process)))
     errors = process_errors(load_process(options.process))
@@ -154,7 +97,7 @@ def calibrate(options: CalibrateOptions) -> WrittenCalibration:
         raise InputError(
             f"{options.intrinsics}: no such file; give the one that `tbcad intrinsics` wrote"
         )
-    from tbcad.tolerance.process.process import load_process
+    from tbcad.tolerancing.process.process import load_process
 
     if options.process is not None:
         load_process(options.process, options.settings)  # before what is heavy is loaded
@@ -244,7 +187,7 @@ def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     built = export_of(known) if options.exports is None else Path(options.exports)
     check_replaceable(out, "as-built", options.force, (known, built))
     options.progress("solids")
-    from tbcad.as_built.files import as_built as write_files
+    from tbcad.calibrated_solids.files import as_built as write_files
 
     with replacing(out, "as-built", options.force, (known, built)) as folder:
         record = write_files(known, built, folder)

@@ -2,87 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tbcad.errors import InputError
-from tbcad.options.call import silent
+from tbcad.options.call import keywords
+from tbcad.options.captures import ReconstructOptions
+from tbcad.options.checks import LIGHT_FIELD_FILE, check_is_capture
+from tbcad.options.shared import AnyPath
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
     from tbcad.reconstruction.field import Field
-    from tbcad.reconstruction.options import Options
     from tbcad.simulate.capture.light_field import LightField
-    from tbcad.types import Progress
 
-LIGHT_FIELD = "lightfield.h5"
-PREVIEW_DEG, PREVIEW_MM, PREVIEW_PX = (30.0, 30.0), 640.0, (480, 360)
 # Bytes at the most, as measured (docs/reconstruct.md): of each pixel of all photographs, and of
 # each node of the finest cube.
 PIXEL_BYTES, NODE_BYTES = 300, 110
-EVERY: Literal["all"] = "all"
+EVERY = "all"
 SURFACE = "surface"
 # For the time left: of a pixel that is read, of a pixel and node by each epoch, and of the surface.
 READ_S, EPOCH_S, SURFACE_S, CHOICE_EPOCHS = 2e-6, 2e-8, 10.0, 6
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """Files of a reconstruction.
-
-    Attributes:
-        capture: folder of a capture or merged run, or its light field.
-        out: the field; None: beside the light field.
-        frame: of the capture's sequence, "all" one after the other, or None for the capture itself.
-        meshes: files to write the surface to.
-        preview: picture that is written after each epoch.
-        resume: go on with what was interrupted, and keep what is done.
-        force: replace files that exist.
-        volume: file to write density and colours on the whole lattice to.
-    """
-
-    capture: Path
-    out: Path | None = None
-    frame: int | Literal["all"] | None = None
-    meshes: tuple[Path, ...] = ()
-    preview: Path | None = None
-    resume: bool = False
-    force: bool = False
-    volume: Path | None = None
-
-    @property
-    def folder(self) -> Path:
-        """Of the light field."""
-        return self.capture if self.capture.is_dir() else self.capture.parent
-
-    def field_file(self, number: int | None) -> Path:
-        """Where the field of a frame is written, or that of the capture itself."""
-        from tbcad.reconstruction.field import field_file
-
-        if self.out is None:
-            return field_file(self.folder, number)
-        return self._numbered(self.out, number)
-
-    def mesh_files(self, number: int | None) -> list[Path]:
-        """Where the surface of a frame is written, or that of the capture itself."""
-        return [self._numbered(file, number) for file in self.meshes]
-
-    def volume_file(self, number: int | None) -> Path | None:
-        """Where the volume of a frame is written, or that of the capture itself."""
-        return None if self.volume is None else self._numbered(self.volume, number)
-
-    def part_file(self, number: int | None) -> Path:
-        """The checkpoint of that field."""
-        from tbcad.reconstruction.checkpoint import part_file
-
-        return part_file(self.field_file(number))
-
-    def _numbered(self, file: Path, number: int | None) -> Path:
-        return file.with_stem(f"{file.stem}-{number}") if self.frame == EVERY else file
 
 
 @dataclass(frozen=True)
@@ -111,35 +55,11 @@ class Reconstructed:
         }
 
 
-def reconstruct(
-    capture: Path | str,
-    *,
-    out: Path | str | None = None,
-    options: Options | None = None,
-    frame: int | Literal["all"] | None = None,
-    meshes: Sequence[Path | str] = (),
-    volume: Path | str | None = None,
-    preview: Path | str | None = None,
-    resume: bool = False,
-    force: bool = False,
-    progress: Progress = silent,
-    detail: Progress = silent,
-) -> Field:
+@keywords(ReconstructOptions)
+def reconstruct(options: ReconstructOptions) -> Field:
     """Fit one field of density and colour to all rays of a light field, and write it.
 
-    Args:
-        capture: folder that `capture` or `merge` wrote, or its light field.
-        out: file to write, .npz; None: field.npz beside the light field, field-K.npz for a frame.
-        options: grid, epochs, view dependence, rays of a pixel, blur of the lens, seed.
-        frame: of the capture's sequence, from 0; "all": each, started from the one before, and each
-            file has the frame's number at the end of its name; None: the capture itself.
-        meshes: files to write the surface to, .glb, .ply or .stl.
-        volume: file to write density and colours on the whole lattice to, .vti.
-        preview: PNG file that shows the field after each epoch.
-        resume: go on with a fit that was interrupted, and keep what is done.
-        force: replace files that exist.
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
+    A frame may be "all": each, started from the one before, in files with its number.
 
     Returns:
         The field, of the last frame if there are several.
@@ -147,154 +67,155 @@ def reconstruct(
     Raises:
         InputError: the light field cannot be read or shows nothing, or a file cannot be written.
     """
-    from tbcad.reconstruction.options import Options
-
-    wanted = Wanted(
-        Path(capture),
-        None if out is None else Path(out),
-        frame,
-        tuple(map(Path, meshes)),
-        None if preview is None else Path(preview),
-        resume,
-        force,
-        None if volume is None else Path(volume),
-    )
-    return reconstruct_files(wanted, options or Options(), progress, detail)[-1].field
+    return reconstruct_files(options)[-1].field
 
 
-def reconstruct_files(
-    wanted: Wanted, options: Options, progress: Progress = silent, detail: Progress = silent
-) -> list[Reconstructed]:
-    """Reconstruct and write all that is wanted; arguments as for `reconstruct`."""
+def reconstruct_files(options: ReconstructOptions) -> list[Reconstructed]:
+    """Reconstruct and write all that is asked for."""
+    numbers = checked_frames(options)
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.capture.sequence import sequence_frame
 
-    numbers = checked_frames(wanted)
     done: list[Reconstructed] = []
-    with LightField.open(wanted.capture) as stored:
+    with LightField.open(Path(options.capture)) as stored:
         check_memory(stored, options)
         for number in numbers:
-            source = stored if number is None else sequence_frame(stored, wanted.folder, number)
-            stage = partial(_of_frame, progress, number) if wanted.frame == EVERY else progress
+            source = stored if number is None else sequence_frame(stored, _folder(options), number)
             last = done[-1].field if done else None
-            done.append(_reconstructed(source, wanted, number, last, (options, stage, detail)))
+            done.append(_reconstructed(source, _staged(options, number), number, last))
     return done
 
 
-def _of_frame(progress: Progress, number: int | None, stage: str) -> None:
-    progress(f"frame {number}: {stage}")
+def _staged(options: ReconstructOptions, number: int | None) -> ReconstructOptions:
+    """The options, with the frame's number before the names of stages."""
+    if options.frame != EVERY:
+        return options
+    return replace(options, progress=lambda stage: options.progress(f"frame {number}: {stage}"))
+
+
+def _folder(options: ReconstructOptions) -> Path:
+    """Of the light field."""
+    capture = Path(options.capture)
+    return capture if capture.is_dir() else capture.parent
+
+
+def field_of(options: ReconstructOptions, number: int | None) -> Path:
+    """Where the field of a frame is written, or that of the capture itself."""
+    from tbcad.reconstruction.field import field_file
+
+    if options.out is None:
+        return field_file(_folder(options), number)
+    return _numbered(options, number, [options.out])[0]
+
+
+def part_of(options: ReconstructOptions, number: int | None) -> Path:
+    """The checkpoint of that field."""
+    from tbcad.reconstruction.checkpoint import part_file
+
+    return part_file(field_of(options, number))
+
+
+def _numbered(
+    options: ReconstructOptions, number: int | None, files: Sequence[AnyPath | None]
+) -> list[Path]:
+    """Files of a frame, or of the capture itself."""
+    paths = [Path(file) for file in files if file is not None]
+    if options.frame != EVERY:
+        return paths
+    return [path.with_stem(f"{path.stem}-{number}") for path in paths]
 
 
 def _reconstructed(
-    source: LightField,
-    wanted: Wanted,
-    number: int | None,
-    last: Field | None,
-    how: tuple[Options, Progress, Progress],
+    source: LightField, options: ReconstructOptions, number: int | None, last: Field | None
 ) -> Reconstructed:
+    from tbcad.atomic_files import replace_files
     from tbcad.reconstruction.checkpoint import check_same
     from tbcad.reconstruction.field import read_field, write_field
-    from tbcad.reconstruction.fitted import Told, asked_for, reconstruction
+    from tbcad.reconstruction.files import volume_file
+    from tbcad.reconstruction.fitted import asked_for, reconstruction
+    from tbcad.reconstruction.picture import write_preview
 
-    options, stage, detail = how
-    file, part = wanted.field_file(number), wanted.part_file(number)
-    kept = wanted.resume and file.exists()
+    file, part = field_of(options, number), part_of(options, number)
+    kept = options.resume and file.exists()
+    show = partial(write_preview, Path(options.preview)) if options.preview else lambda _: None
     if kept:
         made = read_field(file)
         check_same(file, made.facts, asked_for(source, options, last))
     else:
-        if not wanted.resume:
+        if not options.resume:
             part.unlink(missing_ok=True)
-        told = Told(stage, detail, partial(_show, wanted.preview))
-        made = reconstruction(source, options, told, part, last)
+        made = reconstruction(source, options, part, last, show)
         write_field(file, made)
     part.unlink(missing_ok=True)
-    _write_volume(made, wanted.volume_file(number), wanted.force)
-    return Reconstructed(file, made, kept, _meshes(made, source, wanted, number, stage))
+    for volume in _numbered(options, number, [options.volume]):
+        if options.force or not volume.exists():
+            replace_files(volume.parent, {volume.name: volume_file(made)})
+    return Reconstructed(file, made, kept, _meshes(made, source, options, number))
 
 
-def _write_volume(made: Field, file: Path | None, force: bool) -> None:
-    """Write the volume, unless it is there already."""
-    if file is None or (file.exists() and not force):
-        return
-    from tbcad.atomic_files import replace_files
-    from tbcad.reconstruction.files import volume_file
-
-    replace_files(file.parent, {file.name: volume_file(made)})
-
-
-def _show(preview: Path | None, made: Field) -> None:
-    """Write how the object looks now."""
-    if preview is None:
-        return
-    from math import radians
-
-    from tbcad.reconstruction.picture import field_picture
-    from tbcad.simulate.image_files import write_images
-    from tbcad.simulate.scene.viewpoint import camera_around_object
-
-    azimuth, elevation = map(radians, PREVIEW_DEG)
-    at = camera_around_object(azimuth, elevation, PREVIEW_MM, made.grid.width_mm, PREVIEW_PX)
-    write_images({preview: field_picture(made, at).image})
-
-
-def checked_frames(wanted: Wanted) -> list[int | None]:
+def checked_frames(options: ReconstructOptions) -> list[int | None]:
     """Refuse, before any work, what cannot be read or written; the frames, None for the capture.
 
     Raises:
         InputError: as said.
     """
+    capture, folder = Path(options.capture), _folder(options)
+    check_is_capture(capture)
+    if options.blur_px and options.rays == 1:
+        raise InputError(
+            f"--blur {options.blur_px:g} is for several rays a pixel: add --rays 12, or leave it "
+            "out"
+        )
+    if options.force and options.resume:
+        raise InputError("--force and --resume exclude each other: leave one out")
     from tbcad.output.single_files import check_file
     from tbcad.simulate.capture.sequence import NAME, frame_count
     from tbcad.simulate.image_files import check_image_path
 
-    if wanted.force and wanted.resume:
-        raise InputError("--force and --resume exclude each other: leave one out")
-    numbers: list[int | None] = [wanted.frame] if wanted.frame != EVERY else []
-    if wanted.frame == EVERY:
-        numbers = list(range(frame_count(wanted.folder)))
-    light_field = wanted.folder / LIGHT_FIELD if wanted.capture.is_dir() else wanted.capture
-    inputs = (light_field, wanted.folder / NAME)
+    numbers: list[int | None] = (
+        [*range(frame_count(folder))] if options.frame == "all" else [options.frame]
+    )
+    light_field = folder / LIGHT_FIELD_FILE if capture.is_dir() else capture
     taken: set[Path] = set()
-    for file, suffixes, may_be in _files(wanted, numbers):
+    for file, suffixes, may_be in _files(options, numbers):
         check_image_path(file, True, suffixes)
-        check_file(file, may_be, inputs)
+        check_file(file, may_be, (light_field, folder / NAME))
         if (place := file.parent.resolve() / file.name) in taken:
             raise InputError(f"{file} is named twice: choose another name")
         taken.add(place)
-    for part in map(wanted.part_file, numbers):
-        if part.exists() and not (wanted.resume or wanted.force):
+    for number in numbers:
+        part = part_of(options, number)
+        if part.exists() and not (options.resume or options.force):
             raise InputError(f"{part} exists: go on with --resume, or begin anew with --force")
     return numbers
 
 
-def _files(wanted: Wanted, numbers: list[int | None]) -> list[tuple[Path, tuple[str, ...], bool]]:
+def _files(
+    options: ReconstructOptions, numbers: list[int | None]
+) -> Iterator[tuple[Path, tuple[str, ...], bool]]:
     """Each file to write, its suffixes, and whether it may exist."""
     from tbcad.reconstruction.field import SUFFIX
     from tbcad.reconstruction.files import MESH_SUFFIXES, VOLUME_SUFFIX
 
-    files: list[tuple[Path, tuple[str, ...], bool]] = []
-    may_be = wanted.force or wanted.resume
-    if wanted.preview is not None:
-        files.append((wanted.preview, (".png",), may_be))
+    may_be = options.force or options.resume
+    if options.preview is not None:
+        yield Path(options.preview), (".png",), may_be
     for number in numbers:
-        made = wanted.field_file(number)
-        files.append((made, (SUFFIX,), may_be))
-        done = wanted.force or (wanted.resume and made.exists())
-        files += [(mesh, MESH_SUFFIXES, done) for mesh in wanted.mesh_files(number)]
-        if (dense := wanted.volume_file(number)) is not None:
-            files.append((dense, (VOLUME_SUFFIX,), done))
-    return files
+        made = field_of(options, number)
+        yield made, (SUFFIX,), may_be
+        done = options.force or (options.resume and made.exists())
+        for mesh in _numbered(options, number, options.meshes):
+            yield mesh, MESH_SUFFIXES, done
+        for volume in _numbered(options, number, [options.volume]):
+            yield volume, (VOLUME_SUFFIX,), done
 
 
-def expected_seconds(
-    wanted: Wanted, options: Options, numbers: list[int | None]
-) -> dict[str, float]:
+def expected_seconds(options: ReconstructOptions, numbers: list[int | None]) -> dict[str, float]:
     """About how long each stage takes, by its title, on two cores."""
     from tbcad.reconstruction.fitted import CHOICE, READING, level_name, levels
     from tbcad.simulate.capture.light_field import LightField
 
-    with LightField.open(wanted.capture) as source:
+    with LightField.open(Path(options.capture)) as source:
         count = pixels(source)
     of_fit = {level_name(one): EPOCH_S * count * one.nodes * one.epochs for one in levels(options)}
     *_, finest = of_fit
@@ -304,9 +225,9 @@ def expected_seconds(
         CHOICE: CHOICE_EPOCHS * next(iter(of_fit.values())),
         **of_fit,
     }
-    if wanted.meshes:
+    if options.meshes:
         of_frame[SURFACE] = SURFACE_S
-    if wanted.frame != EVERY:
+    if options.frame != EVERY:
         return of_frame
     return {
         f"frame {number}: {stage}": seconds
@@ -321,7 +242,7 @@ def pixels(source: LightField) -> int:
     return sum(frame.camera.width_px * frame.camera.height_px for frame in source.frames.values())
 
 
-def check_memory(source: LightField, options: Options) -> None:
+def check_memory(source: LightField, options: ReconstructOptions) -> None:
     """Refuse what this computer has no memory for.
 
     Raises:
@@ -340,36 +261,37 @@ def check_memory(source: LightField, options: Options) -> None:
 
 
 def _meshes(
-    made: Field, source: LightField, wanted: Wanted, number: int | None, stage: Progress
+    made: Field, source: LightField, options: ReconstructOptions, number: int | None
 ) -> dict[str, Any]:
     """Write the files of the surface that are not there yet; what is known of them."""
-    files = [file for file in wanted.mesh_files(number) if wanted.force or not file.exists()]
+    wanted = _numbered(options, number, options.meshes)
+    files = [file for file in wanted if options.force or not file.exists()]
     if not files:
         return {}
     from tbcad.atomic_files import replace_files
     from tbcad.reconstruction.files import mesh_file
     from tbcad.reconstruction.surface import field_mesh
 
-    stage(SURFACE)
+    options.progress(SURFACE)
     if (level := made.facts["surface_level"]) is None:
         raise InputError(
-            f"{wanted.field_file(number)} is empty, without a surface: leave out --mesh"
+            f"{field_of(options, number)} is empty, without a surface: leave out --mesh"
         )
     surface = field_mesh(made, level, made.facts["resolved_mm"])
     for file in files:
         replace_files(file.parent, {file.name: mesh_file(surface, file.suffix)})
-    known = {"triangles": len(surface.faces), **_distances(surface, source, wanted, number)}
+    known = {"triangles": len(surface.faces)}
+    if number is None:
+        known |= _distances(surface, source, _folder(options))
     return {str(file): known for file in files}
 
 
-def _distances(
-    surface: Trimesh, source: LightField, wanted: Wanted, number: int | None
-) -> dict[str, float]:
+def _distances(surface: Trimesh, source: LightField, folder: Path) -> dict[str, Any]:
     """How far a surface is from the true one, if the capture has it as it stood."""
     from tbcad.reconstruction.mesh_distance import mesh_distance
     from tbcad.reconstruction.rays import captured_rays
     from tbcad.simulate.capture.files import OBJECT, read_object
 
-    if number is not None or not (wanted.folder / OBJECT).is_file():
+    if not (folder / OBJECT).is_file():
         return {}
-    return asdict(mesh_distance(surface, read_object(wanted.folder), captured_rays(source)))
+    return asdict(mesh_distance(surface, read_object(folder), captured_rays(source)))

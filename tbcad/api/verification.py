@@ -6,28 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tbcad.errors import InputError
-from tbcad.options.call import silent
+from tbcad.options.builds import VerificationOptions
+from tbcad.options.call import keywords, silent
 
 if TYPE_CHECKING:
     from tbcad_verify.as_built.report import AsBuiltReport
     from tbcad_verify.report.report import Report
-    from tbcad_verify.run.verify import VerifyOptions
 
     from tbcad.types import Progress
 
 
-def verify(
-    exports: Path | str,
-    options: VerifyOptions | None = None,
-    *,
-    progress: Progress = silent,
-) -> Report:
+@keywords(VerificationOptions)
+def verify(options: VerificationOptions) -> Report:
     """Verify the files of a build with code that shares nothing with the code that wrote them.
-
-    Args:
-        exports: folder that `build` wrote.
-        options: what else to check, and how long a stage may take.
-        progress: called with the name of each stage.
 
     Returns:
         The report; `report.passed` is the verdict. It is written to verify.json too.
@@ -35,15 +26,18 @@ def verify(
     Raises:
         InputError: the folder is no readable export.
     """
+    options.check()
     from tbcad_verify.errors import BadExport
     from tbcad_verify.run.verify import VerifyOptions
     from tbcad_verify.run.verify import verify as verify_files
 
+    limit, printers = options.time_limit, tuple(options.printers)
+    asked = VerifyOptions(
+        seconds=limit, printers=printers, clients=options.clients, strict=options.strict
+    )
     try:
         return verify_files(
-            Path(exports),
-            lambda name: progress(f"verification: {name}"),
-            options or VerifyOptions(),
+            Path(options.exports), lambda name: options.progress(f"verification: {name}"), asked
         )
     except BadExport as error:
         raise InputError(str(error)) from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tbcad.errors import InputError
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from tbcad.reconstruction.field import Field
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.simulate.views.refocus import ThinLens
     from tbcad.simulate.views.synthesis import Method, SynthesisedView
     from tbcad.types import Progress
 
@@ -26,32 +28,62 @@ class Views:
     """
 
     def __init__(
-        self, source: LightField | Field, *, quick: bool = False, progress: Progress = silent
+        self,
+        source: LightField | Field | Path | str,
+        *,
+        quick: bool = False,
+        progress: Progress = silent,
     ) -> None:
         """Read nothing yet.
 
         Args:
-            source: a light field, in memory or in a file that stays open; or a field.
+            source: a light field, in memory or in a file that stays open; a field; or the folder
+                of a capture, which is shown by the field in it, if there is one.
             quick: look for the depth of a light field on fewer planes and at fewer points: a sixth
                 of the time.
             progress: called with the state of what is made once.
         """
-        self._source, self._quick, self._progress = source, quick, progress
+        self._source = Path(source) if isinstance(source, str) else source
+        self._quick, self._progress = quick, progress
 
     @cached_property
-    def _tiles(self) -> MirrorTiles:
-        from tbcad.reconstruction.field import Field
+    def light_field(self) -> LightField:
+        """The light field; a file stays open."""
+        from tbcad.simulate.capture.light_field import LightField
+
+        if isinstance(self._source, LightField):
+            return self._source
+        if not isinstance(self._source, Path):
+            raise InputError(
+                f"source is {self._source!r:.60}, allowed is a light field, the folder of a "
+                "capture, or for views a field: change it"
+            )
+        return LightField.open(self._source)
+
+    @cached_property
+    def _field(self) -> Field | None:
+        """What is shown by default, if there is one."""
+        from tbcad.reconstruction.field import Field, wanted_field
+
+        if isinstance(self._source, Field):
+            return self._source
+        if not isinstance(self._source, Path):
+            return None
+        return wanted_field(None, self._source, self.light_field)
+
+    @cached_property
+    def tiles(self) -> MirrorTiles:
+        """Its mirrors, as views need them."""
         from tbcad.simulate.views.mirror_tiles import MirrorTiles
 
-        assert not isinstance(self._source, Field)
-        return MirrorTiles(self._source)
+        return MirrorTiles(self.light_field)
 
     @cached_property
     def _depths(self) -> DepthViews:
         from tbcad.depth.depth_map import depth_views
         from tbcad.depth.plane_sweep import FINE, QUICK
 
-        return depth_views(self._tiles, QUICK if self._quick else FINE, self._progress)
+        return depth_views(self.tiles, QUICK if self._quick else FINE, self._progress)
 
     def view(
         self,
@@ -73,21 +105,22 @@ class Views:
         from tbcad.reconstruction.field import Field
         from tbcad.simulate.scene.viewpoint import camera_around_object
 
-        source, angles = self._source, (radians(azimuth_deg), radians(elevation_deg))
-        capture_mm = source.grid.width_mm if isinstance(source, Field) else source.capture_mm
+        made = self._field if method is None or isinstance(self._source, Field) else None
+        angles = radians(azimuth_deg), radians(elevation_deg)
+        capture_mm = self.light_field.capture_mm if made is None else made.grid.width_mm
         camera = camera_around_object(*angles, distance_mm, capture_mm, size)
-        if not isinstance(source, Field):
+        if made is None:
             return self._of_light_field(camera, method or "depth")
         if method is not None:
             raise InputError(f"method {method!r} is for a light field: leave it out for a field")
-        return _of_field(source, camera)
+        return _of_field(made, camera)
 
     def _of_light_field(self, camera: Camera, method: Method | Literal["depth"]) -> SynthesisedView:
         from tbcad.simulate.views.synthesis import synthesise
 
         if method == "depth":
             return self._depths.of(camera)[0]
-        return synthesise(self._tiles, camera, method)
+        return synthesise(self.tiles, camera, method)
 
 
 def _of_field(made: Field, camera: Camera) -> SynthesisedView:
@@ -101,7 +134,7 @@ def _of_field(made: Field, camera: Camera) -> SynthesisedView:
 
 
 def view(
-    source: LightField | Field,
+    source: LightField | Field | Path | str,
     azimuth_deg: float = 0.0,
     elevation_deg: float = 30.0,
     *,
@@ -112,8 +145,8 @@ def view(
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
     Args:
-        source: a light field, in memory or in an open file; or the field of `tbcad.reconstruct`,
-            the best where there is one.
+        source: a light field, in memory or in an open file; the field of `tbcad.reconstruct`, the
+            best where there is one; or the folder of a capture, with or without such a field.
         azimuth_deg: of the camera about z, from x.
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.
@@ -129,3 +162,60 @@ def view(
     return Views(source).view(
         azimuth_deg, elevation_deg, distance_mm=distance_mm, size=size, method=method
     )
+
+
+def refocused(
+    tiles: MirrorTiles, at: Camera, lens: ThinLens, all_in_focus: bool, progress: Progress = silent
+) -> SynthesisedView:
+    """The picture of a lens, sharp at its focus or everywhere."""
+    from tbcad.datasets.pictures import pinhole_pictures
+    from tbcad.depth.depth_map import depth_map
+    from tbcad.simulate.views.refocus import refocus, refocus_everywhere
+
+    if not all_in_focus:
+        return refocus(tiles, at, lens)
+    depth = depth_map(pinhole_pictures(tiles.source, progress), at)
+    return refocus_everywhere(tiles, at, lens.aperture_mm, depth.along_rays)
+
+
+def refocus(
+    source: LightField | Path | str,
+    azimuth_deg: float = 0.0,
+    elevation_deg: float = 30.0,
+    *,
+    aperture_mm: float = 300.0,
+    focus_mm: float = 0.0,
+    all_in_focus: bool = False,
+    distance_mm: float = 640.0,
+    size: tuple[int, int] = (640, 480),
+) -> SynthesisedView:
+    """Refocus a light field as `tbcad refocus`: the picture of a large lens, of 69 pinhole views.
+
+    Args:
+        source: a light field, in memory or in an open file, or the folder of a capture.
+        azimuth_deg: of the lens about z, from x.
+        elevation_deg: of the lens above the plane z = 0, 0 to 90.
+        aperture_mm: diameter of the lens.
+        focus_mm: position of the focal plane, from the centre of the object toward the lens.
+        all_in_focus: each pixel is sharp at its own depth, which is found in the light field.
+        distance_mm: of the lens from the centre of the object.
+        size: columns and rows of the picture.
+
+    Raises:
+        InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object;
+            there is no such lens, or its focus is far from the object.
+    """
+    from math import radians
+
+    from tbcad.simulate.scene.viewpoint import camera_around_object
+    from tbcad.simulate.views.refocus import ThinLens
+
+    views = Views(source)
+    angles, capture_mm = (
+        (radians(azimuth_deg), radians(elevation_deg)),
+        views.light_field.capture_mm,
+    )
+    at = camera_around_object(*angles, distance_mm, capture_mm, size)
+    lens = ThinLens(aperture_mm, focus_mm)
+    lens.check(at, capture_mm)
+    return refocused(views.tiles, at, lens, all_in_focus)

@@ -22,8 +22,8 @@ from tbcad.records.run import Geometry
 from tbcad.records.tables import StopRow
 from tbcad.simulate.prototype.plan import Plan
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.draws import read_wind_up
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
 from tbcad.types import Bools, Ints, Progress
 
 MIN_HIGHLIGHTS = 10  # of a half

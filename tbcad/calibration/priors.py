@@ -1,6 +1,6 @@
 """What is known of a machine before it is photographed: the errors of the process that made it.
 
-Figures of a process come from tbcad/tolerance/process/*.toml, each with its source there. What no
+Figures of a process come from tbcad/tolerancing/process/*.toml, each with its source there. What no
 process says is a judgement, below.
 """
 
@@ -15,7 +15,7 @@ from tbcad.errors import InputError
 from tbcad.geometry.vectors import norm
 from tbcad.machine.built import LED_MM
 from tbcad.machine.machine import Machine
-from tbcad.tolerance.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats, Ints
 
 PRINCIPAL_SHARE = 0.01

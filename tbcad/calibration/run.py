@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tbcad.atomic_files import InFolder
 from tbcad.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.calibration.detection.detect import detect
 from tbcad.calibration.detection.expected import Room
@@ -23,7 +24,7 @@ from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, files_named
 from tbcad.runs.photographs import Run, check_same_export, read_run
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.tolerance.process.process import Process, load_process, process_errors
+from tbcad.tolerancing.process.process import Process, load_process, process_errors
 
 DEFAULT_PROCESS = "fdm"
 """A prototype is printed; its design does not say how."""
@@ -37,7 +38,7 @@ READING, DETECTING, ESTIMATING, WRITING = (
 
 
 @dataclass(frozen=True)
-class WrittenCalibration:
+class WrittenCalibration(InFolder):
     """A calibration whose files are written.
 
     Attributes:
@@ -50,6 +51,9 @@ class WrittenCalibration:
     text: str
     record: dict[str, Any]
     others: tuple["WrittenCalibration", ...] = ()
+
+    def __fspath__(self) -> str:
+        return str(self.folder.parent if self.others else self.folder)
 
     @property
     def every(self) -> tuple["WrittenCalibration", ...]:

@@ -35,7 +35,7 @@ from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Cell, Record, Table
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.types import Floats, Ints, Progress
 
 NOISES_PX = (0.02, 0.05, 0.1, 0.2)

@@ -11,32 +11,23 @@ from functools import partial
 
 import typer
 
-from tbcad.cli import as_built as _as_built  # noqa: F401 - adds its command
-from tbcad.cli import inspection as _inspection  # noqa: F401 - adds its command
-from tbcad.cli import assembly as _assembly  # noqa: F401 - adds its command
 from tbcad.cli import build as _build  # noqa: F401 - adds its commands
-from tbcad.cli import calibrate as _calibrate  # noqa: F401 - adds its commands
-from tbcad.cli import camera as _camera  # noqa: F401 - adds its command
+from tbcad.cli import designs as _designs  # noqa: F401 - adds its commands
 from tbcad.cli import explain as _explain  # noqa: F401 - adds its command
 from tbcad.cli import export as _export  # noqa: F401 - adds its command
-from tbcad.cli import init as _init  # noqa: F401 - adds its command
-from tbcad.cli import drawings as _drawings  # noqa: F401 - adds its command
-from tbcad.cli import merge as _merge  # noqa: F401 - adds its command
-from tbcad.cli import optimize as _optimize  # noqa: F401 - adds its command
-from tbcad.cli import parts as _parts  # noqa: F401 - adds its command
+from tbcad.cli import machines as _machines  # noqa: F401 - adds its commands
 from tbcad.cli import reconstruct as _reconstruct  # noqa: F401 - adds its command
 from tbcad.cli import refocus as _refocus  # noqa: F401 - adds its command
 from tbcad.cli import report as _report  # noqa: F401 - adds its command
 from tbcad.cli import run_command as _run_command  # noqa: F401 - adds its command
 from tbcad.cli import show as _show_command  # noqa: F401 - adds its command
 from tbcad.cli import simulate as _simulate  # noqa: F401 - adds its command
-from tbcad.cli import simulated_run as _simulated_run  # noqa: F401 - adds its command
 from tbcad.cli import study as _study  # noqa: F401 - adds its commands
 from tbcad.cli import tolerance as _tolerance  # noqa: F401 - adds its command
 from tbcad.cli import view as _view  # noqa: F401 - adds its command
+from tbcad.cli import workshop as _workshop  # noqa: F401 - adds its commands
 from tbcad.cli.app import app
-from tbcad.cli.examples import add_examples
-from tbcad.cli.help_order import order_help
+from tbcad.cli.help_texts import add_examples, order_help
 from tbcad.cli.stopping import INTERRUPTED, Stopped, signals_as_interrupt
 from tbcad.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning

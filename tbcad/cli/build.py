@@ -3,24 +3,16 @@
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.cli.app import app
-from tbcad.cli.for_process import DEFAULT_YIELD, asked_process, design_for
+from tbcad.cli.app import app, command
 from tbcad.cli.output_mode import Full, Json, Quiet, output_mode, print_json
 from tbcad.errors import InputError
-from tbcad.options.checks import check_are_printers, check_is_calibration, check_is_folder
-from tbcad.options.shared import (
-    Design,
-    Exports,
-    Force,
-    ForceFile,
-    JsonResult,
-    OutReplaced,
-    Settings,
-)
+from tbcad.options.builds import BuildOptions, VerificationOptions
+from tbcad.options.checks import check_is_calibration
+from tbcad.options.shared import Exports, ForceFile, JsonResult
 from tbcad.screen import report_console, stages
 
 if TYPE_CHECKING:
@@ -33,52 +25,9 @@ SHELL_STAGES, PROTOTYPE_STAGES, VERIFICATION_STAGES = (5, 14), (9, 27), 19
 FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
 
 
-@app.command()
+@command()
 def build(
-    design: Design[Path] = None,
-    n: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N",
-            help="Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared.",
-        ),
-    ] = None,
-    out: OutReplaced[Path] = Path("exports"),
-    radius_rule: Annotated[
-        Literal["traced", "paper", "flat"] | None,
-        typer.Option(
-            help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 "
-            "and 2 of the paper; flat: planar mirrors."
-        ),
-    ] = None,
-    settings: Settings = None,
-    parts: Annotated[
-        str | None,
-        typer.Option(
-            help="What to build: shell, prototype, or shell,prototype. By default both, but no "
-            "prototype of planar mirrors."
-        ),
-    ] = None,
-    for_process: Annotated[
-        str | None,
-        typer.Option(
-            "--for-process",
-            "--process",
-            metavar="NAME|FILE",
-            help="Choose edges and coverage margins for a manufacturing process, and say what they "
-            "cost: fdm, sls, sla, cnc, diamond, or a TOML file; see tbcad tolerance. A design that "
-            "names its edges keeps them.",
-        ),
-    ] = None,
-    share: Annotated[
-        float | None,
-        typer.Option(
-            "--yield",
-            help="With --for-process: share of simulated builds that must reach the target; by "
-            f"default {DEFAULT_YIELD:g}.",
-        ),
-    ] = None,
-    verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True,
+    options: BuildOptions,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -87,7 +36,6 @@ def build(
             "printing and cost; seconds, and nothing is written.",
         ),
     ] = False,
-    force: Force = False,
     full: Full = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -98,74 +46,36 @@ def build(
     input, nothing written.
     """
     output = output_mode(full, quiet, json)
-    if not verify and not dry_run and output in ("full", "json"):
+    if not options.verify and not dry_run and output in ("full", "json"):
         raise InputError(f"--{output} shows a verification: leave --no-verify out")
     from tbcad.api import build as build_files
+    from tbcad.api.builds import planned, spec_for_process
     from tbcad.cli.memory import keep_freed_memory
-    from tbcad.output.folder import check_replaceable
-    from tbcad.output.inputs import design_files, files_named
-    from tbcad.output.parts import PROTOTYPE, check_lists, check_parts, default_parts, parse_parts
-    from tbcad.spec.load import load_spec
+    from tbcad.output.parts import PROTOTYPE
 
-    started = monotonic()
     keep_freed_memory()
-    asked = parse_parts(parts) if parts is not None else None
-    options = list(settings or [])
-    options += [f"optics.n={n}"] if n is not None else []
-    options += [f"mirrors.radius_rule={radius_rule}"] if radius_rule else []
-    spec = load_spec(design, options)
-    process, wanted_yield = asked_process(for_process, share)
-    chosen = asked or default_parts(spec)
-    if asked is not None:
-        check_parts(spec, asked)
-    check_lists(spec, chosen)
-    inputs = [*design_files(spec, design), *files_named(for_process)]
-    check_replaceable(out, "build", force, inputs)
-    number = (PROTOTYPE_STAGES if PROTOTYPE in chosen else SHELL_STAGES)[verify]
+    plan = planned(options)
+    number = (PROTOTYPE_STAGES if PROTOTYPE in plan.parts else SHELL_STAGES)[options.verify]
     with stages(number, silent=quiet) as screen:
-        if process is not None:
-            screen.stage(f"edges and margins for {process.name}")
-            spec = design_for(spec, process, wanted_yield, screen)
+        shown = options.on(screen)
         if dry_run:
             from tbcad.cli.dry_run import show_overview
 
-            return show_overview(spec, asked, output, screen)
-        built = build_files(
-            spec,
-            out,
-            parts=asked,
-            verify=verify,
-            force=force,
-            progress=screen.stage,
-            detail=screen.detail,
-        )
+            spec = spec_for_process(plan, shown)
+            return show_overview(spec, plan.parts, options.parts is None, output, screen)
+        built = build_files(shown)
     if built.report is None:
         note = f"{built.note}\n" if built.note else ""
+        out = options.out
         typer.echo(f"{note}{out}: built, not verified: run tbcad verify {out}")
         return 0
-    report = replace(built.report, seconds=monotonic() - started)
-    report.show(report_console(), output)
+    built.report.show(report_console(), output)
     return 0 if built.passed else 1
 
 
-@app.command("verify")
+@command("verify")
 def verify_command(
-    folder: Exports[Path],
-    printers: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--printer",
-            metavar="NAME|FILE",
-            help="Fail unless every part can be made by this printer: fdm, sls, sla, cnc, or "
-            "a TOML file; repeatable.",
-        ),
-    ] = None,
-    clients: Annotated[
-        bool,
-        typer.Option(
-            "--clients", help="Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."
-        ),
-    ] = False,
+    options: VerificationOptions,
     as_built: Annotated[
         Path | None,
         typer.Option(
@@ -175,17 +85,6 @@ def verify_command(
             "covers, and what to shim. Writes nothing.",
         ),
     ] = None,
-    time_limit: Annotated[
-        float,
-        typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
-    ] = 600.0,
-    strict: Annotated[
-        bool,
-        typer.Option(
-            "--strict",
-            help="Fail also where a file was changed that only people read, such as a parts list.",
-        ),
-    ] = False,
     full: Full = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -194,29 +93,21 @@ def verify_command(
 
     Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
     """
-    output = output_mode(full, quiet, json)
-    if not time_limit > 0:
-        raise InputError(f"--time-limit must be more than 0 seconds, not {time_limit:g}")
-    check_is_folder(folder)
+    output, folder = output_mode(full, quiet, json), Path(options.exports)
+    if as_built is not None and (options.printers or options.clients or options.strict):
+        raise InputError(
+            "--as-built is about no files: leave out --printer, --clients and --strict"
+        )
+    options.check()
     if as_built is not None:
-        if printers or clients or strict:
-            raise InputError(
-                "--as-built is about no files: leave out --printer, --clients and --strict"
-            )
         return _verify_as_built(folder, as_built, output)
-    check_are_printers(printers or ())
-    from tbcad_verify.run.verify import VerifyOptions
-
     from tbcad.api import as_made, verify
 
-    options = VerifyOptions(
-        seconds=time_limit, printers=tuple(printers or ()), clients=clients, strict=strict
-    )
     started = monotonic()
     with stages(VERIFICATION_STAGES, silent=quiet) as screen:
         # Before the verification, which writes: a command that is stopped has changed nothing.
         simulated = as_made(folder, screen.stage, screen.detail)
-        report = verify(folder, options, progress=screen.stage)
+        report = verify(options.on(screen))
     report = replace(report, as_made=simulated, seconds=monotonic() - started)
     report.show(report_console(), output)
     return 0 if report.passed else 1

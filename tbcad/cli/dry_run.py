@@ -9,7 +9,7 @@ import typer
 
 from tbcad.mirrors.array import design
 from tbcad.output.overview import Overview, PrintEstimate, PrototypeOverview, overview
-from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, default_parts
+from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.screen import Stages
 from tbcad.spec.design import Spec
 from tbcad.spec.load import spec_dict
@@ -24,11 +24,12 @@ SECONDS = {(SHELL,): (1.0, 25.8), (PROTOTYPE,): (20.7, 12.8), PARTS: (20.7, 18.8
 N, FIXED_SHARE = 18, 0.2
 
 
-def show_overview(spec: Spec, asked: Sequence[str] | None, output: "Output", screen: Stages) -> int:
+def show_overview(
+    spec: Spec, parts: Sequence[str], optional: bool, output: "Output", screen: Stages
+) -> int:
     """Print what a build would give, as a record when that is the output."""
-    parts = default_parts(spec) if asked is None else asked
     screen.stage("mirrors: radii and cells")
-    figures = overview(design(spec), parts, screen.stage, optional_prototype=asked is None)
+    figures = overview(design(spec), parts, screen.stage, optional_prototype=optional)
     there = [part for part in parts if part != PROTOTYPE or figures.prototype]
     fixed, of_mirrors = SECONDS[tuple(there)]
     share = FIXED_SHARE + (1 - FIXED_SHARE) * (spec.optics.n / N) ** 2

@@ -1,6 +1,5 @@
 """The command that explains terms, keys of a design, and checks of the verification."""
 
-import json as json_text
 import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
+from tbcad.cli.output_mode import print_result
 from tbcad.screen import WIDTH
 
 if TYPE_CHECKING:
@@ -40,14 +40,12 @@ def explain(
 
     entries = [*terms_and_keys(), *_checks()]
     if name is None:
-        typer.echo(_list_as_json(entries) if json else "\n".join(_lists(entries)))
+        names = {kind: _names(entries, kind) for kind in KINDS}
+        print_result({"schema": SCHEMA, **names}, _lists(entries), json)
         return 0
     found = explained(name, entries)
-    if json:
-        record = {"schema": SCHEMA, "found": [entry.record for entry in found]}
-        typer.echo(json_text.dumps(record, indent=1, ensure_ascii=False))
-    else:
-        typer.echo("\n\n".join("\n".join(_lines(entry)) for entry in found))
+    record = {"schema": SCHEMA, "found": [entry.record for entry in found]}
+    print_result(record, ["\n\n".join("\n".join(_lines(entry)) for entry in found)], json)
     return 0
 
 
@@ -90,11 +88,6 @@ def _lists(entries: "list[ReferenceEntry]") -> Iterator[str]:
 
 def _list(heading: str, names: list[str]) -> str:
     return f"{heading}:\n{_wrapped('; '.join(names), '  ', '  ')}"
-
-
-def _list_as_json(entries: "list[ReferenceEntry]") -> str:
-    names = {kind: _names(entries, kind) for kind in KINDS}
-    return json_text.dumps({"schema": SCHEMA, **names}, indent=1, ensure_ascii=False)
 
 
 def _names(entries: "list[ReferenceEntry]", kind: str) -> list[str]:

@@ -1,81 +1,26 @@
 """The command that reconstructs an object from all rays of a light field."""
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.cli.app import app
+from tbcad.cli.app import command
 from tbcad.cli.output_mode import print_result
 from tbcad.cli.stopping import Stopped
 from tbcad.errors import InputError
-from tbcad.options.checks import check_is_capture
-from tbcad.options.shared import ForceFile, JsonResult
+from tbcad.options.captures import ReconstructOptions
+from tbcad.options.shared import JsonResult
 from tbcad.screen import stages
 
 if TYPE_CHECKING:
     from tbcad.api.reconstructions import Reconstructed
 
 
-@app.command()
+@command()
 def reconstruct(
-    capture: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FOLDER", help="Folder written by tbcad capture or merge, or its lightfield.h5."
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="The field to write (.npz); by default field.npz beside the light field, which "
-            "view, show and turntables then show.",
-        ),
-    ] = None,
-    nodes: Annotated[
-        int, typer.Option(metavar="N", help="Nodes along each edge of the finest grid, 16 to 512.")
-    ] = 144,
-    epochs: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            help="How often each ray is used on the finest grid, 1 to 100; on the coarser grids in "
-            "proportion.",
-        ),
-    ] = 5,
-    order: Annotated[
-        Literal["0", "1", "auto"],
-        typer.Option(
-            help="How colours depend on the direction they are seen from: 0: not; 1: linearly, for "
-            "gloss; auto: by which of both mirrors that are left out are shown better."
-        ),
-    ] = "auto",
-    rays: Annotated[
-        int,
-        typer.Option(
-            metavar="K",
-            help="Rays of a pixel on the finest grid: 1, its central ray, or 12 and more, which "
-            "take its area and the lens' spread into account, in K times the time.",
-        ),
-    ] = 1,
-    blur: Annotated[
-        float | None,
-        typer.Option(
-            metavar="PX",
-            help="With --rays: standard deviation of the lens' spread, pixels of the photograph, "
-            "besides the pixel's own area; by default what the light field says, else 0.",
-        ),
-    ] = None,
-    frame: Annotated[
-        int | None,
-        typer.Option(
-            min=0, metavar="K", help="Frame of tbcad capture --frames to show, from 0 on."
-        ),
-    ] = None,
+    options: ReconstructOptions,
     all_frames: Annotated[
         bool,
         typer.Option(
@@ -84,35 +29,6 @@ def reconstruct(
             "the frame is added to the names of files.",
         ),
     ] = False,
-    mesh: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--mesh",
-            metavar="FILE",
-            help="Also write the surface with its colours (.glb, .ply) or without (.stl); "
-            "repeatable.",
-        ),
-    ] = None,
-    volume: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also write density and colours on the whole lattice, for ParaView and PyVista "
-            "(.vti).",
-        ),
-    ] = None,
-    preview: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A picture (.png) that is written after each epoch."),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Of all that is random.")] = 0,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Go on with what was interrupted; with a field, make what is missing."
-        ),
-    ] = False,
-    force: ForceFile = False,
     json: JsonResult = False,
 ) -> int:
     """Reconstruct one object from all rays of a light field, as a field of density and colour.
@@ -120,23 +36,18 @@ def reconstruct(
     The field is fitted to all photographed rays, from a coarse grid to a fine one. Views of it are
     sharper than those of the light field alone; they are the default where it lies beside it.
     """
-    check_is_capture(capture)
-    if frame is not None and all_frames:
+    if options.frame is not None and all_frames:
         raise InputError("--frame and --all-frames exclude each other: leave one out")
-    from tbcad.reconstruction.options import Options
-
-    options = Options(nodes, epochs, order, rays, blur, seed)
-    from tbcad.api.reconstructions import Wanted, checked_frames, expected_seconds
+    from tbcad.api.reconstructions import checked_frames, expected_seconds, part_of
     from tbcad.api.reconstructions import reconstruct_files as reconstructed
 
-    which: int | Literal["all"] | None = "all" if all_frames else frame
-    wanted = Wanted(capture, out, which, tuple(mesh or ()), preview, resume, force, volume)
-    numbers = checked_frames(wanted)
+    asked = replace(options, frame="all") if all_frames else options
+    numbers = checked_frames(asked)
     try:
-        with stages(expected_seconds(wanted, options, numbers)) as screen:
-            done = reconstructed(wanted, options, screen.stage, screen.detail)
+        with stages(expected_seconds(asked, numbers)) as screen:
+            done = reconstructed(asked.on(screen))
     except KeyboardInterrupt:
-        parts = [str(part) for part in map(wanted.part_file, numbers) if part.exists()]
+        parts = [str(part) for n in numbers if (part := part_of(asked, n)).exists()]
         if not parts:
             raise
         kept = f"{parts[0]} keeps what is done: go on with the same options and --resume"

@@ -32,7 +32,6 @@ from tbcad.screen import stages
 if TYPE_CHECKING:
     from tbcad.optics.camera import Camera
     from tbcad.simulate.scene.ray_casting import Scene
-    from tbcad.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.simulate.views.refocus import ThinLens
     from tbcad.types import Bytes, Progress
 
@@ -84,6 +83,7 @@ def refocus(
     check_is_capture(capture_folder)
     if all_in_focus and sweep is not None:
         raise InputError("--all-in-focus has no focus to move: leave out --sweep")
+    from tbcad.api.views import refocused
     from tbcad.output.single_files import check_file
     from tbcad.simulate.capture.light_field import LightField
     from tbcad.simulate.image_files import ANIMATED_SUFFIXES, check_image_path, write_animation
@@ -104,7 +104,7 @@ def refocus(
         lens.check(at, source.capture_mm)
         tiles, scene = MirrorTiles(source), scene_of(capture_folder)
         screen.stage(names[0])
-        picture = _picture(tiles, at, lens, all_in_focus, screen.detail)
+        picture = refocused(tiles, at, lens, all_in_focus, screen.detail).image
         screen.stage(names[1])
         samples = 0 if all_in_focus else truth_samples
         truth = None if scene is None else _truth(scene, at, lens, samples, screen.detail)
@@ -115,21 +115,6 @@ def refocus(
     if sweep is not None:
         typer.echo(f"{sweep}: focus from the back of the capture sphere to its front, and back")
     return 0
-
-
-def _picture(
-    tiles: "MirrorTiles", at: "Camera", lens: "ThinLens", all_in_focus: bool, progress: "Progress"
-) -> "Bytes":
-    """The picture of the lens, sharp at its focus or everywhere."""
-    from tbcad.datasets.pictures import pinhole_pictures
-    from tbcad.depth.depth_map import depth_map
-    from tbcad.simulate.views.refocus import refocus as refocused
-    from tbcad.simulate.views.refocus import refocus_everywhere
-
-    if not all_in_focus:
-        return refocused(tiles, at, lens).image
-    depth = depth_map(pinhole_pictures(tiles.source, progress), at)
-    return refocus_everywhere(tiles, at, lens.aperture_mm, depth.along_rays).image
 
 
 def _truth(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.cli.app import app
-from tbcad.cli.study_command import Work, of_design, of_export
+from tbcad.cli.study_output import Work, of_design, of_export
 from tbcad.options.checks import check_is_object
 from tbcad.options.shared import (
     Distance,

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tbcad.atomic_files import InFolder
 from tbcad.control.plan import ControlPlan
 from tbcad.control.selection import Shots, count, duration_text, size_text
 
@@ -12,7 +13,7 @@ SHOWN_STOPS = 3
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(InFolder):
     """What a run came to.
 
     Attributes:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
-from typing import Literal
 
 from tbcad.control.base import travel_s
 from tbcad.control.plan import ControlPlan
@@ -16,7 +15,6 @@ from tbcad.records.prototype_drive import Phase
 
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?$")
 RUNS = {"a": (0,), "b": (180,), "ab": (0, 180)}
-Preflight = Literal["first", "only", "off"]
 """Whether one stop is looked at before a run, and whether the run follows."""
 SIDECAR_BYTES = 8_192  # with the journal's line, as a disk's blocks count them
 SPARE = 1.1  # of disk: a lit object takes more bytes than the dark

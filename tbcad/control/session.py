@@ -1,6 +1,6 @@
 """A run from its start, or from where it stopped, to its end."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, suppress
 from functools import partial
 from itertools import groupby
@@ -11,7 +11,6 @@ from tbcad.control.machine import CameraFault, DrivenMachine, MachineFault
 from tbcad.control.outcome import Outcome
 from tbcad.control.plan import ControlPlan
 from tbcad.control.selection import (
-    Preflight,
     RunSelection,
     Shots,
     bytes_each,
@@ -31,18 +30,13 @@ from tbcad.control.shooting import (
     taken_twice,
 )
 from tbcad.errors import InputError
+from tbcad.options.runs import Ask, Preflight, Show
 from tbcad.records.exposure import Frame, exposure_name
 from tbcad.runs.writing import DiskFault, RunWriter, new_run, resumed_run
-from tbcad.screen import Stages
 from tbcad.types import Progress
 
 MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph
 STRAIGHT, TURNED = "object straight", "object turned by 180 degrees about z"
-
-Ask = Callable[[str], bool]
-"""Asks the operator to do something; False: the operator will not."""
-Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
-"""Shows stages with their expected seconds while a block runs."""
 
 
 class Session:

@@ -18,7 +18,7 @@ from tbcad.formats.step import read_named_solid
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.records.prototype import PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow
-from tbcad.tolerance.process.process import load_process
+from tbcad.tolerancing.process.process import load_process
 from tbcad.types import Floats
 
 RESIN, RESIN_PROCESS, FILAMENT_PROCESS = "resin", "sla", "fdm"

@@ -5,7 +5,7 @@ writes is refused before anything is read of it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from math import prod
@@ -53,8 +53,10 @@ class StoredArray:
         """Read a part.
 
         Raises:
-            InputError: the file is damaged there.
+            InputError: the file is damaged there, or closed.
         """
+        if not self._data:
+            raise InputError("the file is closed: read its arrays within the block that opened it")
         try:
             return self._data[part]
         except (OSError, RuntimeError) as error:
@@ -123,7 +125,16 @@ class StoredGroup:
 def open_hdf5(
     file: Path, schema: str, what: str, again: str, read: Callable[[StoredGroup], Found]
 ) -> Iterator[Found]:
-    """Open a file for reading, and read what is asked for; arrays stay open for the block.
+    """Open a file as `opened_hdf5` does; arrays stay open for the block."""
+    store, found = opened_hdf5(file, schema, what, again, read)
+    with store:
+        yield found
+
+
+def opened_hdf5(
+    file: Path, schema: str, what: str, again: str, read: Callable[[StoredGroup], Found]
+) -> tuple[h5py.File, Found]:
+    """Open a file for reading, and read what is asked for; it is open while an array is kept.
 
     Args:
         file: that exists.
@@ -139,13 +150,15 @@ def open_hdf5(
         store = h5py.File(file, "r", rdcc_nbytes=CHUNK_CACHE)
     except OSError as error:
         raise InputError(f"{file} is no {what}: {_line(error)}: {again}") from error
-    with store:
+    with ExitStack() as refused:
+        refused.enter_context(store)
         try:
             _check_schema(store, schema)
             found = read(StoredGroup(store, partial(_damaged, file, what, again)))
         except UNREADABLE as error:
             raise _damaged(file, what, again, error) from error
-        yield found
+        refused.pop_all()
+    return store, found
 
 
 def _damaged(file: Path, what: str, again: str, error: BaseException) -> InputError:

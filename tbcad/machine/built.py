@@ -9,10 +9,10 @@ from tbcad.machine.machine import Machine
 from tbcad.optics.camera import LensCamera
 from tbcad.optics.pedestals.walls import NO_WALLS, GrooveWalls
 from tbcad.simulate.prototype.plan import Plan
-from tbcad.tolerance.montecarlo.draws import ShellDraws
-from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.draws import PrototypeDraws, draw_prototypes
-from tbcad.tolerance.prototype.windows import tilted_centres
+from tbcad.tolerancing.montecarlo.draws import ShellDraws
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
+from tbcad.tolerancing.prototype.windows import tilted_centres
 from tbcad.types import Bools, Floats
 
 # Along each axis, mm. Drawings of T-1 LEDs allow 0.25 mm, and a printed pocket has 0.3 mm of play,

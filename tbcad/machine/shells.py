@@ -20,10 +20,10 @@ from tbcad.records.exposure import Frame
 from tbcad.records.run import Geometry
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
-from tbcad.tolerance.montecarlo.edge_model import edge_models, warp_maps_of
-from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.montecarlo.sharpness import built_walls
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_models, warp_maps_of
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.sharpness import built_walls
 from tbcad.types import Floats
 
 CAMERAS = ("a", "b")

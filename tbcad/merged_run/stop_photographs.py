@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.optics.camera import LensCamera, vignetting
 from tbcad.options.machines import MergeOptions
+from tbcad.options.shared import AnyPath
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
 from tbcad.runs.images import Image16, read_image
 from tbcad.runs.photographs import Run, read_photograph
@@ -77,7 +78,7 @@ def cos4_gain(camera: LensCamera) -> Singles:
     return gain.astype(np.float32)
 
 
-def flat_field_gain(files: Sequence[Path | str], encoding: Encoding, camera: LensCamera) -> Singles:
+def flat_field_gain(files: Sequence[AnyPath], encoding: Encoding, camera: LensCamera) -> Singles:
     """What makes the mean of photographs of an even surface even, (h, w, 3).
 
     Pixels with next to no light, beyond the lens's picture, show nothing.

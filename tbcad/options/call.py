@@ -1,9 +1,10 @@
 """Records of calls, and what follows from them: Python's keywords, the command's options, JSON."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache, wraps
 from inspect import Parameter, Signature, signature
+from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
@@ -11,6 +12,7 @@ from typing import (
     Any,
     ParamSpec,
     Protocol,
+    Self,
     TypeVar,
     Union,
     cast,
@@ -24,6 +26,7 @@ from typer.models import ParameterInfo
 
 from tbcad.errors import InputError
 from tbcad.progress import Progress
+from tbcad.screen import Stages
 
 Keywords = ParamSpec("Keywords")
 Record = TypeVar("Record")
@@ -51,13 +54,20 @@ class Call:
     answer: Progress = silent
 
     def __post_init__(self) -> None:
-        """Refuse values of another type, or out of range.
+        """Refuse values of another type, or out of range; what lies in a folder stands for it.
 
         Raises:
             InputError: as said.
         """
-        for name, option in declared(type(self)).items():
+        for name, option in _annotated(type(self)).items():
+            value = getattr(self, name)
+            if isinstance(value, PathLike) and not isinstance(value, Path):
+                object.__setattr__(self, name, Path(value))
             _check(name, getattr(self, name), *get_args(option))
+
+    def on(self, screen: Stages) -> Self:
+        """The call, with its progress on a screen."""
+        return replace(self, progress=screen.stage, detail=screen.detail, answer=screen.note)
 
     def json(self) -> dict[str, Any]:
         """The options by name, for a file of JSON."""
@@ -98,6 +108,15 @@ def keywords(
 
 def declared(record: type) -> dict[str, Any]:
     """The options of a record by name: types with what typer makes an option of."""
+    return {
+        name: kind
+        for name, kind in _annotated(record).items()
+        if isinstance(get_args(kind)[1], ParameterInfo)
+    }
+
+
+def _annotated(record: type) -> dict[str, Any]:
+    """Types of the fields that have an option, or a text: those are keywords of Python alone."""
     kinds = get_type_hints(record, include_extras=True)
     return {
         one.name: kinds[one.name]
@@ -118,7 +137,7 @@ def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
 
 def _signature(record: type[Call], returned: object) -> Signature:
     """Keywords as a person reads them: options in the order of the command, then callbacks."""
-    options, every = declared(record), signature(record).parameters.values()
+    options, every = _annotated(record), signature(record).parameters.values()
     own = [
         one.replace(annotation=get_args(options[one.name])[0])
         for one in every
@@ -138,14 +157,16 @@ def _typed(parameter: Parameter) -> Parameter:
 
 
 def _written(kind: Any) -> Any:
-    """The type of what is written on a command line: a path, or a text, of several that fit."""
+    """The type of what is written on a command line: of several, a path, text or number."""
     if get_origin(kind) is Sequence:
         return list[_written(get_args(kind)[0])]  # type: ignore[misc]
     if get_origin(kind) not in (Union, UnionType):
         return kind
-    for word in (Path, str):
+    for word in (Path, str, int):
         if word in get_args(kind):
             return word | None if NoneType in get_args(kind) else word
+    for several in (one for one in get_args(kind) if get_origin(one) is Sequence):
+        return _written(several)
     return kind
 
 
@@ -156,16 +177,16 @@ def _reader(kind: Any) -> Any:
     return TypeAdapter(kind)
 
 
-def _check(name: str, value: object, kind: Any, option: ParameterInfo) -> None:
+def _check(name: str, value: object, kind: Any, option: ParameterInfo | str) -> None:
     from annotated_types import Ge, Le
     from pydantic import ValidationError
 
     from tbcad.spec.errors import short_text
 
-    low, high = option.min, option.max
+    low, high = getattr(option, "min", None), getattr(option, "max", None)
     try:
         _reader(kind).validate_python(value, strict=True)
-        number = cast("float", value if value is not None else low or 0)
+        number = value if isinstance(value, int | float) else low or 0
         inside = (low is None or low <= number) and (high is None or number <= high)
     except ValidationError:
         inside = False
@@ -191,7 +212,7 @@ def _allowed(kind: Any, limits: Sequence[object]) -> str:
 
 def _with_arguments(text: str, record: type[Call]) -> str:
     """A docstring with the record's help texts as its arguments."""
-    options = declared(record)
-    told = [f"    {name}: {get_args(kind)[1].help}" for name, kind in options.items()]
+    texts = {name: get_args(kind)[1] for name, kind in _annotated(record).items()}
+    told = [f"    {name}: {getattr(text, 'help', text)}" for name, text in texts.items()]
     summary, *sections = text.rstrip().split("\n\n    ")
     return "\n\n    ".join([summary, "Args:\n    " + "\n    ".join(told), *sections]) + "\n    "

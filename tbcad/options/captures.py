@@ -1,5 +1,6 @@
-"""Calls about light fields: written for other programs."""
+"""Calls about light fields: simulated, reconstructed, written for other programs."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -8,9 +9,21 @@ import typer
 
 from tbcad.errors import InputError
 from tbcad.options.call import Call
-from tbcad.options.shared import AnyPath, Capture, Force, OutReplaced
+from tbcad.options.shared import (
+    AnyPath,
+    Capture,
+    Exports,
+    Force,
+    ForceFile,
+    ObjectFile,
+    OutReplaced,
+    PaintOption,
+    UnitOption,
+    UpOption,
+)
 
 Target = Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"]
+Geometry = Literal["spheres", "mesh", "prototype"]
 AS_CAPTURED: tuple[Target, ...] = ("ngp-rays", "rays")
 SIZES_PX = (8, 4096)
 
@@ -87,3 +100,187 @@ class ExportOptions(Call):
         if self.size is not None and not low <= self.size <= high:
             raise InputError(f"--size {self.size} is not allowed: from {low} to {high} pixels")
         return self.to
+
+
+@dataclass(frozen=True)
+class ReconstructOptions(Call):
+    """A light field, how one object is fitted to it, and the files to write."""
+
+    capture: Annotated[
+        AnyPath,
+        typer.Argument(
+            metavar="FOLDER", help="Folder written by tbcad capture or merge, or its lightfield.h5."
+        ),
+    ]
+    _: KW_ONLY
+    out: Annotated[
+        AnyPath | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="The field to write (.npz); by default field.npz beside the light field, which "
+            "view, show and turntables then show.",
+        ),
+    ] = None
+    nodes: Annotated[
+        int,
+        typer.Option(
+            min=16, max=512, metavar="N", help="Nodes along each edge of the finest grid."
+        ),
+    ] = 144
+    epochs: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=100,
+            metavar="N",
+            help="How often each ray is used on the finest grid; on the coarser grids in "
+            "proportion.",
+        ),
+    ] = 5
+    order: Annotated[
+        Literal["0", "1", "auto"],
+        typer.Option(
+            help="How colours depend on the direction they are seen from: 0: not; 1: linearly, for "
+            "gloss; auto: by which of both mirrors that are left out are shown better."
+        ),
+    ] = "auto"
+    rays: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=64,
+            metavar="K",
+            help="Rays of a pixel on the finest grid: 1, its central ray, or 12 and more, which "
+            "take its area and the lens' spread into account, in K times the time.",
+        ),
+    ] = 1
+    blur_px: Annotated[
+        float | None,
+        typer.Option(
+            "--blur",
+            min=0,
+            max=5,
+            metavar="PX",
+            help="With --rays: standard deviation of the lens' spread, pixels of the photograph, "
+            "besides the pixel's own area; by default what the light field says, else 0.",
+        ),
+    ] = None
+    frame: Annotated[
+        int | Literal["all"] | None,
+        typer.Option(
+            min=0, metavar="K", help="Frame of tbcad capture --frames to show, from 0 on."
+        ),
+    ] = None
+    meshes: Annotated[
+        Sequence[AnyPath],
+        typer.Option(
+            "--mesh",
+            metavar="FILE",
+            help="Also write the surface with its colours (.glb, .ply) or without (.stl); "
+            "repeatable.",
+        ),
+    ] = ()
+    volume: Annotated[
+        AnyPath | None,
+        typer.Option(
+            metavar="FILE",
+            help="Also write density and colours on the whole lattice, for ParaView and PyVista "
+            "(.vti).",
+        ),
+    ] = None
+    preview: Annotated[
+        AnyPath | None,
+        typer.Option(metavar="FILE", help="A picture (.png) that is written after each epoch."),
+    ] = None
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Of all that is random.")] = 0
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume", help="Go on with what was interrupted; with a field, make what is missing."
+        ),
+    ] = False
+    force: ForceFile = False
+
+
+@dataclass(frozen=True)
+class CaptureOptions(Call):
+    """An export, an object before it, and how its photographs are traced."""
+
+    exports: Exports[AnyPath]
+    object_file: ObjectFile[AnyPath] = None
+    _: KW_ONLY
+    up: UpOption = None
+    unit: UnitOption = None
+    out: Annotated[
+        AnyPath | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for all files; replaced as a whole or not at all. By default captures/ "
+            "with the name of the object, such as captures/knot; from Python none.",
+        ),
+    ] = None
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
+    ] = False
+    paint: PaintOption = "own"
+    samples: Annotated[
+        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
+    ] = 1
+    geometry: Annotated[
+        Geometry,
+        "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
+        "stop by stop.",
+    ] = "spheres"
+    lights: Annotated[
+        AnyPath | None,
+        typer.Option(
+            metavar="FILE",
+            help="Also write a reflectance field, a photograph for each lamp: FILE is a table with "
+            "the columns x_mm,y_mm,z_mm; the word mirrors is a lamp in the place of each virtual "
+            "camera, projectors what each mirror throws of a projector in its camera's place.",
+        ),
+    ] = None
+    every: Annotated[
+        int,
+        typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors or projectors."),
+    ] = 1
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=10_000,
+            help="Also photograph the object N times while it turns about z, as one file.",
+            metavar="N",
+        ),
+    ] = None
+    turn: Annotated[
+        float, typer.Option(help="How far the object turns during all frames, degrees.")
+    ] = 360.0
+    force: Force = False
+
+    def check(self) -> None:
+        """Refuse what does not go together.
+
+        Raises:
+            InputError: as said.
+        """
+        lights, single = str(self.lights), self.samples == 1
+        if self.lights is not None and not single:
+            raise InputError("--lights follows one ray a pixel: leave out --samples")
+        if self.every > 1 and lights not in ("mirrors", "projectors"):
+            raise InputError(
+                "--every chooses among the lamps of --lights mirrors or projectors: leave it out"
+            )
+        if lights == "projectors" and self.geometry == "prototype":
+            raise InputError(
+                "--lights projectors is light from the mirrors of shells: leave out --prototype"
+            )
+        if self.frames is not None and (not single or self.geometry == "prototype"):
+            raise InputError(
+                "--frames follows one ray a pixel: leave out --samples and --prototype"
+            )
+        if self.out is None and (self.lights, self.frames) != (None, None):
+            raise InputError("lamps and frames are written beside the light field: give out")

@@ -14,6 +14,7 @@ MOST_STOPS = 1_000_000  # as a run's record may have
 ExposureLeds = Annotated[
     Time | None,
     typer.Option(
+        "--exposure-leds",
         metavar="S",
         help="Exposure of the photographs by LEDs and in the dark, s, such as 1/60; --exposure-lit "
         "alone is for all.",
@@ -22,6 +23,7 @@ ExposureLeds = Annotated[
 ExposureLit = Annotated[
     Time | None,
     typer.Option(
+        "--exposure-lit",
         metavar="S",
         help="Exposure of the photographs of the lit object, s, such as 0.5; --exposure-leds alone "
         "is for all.",

@@ -1,12 +1,15 @@
 """Options that several commands share; those of places by what the place may be."""
 
+from collections.abc import Mapping, Sequence
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
 import typer
 
 Place = TypeVar("Place")
-AnyPath = Path | str
+Changes = Mapping[str, str] | Sequence[str]
+AnyPath = Path | str | PathLike[str]  # such as a build, a run, a calibration
 
 Design = Annotated[
     Place | None,

@@ -1,13 +1,14 @@
 """What a command reads and what it writes are apart: no result replaces its own source."""
 
 from collections.abc import Iterable
+from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
 from tbcad.errors import InputError
 from tbcad.spec.design import Spec
 
-Source: TypeAlias = Path | str | None
+Source: TypeAlias = str | PathLike[str] | None
 """A file or folder that a command reads; None, and what is not there, are left out."""
 
 _Place: TypeAlias = tuple[int, int]
@@ -44,12 +45,12 @@ def refuse_inputs(out: Path, inputs: Iterable[Source]) -> None:
             )
 
 
-def files_named(*texts: Path | str | None) -> list[Path]:
+def files_named(*texts: Source) -> list[Path]:
     """Return the files among texts that may also be words, as a built-in process or "mirrors"."""
     return [Path(text) for text in texts if text is not None and Path(text).is_file()]
 
 
-def design_files(spec: Spec, file: Path | str | None) -> list[Path]:
+def design_files(spec: Spec, file: Source) -> list[Path]:
     """Return the files that a design is read from: its own, catalogues and prices."""
     return files_named(file, *spec.prototype.catalogues, *spec.prototype.prices)
 

@@ -1,7 +1,7 @@
 """A light field reconstructed: rays, choice, fit with checkpoints, and what came of it."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from math import log10
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.options.captures import ReconstructOptions
 from tbcad.reconstruction.checkpoint import (
     Checkpoint,
     read_checkpoint,
@@ -20,7 +21,6 @@ from tbcad.reconstruction.choice import chosen
 from tbcad.reconstruction.field import FACT, Field, light_field_fingerprint
 from tbcad.reconstruction.fit import all_spans, fit, squared_error
 from tbcad.reconstruction.marching import Singles
-from tbcad.reconstruction.options import Options
 from tbcad.reconstruction.rays import (
     NO_FOOTPRINT,
     CapturedRays,
@@ -31,7 +31,7 @@ from tbcad.reconstruction.rays import (
 from tbcad.reconstruction.start import CENTRAL, Level, Settings, State, first_state, hull, start
 from tbcad.reconstruction.surface import best_level, resolved_mm
 from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
-from tbcad.types import Bools, Progress
+from tbcad.types import Bools
 from tbcad.version import __version__
 
 READING, CHOICE = "rays and hull", "choice by mirrors left out"
@@ -39,24 +39,12 @@ LEFT_OUT = 0.02  # share of the mirrors that the fit does not see
 LEAST_MIRRORS = 10  # with fewer none is left out
 COLOURS = 3
 LARGEST_DB = 99.0  # of colours that are equal
+FIT = ("nodes", "epochs", "order", "rays", "blur_px", "seed")  # options that a field follows from
 
 
-@dataclass(frozen=True)
-class Told:
-    """Who is told of a reconstruction under way.
-
-    Attributes:
-        stage: of each stage, by its name.
-        detail: of each epoch.
-        field: likewise, with the field as it is.
-    """
-
-    stage: Progress
-    detail: Progress
-    field: Callable[[Field], None] = lambda _: None
-
-
-def asked_for(source: LightField, options: Options, last: Field | None = None) -> dict[str, Any]:
+def asked_for(
+    source: LightField, options: ReconstructOptions, last: Field | None = None
+) -> dict[str, Any]:
     """All that a field follows from.
 
     Args:
@@ -66,7 +54,7 @@ def asked_for(source: LightField, options: Options, last: Field | None = None) -
     """
     return {
         "tbcad": __version__,
-        "options": asdict(options),
+        "options": {name: getattr(options, name) for name in FIT},
         FACT: light_field_fingerprint(source),
         "started_from": None if last is None else last.facts[FACT],
     }
@@ -74,25 +62,25 @@ def asked_for(source: LightField, options: Options, last: Field | None = None) -
 
 def reconstruction(
     source: LightField,
-    options: Options,
-    told: Told,
+    options: ReconstructOptions,
     part: Path | None = None,
     last: Field | None = None,
+    show: Callable[[Field], None] = lambda _: None,
 ) -> Field:
     """Fit a field to the rays of a light field; its facts say how it was made.
 
     Args:
         source: the light field.
-        options: how.
-        told: of progress.
+        options: how, and who is told of progress.
         part: where the checkpoint is written after each epoch, and from which an interrupted fit
             goes on; None: there is none.
         last: field of the frame before, to start from.
+        show: called with the field as it is after each epoch.
 
     Raises:
         InputError: no ray shows anything, or the checkpoint is of another fit.
     """
-    told.stage(READING)
+    options.progress(READING)
     asked = asked_for(source, options, last)
     settings = _settings(source, options)
     saved = None
@@ -102,16 +90,17 @@ def reconstruction(
     used = used_rays(rays, options.seed)
     inside = hull(rays)
     if saved is None:
-        settings, trials = _chosen(rays, inside, settings, options, told, last)
+        settings, trials = _chosen(rays, inside, settings, options, last)
         state = start(inside, last, rays.capture_mm, settings)
     else:
         settings, trials, state = saved.settings, saved.trials, saved.state
-    told.stage(level_name(settings.levels[state.level]))
+    options.progress(level_name(settings.levels[state.level]))
     for reached in fit(rays, settings, used, state):
         state = reached
         if part is not None:
             write_checkpoint(part, Checkpoint(asked, settings, trials, state))
-        _tell(state, settings, told)
+        _tell(state, settings, options)
+        show(state.field())
     made = state.field()
     if not len(made.grid):
         raise InputError(
@@ -127,7 +116,7 @@ def level_name(level: Level) -> str:
     return f"grid of {level.nodes} nodes"
 
 
-def levels(options: Options) -> tuple[Level, ...]:
+def levels(options: ReconstructOptions) -> tuple[Level, ...]:
     """The usual grids, in proportion to the finest that is asked for."""
     usual = Settings().levels
     finest = usual[-1]
@@ -140,14 +129,14 @@ def levels(options: Options) -> tuple[Level, ...]:
     )
 
 
-def _settings(source: LightField, options: Options) -> Settings:
+def _settings(source: LightField, options: ReconstructOptions) -> Settings:
     """As asked, before anything is chosen."""
     places = CENTRAL if options.rays == 1 else _places(source, options)
     order = int(options.order == "1")
     return Settings(levels(options), order=order, places=places, seed=options.seed)
 
 
-def _places(source: LightField, options: Options) -> Singles:
+def _places(source: LightField, options: ReconstructOptions) -> Singles:
     """Of the rays of a pixel.
 
     Raises:
@@ -186,19 +175,18 @@ def _chosen(
     rays: CapturedRays,
     inside: Bools,
     settings: Settings,
-    options: Options,
-    told: Told,
+    options: ReconstructOptions,
     last: Field | None,
 ) -> tuple[Settings, list[dict[str, Any]]]:
     """Weights and order by mirrors left out, and the trials; the first frame's hold for all."""
     if last is not None:
         before = settings_of(last.facts["chosen"], settings.places)
         return replace(before, levels=settings.levels, seed=settings.seed), last.facts["trials"]
-    told.stage(CHOICE)
+    options.progress(CHOICE)
     orders = (0, 1) if options.order == "auto" else (settings.order,)
     # Trials are coarse: they do not resolve a pixel.
     single = replace(settings, places=CENTRAL)
-    best, trials = chosen(rays, inside, single, orders, told.detail)
+    best, trials = chosen(rays, inside, single, orders, options.detail)
     tried = [
         {"order": one.settings.order, "smooth_density": one.settings.smooth_density,
          "loss": one.loss} for one in trials
@@ -206,13 +194,12 @@ def _chosen(
     return replace(best, places=settings.places), tried
 
 
-def _tell(state: State, settings: Settings, told: Told) -> None:
+def _tell(state: State, settings: Settings, options: ReconstructOptions) -> None:
     """Tell of an epoch that is done, and of the next grid if it was the last of this one."""
     epochs = settings.levels[state.level].epochs
-    told.detail(f"epoch {state.epoch} of {epochs}, {decibels(state.loss / COLOURS):.1f} dB")
-    told.field(state.field())
+    options.detail(f"epoch {state.epoch} of {epochs}, {decibels(state.loss / COLOURS):.1f} dB")
     if state.epoch == epochs and state.level + 1 < len(settings.levels):
-        told.stage(level_name(settings.levels[state.level + 1]))
+        options.progress(level_name(settings.levels[state.level + 1]))
 
 
 def _facts(

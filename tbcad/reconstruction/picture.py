@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import radians
+from pathlib import Path
 from threading import Lock
 
 import numpy as np
@@ -16,14 +18,16 @@ from tbcad.reconstruction.marching import Medium, Singles, composited
 from tbcad.reconstruction.rays import LEAST_CHORD_MM, captured_rays, entries
 from tbcad.reconstruction.start import Level, Settings
 from tbcad.simulate.capture.light_field import LightField
+from tbcad.simulate.image_files import write_images
 from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.simulate.scene.viewpoint import view_directions
+from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
 from tbcad.simulate.views.viewpoints import OwnMethod
 from tbcad.types import Bytes, Floats
 
 STRIDE = 0.45  # distances of nodes between samples
 RAYS_PER_CHUNK = 1 << 13
 SMOOTHED = 1.2  # nodes, standard deviation: the opacity whose gradient gives normals
+PREVIEW_DEG, PREVIEW_MM, PREVIEW_PX = (30.0, 30.0), 640.0, (480, 360)
 BEFORE = 1.0  # nodes: where it is taken, in front of where the ray is half opaque
 QUICK = Settings(levels=(Level(36, 1), Level(64, 1)), batch=10_000)
 
@@ -138,6 +142,13 @@ def normals_png(normals: Floats) -> bytes:
 def opacity_png(picture: FieldPicture) -> bytes:
     """The opacity as a PNG in grey: 0 nothing, 255 opaque."""
     return png_bytes(np.rint(255 * np.clip(picture.opacity, 0, 1)).astype(np.uint8))
+
+
+def write_preview(file: Path, made: Field) -> None:
+    """Write how a field looks from the usual side."""
+    azimuth, elevation = map(radians, PREVIEW_DEG)
+    at = camera_around_object(azimuth, elevation, PREVIEW_MM, made.grid.width_mm, PREVIEW_PX)
+    write_images({file: field_picture(made, at).image})
 
 
 def quick_field(source: LightField) -> Field:

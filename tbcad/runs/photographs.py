@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from tbcad.atomic_files import InFolder
 from tbcad.errors import InputError
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.records.run import RunRecord, read_record
@@ -14,7 +15,7 @@ AGAIN = Exposure.MISSING
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(InFolder):
     """A run's folder.
 
     Attributes:

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 from functools import partial
-from typing import Literal
 
+from tbcad.options.captures import Geometry
 from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.simulate.capture.photograph import CameraPhotographs, RowBand, Samples, photograph
 from tbcad.simulate.prototype.merge import merge_run
@@ -15,8 +15,6 @@ from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.types import Progress
-
-Geometry = Literal["spheres", "mesh", "prototype"]
 
 
 def camera_photographs(

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from io import BytesIO
+from os import PathLike
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -41,8 +42,8 @@ from tbcad.simulated_run.photographs import (
     phases_of,
 )
 from tbcad.simulated_run.sensor import Image16, SimulatedSensor
-from tbcad.tolerance.montecarlo.error_kinds import Errors
-from tbcad.tolerance.prototype.draws import read_wind_up
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
 from tbcad.types import Progress
 
 CAMERA = "simulated"
@@ -250,7 +251,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
 
 def run_object(
     export: ExportedDesign,
-    file: Path | str | None,
+    file: str | PathLike[str] | None,
     options: ObjectOptions | None = None,
     told: Progress | None = None,
 ) -> SceneObject:

@@ -6,10 +6,11 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.optics.camera import Camera
+from tbcad.options.captures import Geometry
 from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Record, Table
-from tbcad.simulate.camera_photographs import Geometry, photographed
+from tbcad.simulate.camera_photographs import photographed
 from tbcad.simulate.capture.light_field import LightField
 from tbcad.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
 from tbcad.simulate.scene.exported import ExportedDesign

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import ttest_rel
 
+from tbcad.options.captures import Geometry
 from tbcad.results.plots import PlotPanel, Series
 from tbcad.results.study import Figure, Study
 from tbcad.results.tables import Table
-from tbcad.simulate.camera_photographs import Geometry, photographed
+from tbcad.simulate.camera_photographs import photographed
 from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.simulate.scene.object import SceneObject
 from tbcad.simulate.scene.ray_casting import prepared_scene

@@ -10,7 +10,7 @@ from tbcad.calibration.detection.detection import Detection
 from tbcad.calibration.study import designed_setup
 from tbcad.machine.built import BuiltPrototype, random_build
 from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.calibration.machines import every_highlight
 
 ERRORS = process_errors(load_process("fdm"))

@@ -7,7 +7,7 @@ from tbcad.calibration.priors import prototype_prior
 from tbcad.geometry.vectors import unit
 from tbcad.machine.machine import Highlights, Machine
 from tbcad.optics.camera import Camera, without_distortion
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 AXIS = unit(np.array([1.0, 0.0, -1.0]))

@@ -14,7 +14,7 @@ from tbcad.calibration.priors import (
     shell_prior,
 )
 from tbcad.errors import InputError
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.calibration.machines import small_machine
 
 MACHINE = small_machine()

@@ -23,7 +23,7 @@ from tbcad.calibration.uncertainty import known_rays
 from tbcad.machine.designed import designed_shell, read_leds
 from tbcad.prototype.stage.leds import MIN_SEEN
 from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 
 NOISE_PX, SIGMA_MM = 0.05, 0.025
 

@@ -7,7 +7,7 @@ import pytest
 
 import tbcad.cli  # noqa: F401 - adds all commands
 from tbcad.cli import run
-from tbcad.cli.help_order import HEADINGS
+from tbcad.cli.help_texts import HEADINGS
 from tests.cli.commands import Words, commands, leaves, long_name, options
 
 WIDE = "2000"  # columns: no line of help is broken

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
+import tbcad
 from tbcad.cli import run
-from tbcad.optimize import search as search_module
-from tbcad.optimize.candidate import DesignCandidate, Figures, MachineLimits, Place
+from tbcad.errors import InputError
+from tbcad.optimizing import search as search_module
+from tbcad.optimizing.candidate import DesignCandidate, Figures, MachineLimits, Place
 from tbcad.spec.design import Spec
 from tests.exported_files import read_csv
 
@@ -52,6 +54,22 @@ def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert result["before"]["place"] == [100, -100, 100, 1, 1]
     assert result["after"]["figures"]["minimum_px"] > 100
     assert result["after"] in result["front"]
+
+
+def test_in_python(tmp_path: Path) -> None:
+    out = tmp_path / "found" / "better.toml"
+    asked = {"settings": ["n=4"], "out": out, "candidates": 80}
+    result = tbcad.optimize(objectives=("minimum",), **asked)  # type: ignore[call-overload]
+    assert result.best.figures.minimum_px > result.start.figures.minimum_px == 100
+    assert tbcad.load_spec(out).optics.semi_minor_mm == result.best.place[2]
+    again = tbcad.optimize(tbcad.load_spec(out), out=tmp_path / "more.toml", candidates=80)
+    assert again.start.place == result.best.place
+    with pytest.raises(InputError, match=r"better\.toml exists"):
+        tbcad.optimize(**asked)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match="design is 3, allowed is a spec, a design file"):
+        tbcad.optimize(3)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match="candidates is 3, allowed is a whole number from 80"):
+        tbcad.optimize(candidates=3)
 
 
 def test_a_search_that_was_stopped_goes_on(

@@ -13,7 +13,7 @@ import pytest
 
 import tbcad.cli  # noqa: F401 - adds all commands
 from tbcad.cli import run
-from tbcad.cli.examples import EXAMPLES
+from tbcad.cli.help_texts import EXAMPLES
 from tbcad.doctor import Finding
 from tests.cli.commands import Words, leaves, long_name, options
 

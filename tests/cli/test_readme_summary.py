@@ -11,7 +11,7 @@ from tbcad_verify.report.summary import MAX_LINES
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.screen import WIDTH
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.tolerance.as_made import as_made
+from tbcad.tolerancing.as_made import as_made
 
 README = Path(__file__).parents[2] / "README.md"
 

@@ -12,7 +12,6 @@ from PIL import Image
 from tbcad.api import reconstruct
 from tbcad.cli import run
 from tbcad.reconstruction import fitted
-from tbcad.reconstruction.options import Options
 from tests.ball_captures import ball, four, quick_choice  # noqa: F401 - fixtures
 
 SMALL = ("--nodes", "24", "--epochs", "3", "--order", "0")
@@ -34,7 +33,7 @@ def test_field_picture_and_verdict(
     assert record["psnr_left_out_db"] > 20
     assert np.asarray(Image.open(preview)).max() > 60
     assert {file.name for file in tmp_path.iterdir()} == {"it", "p.png"}
-    reconstruct(capture, out=tmp_path / "f.npz", options=Options(24, 3, "0"))
+    reconstruct(capture, out=tmp_path / "f.npz", nodes=24, epochs=3, order="0")
     assert (tmp_path / "f.npz").read_bytes() == (capture / "field.npz").read_bytes()
     mesh, volume = tmp_path / "ball.ply", tmp_path / "ball.vti"
     files = ("--mesh", str(mesh), "--volume", str(volume))

@@ -35,7 +35,7 @@ def _quick() -> Iterator[None]:
             "montecarlo.sharpness.VIEWPOINTS": ((60.0,), 1, 640.0),
             "analysis.BUILT_IN": ("sla", "diamond"),
         }.items():
-            patch.setattr(f"tbcad.tolerance.{name}", value)
+            patch.setattr(f"tbcad.tolerancing.{name}", value)
         yield
 
 
@@ -194,7 +194,7 @@ def test_target_that_is_a_file_is_refused_at_once(
     def never(*_: object) -> None:
         raise AssertionError("worked before it looked")
 
-    monkeypatch.setattr("tbcad.tolerance.analysis.analyse", never)
+    monkeypatch.setattr("tbcad.tolerancing.analysis.analyse", never)
     (tmp_path / "file").write_text("mine")
     assert run(["tolerance", str(bare), "--out", str(tmp_path / "file")]) == 2
     _one_line(capsys, "file")

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import tbcad
 from tbcad.cli import run
+from tbcad.errors import InputError
 from tbcad.simulate.capture.light_field import LightField
 from tests.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, write_ball
 
@@ -39,6 +41,20 @@ def refused(folder: Path, words: str, capsys: pytest.CaptureFixture[str], *more:
     error = capsys.readouterr().err
     assert words in error.splitlines()[-1]
     assert not (folder.parent / "v.png").exists()
+
+
+def test_by_its_path_in_python(folder: Path, captured: Path) -> None:
+    light_field, size = LightField.open(captured), (160, 120)
+    views = tbcad.Views(str(folder))
+    ball = views.view(size=size).image
+    assert tuple(ball[60, 80]) == COLOUR_8
+    knot = tbcad.view(light_field, size=size, method="nearest").image
+    assert np.array_equal(views.view(size=size, method="nearest").image, knot)
+    assert np.array_equal(tbcad.view(captured, size=size, method="nearest").image, knot)
+    with pytest.raises(InputError, match="source is 3, allowed is a light field, the folder"):
+        tbcad.view(3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="no such file; give a light field"):
+        tbcad.view(folder.parent)
 
 
 @pytest.mark.parametrize(

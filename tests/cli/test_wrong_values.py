@@ -40,9 +40,9 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
 
     for name in ("build", "photograph", "analyse", "verify", "simulate_run"):
         monkeypatch.setattr(f"tbcad.api.{name}", begun)
-    monkeypatch.setattr("tbcad.tolerance.process_design.edges_for_process", begun)
+    monkeypatch.setattr("tbcad.tolerancing.process_design.edges_for_process", begun)
     monkeypatch.setattr("tbcad.cli.study_output.stages", begun)
-    monkeypatch.setattr("tbcad.cli.optimize.stages", begun)
+    monkeypatch.setattr("tbcad.api.designs._checked_store", begun)
     monkeypatch.setattr("tbcad.doctor.diagnose", begun)
     monkeypatch.chdir(tmp_path)
 

@@ -8,11 +8,13 @@ import pytest
 import tbcad
 from tbcad.depth.depth_map import depth_views
 from tbcad.depth.plane_sweep import QUICK
+from tbcad.errors import InputError
 from tbcad.simulate.capture.photograph import to_bytes
 from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.ground_truth import pinhole_picture
 from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.refocus import ThinLens, refocus
 from tbcad.simulate.views.viewpoints import image_quality
 from tests.depth.test_depth_map import CAPTURE_MM, tiles  # noqa: F401
 from tests.simulate.conftest import knot  # noqa: F401
@@ -40,6 +42,18 @@ def test_views_from_python_are_those_of_one_at_a_time(
         once = tbcad.view(tiles.source, azimuth, 25.0, size=(96, 72), method=method)
         again = views.view(azimuth, 25.0, size=(96, 72), method=method)
         assert np.array_equal(again.colour, once.colour)
+
+
+def test_refocused_from_python(tiles: MirrorTiles) -> None:  # noqa: F811
+    view = camera_around_object(np.radians(20), np.radians(25), 640.0, CAPTURE_MM, (96, 72))
+    expected = refocus(tiles, view, ThinLens(200, 10)).colour
+    asked = {"aperture_mm": 200, "size": (96, 72)}
+    found = tbcad.refocus(tiles.source, 20, 25, focus_mm=10, **asked)  # type: ignore[arg-type]
+    assert np.array_equal(found.colour, expected)
+    sharp = tbcad.refocus(tiles.source, 20, 25, all_in_focus=True, **asked)  # type: ignore[arg-type]
+    assert not np.array_equal(sharp.colour, expected)
+    with pytest.raises(InputError, match="--focus 200 is far from the object"):
+        tbcad.refocus(tiles.source, focus_mm=200)
 
 
 def test_a_quick_view_has_fewer_points_of_depth(tiles: MirrorTiles) -> None:  # noqa: F811

@@ -11,7 +11,7 @@ from tbcad.machine.machine import Machine
 from tbcad.optics.camera import without_distortion
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.simulate.prototype.plan import Plan
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tests.prototype_exports import plan_of
 
 LEDS = np.array([[18.0, 14.0, -8.0], [-10.0, -20.0, -5.0]])

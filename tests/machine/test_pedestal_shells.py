@@ -22,9 +22,9 @@ from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulate.scene.reflector import Reflector
 from tbcad.simulated_run.led_light import LightPoints, Occluders, balls_of_frame, led_light
 from tbcad.simulated_run.photographs import object_light, pixel_directions
-from tbcad.tolerance.montecarlo.draws import draw
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sharpness import built_reflector
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sharpness import built_reflector
 from tests.pedestal_designs import pedestal_design
 
 SETTINGS = ("n=6", "camera.width_px=416", "camera.height_px=310", "shell.groove_mm=0.4")

@@ -27,9 +27,9 @@ from tbcad.simulate.scene.ray_casting import prepared_scene
 from tbcad.simulate.scene.rays import exact_tracer
 from tbcad.simulated_run.led_light import balls_of_frame
 from tbcad.simulated_run.photographs import object_light, pixel_directions
-from tbcad.tolerance.montecarlo.draws import draw
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sharpness import built_reflector
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sharpness import built_reflector
 
 FLIPS = (np.ones(3), HALF_TURN)
 ROWS = slice(60, 300, 8)  # of the picture, that are compared

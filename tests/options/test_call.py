@@ -2,18 +2,28 @@
 
 import inspect
 import json
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
+from itertools import repeat
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
+from unittest.mock import Mock
 
 import pytest
 import typer
 
 import tbcad
+from tbcad.calibration.run import WrittenCalibration
 from tbcad.errors import InputError
 from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
+from tbcad.runs.photographs import Run
+
+ONLY_WRITTEN = {
+    *("json", "all_frames", "mesh", "prototype"),
+    *("no_preflight", "preflight_only", "yes", "dry_run", "full", "quiet", "as_built"),
+}
+ONLY_PYTHON = {"progress", "detail", "answer", "ask", "show", "preflight", "geometry"}
 
 
 @dataclass(frozen=True)
@@ -24,6 +34,7 @@ class Polish(Call):
     _: KW_ONLY
     passes: Annotated[int, typer.Option(min=1, max=9, help="How often.")] = 2
     grits: Annotated[tuple[float, ...], typer.Option(help="One after the other.")] = ()
+    side: Annotated[Literal["back", "front"], "Which is polished."] = "front"
 
 
 @keywords(Polish)
@@ -44,16 +55,33 @@ def test_fields_are_keywords() -> None:
     assert shown.parameters["passes"].default == 2
     assert shown.parameters["passes"].kind is inspect.Parameter.KEYWORD_ONLY
     assert shown.parameters["passes"].annotation is int
-    assert [*shown.parameters] == ["mirror", "passes", "grits", "progress", "detail", "answer"]
+    assert [*shown.parameters] == [
+        "mirror",
+        "passes",
+        "grits",
+        "side",
+        "progress",
+        "detail",
+        "answer",
+    ]
     assert shown.return_annotation is str
     with pytest.raises(TypeError, match="passs"):
         polish("m.step", passs=3)  # type: ignore[call-overload]
 
 
+def test_what_lies_in_a_folder_stands_for_its_path() -> None:
+    run = Run(Path("runs/first"), *repeat(Mock(), 3))
+    assert Polish(run).mirror == Path("runs/first")
+    halves = [WrittenCalibration(Path(f"c/{name}"), *repeat(Mock(), 4)) for name in "ab"]
+    assert Path(halves[0]) == Path("c/a")
+    assert Path(replace(halves[0], others=(halves[1],))) == Path("c")
+
+
 def test_help_texts_are_the_arguments() -> None:
     assert inspect.getdoc(polish) == (
         "Polish a mirror.\n\nArgs:\n    mirror: File of the mirror.\n    passes: How often.\n"
-        "    grits: One after the other.\n\nReturns:\n    What was done."
+        "    grits: One after the other.\n    side: Which is polished.\n\n"
+        "Returns:\n    What was done."
     )
 
 
@@ -63,6 +91,7 @@ def test_help_texts_are_the_arguments() -> None:
         ({"passes": 10}, "passes is 10, allowed is a whole number from 1 to 9: change it"),
         ({"passes": "2"}, "passes is '2', allowed is a whole number from 1 to 9: change it"),
         ({"mirror": 3}, "mirror is 3, allowed is a path: change it"),
+        ({"side": "left"}, "side is 'left', allowed is back or front: change it"),
     ],
 )
 def test_wrong_values_are_one_line(given: dict[str, object], message: str) -> None:
@@ -88,13 +117,19 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
     assert shown["exports"].annotation.__origin__ is Path
 
 
-@pytest.mark.parametrize("name", ["calibrate", "export", "intrinsics", "merge", "simulate_run"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("build", "calibrate", "capture", "export", "intrinsics", "merge", "reconstruct"),
+        *("run", "simulate_run", "verify"),
+    ],
+)
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     from tests.cli.commands import leaves
 
     command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
     python = set(inspect.signature(getattr(tbcad, name)).parameters)
-    assert command - {"json"} == python - {"progress", "detail", "answer"}
+    assert command - ONLY_WRITTEN == python - ONLY_PYTHON
 
 
 def test_what_is_wanted_is_said_in_one_line(tmp_path: Path) -> None:

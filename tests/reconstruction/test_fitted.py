@@ -4,21 +4,23 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tbcad.api import reconstruct
 from tbcad.errors import InputError
+from tbcad.options.captures import ReconstructOptions
 from tbcad.reconstruction.checkpoint import part_file
 from tbcad.reconstruction.field import read_field
-from tbcad.reconstruction.fitted import Told, levels, reconstruction, used_rays
-from tbcad.reconstruction.options import Options
+from tbcad.reconstruction.fitted import levels, reconstruction, used_rays
 from tbcad.reconstruction.rays import captured_rays
 from tbcad.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tests.ball_captures import RADIUS_MM, ball, four, quick_choice, without_trials  # noqa: F401 - fixtures
 
-SMALL = Options(nodes=24, epochs=3, order="0")
+SMALL: dict[str, Any] = {"nodes": 24, "epochs": 3, "order": "0"}
+ASKED = ReconstructOptions("", **SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +28,7 @@ def made(ball: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:  # noqa:
     out = tmp_path_factory.mktemp("made") / "field.npz"
     with pytest.MonkeyPatch.context() as patch:
         without_trials(patch)
-        reconstruct(ball, out=out, options=SMALL)
+        reconstruct(ball, out=out, **SMALL)
     return out
 
 
@@ -60,7 +62,7 @@ def test_same_bytes_on_another_number_of_threads(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("tbcad.simulate.parallel.THREADS", 3)
-    reconstruct(ball, out=tmp_path / "again.npz", options=SMALL)
+    reconstruct(ball, out=tmp_path / "again.npz", **SMALL)
     assert (tmp_path / "again.npz").read_bytes() == made.read_bytes()
 
 
@@ -73,49 +75,51 @@ def test_same_bytes_after_a_stop(
 ) -> None:
     out = tmp_path / "field.npz"
     with pytest.raises(KeyboardInterrupt):
-        reconstruct(ball, out=out, options=SMALL, detail=stopped_after(epochs))
+        reconstruct(ball, out=out, **SMALL, detail=stopped_after(epochs))
     assert [file.name for file in tmp_path.iterdir()] == [".field.npz.part"]
     with pytest.raises(InputError, match="go on with --resume, or begin anew with --force"):
-        reconstruct(ball, out=out, options=SMALL)
+        reconstruct(ball, out=out, **SMALL)
     told: list[str] = []
-    reconstruct(ball, out=out, options=SMALL, resume=True, detail=told.append)
+    reconstruct(ball, out=out, **SMALL, resume=True, detail=told.append)
     assert out.read_bytes() == made.read_bytes()
     assert [file.name for file in tmp_path.iterdir()] == ["field.npz"]
-    assert len(told) == sum(level.epochs for level in levels(SMALL)) - epochs
+    assert len(told) == sum(level.epochs for level in levels(ASKED)) - epochs
 
 
 def test_same_bytes_after_a_stop_where_pixels_have_an_area(ball: Path, tmp_path: Path) -> None:  # noqa: F811
     """The grids before the last have single rays: also where the stop is between them."""
-    options = Options(nodes=16, epochs=2, order="1", rays=4, blur_px=0.4)
+    options: dict[str, Any] = {"nodes": 16, "epochs": 2, "order": "1", "rays": 4, "blur_px": 0.4}
     whole, out = tmp_path / "whole.npz", tmp_path / "field.npz"
-    reconstruct(ball, out=whole, options=options)
+    reconstruct(ball, out=whole, **options)
     assert read_field(whole).facts["rays_a_pixel"] == 4
     with pytest.raises(KeyboardInterrupt):
-        reconstruct(ball, out=out, options=options, detail=stopped_after(3))
-    reconstruct(ball, out=out, options=options, resume=True)
+        reconstruct(ball, out=out, **options, detail=stopped_after(3))
+    reconstruct(ball, out=out, **options, resume=True)
     assert out.read_bytes() == whole.read_bytes()
 
 
 def test_a_checkpoint_of_other_options_is_refused(ball: Path, tmp_path: Path) -> None:  # noqa: F811
     out = tmp_path / "field.npz"
     with pytest.raises(KeyboardInterrupt):
-        reconstruct(ball, out=out, options=SMALL, detail=stopped_after(1))
+        reconstruct(ball, out=out, **SMALL, detail=stopped_after(1))
     kept = part_file(out).read_bytes()
-    others = [(Options(nodes=24, epochs=3, order="0", seed=1), None, "is of seed 0, not 1")]
-    others += [(Options(nodes=30, epochs=3, order="0"), None, "is of nodes 24, not 30")]
-    for options, frame, message in [*others, (SMALL, 1, "is of another capture")]:
+    for other, message in (
+        ({"seed": 1}, "is of seed 0, not 1"),
+        ({"nodes": 30}, "is of nodes 24, not 30"),
+        ({"frame": 1}, "is of another capture"),
+    ):
         with pytest.raises(InputError, match=message):
-            reconstruct(ball, out=out, options=options, frame=frame, resume=True)
+            reconstruct(ball, out=out, resume=True, **{**SMALL, **other})
     assert part_file(out).read_bytes() == kept
     part_file(out).write_bytes(kept[:-2000])
     with pytest.raises(InputError, match=r"is damaged .*: begin anew with --force"):
-        reconstruct(ball, out=out, options=SMALL, resume=True)
+        reconstruct(ball, out=out, **SMALL, resume=True)
 
 
 def test_frames_start_from_the_one_before(ball: Path, tmp_path: Path) -> None:  # noqa: F811
     stages: list[str] = []
     out = tmp_path / "turn.npz"
-    reconstruct(ball, out=out, options=SMALL, frame="all", progress=stages.append)
+    reconstruct(ball, out=out, **SMALL, frame="all", progress=stages.append)
     first, second = (read_field(tmp_path / f"turn-{k}.npz").facts for k in (0, 1))
     assert first["started_from"] is None
     assert second["started_from"] == first["light_field"] != second["light_field"]
@@ -124,7 +128,7 @@ def test_frames_start_from_the_one_before(ball: Path, tmp_path: Path) -> None:  
     assert second["psnr_left_out_db"] > first["psnr_left_out_db"] - 1
     whole = (tmp_path / "turn-1.npz").read_bytes()
     (tmp_path / "turn-1.npz").unlink()
-    reconstruct(ball, out=out, options=SMALL, frame="all", resume=True)
+    reconstruct(ball, out=out, **SMALL, frame="all", resume=True)
     assert (tmp_path / "turn-1.npz").read_bytes() == whole
 
 
@@ -157,7 +161,7 @@ def test_what_shows_nothing_is_refused(case: str, ball: Path) -> None:  # noqa: 
         "away": "no ray of the light field meets its capture sphere",
     }[case]
     with pytest.raises(InputError, match=message):
-        reconstruction(source, SMALL, Told(print, print))
+        reconstruction(source, ASKED)
 
 
 def test_light_that_no_hull_explains(ball: Path) -> None:  # noqa: F811
@@ -166,7 +170,7 @@ def test_light_that_no_hull_explains(ball: Path) -> None:  # noqa: F811
     frame = source.frames["a"]
     alone = frame.planes["mirror"] == 20
     frame.planes["colour"][alone] = 200
-    facts = reconstruction(source, Options(nodes=72, epochs=1), Told(print, print)).facts
+    facts = reconstruction(source, ReconstructOptions("", nodes=72, epochs=1)).facts
     assert 0.0003 < facts["unexplained_light"] < 0.1
 
 
@@ -178,5 +182,5 @@ def test_mirrors_that_are_known_badly_count_less(ball: Path) -> None:  # noqa: F
         for name, frame in source.frames.items()
     }
     known = replace(source, facts={**source.facts, RAY_SIGMAS: told})
-    even, weighted = (reconstruction(one, SMALL, Told(print, print)) for one in (source, known))
+    even, weighted = (reconstruction(one, ASKED) for one in (source, known))
     assert not np.array_equal(even.values, weighted.values)

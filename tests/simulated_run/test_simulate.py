@@ -15,8 +15,8 @@ from tbcad.runs.photographs import read_photograph, read_run
 from tbcad.simulate.prototype.plan import read_plan
 from tbcad.simulate.scene.exported import read_export
 from tbcad.simulated_run import simulate
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.prototype.draws import read_wind_up
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
 from tests.exported_files import contents
 from tests.prototype_records import printed_part, write_prototype
 from tests.simulated_runs import Small, fdm_errors, small_run

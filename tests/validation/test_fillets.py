@@ -8,10 +8,10 @@ from tbcad.mirrors.array import design
 from tbcad.optics.reflection import reflect
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
-from tbcad.tolerance.montecarlo.draws import draw
-from tbcad.tolerance.montecarlo.edge_model import edge_model, edge_models
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_model, edge_models
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 
 DIRECTIONS, HALVINGS = 360, 30
 

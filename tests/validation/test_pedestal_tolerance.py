@@ -14,18 +14,18 @@ from tbcad.mirrors.record import write_record
 from tbcad.optics.reflection import miss_distances
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.tolerance.as_made import as_made
-from tbcad.tolerance.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
-from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage
-from tbcad.tolerance.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sensitivity import scaled, shell_kinds
-from tbcad.tolerance.montecarlo.warp import pivots, smooth_field
+from tbcad.tolerancing.as_made import as_made
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sensitivity import scaled, shell_kinds
+from tbcad.tolerancing.montecarlo.warp import pivots, smooth_field
 from tests.pedestal_designs import pedestal_design
-from tests.tolerance.exact_builds import traced_coverage, verified_coverage, write_meshes
-from tests.tolerance.exact_fields import displaced_coverage
-from tests.tolerance.montecarlo.every_edge import every_edge
+from tests.tolerancing.exact_builds import traced_coverage, verified_coverage, write_meshes
+from tests.tolerancing.exact_fields import displaced_coverage
+from tests.tolerancing.montecarlo.every_edge import every_edge
 
 COARSE = Errors(
     sphere_centre=Error(0.03),

@@ -16,12 +16,12 @@ from tbcad.mirrors.record import write_record
 from tbcad.output.manifest import write_manifest
 from tbcad.simulate.scene.reflector import reflectors
 from tbcad.spec.load import load_spec
-from tbcad.tolerance.montecarlo.coverage import coverage, mirror_coverage, pointing
-from tbcad.tolerance.montecarlo.draws import ShellDraws, draw
-from tbcad.tolerance.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sensitivity import scaled
-from tests.tolerance.exact_builds import (
+from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, pointing
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sensitivity import scaled
+from tests.tolerancing.exact_builds import (
     bisected_coverage,
     traced_coverage,
     verified_coverage,

@@ -13,18 +13,18 @@ and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64, and boxes
 columns x0, x1 and rows y0, y1, ends excluded, that hold all of a mirror's pixels.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.formats.hdf5 import StoredGroup, open_hdf5
+from tbcad.formats.hdf5 import StoredGroup, opened_hdf5
 from tbcad.optics.camera import Camera
 from tbcad.optics.surfaces import Surfaces
 from tbcad.picture_bytes import png_bytes
@@ -87,25 +87,39 @@ class LightField:
     capture_mm: float
     facts: dict[str, Any]
 
+    _store: h5py.File | None = field(default=None, repr=False, compare=False)
+
     @staticmethod
-    @contextmanager
-    def open(path: Path) -> Iterator["LightField"]:
+    def open(path: Path | str) -> "LightField":
         """Open a file, or the file in a folder that `tbcad capture` wrote, for reading.
+
+        The file is closed at the end of a `with` block, by `close`, or when nothing of it is used.
 
         Raises:
             InputError: it cannot be read, or is no light field of this schema.
         """
-        file = path / NAME if path.is_dir() else path
+        file = Path(path) / NAME if Path(path).is_dir() else Path(path)
         if not file.is_file():
             raise InputError(
                 f"{file}: no such file; give a light field: the folder that `tbcad capture` or "
                 "`tbcad merge` wrote, or its lightfield.h5"
             )
-        with open_hdf5(file, SCHEMA, "light field", "capture again", _read) as stored:
-            yield stored
+        store, found = opened_hdf5(file, SCHEMA, "light field", "capture again", _read)
+        return replace(found, _store=store)
+
+    def close(self) -> None:
+        """Close the file, if it is in one."""
+        if self._store is not None:
+            self._store.close()
+
+    def __enter__(self) -> "LightField":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     @staticmethod
-    def read(path: Path) -> "LightField":
+    def read(path: Path | str) -> "LightField":
         """Read a whole file, or the file in a folder that `tbcad capture` wrote, into memory.
 
         Raises:
@@ -116,7 +130,7 @@ class LightField:
                 name: replace(frame, planes=frame.read(slice(None)))
                 for name, frame in stored.frames.items()
             }
-            return replace(stored, frames=frames)
+            return replace(stored, frames=frames, _store=None)
 
     def __len__(self) -> int:
         return sum(len(frame.u) for frame in self.frames.values())

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -78,7 +79,7 @@ class ObjectOptions:
 
 
 def load_or_built_in(
-    path: Path | str | None,
+    path: str | PathLike[str] | None,
     capture_mm: float,
     options: ObjectOptions | None = None,
     told: Progress | None = None,

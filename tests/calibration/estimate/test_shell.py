@@ -11,7 +11,7 @@ from tbcad.calibration.uncertainty import ray_uncertainty
 from tbcad.machine.designed import designed_shell
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.simulate.scene.reflector import reflectors
-from tbcad.tolerance.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.calibration.machines import LEDS, drawn, every_highlight
 
 HIGHLIGHTS = 4

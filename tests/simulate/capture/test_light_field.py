@@ -1,5 +1,6 @@
 """The light field's file: what is written is read, in parts too; other files are refused."""
 
+import gc
 from io import BytesIO
 from pathlib import Path
 
@@ -130,6 +131,18 @@ def _changed(store: h5py.File, change: str) -> None:
         group.create_dataset(
             "colour", (310, 416, 3), "u1", external=[("/etc/hostname", 0, 386_880)]
         )
+
+
+def test_a_file_stays_open_while_it_is_used(file: Path, light_field: LightField) -> None:
+    frames = LightField.open(str(file)).frames
+    gc.collect()
+    part = frames["b"].read(slice(50, 60))["origin"]
+    assert np.array_equal(part, light_field.frames["b"].planes["origin"][50:60])
+    with LightField.open(file) as source:
+        kept = source.frames["a"]
+    with pytest.raises(InputError, match="the file is closed"):
+        kept.image()
+    source.close()
 
 
 def test_missing_file(tmp_path: Path) -> None:

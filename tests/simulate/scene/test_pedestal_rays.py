@@ -15,11 +15,11 @@ from tbcad.simulate.scene.ray_casting import Scene
 from tbcad.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.simulate.scene.reflector import Reflector, reflectors
 from tbcad.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
-from tbcad.tolerance.montecarlo.coverage import mirror_coverage
-from tbcad.tolerance.montecarlo.draws import draw
-from tbcad.tolerance.montecarlo.edge_model import edge_model
-from tbcad.tolerance.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerance.montecarlo.sharpness import built_reflector
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_model
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sharpness import built_reflector
 from tests.pedestal_designs import pedestal_design
 from tests.shell_meshes import export_with_meshes
 

@@ -1,0 +1,213 @@
+"""The folder of an inspection: a table and a STEP file with tolerances for each half, a record."""
+
+import json
+from dataclasses import dataclass
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.cad.brep import Solid
+from tbcad.cad.solids import cylinder_radius
+from tbcad.errors import InputError
+from tbcad.formats.csv_table import Row, write_table
+from tbcad.formats.step import read_named_solid
+from tbcad.formats.step_tolerances import FaceTolerances, write_tolerances
+from tbcad.mirror_limits.limits import MirrorLimits
+from tbcad.mirror_limits.read_back import check_read_back
+from tbcad.mirror_limits.sensitivity import MM_PER_UM, Sensitivities
+from tbcad.mirrors.array import mirror_ids
+from tbcad.optics.cells import Cells
+from tbcad.optics.pedestals.cells import PedestalCells
+from tbcad.optics.power_diagram import PLANES
+from tbcad.optics.surfaces import Surfaces
+from tbcad.shell.files import wall_names
+from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.types import Floats
+
+SCHEMA = "tbcad-inspection/1"
+RECORD = "inspection.json"
+DATUM_FACES = {"A": "foot", "B": "seam"}
+WAVELENGTH_NM = 550.0  # the middle of the visible
+SCATTERED = 0.01  # share of the light that roughness may scatter: a judgement
+UNITS = ("offset_um", "tilt_mrad", "radius_mm", "wall_um")
+SPHERE_KINDS = UNITS[:3]
+COLUMNS = (
+    *("id", "centre_x_mm", "centre_y_mm", "centre_z_mm", "radius_mm"),
+    *("apex_x_mm", "apex_y_mm", "apex_z_mm", "normal_x", "normal_y", "normal_z"),
+    *("offset_limit_um", "tilt_limit_mrad", "radius_limit_mm", "profile_mm"),
+    *("offset_sigma_um", "tilt_sigma_mrad", "radius_sigma_mm"),
+)
+WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um")  # of mirrors on pedestals
+
+
+@dataclass(frozen=True)
+class Half:
+    """One half of the shell, as its solid is.
+
+    Attributes:
+        name: of its solid, "shell_a".
+        surfaces: of the solid, below the coat.
+        dowel_mm: diameter of the holes for dowel pins.
+        walls: of each mirror's pedestal: names of the faces, with a point (mm) and the normal of
+            their planes, (6,); none where spheres meet.
+    """
+
+    name: str
+    ids: tuple[str, ...]
+    surfaces: Surfaces
+    limits: MirrorLimits
+    dowel_mm: float
+    walls: tuple[dict[str, Floats], ...]
+
+    @property
+    def profile_mm(self) -> Floats:
+        """Width of the zone about each mirror that its offset leaves, mm, (m,)."""
+        return np.round(2 * MM_PER_UM * self.limits.each[:, 0], 6)
+
+    @property
+    def wall_um(self) -> Floats | None:
+        """By how much the walls of each pedestal may be off, (m,); None where spheres meet."""
+        each = self.limits.each
+        return each[:, len(SPHERE_KINDS)] if each.shape[1] > len(SPHERE_KINDS) else None
+
+    @property
+    def wall_profile_mm(self) -> list[float]:
+        """Width of the zones about the walls of each pedestal, mm; none where spheres meet."""
+        wall = self.wall_um
+        return [] if wall is None else np.round(2 * MM_PER_UM * wall, 6).tolist()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the table."""
+        return COLUMNS if self.wall_um is None else COLUMNS + WALL_COLUMNS
+
+    def rows(self) -> list[Row]:
+        """Rows of the table."""
+        each, sigma = (
+            np.hsplit(of, [len(SPHERE_KINDS)]) for of in (self.limits.each, self.limits.sigma)
+        )
+        numbers = np.column_stack(
+            [
+                *(self.surfaces.centre, self.surfaces.radius, self.surfaces.apex),
+                *(self.surfaces.normal, each[0], self.profile_mm, sigma[0], each[1], sigma[1]),
+            ]
+        ).tolist()
+        named = zip(self.ids, numbers, strict=True)
+        return [dict(zip(self.columns, (name, *row), strict=True)) for name, row in named]
+
+
+def halves(export: ExportedDesign, limits: MirrorLimits) -> tuple[Half, Half]:
+    """Both halves of an export with their part of the limits."""
+    coat = export.spec.mirrors.coating_um * MM_PER_UM
+    m = len(export.reflectors[0])
+    a, b = (
+        Half(
+            f"shell_{one.camera_id}",
+            tuple(mirror_ids(one.camera_id, m)),
+            one.mirrors.offset(-coat),
+            MirrorLimits(limits.each[k * m :][:m], limits.sigma[k * m :][:m], limits.seat_um),
+            export.spec.shell.foot_flange.dowel_hole_mm,
+            _walls(tuple(mirror_ids(one.camera_id, m)), one.cells),
+        )
+        for k, one in enumerate(export.reflectors)
+    )
+    return a, b
+
+
+def _walls(ids: tuple[str, ...], cells: Cells) -> tuple[dict[str, Floats], ...]:
+    """Walls of each mirror's pedestal, as `Half` has them; none where spheres meet."""
+    if not isinstance(cells, PedestalCells):
+        return ()
+    planes = cells.surfaces.subset(slice(cells.mirrors + PLANES, None))
+    poses = zip(
+        cells.walls[:, 0].tolist(),
+        wall_names(ids, cells),
+        np.hstack([planes.apex, planes.normal]),
+        strict=True,
+    )
+    walls: tuple[dict[str, Floats], ...] = tuple({} for _ in ids)
+    for mirror, name, plane in poses:
+        walls[mirror][name] = plane
+    return walls
+
+
+def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
+    """Write table and STEP file of one half, read the tolerances back, and name both files.
+
+    Raises:
+        InputError: the export has no such solid, or it is not that of its mirrors.
+    """
+    table, step = f"inspection_{half.name[-1]}.csv", f"{half.name}_tolerances.step"
+    write_table(folder / table, half.columns, half.rows())
+    solid = read_named_solid(export / f"{half.name}.step")
+    names = {name for name, _ in solid.faces}
+    missing = sorted({*half.ids, *DATUM_FACES.values()} - names)
+    if missing:
+        raise InputError(f"{export / half.name}.step has no face {missing[0]}: run tbcad build")
+    given = tolerances(half, dowel_face(solid, half.dowel_mm))
+    write_tolerances(folder / step, solid, given)
+    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
+    walls = {name: plane for of_mirror in half.walls for name, plane in of_mirror.items()}
+    check_read_back(folder / step, given, centres, walls)
+    return {"table": table, "solid": step}
+
+
+def tolerances(half: Half, dowel: str) -> FaceTolerances:
+    """What the faces of a half may be off."""
+    seat = half.limits.seat_um * MM_PER_UM
+    radius = zip(half.surfaces.radius.tolist(), half.limits.each[:, 2].tolist(), strict=True)
+    return FaceTolerances(
+        datums=DATUM_FACES | {"C": dowel},
+        flatness=dict.fromkeys(DATUM_FACES.values(), seat),
+        profile=dict(zip(half.ids, half.profile_mm.tolist(), strict=True)),
+        radius=dict(zip(half.ids, radius, strict=True)),
+        notes=notes(half.wall_um),
+        common_profile=dict(zip(map(tuple, half.walls), half.wall_profile_mm, strict=True)),
+    )
+
+
+def dowel_face(solid: Solid, diameter: float) -> str:
+    """Name of the first dowel hole in the foot flange."""
+    holes = (one for one in solid.faces if one[0].startswith("foot_hole"))
+    return next(name for name, face in holes if isclose(2 * cylinder_radius(face), diameter))
+
+
+def notes(wall_um: Floats | None = None) -> dict[str, str]:
+    """What tolerances of faces cannot say; walls of pedestals may be off by micrometres, (m,)."""
+    walls = {}
+    if wall_um is not None:
+        limit = f"{wall_um.min():.1f} um along their normals, or as the zones allow"
+        walls["walls of grooves"] = f"zones hold at the edges of mirrors: within {limit}"
+    return walls | {
+        "surface finish": f"mirrors polished, Rq {roughness_nm():.1f} nm or better",
+        "limits": "of mirrors: as reflecting, coated; each zone by its own mirror",
+        "datums": "A foot plane, B seam plane, C dowel hole",
+    }
+
+
+def roughness_nm() -> float:
+    """RMS roughness that scatters the share of light: (4 pi Rq / wavelength)^2 (ISO 10110-8)."""
+    return WAVELENGTH_NM * float(np.sqrt(SCATTERED)) / (4 * np.pi)
+
+
+def write_record(
+    folder: Path, found: Sensitivities, limits: MirrorLimits, facts: dict[str, Any]
+) -> dict[str, Any]:
+    """Write the record of an inspection, and return it."""
+    smallest = limits.each.min(axis=0).tolist()
+    median = np.median(limits.each, axis=0).tolist()
+    record = {
+        "schema": SCHEMA,
+        **facts,
+        "designed_minimum_mm": float(found.coverage.min()),
+        "limits": {
+            "smallest": dict(zip(UNITS, smallest, strict=False)),
+            "median": dict(zip(UNITS, median, strict=False)),
+            "seat_um": limits.seat_um,
+            "roughness_rq_nm": roughness_nm(),
+        },
+    }
+    (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    return record

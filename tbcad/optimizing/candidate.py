@@ -1,0 +1,214 @@
+"""What is varied, and what a candidate is judged by."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from pydantic import ValidationError
+
+from tbcad.errors import InputError
+from tbcad.formats.checked_files import parse_json
+from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.optimizing.views import ViewsBy, mean_ssim
+from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels
+from tbcad.spec.design import FIT, Spec, spec_with
+from tbcad.spec.errors import SpecError
+from tbcad.types import Floats, Ints
+
+STEP_MM = 0.5  # of lengths: finer changes no figure that counts
+STRETCH_STEP, STRETCH_DIGITS = 0.05, 2
+STRETCH = (0.8, 2.0)  # least and largest that are tried
+LEAST = 0.4  # of what the first design has, of all lengths
+# At most, of the largest machine's longest side; a pinhole is on either side.
+CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
+
+Place = tuple[float, float, float, float, float]
+"""Camera's x and z, and the semi-minor axis, mm; stretch of the directions along x and y."""
+SCHEMA = "tbcad-candidates/2"
+Record: TypeAlias = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a design gives.
+
+    Attributes:
+        minimum_px: pixels that show the capture sphere, of the virtual camera with fewest.
+        median_px: of all virtual cameras.
+        mean_log_px: mean of the natural logarithm of the pixels of all virtual cameras.
+        variation: standard deviation of the pixels over their mean.
+        size_mm: longest side of the box round all mirrors' apices and both pinholes.
+        view_angle_deg: that the lenses need, across the columns.
+        ssim: mean over the stated views; None where it was not measured.
+    """
+
+    minimum_px: float
+    median_px: float
+    mean_log_px: float
+    variation: float
+    size_mm: float
+    view_angle_deg: float
+    ssim: float | None = None
+
+
+@dataclass(frozen=True)
+class MachineLimits:
+    """What a candidate may need at most.
+
+    Attributes:
+        size_mm: longest side of the machine.
+    """
+
+    size_mm: float
+    view_angle_deg: float
+
+    def excess(self, figures: Figures) -> float:
+        """By how much figures exceed the limits, relatively; 0 where they hold."""
+        size = figures.size_mm / self.size_mm - 1
+        angle = figures.view_angle_deg / self.view_angle_deg - 1
+        return max(size, 0.0) + max(angle, 0.0)
+
+
+@dataclass(frozen=True)
+class DesignCandidate:
+    """A place and what it gives.
+
+    Attributes:
+        figures: None where it cannot be made.
+        reason: why it cannot, in one line.
+    """
+
+    place: Place
+    figures: Figures | None
+    reason: str = ""
+
+
+def place_of(spec: Spec) -> Place:
+    """What is varied, as a design has it."""
+    x, _, z = spec.optics.camera_mm
+    return x, z, spec.optics.semi_minor_mm, *spec.optics.stretch
+
+
+def bounds(spec: Spec, size_mm: float) -> list[tuple[float, float]]:
+    """Least and largest of each variable; the first design is within, whatever the size."""
+    x, z, semi_minor, *stretch = place_of(spec)
+    depth = max(CAMERA_Z * size_mm, -z)
+    return [
+        (LEAST * x, max(CAMERA_X * size_mm, x)),
+        (-depth, LEAST * z),
+        (LEAST * semi_minor, max(SEMI_MINOR * size_mm, semi_minor)),
+        *((min(STRETCH[0], one), max(STRETCH[1], one)) for one in stretch),
+    ]
+
+
+def rounded(place: Floats) -> Place:
+    """The nearest place on the grid."""
+    x, z, semi_minor = (np.round(place[:3] / STEP_MM) * STEP_MM).tolist()
+    steps = np.round(place[3:] / STRETCH_STEP) * STRETCH_STEP
+    along_x, along_y = np.round(steps, STRETCH_DIGITS).tolist()
+    return x, z, semi_minor, along_x, along_y
+
+
+def placed(spec: Spec, place: Place) -> Spec:
+    """A design with its camera, ellipsoid and directions elsewhere, and a lens that fits."""
+    x, z, semi_minor, *stretch = place
+    camera = (x, spec.optics.camera_mm[1], z)
+    moved = spec_with(
+        spec,
+        optics={"camera_mm": camera, "semi_minor_mm": semi_minor, "stretch": tuple(stretch)},
+        camera={"hfov_deg": FIT},
+    )
+    return Spec.model_validate(moved.model_dump(by_alias=True))
+
+
+def evaluate(
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: ViewsBy = "nearest"
+) -> DesignCandidate:
+    """Design the mirrors of a place, count pixels, and compare views within limits, if given."""
+    try:
+        designed = design(placed(spec, place))
+        figures = figures_of(designed)
+        if ssim_within and ssim_within.excess(figures) == 0:
+            figures = replace(figures, ssim=mean_ssim(designed, method))
+        return DesignCandidate(place, figures)
+    except ValidationError as error:
+        return DesignCandidate(place, None, error.errors()[0]["msg"])
+    except SpecError as error:
+        return DesignCandidate(place, None, str(error))
+
+
+def figures_of(designed: MirrorDesign) -> Figures:
+    """Figures of a design, of both halves together."""
+    array, camera = designed.arrays[0], designed.spec.camera
+    pixels, weight = virtual_camera_pixels(array, designed.spec)
+    mean = float(np.average(pixels, weights=weight))
+    variance = float(np.average((pixels - mean) ** 2, weights=weight))
+    return Figures(
+        minimum_px=float(pixels.min()),
+        median_px=float(np.median(np.repeat(pixels, weight))),
+        mean_log_px=float(np.average(np.log(np.maximum(pixels, 1)), weights=weight)),
+        variation=math.sqrt(variance) / mean,
+        size_mm=size_of(array),
+        view_angle_deg=float(camera.hfov_deg),
+    )
+
+
+def virtual_camera_pixels(array: MirrorArray, spec: Spec) -> tuple[Floats, Ints]:
+    """Pixels that show the capture sphere, (m,), and how many virtual cameras have as many, (m,).
+
+    The two halves of a mirror on the seam make one virtual camera, with the pixels of both.
+    """
+    sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
+    counts = count_pixels(array, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
+    halved = array.u[:, 0] == 0
+    return np.where(halved, 2, 1) * counts.seen, np.where(halved, 1, 2)
+
+
+def size_of(array: MirrorArray) -> float:
+    """Longest side of the box round all mirrors' apices and both pinholes, mm."""
+    apex = array.apex_distance[:, None] * array.u
+    points = np.abs(np.vstack([apex, array.camera.pinhole])[:, 0]).max()
+    rest = np.vstack([apex, array.camera.pinhole])[:, 1:]
+    return float(max(2 * points, *np.ptp(rest, axis=0)))
+
+
+def store_bytes(key: str, judged: dict[Place, DesignCandidate]) -> bytes:
+    """The file of candidates of the design with a key."""
+    head = {"schema": SCHEMA, "design": key}
+    rows = [head, *map(asdict, judged.values())]
+    return "".join(json.dumps(row) + "\n" for row in rows).encode()
+
+
+def read_store(store: Path, key: str) -> dict[Place, DesignCandidate]:
+    """Judgements of an earlier search of the same key; none where there is no file."""
+    if not store.exists():
+        return {}
+    try:
+        head, *rows = map(parse_json, store.read_text(encoding="utf-8").splitlines())
+        known = head["design"] == key
+        found = [_candidate(row) for row in rows]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
+    if not known:
+        raise InputError(
+            f"{store}: of another design or method: name another --out, or remove the file"
+        )
+    return {one.place: one for one in found}
+
+
+def _candidate(row: Record) -> DesignCandidate:
+    place, figures = row["place"], row["figures"]
+    x, z, semi_minor, along_x, along_y = np.array(place, dtype=float).tolist()
+    if figures is not None and not isinstance(figures, dict):
+        raise ValueError("figures are not an object")
+    numbers = {
+        name: None if number is None else float(number) for name, number in (figures or {}).items()
+    }
+    return DesignCandidate(
+        (x, z, semi_minor, along_x, along_y),
+        Figures(**numbers) if figures else None,  # type: ignore[arg-type]
+        str(row["reason"]),
+    )

@@ -1,0 +1,147 @@
+"""Calls about builds: made, verified, shown."""
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tbcad.errors import InputError
+from tbcad.options.call import Call
+from tbcad.options.checks import check_are_printers, check_is_folder
+from tbcad.options.designs import AnyDesign
+from tbcad.options.shared import AnyPath, Changes, Design, Exports, Force, OutReplaced
+
+DEFAULT_YIELD = 0.99
+
+
+@dataclass(frozen=True)
+class BuildOptions(Call):
+    """A design, what of it is built, and for which process."""
+
+    spec: Design[AnyDesign] = None
+    out: OutReplaced[AnyPath] = Path("exports")
+    _: KW_ONLY
+    n: Annotated[
+        int | str | None,
+        typer.Option(
+            metavar="N",
+            help="Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared.",
+        ),
+    ] = None
+    radius_rule: Annotated[
+        Literal["traced", "paper", "flat"] | None,
+        typer.Option(
+            help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 "
+            "and 2 of the paper; flat: planar mirrors."
+        ),
+    ] = None
+    settings: Annotated[
+        Changes,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."
+        ),
+    ] = ()
+    parts: Annotated[
+        str | Sequence[str] | None,
+        typer.Option(
+            help="What to build: shell, prototype, or shell,prototype. By default both, but no "
+            "prototype of planar mirrors."
+        ),
+    ] = None
+    for_process: Annotated[
+        str | None,
+        typer.Option(
+            "--for-process",
+            "--process",
+            metavar="NAME|FILE",
+            help="Choose edges and coverage margins for a manufacturing process, and say what they "
+            "cost: fdm, sls, sla, cnc, diamond, or a TOML file; see tbcad tolerance. A design that "
+            "names its edges keeps them.",
+        ),
+    ] = None
+    wanted_yield: Annotated[
+        float | None,
+        typer.Option(
+            "--yield",
+            help="With --for-process: share of simulated builds that must reach the target; by "
+            f"default {DEFAULT_YIELD:g}.",
+        ),
+    ] = None
+    verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True
+    force: Force = False
+
+
+@dataclass(frozen=True)
+class VerificationOptions(Call):
+    """An export, and what else to verify of it."""
+
+    exports: Exports[AnyPath]
+    _: KW_ONLY
+    printers: Annotated[
+        Sequence[str],
+        typer.Option(
+            "--printer",
+            metavar="NAME|FILE",
+            help="Fail unless every part can be made by this printer: fdm, sls, sla, cnc, or "
+            "a TOML file; repeatable.",
+        ),
+    ] = ()
+    clients: Annotated[
+        bool,
+        typer.Option(
+            "--clients", help="Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."
+        ),
+    ] = False
+    time_limit: Annotated[
+        float,
+        typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
+    ] = 600.0
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict",
+            help="Fail also where a file was changed that only people read, such as a parts list.",
+        ),
+    ] = False
+
+    def check(self) -> None:
+        """Refuse what cannot be, before heavy libraries are loaded.
+
+        Raises:
+            InputError: as said.
+        """
+        if not self.time_limit > 0:
+            raise InputError(f"--time-limit must be more than 0 seconds, not {self.time_limit:g}")
+        check_is_folder(Path(self.exports))
+        check_are_printers(self.printers)
+
+
+@dataclass(frozen=True)
+class ReportOptions(Call):
+    """An export, and what its page shows."""
+
+    exports: Exports[AnyPath]
+    out: Annotated[
+        AnyPath | None,
+        typer.Option(
+            "--out", "-o", help="HTML file to write; by default report.html in the folder."
+        ),
+    ] = None
+    _: KW_ONLY
+    capture: Annotated[
+        AnyPath | None,
+        typer.Option(
+            "--capture",
+            metavar="FOLDER",
+            help="Folder written by tbcad capture or merge for this export: shows the photograph "
+            "in each mirror.",
+        ),
+    ] = None
+    force: Annotated[
+        bool,
+        typer.Option(
+            "--force", help="Replace a file that tbcad did not write, instead of refusing."
+        ),
+    ] = False

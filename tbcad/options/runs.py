@@ -1,0 +1,142 @@
+"""The call that drives the machine and photographs it."""
+
+import re
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tbcad.errors import InputError
+from tbcad.options.call import Call
+from tbcad.options.lists import ExposureLeds, ExposureLit, seconds
+from tbcad.options.shared import AnyPath, Exports
+from tbcad.screen import Stages
+
+_SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
+LEAST_PX = 16
+Preflight = Literal["first", "only", "off"]
+Ask = Callable[[str], bool]
+"""Asks the operator to do something; False: the operator will not."""
+Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
+"""Shows stages with their expected seconds while a block runs."""
+
+
+@dataclass(frozen=True)
+class RunOptions(Call):
+    """What is photographed of a prototype, by which controller and camera."""
+
+    exports: Exports[AnyPath]
+    out: Annotated[
+        AnyPath, typer.Option("--out", "-o", help="Folder of the run, which must be new.")
+    ] = Path("runs/first")
+    _: KW_ONLY
+    port: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PORT",
+            help="Serial port of the controller, such as /dev/ttyUSB0; Klipper: "
+            "moonraker:http://HOST:7125.",
+        ),
+    ] = None
+    camera: Annotated[
+        str,
+        typer.Option(
+            metavar="CAMERA",
+            help="gphoto2: the camera on USB; command:PROGRAM ARGUMENTS, with {output} for the "
+            "image's path without suffix and {exposure_s}, {exposure_ms} or {exposure_us} for the "
+            "exposure; folder:PATH, where another program puts photographs.",
+        ),
+    ] = "gphoto2"
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in the folder of --out.")
+    ] = False
+    phases: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Photographs at each stop: dark, led_1, led_2 ..., lit, with commas between; leds "
+            "for all LEDs. By default all.",
+        ),
+    ] = None
+    stops: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Stops to photograph, such as 1-10,40. By default all."),
+    ] = None
+    runs: Annotated[
+        str | None,
+        typer.Option(
+            metavar="a|b|ab",
+            help="a: object straight; b: turned by 180 degrees; ab: both, the default.",
+        ),
+    ] = None
+    size_px: Annotated[
+        tuple[int, int] | str | None,
+        typer.Option(
+            "--size",
+            metavar="WxH",
+            help="Pixels of a photograph, such as 4160x3104. By default those of the design.",
+        ),
+    ] = None
+    timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--time-limit",
+            "--timeout",
+            metavar="S",
+            min=1,
+            max=3600,
+            help="Seconds that command: and folder: may take for one photograph.",
+        ),
+    ] = 30.0
+    exposure_leds_s: ExposureLeds[str | float] = None
+    exposure_lit_s: ExposureLit[str | float] = None
+    send_settings: Annotated[
+        bool,
+        typer.Option(
+            "--send-settings",
+            help="Send the controller the settings of grbl_settings.txt that differ.",
+        ),
+    ] = False
+    preflight: Annotated[
+        Preflight,
+        "first: one stop is looked at under each light before a new run; only: and nothing is "
+        "photographed; off: it is not.",
+    ] = "first"
+    ask: Annotated[
+        Ask | None,
+        "Called with what a person must do, such as turn the object; says whether it is done.",
+    ] = None
+    show: Annotated[
+        Show | None, "Shows stages with their expected seconds, as tbcad.screen.stages does."
+    ] = None
+
+    def size(self) -> tuple[int, int] | None:
+        """Columns and rows of a photograph.
+
+        Raises:
+            InputError: they are none.
+        """
+        if self.size_px is None or isinstance(self.size_px, tuple):
+            return self.size_px
+        match = _SIZE.match(self.size_px)
+        width, height = (int(match[1]), int(match[2])) if match else (0, 0)
+        if min(width, height) < LEAST_PX:
+            raise InputError(
+                f"--size is {self.size_px!r:.40}, allowed is WIDTHxHEIGHT of {LEAST_PX} pixels or "
+                "more, such as 4160x3104"
+            )
+        return width, height
+
+    def seconds(self) -> tuple[float | None, float | None]:
+        """Exposure by LEDs and of the lit object, s; None where they are not said.
+
+        Raises:
+            InputError: one is no time of an exposure.
+        """
+        return (
+            seconds("--exposure-leds", self.exposure_leds_s),
+            seconds("--exposure-lit", self.exposure_lit_s),
+        )

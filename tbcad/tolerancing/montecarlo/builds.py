@@ -1,0 +1,211 @@
+"""Thousands of simulated builds: what the cameras of each one cover, and how many cover enough."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from math import sqrt
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+import numpy as np
+
+from tbcad.simulate.parallel import chunks, in_threads
+from tbcad.tolerancing.montecarlo.coverage import coverage, pointing
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, warp_maps_of
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.warp import WarpMaps
+from tbcad.tolerancing.process.process import Process
+from tbcad.types import Floats, Ints
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+# Builds in one unit of work: few enough that all workers end together.
+BUILDS_PER_BATCH = 10
+# Probability that the true yield lies in the reported interval.
+CONFIDENCE = 0.95
+AnyResult = TypeVar("AnyResult", bound="DataclassInstance")
+Case: TypeAlias = Callable[[range], AnyResult]
+RunBatches: TypeAlias = Callable[[Any, Sequence[range]], list[Any]]
+
+
+@dataclass(frozen=True)
+class CameraCoverage:
+    """Exact coverage diameters, mm, (s, v), in s builds, by number, of v virtual cameras."""
+
+    coverage: Floats
+
+    def __len__(self) -> int:
+        return len(self.coverage)
+
+    @property
+    def worst(self) -> Floats:
+        """Minimum coverage of each build, mm, (s,)."""
+        return np.asarray(self.coverage.min(axis=1))
+
+
+@dataclass(frozen=True)
+class CoverageResult(CameraCoverage):
+    """Coverage and pointing errors.
+
+    Attributes:
+        offset: distance at the object between the ray of each mirror's centre pixel and the
+            designed ray, a's mirrors, then b's, mm, (s, 2 m); not finite where the ray misses its
+            mirror.
+    """
+
+    offset: Floats
+
+    @property
+    def worst_camera(self) -> Ints:
+        """Number of the virtual camera with the minimum coverage of each build, (s,)."""
+        return np.asarray(np.argmin(self.coverage, axis=1))
+
+    def quantiles(self, shares: Sequence[float]) -> Floats:
+        """Coverage, mm, (k, v), that k shares of the builds do not reach at each camera."""
+        return np.asarray(np.quantile(self.coverage, shares, axis=0))
+
+
+@dataclass(frozen=True)
+class ShellResult(CoverageResult):
+    """Coverage and pointing errors in s builds of the shell.
+
+    Attributes:
+        pixels: sizes of the pictures, (s, v).
+        angle: pointing errors of an uncalibrated build, radians, (s, 2 m).
+    """
+
+    pixels: Floats
+    angle: Floats
+
+
+@dataclass(frozen=True)
+class YieldEstimate:
+    """Share of builds whose every virtual camera covers enough.
+
+    Attributes:
+        low: lower end of the confidence interval of the true share.
+        high: upper end.
+    """
+
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class ShellCase:
+    """Builds of the shell to be simulated; it can be sent to another process.
+
+    Attributes:
+        edge_models: both halves as designed.
+        warp: what the process's warp does to both halves.
+    """
+
+    edge_models: EdgeModels
+    errors: Errors
+    seed: int
+    warp: WarpMaps | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warp", warp_maps_of(self.edge_models, self.errors))
+
+    def draws(self, builds: range) -> tuple[ShellDraws, ShellDraws]:
+        """Errors of both halves of the builds of these numbers."""
+        half = self.edge_models[0]
+        return draw(self.errors, self.seed, builds, len(half), self.warp, len(half.walls))
+
+
+@dataclass(frozen=True)
+class MonteCarloCase(ShellCase):
+    """Simulates builds of the shell."""
+
+    def __call__(self, builds: range) -> ShellResult:
+        """Result of the builds of these numbers."""
+        draws = self.draws(builds)
+        diameter, pixels = coverage(self.edge_models, draws)
+        rays = [
+            pointing(edge_model, drawn)
+            for edge_model, drawn in zip(self.edge_models, draws, strict=True)
+        ]
+        angle, offset = (np.concatenate(errors, axis=1) for errors in zip(*rays, strict=True))
+        return ShellResult(diameter, offset, pixels, angle)
+
+
+@dataclass(frozen=True)
+class CoverageCase(ShellCase):
+    """The same builds as MonteCarloCase's, but only what their virtual cameras cover.
+
+    Attributes:
+        worst_only: only the minimum of each build is exact, the others are not below it; in less
+            time.
+    """
+
+    worst_only: bool = False
+
+    def __call__(self, builds: range) -> CameraCoverage:
+        """Result of the builds of these numbers."""
+        return CameraCoverage(coverage(self.edge_models, self.draws(builds), self.worst_only)[0])
+
+
+def simulate(
+    case: Case[AnyResult], builds: int, run_batches: RunBatches = in_threads, first: int = 0
+) -> AnyResult:
+    """Result of builds, numbered from the first; workers and batches do not change it."""
+    numbers = range(first, first + builds)
+    batches = [numbers[part] for part in chunks(builds, BUILDS_PER_BATCH)]
+    results: list[AnyResult] = run_batches(case, batches)
+    return joined_results(results)
+
+
+def joined_results(results: Sequence[AnyResult]) -> AnyResult:
+    """Results of consecutive builds as one; at least one is needed."""
+    kind = type(results[0])
+    names = [one.name for one in fields(kind)]
+    return kind(*(np.concatenate([getattr(one, name) for one in results]) for name in names))
+
+
+def coverage_at_yield(worst: Floats, share: float) -> float:
+    """Coverage, mm, that a share of the builds reach with their worst camera (s,).
+
+    It is at least the target exactly where that share of them is good: an order statistic, without
+    interpolation between two builds.
+    """
+    bad = int((1 - share) * len(worst) + 1e-9)
+    return float(np.sort(worst)[min(bad, len(worst) - 1)])
+
+
+def estimate_yield(worst: Floats, target: float) -> YieldEstimate:
+    """Share of builds whose worst coverage (s,) is at least the target (mm), with its interval."""
+    good, count = int(np.count_nonzero(worst >= target)), len(worst)
+    return YieldEstimate(good / count, *wilson_interval(good, count))
+
+
+def wilson_interval(good: int, count: int) -> tuple[float, float]:
+    """Confidence interval (95 %) of a share of which `good` out of `count` were seen.
+
+    E. B. Wilson, Probable inference, J. Am. Stat. Assoc. 22 (1927) 209-212.
+    """
+    z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
+    share = good / count
+    middle = share + z * z / (2 * count)
+    width = z * sqrt(share * (1 - share) / count + (z / (2 * count)) ** 2)
+    low, high = ((middle + sign * width) / (1 + z * z / count) for sign in (-1, 1))
+    return (low if good else 0.0), (high if good < count else 1.0)
+
+
+def yield_sentence(process: Process, worst: Floats, target: float) -> str:
+    """How many builds are good, by minimum coverage of each (s,), and what a median one covers."""
+    return (
+        f"Built by {process.name} ({process.title}), "
+        f"{percent(estimate_yield(worst, target))} of the builds "
+        f"cover {target:g} mm with every virtual camera; the worst camera of a build "
+        f"covers {np.median(worst):.2f} mm (median; 1 % cover less than "
+        f"{np.quantile(worst, 0.01):.2f})."
+    )
+
+
+def percent(estimate: YieldEstimate) -> str:
+    """A share with its interval."""
+    return f"{estimate.share:.1%} ({estimate.low:.1%} to {estimate.high:.1%})"

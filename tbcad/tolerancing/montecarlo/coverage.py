@@ -1,0 +1,152 @@
+"""Coverage of every virtual camera of simulated builds: exact, for cells of any topology."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.optics.reflection import reflect, reflected_rays
+from tbcad.tolerancing.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
+from tbcad.tolerancing.montecarlo.draws import ShellDraws
+from tbcad.tolerancing.montecarlo.edge_model import (
+    APEX,
+    CURVATURE,
+    NORMAL,
+    EdgeModel,
+    EdgeModels,
+    form_tables,
+    surface_tables,
+    view_tables,
+)
+from tbcad.tolerancing.montecarlo.edge_samples import RIGHT
+from tbcad.types import Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class MirrorCoverage:
+    """Coverage of m mirrors of one half in s builds.
+
+    Attributes:
+        diameter: twice the minimum distance from the object's centre of all rays camera -> edge of
+            the cell -> reflected (DESIGN.md section 2), mm; inf where there is no edge, (s, m).
+        crossings: how often the image of the cell's outline crosses a half line from the object's
+            centre: an odd number where it surrounds the centre, (s, m).
+        pixels: size of the cell's picture, (s, m).
+    """
+
+    diameter: Floats
+    crossings: Ints
+    pixels: Floats
+
+
+def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False) -> MirrorCoverage:
+    """Coverage of each mirror of one half, for s builds; see `trace_cell_edges` for worst_only."""
+    outlines = np.empty((len(draws), len(half), 3))
+    surfaces, views = surface_tables(half, draws), view_tables(half, draws)
+    forms, pairs = form_tables(half, draws), half.pairs.arrays
+    _move_out(surfaces[:, : len(half)], draws.valley)
+    if worst_only:  # pictures do not count: cameras that only turn see the same
+        views[:, RIGHT:] = views[:1, RIGHT:]
+    for build in range(len(draws)):
+        tables = surfaces, forms, views
+        if build > 0 and all(np.array_equal(one[build - 1], one[build]) for one in tables):
+            outlines[build] = outlines[build - 1]
+            continue
+        outlines[build] = trace_cell_edges(
+            surfaces[build], forms[build], pairs, half.halved, views[build], half.screen,
+            worst_only,
+        )  # fmt: skip
+    area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
+    crossings = outlines[..., CROSSINGS].astype(np.int64)
+    return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
+
+
+def _move_out(mirrors: Floats, by: Floats) -> None:
+    """Move surfaces (s, m, 7) along their normals by mm of each build (s,), in place."""
+    mirrors[..., APEX] += by[:, None, None] * mirrors[..., NORMAL]
+    mirrors[..., CURVATURE] /= 1 + by[:, None] * mirrors[..., CURVATURE]
+
+
+def virtual_camera_numbers(halved: Bools) -> Ints:
+    """Number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
+
+    The two halves of a mirror on the seam, halved (m,), share one virtual camera; mirror i of
+    camera b is mirror i of camera a reflected in the plane x = 0.
+    """
+    of_a = np.arange(len(halved))
+    separate = len(halved) + np.cumsum(~halved) - 1
+    return np.concatenate([of_a, np.where(halved, of_a, separate)])
+
+
+def coverage(
+    edge_models: EdgeModels, draws: tuple[ShellDraws, ShellDraws], worst_only: bool = False
+) -> tuple[Floats, Floats]:
+    """Exact coverage diameter (mm) and pixels of v virtual cameras in s builds, two of (s, v).
+
+    The halves of a mirror on the seam count together: the smaller diameter, all pixels. A mirror
+    without a cell, or whose image does not surround the object's centre, covers nothing.
+
+    Args:
+        edge_models: both halves as designed.
+        draws: errors of each half.
+        worst_only: only the minimum diameter of each build is exact, the others are not below
+            theirs; and no pixels. It takes less time.
+    """
+    camera = virtual_camera_numbers(edge_models[1].halved)
+    shape = (len(draws[0]), int(camera.max()) + 1)
+    diameter, crossings, pixels = np.full(shape, np.inf), np.zeros(shape, int), np.zeros(shape)
+    for half, drawn, of_half in zip(edge_models, draws, np.split(camera, 2), strict=True):
+        seen, place = mirror_coverage(half, drawn, worst_only), np.s_[:, of_half]
+        of_mirrors = seen.diameter - drawn.facets[:, None]
+        diameter[place] = np.minimum(diameter[place], of_mirrors)
+        crossings[place] += seen.crossings
+        pixels[place] += seen.pixels
+    surrounds = (crossings % 2 == 1) & np.isfinite(diameter)
+    return np.where(surrounds, np.maximum(diameter, 0.0), 0.0), pixels
+
+
+def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
+    """Errors of the ray of each mirror's centre pixel, for s builds of one edge_model.
+
+    The centre pixel shows the apex, and its designed ray goes through the object's centre, for a
+    mirror on the seam past it. A pixel is a fixed place on the sensor: moved and tilted cameras and
+    wrong focal lengths count.
+
+    Returns:
+        Angle between the designed and the built ray after the mirror, radians, and distance of the
+        built ray from the point where the designed one is nearest to the object's centre, mm,
+        (s, m) each; NaN where it misses the sphere.
+    """
+    pinhole, middle, scale, *axes = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
+    ray = _pixel_rays(edge_model, draws, axes)
+    mirrors = surface_tables(edge_model, draws)[:, : len(edge_model)]
+    point, normal = _entry(mirrors, pinhole / scale, ray / scale)
+    out = reflect(unit(ray), unit(normal / scale))
+    designed = reflected_rays(edge_model.view.pinhole, edge_model.apex, unit(edge_model.normal))
+    nearest = edge_model.apex - dot(edge_model.apex, designed)[:, None] * designed
+    shells = [Rotation.from_rotvec(turn) for turn in draws.shell_tilt]
+    aim = middle + np.stack([shell.apply(nearest, inverse=True) for shell in shells])
+    offset = norm(np.cross(point * scale - aim, out))
+    built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
+    return np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset
+
+
+def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:
+    """Rays (s, m, 3) of the same pixels in built cameras, whose axes are three of (s, 1, 3)."""
+    designed = (edge_model.apex - edge_model.view.pinhole) @ edge_model.view.axes.T
+    right, down, forward = designed[..., None].swapaxes(0, 1)
+    focal = draws.focal[:, None, None] * forward
+    return np.asarray(axes[2] + axes[0] * right / focal + axes[1] * down / focal)
+
+
+def _entry(table: Floats, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
+    """Points where rays enter surfaces (s, m, 7), and normals: see tbcad.simulate.scene.rays."""
+    apex, normal, curvature = table[..., APEX], table[..., NORMAL], table[..., CURVATURE, None]
+    offset = origin - apex
+    c = dot(normal + curvature / 2 * offset, offset)
+    b = dot(normal + curvature * offset, ray)
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(b * b - 2 * curvature[..., 0] * c * dot(ray, ray))
+    point = origin + (2 * c / (root - b))[..., None] * ray
+    return point, normal + curvature * (point - apex)

@@ -1,0 +1,170 @@
+"""One half of the shell as designed, as the fast model needs it, and its simulated builds."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tbcad.errors import InputError
+from tbcad.geometry.vectors import dot, perpendicular_axes, unit
+from tbcad.optics.camera import Camera
+from tbcad.optics.pedestals.walls import GrooveWalls, groove_walls
+from tbcad.optics.power_diagram import PLANES
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.tolerancing.montecarlo.draws import ShellDraws
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.form import MONOMIALS, term_polynomials
+from tbcad.tolerancing.montecarlo.form_samples import (
+    FIRST,
+    FORM_COLUMNS,
+    HEIGHT,
+    PER_MM,
+    SECOND,
+)
+from tbcad.tolerancing.montecarlo.neighbour_pairs import NeighbourPairs, cell_radii, neighbour_pairs
+from tbcad.tolerancing.montecarlo.warp import ShellShape, WarpMaps, warp_maps
+from tbcad.types import Bools, Floats
+
+# No symmetry plane of a design contains this direction, so no corner lies on a screen's axis; for
+# mirrors on the seam it points away from the seam, where both halves' outlines are open.
+ASYMMETRIC = np.array([1.0, 0.1234, 0.0567])
+
+# Columns of a table of surfaces.
+APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6
+
+
+@dataclass(frozen=True, eq=False)  # compared by identity, so that what follows can be kept
+class EdgeModel:
+    """One camera's half as designed: m mirrors and two planes.
+
+    Attributes:
+        table: apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7).
+        pairs: which of them may share an edge.
+        halved: mirrors that the seam halves, (m,).
+        screen: two axes and the normal of a plane through the object for each mirror, (m, 3, 3);
+            the normal is the direction u.
+        cell_radius: distance of each mirror's farthest corner from its apex, mm, (m,).
+        walls: that end mirrors on pedestals, w of them; none where neighbouring spheres meet.
+    """
+
+    view: Camera
+    table: Floats
+    pairs: NeighbourPairs
+    halved: Bools
+    screen: Floats
+    cell_radius: Floats
+    walls: GrooveWalls
+
+    def __len__(self) -> int:
+        return len(self.halved)
+
+    @property
+    def apex(self) -> Floats:
+        """Apices of the mirrors, mm, (m, 3)."""
+        return self.table[: len(self), APEX]
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normals of the mirrors there, (m, 3)."""
+        return self.table[: len(self), NORMAL]
+
+
+EdgeModels: TypeAlias = tuple[EdgeModel, EdgeModel]
+
+
+def edge_models(cameras: tuple[Reflector, Reflector]) -> EdgeModels:
+    """The fast models of both cameras with their mirrors."""
+    a, b = cameras
+    return edge_model(a), edge_model(b)
+
+
+def edge_model(at: Reflector) -> EdgeModel:
+    """The fast model of one camera with its mirrors."""
+    surfaces = at.cells.surfaces.subset(slice(len(at) + PLANES))
+    table = np.column_stack([surfaces.apex, surfaces.normal, surfaces.curvature])
+    first = unit(ASYMMETRIC - dot(at.u, ASYMMETRIC)[:, None] * at.u)
+    screen = np.stack([first, np.cross(at.u, first), at.u], axis=1)
+    halved = surfaces.apex[: len(at), 0] == 0
+    pairs, radius = neighbour_pairs(at.cells), cell_radii(at.cells)
+    return EdgeModel(at.camera, table, pairs, halved, screen, radius, groove_walls(at.cells))
+
+
+def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
+    """What the warp of a process does to both halves; None where it is none of neighbours."""
+    length = errors.warp.length
+    if errors.warp.spread == 0 or length == 0:
+        return None
+    return _warp_maps(*models, length)
+
+
+@lru_cache(maxsize=1)  # processes of one material share the length
+def _warp_maps(a: EdgeModel, b: EdgeModel, length: float) -> WarpMaps:
+    shapes = [ShellShape(one.table, one.cell_radius, one.walls) for one in (a, b)]
+    return warp_maps((shapes[0], shapes[1]), length)
+
+
+def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """The surfaces of s builds before their shells are scaled and moved, (s, m + 2 + r + w, 7).
+
+    They end with the foot plane at each of the r mirrors near it (NeighbourPairs.footed) and the w
+    walls.
+
+    A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
+    thicker coating moves too. Their tilt is not an error of its own kind.
+
+    Raises:
+        InputError: an error is larger than a mirror's radius.
+    """
+    m, footed = len(edge_model), edge_model.pairs.footed
+    rows = np.append(np.arange(m + 2), np.full(len(footed), m + 1))
+    designed = np.concatenate([edge_model.table[rows], edge_model.walls.table])
+    table = np.repeat(designed[None], len(draws), axis=0)
+    curvature = edge_model.table[:m, CURVATURE]
+    if np.any(draws.radius * curvature <= -1):
+        raise InputError(
+            f"sphere_radius_um and coating_um leave nothing of a mirror: allowed is less than its "
+            f"radius, at minimum {1000 / curvature.max():.0f} um: make the errors smaller"
+        )
+    table[:, :m, APEX] += draws.centre + draws.radius[:, :, None] * edge_model.normal
+    table[:, :m, CURVATURE] = curvature / (1 + draws.radius * curvature)
+    foot = edge_model.table[m + 1, NORMAL]
+    table[:, m + 2 : len(rows), APEX] += draws.foot[:, footed, None] * foot
+    table[:, len(rows) :, APEX] += draws.wall[:, :, None] * edge_model.walls.normal
+    return table
+
+
+def form_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """Waviness of the surfaces of s builds, (s, m + 2 + r + w, FORM_COLUMNS), of planes 0.
+
+    They are in the order of `surface_tables`; (s, 0, ...) where no mirror has any.
+    """
+    if not draws.form.any():
+        return np.empty((len(draws), 0, FORM_COLUMNS))
+    planes = PLANES + len(edge_model.pairs.footed) + len(edge_model.walls)
+    forms = np.zeros((len(draws), len(edge_model) + planes, FORM_COLUMNS))
+    of_mirrors, axes = forms[:, : len(edge_model)], perpendicular_axes(edge_model.normal)
+    # Not by BLAS, whose threads would get into the way of those that simulate builds.
+    polynomials = np.einsum("smt,tk->smk", draws.form, term_polynomials())
+    of_mirrors[..., HEIGHT : HEIGHT + len(MONOMIALS)] = polynomials
+    of_mirrors[..., FIRST : FIRST + 3] = axes[:, 0]
+    of_mirrors[..., SECOND : SECOND + 3] = axes[:, 1]
+    of_mirrors[..., PER_MM] = 1 / edge_model.cell_radius
+    return forms
+
+
+def view_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """Camera and object of s builds, in the frame of the shell, (s, 7, 3).
+
+    The rows are pinhole, object's centre, scale, the camera's right, down and forward, and the
+    radius of the valleys' fillets. Camera and object are moved instead of the shell.
+    """
+    shell = Rotation.from_rotvec(draws.shell_tilt)
+    camera = Rotation.from_rotvec(draws.camera_tilt)
+    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in edge_model.view.axes]
+    pinhole = edge_model.view.pinhole + draws.camera_shift
+    points = [shell.apply(point - draws.shell_shift, inverse=True) for point in (pinhole, 0.0)]
+    valley = np.zeros_like(draws.scale)
+    valley[:, 0] = draws.valley
+    return np.stack([*points, draws.scale, *axes, valley], axis=1)

@@ -1,0 +1,225 @@
+"""Cost of errors in the views: simulated pictures of builds, with rays known or assumed.
+
+An uncalibrated build takes every pixel's ray for the designed one. A calibrated build knows its
+rays, but for the residual of the calibration.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tbcad.mirrors.array import design
+from tbcad.optics.camera import Camera
+from tbcad.optics.pedestals.walls import GrooveWalls
+from tbcad.optics.surfaces import Surfaces
+from tbcad.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
+from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
+from tbcad.simulate.parallel import chunks, in_threads
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector, reflectors
+from tbcad.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.simulate.views.synthesis import synthesise
+from tbcad.simulate.views.viewpoints import ground_truths, image_quality, viewpoints_around
+from tbcad.spec.design import Spec
+from tbcad.tolerancing.montecarlo.draws import ShellDraws
+from tbcad.types import Bytes, Floats, Ints, Progress
+
+# Random stream of the residual, apart from those of the kinds of error.
+CALIBRATION_STREAM = 2000
+# Elevations, azimuths and distance of the viewpoints.
+VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
+
+
+@dataclass(frozen=True)
+class ReferenceViews:
+    """Views to compare with the truth.
+
+    Attributes:
+        capture_mm: diameter of the capture sphere.
+        views: viewpoints, v of them.
+        truths: pictures of a real camera there, (h, w, 3) each.
+    """
+
+    capture_mm: float
+    views: list[Camera]
+    truths: list[Bytes]
+
+
+@dataclass(frozen=True)
+class Sharpness:
+    """SSIM of views against the truth, over s builds and v viewpoints.
+
+    Attributes:
+        designed: of the shell as designed, (v,).
+        uncalibrated: with the designed rays, (s, v).
+        calibrated: with rays known but for the residual of the calibration, (s, v).
+    """
+
+    designed: Floats
+    uncalibrated: Floats
+    calibrated: Floats
+
+
+def sharpness(
+    cameras: tuple[Reflector, Reflector],
+    builds: tuple[ShellDraws, ShellDraws],
+    scene: Scene,
+    reference: ReferenceViews,
+    residual: float,
+    seed: int = 1,
+    progress: Progress = lambda _: None,
+) -> Sharpness:
+    """Views of builds with errors, and with a random residual of calibration, against the truth.
+
+    The residual is of a mirror's direction, per axis, radians.
+    """
+    designed = _light_field(cameras, scene, reference.capture_mm)
+    rows = [_ssim(designed, reference)]
+    for k in range(len(builds[0])):
+        progress(f"build {k + 1} of {len(builds[0])}")
+        a, b = (built_reflector(at, draws, k) for at, draws in zip(cameras, builds, strict=True))
+        built = _light_field((a, b), scene, reference.capture_mm)
+        calibrated = _with_residual(built, residual, (seed, k))
+        for light_field in (_with_rays_of(designed, built), calibrated):
+            rows.append(_ssim(light_field, reference))
+    table = np.array(rows)
+    return Sharpness(table[0], table[1::2], table[2::2])
+
+
+@dataclass(frozen=True)
+class BuiltReflector(SubstitutedReflector):
+    """A camera and its mirrors at their places in a build.
+
+    The cells are those of the design: they only limit where in the picture a mirror may be.
+    """
+
+    built_walls: GrooveWalls
+
+    @property
+    def walls(self) -> GrooveWalls:
+        """What ends mirrors on pedestals."""
+        return self.built_walls
+
+    def boxes(self) -> Ints:
+        """Columns and rows about each cell, wider by its own size on all sides, (m, 4)."""
+        box = super().boxes()
+        border = np.repeat(box[:, 1::2] - box[:, 0::2], 2, axis=1) * [-1, 1, -1, 1]
+        size = np.repeat([self.camera.width_px, self.camera.height_px], 2)
+        return np.asarray(np.clip(box + border, 0, size))
+
+
+def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflector:
+    """One camera and its mirrors as a build has them.
+
+    The mean of the scales along the axes is used for all three: a sphere stays a sphere.
+    """
+    scale = float(draws.scale[build].mean())
+    tilt = Rotation.from_rotvec(draws.shell_tilt[build])
+    radius = at.mirrors.radius + draws.radius[build]
+    centre = tilt.apply(scale * (at.mirrors.centre + draws.centre[build]))
+    normal = tilt.apply(at.mirrors.normal)
+    apex = centre + draws.shell_shift[build] + scale * radius[:, None] * normal
+    surfaces = Surfaces(apex, normal, 1 / (scale * radius))
+    view = _view(at.camera, draws, build)
+    walls = built_walls(at.walls, draws, build, draws.wall[build])
+    return BuiltReflector(at.camera_id, view, at.u, at.cells, surfaces, walls)
+
+
+def built_walls(
+    walls: GrooveWalls, draws: ShellDraws, build: int, off: Floats | float = 0.0
+) -> GrooveWalls:
+    """Walls moved with their shell as a build has it, each off along its normal, mm, (w,)."""
+    tilt, scale = Rotation.from_rotvec(draws.shell_tilt[build]), float(draws.scale[build].mean())
+    point = walls.point + np.reshape(off, (-1, 1)) * walls.normal
+    moved = tilt.apply(scale * point) + draws.shell_shift[build]
+    return GrooveWalls.of_planes(walls.mirror, moved, tilt.apply(walls.normal))
+
+
+def _view(view: Camera, draws: ShellDraws, build: int) -> Camera:
+    tilt = Rotation.from_rotvec(draws.camera_tilt[build])
+    return replace(
+        view,
+        pinhole=view.pinhole + draws.camera_shift[build],
+        forward=tilt.apply(view.forward),
+        right=tilt.apply(view.right),
+        hfov=float(2 * np.arctan(np.tan(view.hfov / 2) / draws.focal[build])),
+    )
+
+
+def _light_field(
+    cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float
+) -> LightField:
+    photographs = ((at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras)
+    return light_field_in_memory(photographs, capture_mm)
+
+
+def _with_rays_of(rays: LightField, pictures: LightField) -> LightField:
+    """The pictures of one light field with the rays of another."""
+    frames = {
+        name: replace(
+            frame, planes={**frame.planes, "colour": pictures.frames[name].planes["colour"]}
+        )
+        for name, frame in rays.frames.items()
+    }
+    return replace(pictures, frames=frames)
+
+
+def _with_residual(built: LightField, residual: float, seed: tuple[int, int]) -> LightField:
+    """A light field with every mirror's rays turned by a random residual of the calibration."""
+    sequence = np.random.SeedSequence(seed[0], spawn_key=(seed[1], CALIBRATION_STREAM))
+    generator = np.random.default_rng(sequence)
+    frames = {
+        name: replace(frame, planes=_rotated(frame, residual, generator))
+        for name, frame in built.frames.items()
+    }
+    return replace(built, frames=frames)
+
+
+def _rotated(
+    frame: CameraFrame, residual: float, generator: np.random.Generator
+) -> dict[str, object]:
+    """Planes of a frame whose mirrors' rays are turned by small random angles."""
+    rotation = np.vstack([np.zeros(3), residual * generator.standard_normal((len(frame.u), 3))])
+    mirror, direction = frame.planes["mirror"], frame.planes["direction"]
+
+    def rotated(rows: slice) -> NDArray[np.float32]:
+        turned = direction[rows] + np.cross(rotation[mirror[rows]], direction[rows])
+        length = np.linalg.norm(turned, axis=2)[..., None]
+        unit = np.divide(turned, length, out=np.zeros_like(turned), where=length > 0)
+        return np.asarray(unit, dtype=np.float32)
+
+    bands = in_threads(rotated, chunks(len(mirror), BAND_ROWS))
+    return {**frame.planes, "direction": np.concatenate(bands)}
+
+
+def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
+    tiles = MirrorTiles(source)
+    pictures = [synthesise(tiles, view, "nearest").image for view in reference.views]
+    pairs = zip(reference.truths, pictures, strict=True)
+    qualities = in_threads(lambda pair: image_quality(*pair), pairs)
+    return np.array([quality.ssim for quality in qualities])
+
+
+def reference_views(
+    scene: Scene, capture_mm: float, progress: Progress = lambda _: None
+) -> ReferenceViews:
+    """The views that are compared, with their truths."""
+    views = viewpoints_around(*VIEWPOINTS).cameras(capture_mm)
+    return ReferenceViews(capture_mm, views, ground_truths(scene, views, progress))
+
+
+def view_ssims(specs: dict[str, Spec]) -> dict[str, float]:
+    """Mean SSIM of views of the built-in object by designs of one capture diameter."""
+    capture_mm = next(iter(specs.values())).optics.capture_diameter_mm
+    scene = prepared_scene(built_in_object(capture_mm))
+    reference = reference_views(scene, capture_mm)
+    return {
+        words: float(
+            _ssim(_light_field(reflectors(design(one)), scene, capture_mm), reference).mean()
+        )
+        for words, one in specs.items()
+    }

@@ -1,0 +1,307 @@
+"""Manufacturing processes: the errors of each, from TOML, with a source for every figure.
+
+docs/decisions/0007-how-tolerances-are-computed.md says what a figure means, and how it follows
+from a maker's tolerance.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal, TypeAlias
+
+from pydantic import BeforeValidator, Field, ValidationError
+
+from tbcad.prototype.balls.catalogue import load_grades
+from tbcad.spec.errors import (
+    SpecError,
+    dotted_fields,
+    section_of,
+    short_text,
+    unknown_key,
+    validation_error,
+)
+from tbcad.spec.files import Table, read_toml, toml_value
+from tbcad.spec.prototype import GradeName
+from tbcad.spec.section import Section
+from tbcad.tolerancing.montecarlo.error_kinds import Distribution, Error, Errors
+
+BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")
+DEFAULT_PROCESS = "sla"
+RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
+MICROMETRE = 1e-3  # mm
+BY_USER = "set by an option"
+SHARP = "Not stated: valleys are taken as sharp, a judgement that flatters milled shells"
+
+Source: TypeAlias = Annotated[str, Field(pattern=r"\S", max_length=600)]
+
+
+def _whole(value: object) -> object:
+    if type(value) is not int:  # true and 1.0 equal 1, so Literal[1] would take them
+        raise ValueError("allowed is the whole number 1: change it")
+    return value
+
+
+class ErrorSpec(Section):
+    """One kind of error: common to all builds (mean), and different in each (magnitude)."""
+
+    unit: ClassVar[float] = 1.0
+
+    magnitude: float = Field(ge=0)
+    """Standard deviation if normal, half width if uniform."""
+    mean: float = 0.0
+    """Error common to all builds."""
+    distribution: Distribution = "normal"
+    """Of the error about its mean."""
+    source: Source
+    """Where the figures come from; says so where they are a judgement."""
+
+    @property
+    def error(self) -> Error:
+        """The same in mm, radians or as a share."""
+        return Error(self.unit * self.magnitude, self.unit * self.mean, self.distribution)
+
+
+class Micrometres(ErrorSpec):
+    """An error in micrometres."""
+
+    unit: ClassVar[float] = MICROMETRE
+    magnitude: float = Field(ge=0, le=10_000)
+    mean: float = Field(0.0, ge=-10_000, le=10_000)
+
+
+class SmoothMicrometres(Micrometres):
+    """An error in micrometres that neighbouring places of a part share."""
+
+    mean: float = Field(0.0, ge=0, le=0)
+    """None: it would move the whole part."""
+    distribution: Literal["normal"] = "normal"
+    """Always normal."""
+    length_mm: float = Field(ge=20, le=10_000)
+    """Correlation length: at this distance 61 % of the error is shared, at twice of it 14 %."""
+
+    @property
+    def error(self) -> Error:
+        """The same in mm."""
+        return replace(super().error, length=self.length_mm)
+
+
+class RootMeanSquare(Micrometres):
+    """A form error within each mirror, in micrometres."""
+
+    mean: float = Field(0.0, ge=0, le=0)
+    """None: it differs from mirror to mirror."""
+    distribution: Literal["normal"] = "normal"
+    """Always normal."""
+
+
+class FilletRadius(ErrorSpec):
+    """Radius of the fillets in the valleys between mirrors, in millimetres."""
+
+    magnitude: float = Field(ge=0, le=10)
+    """The radius: the same in all builds."""
+    mean: float = Field(0.0, ge=0, le=0)
+    """None: the radius is the magnitude."""
+    distribution: Literal["normal"] = "normal"
+    """Without a meaning here."""
+
+    @property
+    def error(self) -> Error:
+        """The same in mm."""
+        return Error(0.0, self.unit * self.magnitude)
+
+
+class FilletMicrometres(FilletRadius):
+    """Radius of the fillets in the valleys between mirrors, in micrometres."""
+
+    unit: ClassVar[float] = MICROMETRE
+    magnitude: float = Field(ge=0, le=10_000)
+
+
+class Millimetres(ErrorSpec):
+    """An error in millimetres."""
+
+    magnitude: float = Field(ge=0, le=100)
+    mean: float = Field(0.0, ge=-100, le=100)
+
+
+class Permille(ErrorSpec):
+    """An error as a share, in thousandths."""
+
+    unit: ClassVar[float] = 1e-3
+    magnitude: float = Field(ge=0, le=200)
+    mean: float = Field(0.0, ge=-200, le=200)
+
+
+class Percent(ErrorSpec):
+    """A share in hundredths."""
+
+    unit: ClassVar[float] = 1e-2
+    magnitude: float = Field(ge=0, le=200)
+    mean: float = Field(0.0, ge=0, le=200)
+
+
+class Milliradians(ErrorSpec):
+    """An error in milliradians."""
+
+    unit: ClassVar[float] = 1e-3
+    magnitude: float = Field(ge=0, le=500)
+    mean: float = Field(0.0, ge=-500, le=500)
+
+
+class Degrees(ErrorSpec):
+    """An error in degrees."""
+
+    unit: ClassVar[float] = math.radians(1)
+    magnitude: float = Field(ge=0, le=45)
+    mean: float = Field(0.0, ge=-45, le=45)
+
+
+class Process(Section):
+    """A manufacturing process of a shell or a prototype, and its errors."""
+
+    name: str = Field(pattern="^[A-Za-z0-9][A-Za-z0-9 ._-]{0,79}$")
+    """Name of the process, for reports."""
+    title: str = Field(pattern=r"\S", max_length=200)
+    """The process in words."""
+    schema_version: Annotated[Literal[1], BeforeValidator(_whole)] = Field(1, alias="schema")
+    """Version of this table's keys."""
+    sphere_centre_um: Micrometres
+    """Each mirror's centre along each axis, by itself, without growth and warp of the shell."""
+    sphere_radius_um: Micrometres
+    """Each mirror's radius, with its centre fixed."""
+    warp_um: SmoothMicrometres
+    """Each shell: smooth displacement of its points along each axis."""
+    waviness_um: RootMeanSquare
+    """Root mean square of the height of the form error within each mirror."""
+    groove_wall_um: Micrometres
+    """Each wall of a groove between mirrors on pedestals along its normal, by itself."""
+    scale_isotropic_permille: Permille
+    """Growth of each shell."""
+    scale_axis_permille: Permille
+    """Growth of both shells along each axis of the frame, besides that of each shell."""
+    shell_shift_um: Micrometres
+    """Each whole shell along each axis."""
+    shell_tilt_mrad: Milliradians
+    """Each whole shell about each axis."""
+    camera_shift_um: Micrometres
+    """Each camera's pinhole along each axis."""
+    camera_tilt_mrad: Milliradians
+    """Each camera about each axis through its pinhole."""
+    camera_focal_permille: Permille
+    """Each camera's focal length."""
+    coating_um: Micrometres
+    """Thickness of each shell's coating: the mean is all of it; a design may allow for a part."""
+    facets_mm: Millimetres
+    """Coverage lost because mirrors are made from the flat facets of an STL."""
+    rotation_angle_deg: Degrees
+    """Prototype: the base's angle at each stop."""
+    axis_runout_um: Micrometres
+    """Prototype: the base's axis, sideways, at each stop."""
+    axis_tilt_mrad: Milliradians
+    """Prototype: direction of the base's axis."""
+    seat_um: Micrometres
+    """Prototype: each ball's centre along each axis."""
+    cap_tilt_mrad: Milliradians
+    """Prototype: each cap about each axis across its own."""
+    wind_up_percent: Percent
+    """Prototype: turn of the base because motor and belt yield to gravity, of that worked out."""
+    cutter_radius_mm: FilletRadius = FilletRadius(magnitude=0, source=SHARP)
+    """Ball cutter that mills the valleys between mirrors of a shell: 0 for sharp valleys."""
+    ridge_rounding_um: FilletMicrometres = FilletMicrometres(magnitude=0, source=SHARP)
+    """Radius to which polishing and coating round a mandrel's ridges, the replica's valleys."""
+    ball_grade: GradeName
+    """Prototype: grade of the balls by ISO 3290-1."""
+
+
+def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
+    """Return a built-in process, or one of a TOML file, with options "kind.key=value" on top.
+
+    A file may name a built-in process as `based_on`; each kind of error that it has replaces the
+    whole kind there, so that no figure keeps the source of another.
+
+    Raises:
+        SpecError: anything that cannot be read, is unknown, or is not allowed.
+    """
+    name = f"built-in process {which}" if which in BUILT_IN else which
+    table = _built_in(which) if which in BUILT_IN else _own(Path(which))
+    options = [_option(text) for text in overrides]
+    for key, value in options:
+        _put(table, key, value)
+    try:
+        return Process.model_validate(table)
+    except ValidationError as error:
+        raise validation_error(error, Process, name, {key for key, _ in options}) from None
+
+
+def process_errors(process: Process, known_coating_um: float = 0.0) -> Errors:
+    """Return the errors of a process in mm, radians and shares.
+
+    Only a coating beyond the known one, which the design allows for, is an error.
+    """
+    kinds = {key: value for key, value in process if isinstance(value, ErrorSpec)}
+    coating = kinds["coating_um"]
+    kinds["coating_um"] = coating.model_copy(update={"mean": coating.mean - known_coating_um})
+    errors = {key.rpartition("_")[0]: kind.error for key, kind in kinds.items()}
+    return Errors(**errors, ball_radius=ball_radius_error(process.ball_grade))
+
+
+def ball_radius_error(grade: str) -> Error:
+    """Return the error of the radii of purchased balls, mm.
+
+    A lot's diameters differ by at most its variation (ISO 3290-1: V_DwL), and one ball's radius
+    by its deviation from spherical form; the sum of both half widths is taken.
+    """
+    limits = load_grades()[grade]
+    half_width = limits.lot_variation_um / 4 + limits.sphericity_um / 2
+    return Error(MICROMETRE * half_width, 0.0, "uniform")
+
+
+def _built_in(name: str) -> Table:
+    file = files("tbcad.tolerancing").joinpath("process", f"{name}.toml")
+    return read_toml(file, name, "process")
+
+
+def _own(path: Path) -> Table:
+    if not path.is_file():
+        if str(path) in RENAMED:
+            new = RENAMED[str(path)]
+            raise SpecError(f"process {path} is called {new}: write {new}")
+        close = get_close_matches(str(path).lower(), BUILT_IN, 1)
+        hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
+        raise SpecError(
+            f"process {short_text(str(path))} is neither built in ({', '.join(BUILT_IN)}) nor a "
+            f"file: {hint}"
+        )
+    table = read_toml(path, str(path), "process")
+    base = table.pop("based_on", None)
+    if base is None:
+        return table
+    if base not in BUILT_IN:
+        raise SpecError(
+            f"{path}: based_on is {short_text(base)}, allowed is {' or '.join(BUILT_IN)}: change it"
+        )
+    return {**_built_in(base), "name": path.stem, **table}
+
+
+def _option(text: str) -> tuple[str, object]:
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key:
+        raise SpecError(f"option {text!r} is not kind=value: write for instance seat_um=20")
+    known = dict(dotted_fields(Process))
+    if key in known and section_of(known[key]):
+        key += ".magnitude"
+    elif key not in known:
+        raise unknown_key("option", key, Process)
+    return key, toml_value(value)
+
+
+def _put(table: Table, key: str, value: object) -> None:
+    kind, dot, leaf = key.partition(".")
+    if not dot:
+        table[kind] = value
+    elif isinstance(given := table.get(kind, {}), dict):
+        # The source of a figure does not apply once the figure is changed.
+        table[kind] = {**given, "source": BY_USER, leaf: value}

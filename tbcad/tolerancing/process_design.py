@@ -1,0 +1,245 @@
+"""The design that a process needs: with the least margins, of single mirrors where that helps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad import schedule
+from tbcad.errors import InputError
+from tbcad.options.tolerances import check_yield
+from tbcad.spec.design import EdgeKind, Spec, spec_with
+from tbcad.spec.errors import SpecError
+from tbcad.tolerancing.margin import (
+    STEP_MM,
+    SeeingPixels,
+    margin,
+    seeing_pixels,
+    solved_designs,
+    with_margin,
+)
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, simulate
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.sharpness import view_ssims
+from tbcad.tolerancing.own_margins import own_margins, with_own_margins
+from tbcad.tolerancing.process.process import Process, process_errors
+from tbcad.types import Floats, Progress
+
+# Simulated builds that the margins of a design are computed from, and their seed.
+BUILDS = 400
+SEED = 1
+# Pixels that pedestals must leave, of those of valleys: margins from 400 builds are known so well
+# that pixels are known to about a per cent, and valleys are simpler to make.
+WORTH = 1.01
+
+
+@dataclass(frozen=True)
+class ProcessDesign:
+    """A design with the margins that a process needs.
+
+    Attributes:
+        spec: with margins of single mirrors, or with one for all where those gain nothing.
+        even_mm: the one margin for all that reaches the same yield.
+    """
+
+    spec: Spec
+    even_mm: float
+
+    @property
+    def is_even(self) -> bool:
+        """Whether all mirrors have the same margin."""
+        return not self.spec.mirrors.own_margins_mm
+
+
+def design_for_process(
+    spec: Spec, process: Process, wanted_yield: float, progress: Progress = lambda _: None
+) -> ProcessDesign:
+    """The same design but for the least margins with which a process reaches a yield.
+
+    No mirror gets less than the spec's margin_mm. Margins of single mirrors are taken where they
+    are smaller on average than one for all.
+
+    Raises:
+        InputError: no margin is enough, or the radii do not follow a target.
+    """
+    check_margins_can_be_set(spec, wanted_yield)
+    spec = spec_with(spec, mirrors={"own_margins_mm": ()})
+    errors, designs = process_errors(process, spec.mirrors.coating_um), solved_designs()
+    needed = margin(spec, errors, wanted_yield, _worst_coverage, progress, designs)
+    if needed.mm is None:
+        raise InputError(
+            f"process {process.name} does not make {wanted_yield:.1%} of the builds good with any "
+            f"margin ({needed.reason}): choose a more exact one, or see tbcad tolerance"
+        )
+    if needed.mm <= spec.mirrors.margin_mm:
+        return ProcessDesign(spec, spec.mirrors.margin_mm)
+    own = own_margins(spec, errors, wanted_yield, needed.mm, _coverage, progress, designs)
+    if own is None or own.average_mm > needed.mm - STEP_MM:
+        return ProcessDesign(with_margin(spec, needed.mm), needed.mm)
+    return ProcessDesign(with_own_margins(spec, own.mm), needed.mm)
+
+
+def check_margins_can_be_set(spec: Spec, wanted_yield: float) -> None:
+    """Refuse what no margins lead to: no share, and radii that follow no target."""
+    check_yield(wanted_yield)
+    if spec.mirrors.radius_rule != "traced":
+        raise InputError(
+            f"--for-process sets margins, which radii of rule {spec.mirrors.radius_rule} do not "
+            "follow: use --radius-rule traced"
+        )
+
+
+def margins_text(made: ProcessDesign) -> str:
+    """The margins in words."""
+    if made.is_even:
+        return f"margin {made.spec.mirrors.margin_mm:g} mm"
+    own = np.array(made.spec.mirrors.own_margins_mm)
+    return (
+        f"margins {own.min():.2f} to {own.max():.2f} mm, {own.mean():.2f} on average "
+        f"(one for all mirrors: {made.even_mm:.2f})"
+    )
+
+
+def pixel_costs(made: ProcessDesign, seen: SeeingPixels | None = None) -> dict[str, SeeingPixels]:
+    """Pixels of a virtual camera that see the object, with these margins, others, and none."""
+    specs = {"with none": with_margin(made.spec, 0.0)}
+    if not made.is_even:
+        specs = {"with one for all": with_margin(made.spec, made.even_mm)} | specs
+    others = {words: seeing_pixels(one) for words, one in specs.items()}
+    return {"with these margins": seen or seeing_pixels(made.spec)} | others
+
+
+def costs_text(costs: dict[str, SeeingPixels]) -> str:
+    """The same in words."""
+    each = (f"{pixels} {words}" for words, pixels in costs.items())
+    return f"pixels of a virtual camera that see the object, median: {', '.join(each)}"
+
+
+def ssim_costs(made: ProcessDesign) -> dict[str, float]:
+    """Mean SSIM of views as designed: with these margins, and with none."""
+    return view_ssims({"with these margins": made.spec, "with none": with_margin(made.spec, 0.0)})
+
+
+def ssim_text(costs: dict[str, float]) -> str:
+    """The same in words."""
+    each = (f"{ssim:.3f} {words}" for words, ssim in costs.items())
+    return f"SSIM of views of the knot, designed: {', '.join(each)}"
+
+
+def _worst_coverage(errors: Errors, models: EdgeModels) -> Floats:
+    return simulate(
+        CoverageCase(models, errors, SEED, worst_only=True), BUILDS, schedule.run_units
+    ).worst
+
+
+def _coverage(errors: Errors, models: EdgeModels) -> Floats:
+    return simulate(CoverageCase(models, errors, SEED), 2 * BUILDS, schedule.run_units).coverage
+
+
+@dataclass(frozen=True)
+class TriedEdges:
+    """A design with one kind of edges, for a process.
+
+    Attributes:
+        made: with the margins that the process needs; None where there are none, or where even
+            without them too few pixels are left.
+        pixels: of a virtual camera of it, or of the most that any margins leave; None where there
+            is no design.
+        error: why there is no design, or None.
+    """
+
+    edges: EdgeKind
+    made: ProcessDesign | None
+    pixels: SeeingPixels | None
+    error: InputError | None = None
+
+
+@dataclass(frozen=True)
+class EdgeChoice:
+    """The design for a process, and the edges that were tried and not taken.
+
+    Attributes:
+        other: with other edges; None where the design says which edges it has.
+    """
+
+    made: ProcessDesign
+    pixels: SeeingPixels
+    other: TriedEdges | None
+
+
+def edges_for_process(
+    spec: Spec, process: Process, wanted_yield: float, progress: Progress = lambda _: None
+) -> EdgeChoice:
+    """The design whose least margins for a process and a yield leave most pixels (median).
+
+    Edges that the design names stay. Else pedestals are taken where they leave a per cent more than
+    valleys. Margins take pixels: where pedestals have too few even with the design's own margin,
+    none are searched for.
+
+    Raises:
+        InputError: as `design_for_process`, with neither kind of edges.
+    """
+    check_margins_can_be_set(spec, wanted_yield)
+    if "edges" in spec.shell.model_fields_set:
+        made = design_for_process(spec, process, wanted_yield, progress)
+        return EdgeChoice(made, seeing_pixels(made.spec), None)
+    valley = _tried("valley", spec, process, wanted_yield, progress)
+    pedestal = _too_few(spec, valley, progress) or _tried(
+        "pedestal", spec, process, wanted_yield, progress
+    )
+    worth = _median(pedestal) >= WORTH * _median(valley)
+    best, other = (pedestal, valley) if worth else (valley, pedestal)
+    if best.made is None or best.pixels is None:
+        raise valley.error or InputError(f"no edges suit process {process.name}")
+    return EdgeChoice(best.made, best.pixels, other)
+
+
+def edges_text(choice: EdgeChoice) -> str:
+    """The choice in words."""
+    chosen, other = choice.made.spec.shell.edges, choice.other
+    if other is None:
+        return f"edges: {chosen}, as the design says"
+    return (
+        f"edges: {chosen}, with a median of {choice.pixels} pixels of a virtual camera; "
+        f"{other.edges}: {_told(other)}"
+    )
+
+
+def _told(tried: TriedEdges) -> str:
+    if tried.pixels is None:
+        return "cannot be made" if isinstance(tried.error, SpecError) else "no margin is enough"
+    return f"{'' if tried.made else 'at most '}{tried.pixels}"
+
+
+def _median(tried: TriedEdges) -> float:
+    return tried.pixels.median if tried.made and tried.pixels else 0.0
+
+
+def _tried(
+    edges: EdgeKind, spec: Spec, process: Process, wanted_yield: float, progress: Progress
+) -> TriedEdges:
+    """One kind of edges, with the margins that the process needs."""
+    try:
+        made = design_for_process(
+            spec_with(spec, shell={"edges": edges}),
+            process,
+            wanted_yield,
+            lambda text: progress(f"{edges}, {text}"),
+        )
+    except InputError as error:
+        return TriedEdges(edges, None, None, error)
+    return TriedEdges(edges, made, seeing_pixels(made.spec))
+
+
+def _too_few(spec: Spec, valley: TriedEdges, progress: Progress) -> TriedEdges | None:
+    """Pedestals without margins for the process, where that is enough to leave them."""
+    if valley.pixels is None:
+        return None
+    progress("pedestal")
+    bare = spec_with(spec, shell={"edges": "pedestal"}, mirrors={"own_margins_mm": ()})
+    try:
+        most = seeing_pixels(bare)
+    except SpecError as error:
+        return TriedEdges("pedestal", None, None, error)
+    few = most.median < WORTH * valley.pixels.median
+    return TriedEdges("pedestal", None, most) if few else None

@@ -1,0 +1,290 @@
+"""Coverage of simulated prototypes: their balls within the windows that the software assumes.
+
+Every mirror has a window in the photograph of its stop, with a ball in it
+(tbcad.simulate.prototype.run). The windows keep their places in the picture, in pixels; base, balls
+and camera are off. So a camera error turns all rays of a build alike, and the other errors move the
+balls under the windows. In a calibrated build the software moves the windows along.
+
+Both runs are described in the frame of the prototype, with the object turned in the second.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tbcad.geometry.rotations import rotated
+from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
+from tbcad.optics.reflection import reflected_rays
+from tbcad.optics.windows import cell_windows
+from tbcad.simulate.prototype.plan import HALF_TURN, Plan
+from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.simulate.scene.reflector import Reflector
+from tbcad.tolerancing.montecarlo.builds import CoverageResult
+from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
+from tbcad.tolerancing.montecarlo.edge_model import ASYMMETRIC
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
+from tbcad.tolerancing.prototype.rays import (
+    SIDE_SAMPLES,
+    coarse_directions,
+    highlights,
+    minimum_miss_distances,
+)
+from tbcad.types import Bools, Floats, Ints
+
+HALVES = (0, 1)
+
+
+@dataclass(frozen=True)
+class RunWindows:
+    """The windows of one run's m mirrors, as camera directions: right, down, forward.
+
+    Attributes:
+        ball: number of the ball in each window, (m,).
+        stop: number of its stop, (m,).
+        side: unit directions along the sides of all windows, mirror after mirror,
+            (e, SIDE_SAMPLES, 3).
+        coarse: see tbcad.tolerancing.prototype.rays.coarse_directions.
+        first: number of each mirror's first side, (m + 1,).
+        middle: unit directions of the mirrors' apices, (m, 3).
+        outward: directions from there to the outline, away from the seam where it halves, (m, 3).
+        halved: mirrors that the seam halves, (m,).
+    """
+
+    ball: Ints
+    stop: Ints
+    side: Floats
+    coarse: Floats
+    first: Ints
+    middle: Floats
+    outward: Floats
+    halved: Bools
+
+
+@dataclass(frozen=True)
+class PrototypeWindows:
+    """The prototype as designed, as the fast model needs it.
+
+    Attributes:
+        pinhole: mm, (3,).
+        axes: the camera's right, down and forward, (3, 3).
+        runs: for camera a's mirrors and for camera b's.
+        virtual: number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
+        wind_up: turn of the base under gravity at each of t stops, radians, (t,).
+    """
+
+    pinhole: Floats
+    axes: Floats
+    plan: Plan
+    runs: tuple[RunWindows, RunWindows]
+    virtual: Ints
+    wind_up: Floats
+
+    @property
+    def is_cap(self) -> Bools:
+        """Which balls are made instead of purchased, (k,)."""
+        return np.asarray(self.plan.body_radius < self.plan.radius)
+
+    @cached_property
+    def designed_rays(self) -> list[tuple[Floats, Floats]]:
+        """Of each run without errors: see `_middle_rays`."""
+        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, self.wind_up)
+        return [_middle_rays(run, run_pose(self, exact, 0, k)) for k, run in enumerate(self.runs)]
+
+
+def prototype_model(
+    reflectors: tuple[Reflector, Reflector], plan: Plan, wind_up: Floats
+) -> PrototypeWindows:
+    """The fast model of both cameras, the plan, and the base's turn under gravity at its stops."""
+    a, b = prototype_runs(reflectors, plan)
+    view = reflectors[0].camera
+    axes = view.axes
+    both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
+    virtual = virtual_camera_numbers(both[1].halved)
+    return PrototypeWindows(view.pinhole, axes, plan, both, virtual, wind_up)
+
+
+def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
+    sides, m = cell_windows(run.reflector.cells, run.camera.pinhole), len(run.reflector)
+    order = np.argsort(sides.mirror, kind="stable")
+    mirror = sides.mirror[order]
+    t = np.broadcast_to(np.linspace(0, 1, SIDE_SAMPLES), (len(mirror), SIDE_SAMPLES))
+    still = np.broadcast_to(run.reflector.u, (m, 3)), np.zeros(m)
+    side = sides.rays(t, *still)[order] @ run.window_rotation[mirror] @ axes.T
+    apex = unit(run.reflector.mirrors.apex - run.camera.pinhole)
+    middle = np.einsum("mx,mxy->my", apex, run.window_rotation) @ axes.T
+    first = np.searchsorted(mirror, np.arange(m + 1))
+    halved = run.reflector.mirrors.apex[:, 0] == 0
+    outline = np.add.reduceat(side.mean(axis=1), first[:-1]) / np.diff(first)[:, None]
+    outward = np.where(halved[:, None], outline - middle, ASYMMETRIC)
+    return RunWindows(
+        run.ball, run.stop, side, coarse_directions(side), first, middle, outward, halved
+    )
+
+
+@dataclass(frozen=True)
+class PrototypeResult:
+    """Coverage and pointing errors of s prototypes: see CoverageResult.
+
+    Attributes:
+        coverage: with designed windows, mm, (s, v).
+        offset: likewise, mm, (s, 2 m).
+        calibrated_coverage: with windows where the balls are, mm, (s, v).
+        calibrated_offset: likewise, mm, (s, 2 m).
+    """
+
+    coverage: Floats
+    offset: Floats
+    calibrated_coverage: Floats
+    calibrated_offset: Floats
+
+    @property
+    def uncalibrated(self) -> CoverageResult:
+        """Builds that are assumed to be the designed one."""
+        return CoverageResult(self.coverage, self.offset)
+
+    @property
+    def calibrated(self) -> CoverageResult:
+        """The same builds, with camera and balls known, so that every window is at its ball."""
+        return CoverageResult(self.calibrated_coverage, self.calibrated_offset)
+
+
+@dataclass(frozen=True)
+class PrototypeCase:
+    """Simulates builds of the prototype; it can be sent to another process."""
+
+    model: PrototypeWindows
+    errors: Errors
+    seed: int
+
+    def __call__(self, builds: range) -> PrototypeResult:
+        """Result of the builds of these numbers."""
+        model = self.model
+        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.wind_up)
+        return prototype_result(model, draws)
+
+
+@dataclass(frozen=True)
+class RunPose:
+    """Actual camera and balls of one run of one build, in the prototype's frame.
+
+    Attributes:
+        pinhole: mm, (3,).
+        lens: matrices that turn directions in the designed camera, as rows, into those of the
+            window's pixels, (m, 3, 3).
+        centre: of the ball in each window, mm, (m, 3).
+        radius: of each, mm, (m,).
+        highlight: unit directions in which they show the object's centre, (m, 3).
+    """
+
+    pinhole: Floats
+    lens: Floats
+    centre: Floats
+    radius: Floats
+    highlight: Floats
+
+
+def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: int) -> RunPose:
+    """Camera and balls when each mirror of one run is photographed."""
+    run, plan = model.runs[half], model.plan
+    on_base = (tilted_centres(plan, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
+    angle = plan.angle[run.stop] + draws.angle[build, half, run.stop]
+    tilt = Rotation.from_rotvec(draws.tilt[build] @ plan.frame[1:])
+    runout = draws.runout[build, half, run.stop] @ plan.frame[1:]
+    centre = tilt.apply(rotated(on_base, plan.frame[0], angle)) + runout
+    radius = plan.radius[run.ball] + draws.radius[build, run.ball]
+    pinhole = model.pinhole + draws.camera_shift[build]
+    lens = _lens(model, draws.camera_tilt[build], float(draws.focal[build]))
+    lenses = np.repeat(lens[None], len(radius), axis=0)
+    return RunPose(pinhole, lenses, centre, radius, highlights(pinhole, centre, radius))
+
+
+def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
+    """Centres of the reflecting spheres with their bodies tilted in their seats, mm, (k, 3).
+
+    Tilts are about two axes across the normal, radians, (k, 2). A ball's own is its body's, and
+    stays.
+    """
+    about = Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
+    return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
+
+
+def _lens(model: PrototypeWindows, tilt: Floats, focal: float) -> Floats:
+    """A longer focal length makes pictures larger: a pixel's ray is nearer to the axis."""
+    nearer = np.array([[1 / focal], [1 / focal], [1.0]])
+    return np.asarray(nearer * Rotation.from_rotvec(tilt).apply(model.axes))
+
+
+def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
+    """The same with windows that the software has moved to the actual balls.
+
+    It knows the camera then, and turns every window about the pinhole, until the middle of the
+    window shows the centre of the object.
+    """
+    run = model.runs[half]
+    lens = model.axes @ _shortest_rotations(unit(run.middle @ model.axes), pose.highlight)
+    return replace(pose, lens=lens)
+
+
+def _shortest_rotations(start: Floats, end: Floats) -> Floats:
+    """Matrices (m, 3, 3) that turn unit vectors (m, 3), as rows, onto others the shortest way."""
+    axis = np.cross(start, end)
+    skew = np.cross(np.eye(3), axis[:, None])  # row x becomes x cross axis
+    return np.asarray(np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None])
+
+
+def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> PrototypeResult:
+    """Coverage and pointing errors of s prototypes, with designed and with calibrated windows.
+
+    Coverage is twice the minimum distance from the object's centre of all rays camera -> edge of
+    the window -> reflected; zero where the window does not contain the centre's image; the smaller
+    of a mirror's halves at the seam. Offsets are the distance at the object between the ray in the
+    middle of each window and the designed ray, square to that; infinite without a ball.
+    """
+    v, m = int(model.virtual.max()) + 1, len(model.virtual)
+    result = PrototypeResult(*(np.empty((len(draws), size)) for size in (v, m, v, m)))
+    for build in range(len(draws)):
+        poses = [run_pose(model, draws, build, half) for half in HALVES]
+        known = [calibrated_pose(model, half, poses[half]) for half in HALVES]
+        result.coverage[build], result.offset[build] = _seen(model, poses)
+        result.calibrated_coverage[build], result.calibrated_offset[build] = _seen(model, known)
+    return result
+
+
+def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:
+    pairs = list(zip(model.runs, poses, strict=True))
+    diameter = np.full(int(model.virtual.max()) + 1, np.inf)
+    np.minimum.at(diameter, model.virtual, np.concatenate([_coverage(*pair) for pair in pairs]))
+    rays = zip(map(_middle_rays, model.runs, poses), model.designed_rays, strict=True)
+    return diameter, np.concatenate([_offsets(*pair) for pair in rays])
+
+
+def _coverage(run: RunWindows, pose: RunPose) -> Floats:
+    return 2 * minimum_miss_distances(
+        *((run.side, run.coarse, run.first), run.outward),
+        *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius),
+    )
+
+
+def _middle_rays(run: RunWindows, pose: RunPose) -> tuple[Floats, Floats]:
+    """Points on the balls and unit directions after them of the windows' middle rays, (m, 3) each.
+
+    NaN where there is no ball.
+    """
+    ray = unit((run.middle[:, None] @ pose.lens)[:, 0])
+    to_centre = pose.centre - pose.pinhole
+    along = dot(ray, to_centre)
+    inside = pose.radius**2 - dot(to_centre, to_centre) + along**2
+    half_chord = np.sqrt(np.where(inside < 0, np.nan, inside))
+    point = pose.pinhole + (along - half_chord)[:, None] * ray
+    return point, reflected_rays(pose.pinhole, point, (point - pose.centre) / pose.radius[:, None])
+
+
+def _offsets(ray: tuple[Floats, Floats], designed: tuple[Floats, Floats]) -> Floats:
+    """Distance (m,) of rays from designed ones, in planes through the origin square to these."""
+    (point, direction), (start, aim) = ray, designed
+    at_plane = point - (dot(point, aim) / dot(direction, aim))[:, None] * direction
+    apart = norm(at_plane - start + dot(start, aim)[:, None] * aim)
+    return np.where(np.isnan(apart), np.inf, apart)

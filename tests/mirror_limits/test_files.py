@@ -1,0 +1,153 @@
+"""Files of an inspection: tables, and STEP with tolerances as other readers get them."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+from tbcad.api import inspect
+from tbcad.cli import run
+from tbcad.formats.step import StepError, read_named_solid
+from tbcad.formats.step_tolerances import read_tolerances
+from tbcad.mirror_limits.read_back import check_read_back
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.mirrors.record import write_record
+from tbcad.shell.files import shell_envelope, write_shell_solids
+from tbcad.spec.load import load_spec
+from tests.helpers import read_step, volume
+
+SMALL = ["n=4", "mirrors.coating_um=20"]
+
+
+@pytest.fixture(scope="module")
+def coated() -> MirrorDesign:
+    return design(load_spec(None, SMALL))
+
+
+@pytest.fixture(scope="module")
+def exports(coated: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shells")
+    write_record(folder, coated, shells=True)
+    write_shell_solids(coated, shell_envelope(coated), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(exports: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("inspection") / "out"
+    inspect(exports, out=out)
+    return out
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "inspection_a.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_spheres_are_those_below_the_coat(written: Path, coated: MirrorDesign) -> None:
+    rows, array = table(written), coated.arrays[0]
+    assert [row["id"] for row in rows] == array.ids
+    radius = [float(row["radius_mm"]) for row in rows]
+    assert radius == pytest.approx(array.mirrors.radius - 0.020, abs=1e-12)
+    columns = ("centre_x_mm", "centre_y_mm", "centre_z_mm")
+    centre = [[float(row[axis]) for axis in columns] for row in rows]
+    assert np.array(centre) == pytest.approx(array.mirrors.centre, abs=1e-9)
+
+
+def test_the_solid_is_the_same(written: Path, exports: Path) -> None:
+    with_tolerances = read_step(written / "shell_b_tolerances.step")
+    without = read_step(exports / "shell_b.step")
+    assert with_tolerances.valid
+    assert sorted(with_tolerances.faces) == sorted(without.faces)
+    assert volume(with_tolerances.shape) == pytest.approx(volume(without.shape), rel=1e-12)
+
+
+@pytest.mark.parametrize("half", ["a", "b"])
+def test_the_datums_are_the_planes_of_seam_and_foot(
+    exports: Path, coated: MirrorDesign, half: str
+) -> None:
+    """By their names in the STEP file, whose faces the kernel reads in another order."""
+    faces = dict(read_named_solid(exports / f"shell_{half}.step").faces)
+    for name, axis in (("seam", 0), ("foot", 2)):
+        plane = BRepAdaptor_Surface(faces[name]).Plane()
+        normal = np.array(plane.Axis().Direction().Coord())
+        assert np.abs(normal) == pytest.approx(np.eye(3)[axis], abs=1e-12)
+        level = coated.arrays[0].cells.surfaces.apex[-1, 2] if name == "foot" else 0.0
+        assert plane.Location().Coord()[axis] == pytest.approx(level, abs=1e-9)
+
+
+def test_tolerances_as_a_parser_of_the_grammar_reads_them(written: Path) -> None:
+    """No CAD kernel: the schema, one zone a mirror in the frame A, B, C, and notes."""
+    from steputils import p21
+
+    file = p21.readfile(str(written / "shell_a_tolerances.step"))
+    assert "AP242" in str(file.header.entities["FILE_SCHEMA"].params)
+    zones, frames, names, notes = [], set(), {}, {}
+    for instance in file.data[0].instances.values():
+        entities = [instance.entity] if hasattr(instance, "entity") else instance.entities
+        kinds = {entity.name: entity.params for entity in entities}
+        if "SURFACE_PROFILE_TOLERANCE" in kinds:
+            width = file[kinds["GEOMETRIC_TOLERANCE"][2]].entity.params[0]
+            zones.append(float(width.param))
+            frames.add(kinds["GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE"][0][0])
+        if "DATUM" in kinds:
+            names[instance.ref] = kinds["DATUM"][4]
+        if "DESCRIPTIVE_REPRESENTATION_ITEM" in kinds:
+            name, note = kinds["DESCRIPTIVE_REPRESENTATION_ITEM"]
+            notes[name] = note
+    given = sorted(float(row["profile_mm"]) for row in table(written))
+    assert sorted(zones) == pytest.approx(given, abs=1e-12)
+    for frame in frames:
+        compartments = file[frame].entity.params[4]
+        assert [names[file[one].entity.params[4]] for one in compartments] == ["A", "B", "C"]
+    assert "Rq 4.4 nm" in notes["surface finish"]
+
+
+def test_radii_are_read_with_their_limits(written: Path) -> None:
+    read = [
+        one for one in read_tolerances(written / "shell_a_tolerances.step") if one.kind == "radius"
+    ]
+    rows = sorted(table(written), key=lambda row: float(row["radius_mm"]))
+    expected = [(float(row["radius_mm"]), float(row["radius_limit_mm"])) for row in rows]
+    found = sorted((one.nominal, one.value) for one in read)
+    assert np.array(found) == pytest.approx(np.array(expected), abs=1e-9)
+
+
+def test_a_file_that_lost_a_zone_is_found(written: Path, tmp_path: Path) -> None:
+    """Read back against what should be there: one mirror more than the file has."""
+    from tbcad.formats.step_tolerances import FaceTolerances
+
+    rows = table(written)
+    profile = {row["id"]: float(row["profile_mm"]) for row in rows} | {"a9999": 1.0}
+    axes = ("centre_x_mm", "centre_y_mm", "centre_z_mm")
+    centres = {row["id"]: np.array([float(row[axis]) for axis in axes]) for row in rows}
+    seat = json.loads((written / "inspection.json").read_text())["limits"]["seat_um"] / 1000
+    given = FaceTolerances({"A": "", "B": "", "C": ""}, {"f": seat, "s": seat}, profile, {}, {})
+    with pytest.raises(StepError, match=f"{len(rows)} zones are read, {len(profile)}"):
+        check_read_back(written / "shell_a_tolerances.step", given, centres)
+
+
+def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:
+    inspect(exports, out=tmp_path / "again")
+    for file in sorted(written.iterdir()):
+        assert file.read_bytes() == (tmp_path / "again" / file.name).read_bytes(), file.name
+
+
+class TestRefused:
+    def test_no_shells(self, record: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert run(["inspection", str(record)]) == 2
+        assert "shell_a.step is not there: build the shell too" in capsys.readouterr().err
+
+    def test_planar_mirrors(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        sample = Path(__file__).parents[2] / "docs" / "sample"
+        out = tmp_path / "out"
+        assert run(["inspection", str(sample), "--out", str(out)]) == 2
+        assert "its mirrors are planar" in capsys.readouterr().err
+        assert not out.exists()
+
+    def test_a_share_that_is_none(self, exports: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert run(["inspection", str(exports), "--yield", "1.5"]) == 2
+        assert "--yield 1.5: allowed is" in capsys.readouterr().err

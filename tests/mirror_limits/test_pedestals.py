@@ -1,0 +1,179 @@
+"""Limits of mirrors on pedestals: each depends on its own mirror alone, and its walls have one."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.TopoDS import TopoDS_Face
+
+from tbcad.api import inspect
+from tbcad.formats.step import StepError, read_named_solid
+from tbcad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
+from tbcad.mirror_limits.files import Half, dowel_face, halves, tolerances
+from tbcad.mirror_limits.inspect import found_limits, minimum_at_limits
+from tbcad.mirror_limits.limits import MirrorLimits
+from tbcad.mirror_limits.read_back import check_read_back
+from tbcad.mirror_limits.sensitivity import Sensitivities, sensitivities
+from tbcad.mirrors.array import MirrorDesign
+from tbcad.mirrors.record import write_record
+from tbcad.optics.pedestals.walls import groove_walls
+from tbcad.shell.files import shell_envelope, wall_names, write_shell_solids
+from tbcad.simulate.scene.exported import ExportedDesign, read_export
+from tests.pedestal_designs import pedestal_design
+
+TARGET = 60.0
+
+
+def face_sphere(face: TopoDS_Face) -> tuple[float, float, float]:
+    """Centre of the sphere that a face is on."""
+    return BRepAdaptor_Surface(face).Sphere().Location().Coord()  # type: ignore[no-any-return]
+
+
+def face_plane(face: TopoDS_Face) -> tuple[np.ndarray, np.ndarray]:
+    """A point and the normal of the plane that a face is on."""
+    plane = BRepAdaptor_Surface(face).Plane()
+    return np.array(plane.Location().Coord()), np.array(plane.Axis().Direction().Coord())
+
+
+@pytest.fixture(scope="module")
+def made() -> MirrorDesign:
+    return pedestal_design("n=6")
+
+
+@pytest.fixture(scope="module")
+def folder(made: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shells")
+    write_record(folder, made, shells=True)
+    write_shell_solids(made, shell_envelope(made), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def export(folder: Path) -> ExportedDesign:
+    return read_export(folder)
+
+
+@pytest.fixture(scope="module")
+def found(export: ExportedDesign) -> tuple[Sensitivities, MirrorLimits]:
+    return found_limits(export, 0.99)
+
+
+def test_each_virtual_camera_depends_on_its_own_mirrors_alone(export: ExportedDesign) -> None:
+    a = export.reflectors[0]
+    one = sensitivities(export.reflectors)
+    of_camera = np.bincount(one.camera)
+    halved = a.mirrors.apex[:, 0] == 0
+    assert of_camera[: len(a)].tolist() == np.where(halved, 2, 1).tolist()
+    assert one.loss.shape[1] == 4
+    assert (one.loss[:, 3] > 0).mean() > 0.8  # others have more coverage than they need
+
+
+def test_all_mirrors_at_their_limits_are_good(
+    export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]
+) -> None:
+    assert minimum_at_limits(export, found[1], builds=200) >= TARGET
+    assert minimum_at_limits(export, replace(found[1], each=4 * found[1].each)) < TARGET
+
+
+@pytest.mark.parametrize("kind", [0, 1, 3])
+def test_one_kind_alone_may_take_the_whole_margin(
+    export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits], kind: int
+) -> None:
+    """Five times its limit, a part of five each; no more than that: it is not far too small."""
+    alone = np.zeros_like(found[1].each)
+    alone[:, kind] = found[1].each[:, kind]
+    assert minimum_at_limits(export, replace(found[1], each=5 * alone)) >= TARGET - 1e-3
+    assert minimum_at_limits(export, replace(found[1], each=8 * alone)) < TARGET
+
+
+def test_offsets_may_be_larger_than_where_spheres_meet(
+    found: tuple[Sensitivities, MirrorLimits],
+) -> None:
+    assert found[1].each[:, 0].min() > 5  # um; where spheres meet 0.5
+    assert found[1].each[:, 3].min() > 1
+
+
+def test_files_name_walls_and_their_limits(
+    folder: Path, made: MirrorDesign, tmp_path: Path
+) -> None:
+    inspect(folder, out=tmp_path / "out")
+    with (tmp_path / "out" / "inspection_b.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    record = json.loads((tmp_path / "out" / "inspection.json").read_text(encoding="utf-8"))
+    smallest = record["limits"]["smallest"]
+    assert min(float(row["wall_limit_um"]) for row in rows) >= smallest["wall_um"] > 0
+    assert record["simulated_minimum_mm"] >= TARGET
+    read = read_tolerances(tmp_path / "out" / "shell_b_tolerances.step")
+    assert sum(one.kind == "profile" and one.centre is not None for one in read) == len(rows)
+    zones = [one for one in read if one.kind == "profile" and one.planes]
+    assert all(one.datums == ("A", "B", "C") for one in zones)
+    assert sum(len(one.planes) for one in zones) == len(groove_walls(made.arrays[1].cells))
+    widths = sorted(one.value for one in zones)
+    asked = sorted(2e-3 * float(row["wall_limit_um"]) for row in rows)
+    assert widths == pytest.approx(asked, abs=1e-9)
+    assert "walls of grooves" in (tmp_path / "out" / "shell_b_tolerances.step").read_text("ascii")
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_a_solid_that_is_read_has_each_face_by_its_name(
+    folder: Path, made: MirrorDesign, camera: int
+) -> None:
+    """The kernel reads faces in another order than the file has them."""
+    array = made.arrays[camera]
+    solid = read_named_solid(folder / f"shell_{array.camera_id}.step")
+    faces = dict(solid.faces)
+    centre = np.array([face_sphere(faces[name]) for name in array.ids])
+    assert np.abs(centre - array.modelled_cells.mirror_surfaces.centre).max() < 1e-9
+    walls = groove_walls(array.modelled_cells)
+    names = wall_names(array.ids, array.modelled_cells)
+    for name, point, normal in zip(names, walls.point, walls.normal, strict=True):
+        at, axis = face_plane(faces[name])
+        assert np.linalg.norm(np.cross(axis, normal)) < 1e-9
+        assert abs((point - at) @ axis) < 1e-8
+
+
+@pytest.fixture(scope="module")
+def half(export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]) -> Half:
+    return halves(export, found[1])[0]
+
+
+@pytest.fixture(scope="module")
+def given(folder: Path, half: Half) -> FaceTolerances:
+    """Written beside the shell."""
+    solid = read_named_solid(folder / "shell_a.step")
+    result = tolerances(half, dowel_face(solid, half.dowel_mm))
+    write_tolerances(folder / "toleranced.step", solid, result)
+    return result
+
+
+def read_back(folder: Path, half: Half, given: FaceTolerances) -> None:
+    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
+    walls = {name: plane for one in half.walls for name, plane in one.items()}
+    check_read_back(folder / "toleranced.step", given, centres, walls)
+
+
+def test_zones_of_walls_as_given_are_read_back(
+    folder: Path, half: Half, given: FaceTolerances
+) -> None:
+    read_back(folder, half, given)
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [("narrower", "read otherwise"), ("swapped", "zones of walls"), ("missing", "zones of walls")],
+)
+def test_zones_of_walls_that_are_not_as_given_are_refused(
+    folder: Path, half: Half, given: FaceTolerances, fault: str, message: str
+) -> None:
+    (first, width), (second, other), *rest = given.common_profile.items()
+    changed = {
+        "narrower": {first: width / 2, second: other, **dict(rest)},
+        "swapped": {(*first[1:], second[0]): width, (first[0], *second[1:]): other, **dict(rest)},
+        "missing": {second: other, **dict(rest)},
+    }[fault]
+    with pytest.raises(StepError, match=message):
+        read_back(folder, half, replace(given, common_profile=changed))

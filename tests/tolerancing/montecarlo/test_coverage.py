@@ -1,0 +1,196 @@
+"""What the fast model makes of one half; tests/validation holds it against other means."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.simulate.scene.rays import exact_tracer
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.spec.load import load_spec
+from tbcad.tolerancing.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
+from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, virtual_camera_numbers
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_model
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tests.tolerancing.exact_builds import surrounded
+from tests.tolerancing.montecarlo.every_edge import every_edge
+
+
+def none(halves: EdgeModels, builds: int = 1) -> tuple[ShellDraws, ShellDraws]:
+    return draw(Errors(), 1, range(builds), len(halves[0]))
+
+
+def test_virtual_cameras_share_halved_mirrors(halves: EdgeModels) -> None:
+    which, m = virtual_camera_numbers(halves[1].halved), len(halves[0])
+    halved = halves[0].halved
+    assert len(np.unique(which)) == which.max() + 1 == 2 * m - halved.sum() == 193
+    assert np.array_equal(which[:m], np.arange(m))
+    assert np.array_equal(which[m:][halved], np.flatnonzero(halved))
+    assert (which[m:][~halved] >= m).all()
+
+
+def test_pixels_are_those_that_are_counted(small_design: MirrorDesign) -> None:
+    """Against one exact ray a pixel, for mirrors whose picture lies inside the frame."""
+    a, _ = reflectors(small_design)
+    half = edge_model(a)
+    area = mirror_coverage(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
+    numbers = exact_tracer(a)(range(a.camera.height_px), (0.0, 0.0)).mirror
+    count = np.bincount(numbers.ravel(), minlength=len(half) + 1)[1:]
+    box = a.boxes()
+    inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < a.camera.width_px)
+    inside &= box[:, 3] < a.camera.height_px
+    # Of the pixels on the border, as many as the root of the area, half of one each is uncertain.
+    assert inside.sum() > 60
+    assert np.abs(area - count)[inside] == pytest.approx(0, abs=0.5 * np.sqrt(count.max()))
+
+
+def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
+    """To a millionth of a polygon with 512 corners on every edge."""
+    a, b = reflectors(small_design)
+    for at in (a, b):
+        half, (offsets, sides) = edge_model(at), at.cells.rings
+        t = np.broadcast_to(np.arange(512) / 512, (len(sides), 512))
+        t = np.where((sides % 2 == 1)[:, None], 1 - t, t)
+        edge = at.camera.project(at.cells.arcs.at(np.broadcast_to(sides[:, None] // 2, t.shape), t))
+        area = mirror_coverage(half, draw(Errors(), 1, range(1), len(half))[0]).pixels[0]
+        for k, (first, last) in enumerate(pairwise(offsets)):
+            x, y = edge[first:last].reshape(-1, 2).T
+            polygon = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+            assert area[k] == pytest.approx(polygon, rel=1e-6)
+
+
+def test_longer_focal_length_makes_larger_pictures(halves: EdgeModels) -> None:
+    draws = none(halves)[0]
+    longer = replace(draws, focal=np.array([1.01]))
+    ratio = mirror_coverage(halves[0], longer).pixels / mirror_coverage(halves[0], draws).pixels
+    assert ratio == pytest.approx(1.01**2, rel=1e-12)
+
+
+def test_facets_cost_what_they_cost(halves: EdgeModels) -> None:
+    whole, _ = coverage(halves, none(halves))
+    less, _ = coverage(halves, draw(Errors(facets=Error(0, 0.4)), 1, range(1), len(halves[0])))
+    assert whole - less == pytest.approx(0.4, abs=1e-12)
+
+
+def test_lesser_half_of_a_mirror_on_the_seam_counts(halves: EdgeModels) -> None:
+    a, b = none(halves)
+    shrunk = replace(b, radius=np.where(halves[1].halved, 0.2, 0.0)[None])
+    both, pixels = coverage(halves, (a, shrunk))
+    one, other = mirror_coverage(halves[0], a), mirror_coverage(halves[1], shrunk)
+    halved = halves[0].halved
+    lesser = (other.diameter < one.diameter)[0, halved]
+    assert 0 < lesser.sum() < halved.sum()
+    least = np.where(lesser, other.diameter[0, halved], one.diameter[0, halved])
+    assert np.array_equal(both[0, : len(halved)][halved], least)
+    together = (one.pixels + other.pixels)[0, halved]
+    assert pixels[0, : len(halved)][halved] == pytest.approx(together, rel=1e-12)
+
+
+def test_mirror_that_its_neighbours_swallow_sees_nothing(halves: EdgeModels) -> None:
+    """Its sphere moved back behind theirs, it has no cell."""
+    lost = int(np.flatnonzero(~halves[0].halved)[10])
+    a, b = none(halves)
+    centre = np.zeros_like(a.centre)
+    centre[0, lost] = -5 * halves[0].table[lost, 3:6]
+    sees, pixels = coverage(halves, (replace(a, centre=centre), b))
+    assert (sees[0, lost], pixels[0, lost]) == (0, 0)
+    assert np.delete(sees[0], lost).min() > 0
+
+
+@pytest.mark.parametrize(("shift", "all_look"), [(3.0, True), (45.0, False), (60.0, False)])
+def test_mirror_that_looks_past_the_object_sees_nothing(
+    halves: EdgeModels, small_design: MirrorDesign, shift: float, all_look: bool
+) -> None:
+    """Its rays may miss the middle by far and yet not surround it."""
+    a, _ = none(halves)
+    moved = replace(a, camera_shift=np.array([[0.0, shift, 0.0]]))
+    one, whole = mirror_coverage(halves[0], moved), ~halves[0].halved
+    wanted = surrounded(small_design.arrays[0], moved.camera_shift[0])
+    assert np.array_equal(one.crossings[0, whole] % 2 == 1, wanted[whole])
+    assert wanted[whole].all() == all_look
+
+
+def test_mirror_that_sends_light_sideways_surrounds_the_object() -> None:
+    """Off mirror a0022 rays fan out to 96 degrees from its axis: some never meet the screen."""
+    options = ["n=3", "camera_mm=[70, 0, -38.8]", "semi_minor_mm=33.8", "capture_diameter_mm=20"]
+    mirrors = design(load_spec(None, options))
+    a, b = (edge_model(at) for at in reflectors(mirrors))
+    sees, _ = coverage((a, b), none((a, b)))
+    assert sees[0, : len(a)] == pytest.approx(mirrors.arrays[0].coverage, abs=1e-3)
+
+
+def test_errors_larger_than_a_mirror_are_refused(halves: EdgeModels) -> None:
+    draws = draw(Errors(sphere_radius=Error(0, -1e3)), 1, range(1), len(halves[0]))
+    with pytest.raises(InputError, match=r"sphere_radius_um.*make the errors smaller"):
+        coverage(halves, draws)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 0.02, 0.1, 0.4])
+class TestSlowWay:
+    """The faces and the parts of edges that are passed over change no bit."""
+
+    @staticmethod
+    def draws(halves: EdgeModels, size: float) -> tuple[ShellDraws, ShellDraws]:
+        errors = Errors(
+            sphere_centre=Error(size),
+            sphere_radius=Error(size),
+            camera_shift=Error(5 * size),
+            scale_axis=Error(size / 20),
+            facets=Error(size),
+        )
+        return draw(errors, 5, range(4), len(halves[0]))
+
+    def test_same_coverage_as_with_every_edge(self, halves: EdgeModels, size: float) -> None:
+        for array, drawn in zip(halves, self.draws(halves, size), strict=True):
+            slow, fast = every_edge(array, drawn), mirror_coverage(array, drawn)
+            assert np.array_equal(fast.diameter, 2 * np.sqrt(slow[..., MISS_SQUARED]))
+            assert np.array_equal(fast.crossings, slow[..., CROSSINGS])
+            scale = (drawn.focal[:, None] / array.view.pixel_pitch) ** 2
+            assert np.array_equal(fast.pixels, np.abs(slow[..., AREA]) * scale)
+
+    def test_same_minimum_where_only_that_is_asked(self, halves: EdgeModels, size: float) -> None:
+        draws = self.draws(halves, size)
+        whole, worst = (coverage(halves, draws, only)[0] for only in (False, True))
+        assert np.array_equal(worst.min(axis=1), whole.min(axis=1))
+        assert (worst >= whole - 1e-9).all()
+
+
+def test_builds_that_see_the_same_are_computed_once(
+    halves: EdgeModels, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Turned cameras see other pictures of the same coverage, and facets come afterwards."""
+    traced: list[None] = []
+
+    def counting(*of: object) -> np.ndarray:
+        traced.append(None)
+        return trace_cell_edges(*of)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("tbcad.tolerancing.montecarlo.coverage.trace_cell_edges", counting)
+    for errors, once in (
+        (Errors(camera_tilt=Error(0.01), camera_focal=Error(0.01), facets=Error(0.3)), True),
+        (Errors(shell_tilt=Error(0.001)), False),
+    ):
+        draws = draw(errors, 1, range(3), len(halves[0]))
+        traced.clear()
+        worst = coverage(halves, draws, worst_only=True)[0].min(axis=1)
+        assert len(traced) == (2 if once else 6)
+        assert np.array_equal(worst, coverage(halves, draws)[0].min(axis=1))
+
+
+def test_no_builds(halves: EdgeModels) -> None:
+    diameter, pixels = coverage(halves, none(halves, 0))
+    assert diameter.shape == pixels.shape == (0, 193)
+
+
+def test_planar_mirrors_with_a_thick_coat_move_and_stay_planar() -> None:
+    """Their cells are cut by straight edges; all moved along their normals they stay alike."""
+    flat = design(load_spec(None, ["n=4", "radius_rule=flat"]))
+    a, b = (edge_model(at) for at in reflectors(flat))
+    bare, _ = coverage((a, b), draw(Errors(), 1, range(1), len(a)))
+    coated, _ = coverage((a, b), draw(Errors(coating=Error(0, 0.05)), 1, range(1), len(a)))
+    assert bare[0, : len(a)] == pytest.approx(flat.arrays[0].coverage, abs=1e-5)
+    assert 0 < np.abs(coated - bare).max() < 1

@@ -1,0 +1,183 @@
+"""What each kind of error costs alone, against losses that are known in closed form."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from tbcad.tolerancing.montecarlo.builds import (
+    MonteCarloCase,
+    coverage_at_yield,
+    estimate_yield,
+    simulate,
+)
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sensitivity import (
+    FACTOR_TOLERANCE,
+    LARGEST_FACTOR,
+    one_at_a_time,
+    only_kind,
+    present_kinds,
+    scaled,
+    tolerable_factor,
+)
+
+MIXED = Errors(
+    sphere_centre=Error(0.02),
+    coating=Error(0.01, 0.03, "uniform"),
+    facets=Error(0.0, 0.36),
+    seat=Error(0.1),
+)
+TARGET = 60.0
+ROOM = 0.6
+
+
+def synthetic(loss: Callable[[float], float]) -> Callable[[Errors], np.ndarray]:
+    """Machines that all lose what a law makes of the mean of facets."""
+    return lambda errors: np.full(7, TARGET + ROOM - loss(errors.facets.mean))
+
+
+def real(halves: EdgeModels, builds: int) -> Callable[[Errors], np.ndarray]:
+    return lambda errors: simulate(MonteCarloCase(halves, errors, 3), builds).worst
+
+
+def test_kinds_are_those_of_which_there_are_any() -> None:
+    assert present_kinds(MIXED) == ["sphere_centre", "coating", "facets", "seat"]
+    assert present_kinds(Errors()) == []
+
+
+def test_only_leaves_one_kind_as_it_is() -> None:
+    for kind in present_kinds(MIXED):
+        one = only_kind(MIXED, kind)
+        assert present_kinds(one) == [kind]
+        assert getattr(one, kind) == getattr(MIXED, kind)
+
+
+def test_scaled_multiplies_spread_and_mean_and_nothing_else() -> None:
+    twice = scaled(MIXED, 2.5)
+    for field in fields(Errors):
+        before, after = getattr(MIXED, field.name), getattr(twice, field.name)
+        assert after.spread == pytest.approx(2.5 * before.spread, rel=1e-15)
+        assert after.mean == pytest.approx(2.5 * before.mean, rel=1e-15)
+        assert after.distribution == before.distribution
+    assert scaled(MIXED, 1.0) == MIXED
+
+
+@pytest.mark.parametrize("mean", [0.0002 * LARGEST_FACTOR, 0.36, 0.05, 7.0, 600.0])
+def test_linear_loss(mean: float) -> None:
+    """What is left is room - times mean: the factor is the one over the other."""
+    found = tolerable_factor(Errors(facets=Error(0, mean)), 0.99, TARGET, synthetic(lambda x: x))
+    assert found == pytest.approx(ROOM / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
+
+
+@pytest.mark.parametrize("power", [0.5, 2.0, 3.0])
+@pytest.mark.parametrize("mean", [0.02, 0.4, 5.0])
+def test_bent_loss(power: float, mean: float) -> None:
+    """The loss is the mean's power: the factor is the root of the room over the mean."""
+    found = tolerable_factor(
+        Errors(facets=Error(0, mean)), 0.9, TARGET, synthetic(lambda x: x**power)
+    )
+    assert found == pytest.approx(ROOM ** (1 / power) / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
+
+
+def test_loss_with_a_cliff_is_bracketed() -> None:
+    """Nothing is lost up to three times, all beyond: no straight line leads there."""
+    found = tolerable_factor(
+        Errors(facets=Error(0, 1.0)), 0.9, TARGET, synthetic(lambda x: 50.0 if x > 3 else 0.0)
+    )
+    assert found == pytest.approx(3.0, rel=FACTOR_TOLERANCE)
+
+
+@pytest.mark.parametrize("count", [1, 7, 10, 100, 101])
+def test_share_is_good_exactly_where_it_is_reached(count: int) -> None:
+    """For every share that so many builds can have, and those between."""
+    worst = np.random.default_rng(count).normal(TARGET, 1, count)
+    for wanted in np.arange(1, 2 * count) / (2 * count):
+        for target in worst:
+            good = estimate_yield(worst, target).share >= wanted
+            assert (coverage_at_yield(worst, wanted) >= target) == good
+
+
+def test_what_costs_nothing_may_be_anything() -> None:
+    assert (
+        tolerable_factor(Errors(facets=Error(1.0)), 0.99, TARGET, synthetic(lambda _: 0.0))
+        == np.inf
+    )
+
+
+def test_what_costs_far_too_little_may_be_anything() -> None:
+    """It would be reached at a million times."""
+    slight = Errors(facets=Error(0, ROOM / 1e6))
+    assert tolerable_factor(slight, 0.99, TARGET, synthetic(lambda x: x)) == np.inf
+
+
+def test_design_that_falls_short_allows_nothing() -> None:
+    some = Errors(facets=Error(0, 0.1))
+    assert tolerable_factor(some, 0.99, TARGET + ROOM + 0.001, synthetic(lambda x: x)) == 0
+    assert tolerable_factor(some, 0.99, TARGET + ROOM - 0.001, synthetic(lambda x: x)) > 0
+
+
+def test_quantile_of_the_builds_decides_not_their_mean() -> None:
+    """Machine k of 101 loses k per cent: at a yield of 0.75 the one that loses 75 % counts."""
+
+    def worst(errors: Errors) -> np.ndarray:
+        return TARGET + ROOM - errors.facets.mean * np.linspace(0, 1, 101)
+
+    found = tolerable_factor(Errors(facets=Error(0, 0.4)), 0.75, TARGET, worst)
+    assert found == pytest.approx(ROOM / (0.4 * 0.75), rel=FACTOR_TOLERANCE)
+    one = one_at_a_time(MIXED, "facets", 0.75, TARGET, worst)
+    assert one.kind == "facets"
+    assert one.loss == pytest.approx(0.36 / 2)
+    assert one.loss_at_yield == pytest.approx(0.36 * 0.75)
+    assert one.tolerable_factor == pytest.approx(ROOM / (0.36 * 0.75), rel=FACTOR_TOLERANCE)
+
+
+def test_alone_asks_for_no_other_kind() -> None:
+    asked: list[Errors] = []
+
+    def worst(errors: Errors) -> np.ndarray:
+        asked.append(errors)
+        return np.full(3, TARGET + ROOM - errors.coating.mean)
+
+    one_at_a_time(MIXED, "coating", 0.9, TARGET, worst)
+    assert len(asked) > 3
+    for errors in asked:
+        assert replace(errors, coating=Error()) == Errors()
+
+
+def test_facets_of_a_build_are_linear(halves: EdgeModels) -> None:
+    """They are taken off the coverage, so the factor is what the design has to spare over them."""
+    worst = real(halves, 10)
+    spare = float(worst(Errors())[0]) - TARGET
+    assert spare > 0.5
+    one = one_at_a_time(MIXED, "facets", 0.99, TARGET, worst)
+    assert one.loss == pytest.approx(0.36, abs=1e-9)
+    assert one.loss_at_yield == pytest.approx(0.36, abs=1e-9)
+    assert one.tolerable_factor == pytest.approx(spare / 0.36, rel=FACTOR_TOLERANCE)
+
+
+@pytest.mark.parametrize(
+    ("kind", "error"),
+    [("sphere_centre", Error(0.025)), ("camera_shift", Error(0.11)), ("coating", Error(0, 0.3))],
+)
+def test_builds_with_the_factor_just_do(halves: EdgeModels, kind: str, error: Error) -> None:
+    """A little less makes the wanted share good; a little more does not."""
+    worst, errors = real(halves, 20), Errors(**{kind: error})
+    times = tolerable_factor(errors, 0.9, TARGET, worst)
+    assert 0 < times < LARGEST_FACTOR
+    less, more = (
+        estimate_yield(worst(scaled(errors, times * by)), TARGET).share
+        for by in (1 - 2 * FACTOR_TOLERANCE, 1 + 2 * FACTOR_TOLERANCE)
+    )
+    assert more < 0.9 <= less
+
+
+def test_camera_that_turns_about_its_pinhole_is_harmless(halves: EdgeModels) -> None:
+    """Coverage hangs on places of pinhole and mirrors alone."""
+    one = one_at_a_time(
+        Errors(camera_tilt=Error(0.003)), "camera_tilt", 0.9, TARGET, real(halves, 10)
+    )
+    assert one.loss == pytest.approx(0, abs=1e-9)
+    assert one.tolerable_factor == np.inf

@@ -1,0 +1,234 @@
+"""Pictures of builds that are off: where their mirrors are, and what calibration gives back."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.optics.camera import Camera
+from tbcad.optics.reflection import reflected_rays
+from tbcad.simulate.scene.object import built_in_object
+from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.simulate.scene.rays import exact_tracer, reflect_pixels
+from tbcad.simulate.scene.reflector import Reflector, reflectors
+from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.simulate.views.viewpoints import ground_truths
+from tbcad.spec.load import load_spec
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_model
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sharpness import (
+    BuiltReflector,
+    ReferenceViews,
+    Sharpness,
+    built_reflector,
+    sharpness,
+)
+
+Cameras = tuple[Reflector, Reflector]
+
+CAPTURE_MM = 60.0
+SIZE = (160, 120)
+# All that a sphere stays a sphere under, and large: cells move by a tenth of their width.
+LARGE = Errors(
+    sphere_centre=Error(0.3),
+    sphere_radius=Error(0.1),
+    scale_isotropic=Error(0.01),
+    shell_shift=Error(0.4),
+    shell_tilt=Error(5e-3),
+    camera_shift=Error(0.4),
+    camera_tilt=Error(5e-3),
+    camera_focal=Error(5e-3),
+)
+
+
+@pytest.fixture(scope="module")
+def little() -> MirrorDesign:
+    # The corners of a wider lens see past the array: looked for everywhere, a mirror is found
+    # there on the far side of its sphere.
+    options = ["n=4", "camera.width_px=416", "camera.height_px=310", "hfov_deg=89"]
+    return design(load_spec(None, options))
+
+
+@pytest.fixture(scope="module")
+def cameras(little: MirrorDesign) -> Cameras:
+    return reflectors(little)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return prepared_scene(built_in_object(CAPTURE_MM))
+
+
+@pytest.fixture(scope="module")
+def reference(scene: Scene) -> ReferenceViews:
+    places = [(0.3, np.radians(60)), (2.0, np.radians(35))]
+    views: list[Camera] = [
+        camera_around_object(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places
+    ]
+    return ReferenceViews(CAPTURE_MM, views, ground_truths(scene, views, lambda _: None))
+
+
+def builds(cameras: Cameras, errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]
+    return draw(errors, 5, range(count), len(cameras[0]))
+
+
+def numbers(at: Reflector) -> np.ndarray:
+    return exact_tracer(at)(range(at.camera.height_px), (0.0, 0.0)).mirror
+
+
+class WholeFrame(BuiltReflector):
+    """Looks for every mirror in the whole picture."""
+
+    def boxes(self) -> np.ndarray:
+        return np.tile([0, self.camera.width_px, 0, self.camera.height_px], (len(self), 1))
+
+
+class OwnCells(BuiltReflector):
+    """Looks for mirrors no farther than about their designed cells."""
+
+    def boxes(self) -> np.ndarray:
+        return Reflector.boxes(self)
+
+
+class TestActual:
+    @pytest.mark.parametrize("side", [0, 1])
+    def test_without_errors_it_is_the_designed_one(self, cameras: Cameras, side: int) -> None:
+        at, drawn = cameras[side], builds(cameras, Errors())[side]
+        built = built_reflector(at, drawn, 0)
+        for name in ("apex", "normal", "curvature"):
+            close = pytest.approx(getattr(at.mirrors, name), abs=1e-12)
+            assert getattr(built.mirrors, name) == close
+        assert built.camera.hfov == pytest.approx(at.camera.hfov, abs=1e-14)
+        assert np.array_equal(numbers(built), numbers(at))
+
+    @pytest.mark.parametrize("side", [0, 1])
+    def test_spheres_are_where_draws_say(self, cameras: Cameras, side: int) -> None:
+        """A point x comes to lie at R (scale x) + shift (tbcad.tolerancing.montecarlo.draws)."""
+        at, drawn = cameras[side], builds(cameras, LARGE, 2)[side]
+        built = built_reflector(at, drawn, 1)
+        scale, turn = drawn.scale[1, 0], Rotation.from_rotvec(drawn.shell_tilt[1])
+        centre = at.mirrors.apex - at.mirrors.normal / at.mirrors.curvature[:, None]
+        moved = turn.apply(scale * (centre + drawn.centre[1])) + drawn.shell_shift[1]
+        now = built.mirrors.apex - built.mirrors.normal / built.mirrors.curvature[:, None]
+        assert now == pytest.approx(moved, abs=1e-9)
+        radius = scale * (1 / at.mirrors.curvature + drawn.radius[1])
+        assert 1 / built.mirrors.curvature == pytest.approx(radius, rel=1e-12)
+
+    def test_camera_is_where_draws_say(self, cameras: Cameras) -> None:
+        at, drawn = cameras[0], builds(cameras, LARGE)[0]
+        view = built_reflector(at, drawn, 0).camera
+        assert np.array_equal(view.pinhole, at.camera.pinhole + drawn.camera_shift[0])
+        angle = np.linalg.norm(drawn.camera_tilt[0])
+        axis = drawn.camera_tilt[0] / angle
+        for new, old in ((view.forward, at.camera.forward), (view.right, at.camera.right)):
+            along = axis * (axis @ old)
+            turned = along + np.cos(angle) * (old - along) + np.sin(angle) * np.cross(axis, old)
+            assert new == pytest.approx(turned, abs=1e-12)
+        longer = np.tan(at.camera.hfov / 2) / np.tan(view.hfov / 2)
+        assert longer == pytest.approx(drawn.focal[0], rel=1e-12)
+        assert drawn.focal[0] != 1
+
+    def test_pixels_are_those_of_the_fast_model(self, cameras: Cameras) -> None:
+        """One ray a pixel against areas of outlines; of the border half a pixel is uncertain."""
+        both, compared = builds(cameras, LARGE, 3), 0
+        for at, drawn in zip(cameras, both, strict=True):
+            area = mirror_coverage(edge_model(at), drawn).pixels
+            for k in range(3):
+                built = built_reflector(at, drawn, k)
+                count = np.bincount(numbers(built).ravel(), minlength=len(at) + 1)[1:]
+                box, view = built.boxes(), built.camera
+                inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < view.width_px)
+                inside &= box[:, 3] < view.height_px
+                close = pytest.approx(area[k][inside], abs=0.5 * np.sqrt(count.max()))
+                assert count[inside] == close
+                compared += int(inside.sum())
+        assert compared > 60
+
+    def test_rays_are_off_as_the_fast_model_says(self, cameras: Cameras) -> None:
+        """The pixels that should show the apices, seen by the built camera after its mirrors."""
+        for at, drawn in zip(cameras, builds(cameras, LARGE), strict=True):
+            built, m = built_reflector(at, drawn, 0), len(at)
+            ray = at.mirrors.apex - at.camera.pinhole
+            old, new = (_axes(view) for view in (at.camera, built.camera))
+            way = (ray @ old.T * [1, 1, drawn.focal[0]]) @ new
+            mirror = np.arange(1, m + 1, dtype=np.int32)[None]
+            rays = reflect_pixels(built.camera.pinhole, way[None], built.mirrors, mirror)
+            designed = reflected_rays(at.camera.pinhole, at.mirrors.apex, at.mirrors.normal)
+            along = np.einsum("mx,mx->m", at.mirrors.apex, designed)
+            aim = at.mirrors.apex - along[:, None] * designed
+            missed = np.linalg.norm(np.cross(rays.origin[0] - aim, rays.direction[0]), axis=1)
+            offset = pointing(edge_model(at), drawn)[1][0]
+            assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
+            assert missed.min() > 0.01
+
+
+def _axes(view: Camera) -> np.ndarray:
+    return np.stack([view.right, np.cross(view.forward, view.right), view.forward])
+
+
+def test_boxes_hold_all_pixels(cameras: Cameras) -> None:
+    """As if every mirror were looked for everywhere; the designed cells would lose some."""
+    lost = 0
+    for at, drawn in zip(cameras, builds(cameras, LARGE, 3), strict=True):
+        for k in range(3):
+            built = built_reflector(at, drawn, k)
+            parts = (
+                built.camera_id,
+                built.camera,
+                built.u,
+                built.cells,
+                built.surfaces,
+                built.walls,
+            )
+            everywhere = numbers(WholeFrame(*parts))
+            assert np.array_equal(numbers(built), everywhere)
+            lost += int((numbers(OwnCells(*parts)) != everywhere).sum())
+    assert lost > 0
+
+
+@pytest.fixture(scope="module")
+def found(cameras: Cameras, scene: Scene, reference: ReferenceViews) -> Callable[..., Sharpness]:
+    """Sharpness of two builds with errors, and with what calibration leaves of them, rad."""
+
+    def of(errors: Errors, residual: float = 0.0) -> Sharpness:
+        return sharpness(cameras, builds(cameras, errors, 2), scene, reference, residual)
+
+    return of
+
+
+class TestSharpness:
+    def test_without_errors_all_are_the_designed_one(self, found: Callable[..., Sharpness]) -> None:
+        """But for rounding in the last digit of a ray that decides between two pixels."""
+        same = found(Errors())
+        assert same.designed.shape == (2,)
+        assert same.uncalibrated.shape == same.calibrated.shape == (2, 2)
+        for table in (same.uncalibrated, same.calibrated):
+            assert table == pytest.approx(np.tile(same.designed, (2, 1)), abs=1e-4)
+        assert 0.5 < same.designed.min() < same.designed.max() < 1
+
+    def test_calibration_gives_back_what_errors_cost(self, found: Callable[..., Sharpness]) -> None:
+        large = found(LARGE, 0.5e-3)
+        assert (large.uncalibrated < large.calibrated).all()
+        assert not np.array_equal(large.calibrated[0], large.calibrated[1])
+        assert (large.uncalibrated < large.designed).all()
+        lost = large.designed - large.uncalibrated
+        assert (np.abs(large.calibrated - large.designed) < lost / 2).all()
+
+    def test_what_calibration_leaves_counts(self, found: Callable[..., Sharpness]) -> None:
+        exactly, roughly = (found(Errors(), residual) for residual in (0.0, 0.02))
+        assert (roughly.calibrated < exactly.calibrated - 0.01).all()
+        assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
+
+    def test_each_build_is_reported(
+        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
+    ) -> None:
+        told: list[str] = []
+        drawn: tuple[ShellDraws, ShellDraws] = builds(cameras, Errors(), 2)
+        one = replace(reference, views=reference.views[:1], truths=reference.truths[:1])
+        sharpness(cameras, drawn, scene, one, 0.0, progress=told.append)
+        assert told == ["build 1 of 2", "build 2 of 2"]

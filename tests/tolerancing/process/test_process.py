@@ -1,0 +1,305 @@
+"""Processes: what they take, the one line they say otherwise, and what their figures mean."""
+
+import json
+import math
+import re
+from dataclasses import fields
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from tbcad.spec.errors import SpecError, section_of
+from tbcad.spec.errors import dotted_fields as keys_of
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.process.process import (
+    BUILT_IN,
+    BY_USER,
+    Process,
+    ball_radius_error,
+    load_process,
+    process_errors,
+)
+
+KINDS = tuple(key for key, field in keys_of(Process) if section_of(field))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "own.toml"
+
+
+def refusal(which: str, *options: str) -> str:
+    with pytest.raises(SpecError) as error:
+        load_process(which, options)
+    text = str(error.value)
+    assert text.isprintable()
+    return text
+
+
+def refused(file: Path, text: str | bytes) -> str:
+    """What is said about a file, which is always named."""
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    said = refusal(str(file))
+    assert said.startswith(f"{file}: ")
+    return said.removeprefix(f"{file}: ")
+
+
+def table(magnitude: float, mean: float, **others: str) -> str:
+    """A whole file whose kinds have the same figures."""
+    head = 'name = "even"\ntitle = "All the same"\nschema = 1\nball_grade = "G3"\n'
+    body = f'magnitude = {magnitude}\nmean = {mean}\nsource = "tests"\n'
+    form = f'magnitude = {magnitude}\nsource = "tests"\n'
+    forms = dict.fromkeys(("waviness_um", "cutter_radius_mm", "ridge_rounding_um"), form)
+    bodies = {"warp_um": f"{form}length_mm = 50\n"} | forms | others
+    return head + "".join(f"[{kind}]\n{bodies.get(kind, body)}" for kind in KINDS)
+
+
+class TestBuiltIn:
+    def test_a_former_name_is_refused_with_the_present_one(self) -> None:
+        assert refusal("machined") == "process machined is called cnc: write cnc"
+
+    def test_are_all_files_there_are(self) -> None:
+        there = files("tbcad.tolerancing").joinpath("process").iterdir()
+        assert sorted(f"{name}.toml" for name in BUILT_IN) == sorted(
+            file.name for file in there if file.name.endswith(".toml")
+        )
+
+    @pytest.mark.parametrize("name", BUILT_IN)
+    def test_every_figure_has_a_source_or_says_that_it_is_a_judgement(self, name: str) -> None:
+        process = load_process(name)
+        assert process.name == name
+        outside = re.compile(
+            r"judgement|vendors|Formlabs|Apollo|ISO \d|Allied|Data sheets|Minebea|\.com"
+            r"|verification|STEP|The (same|shift)|Aluminium 0\.023|As sphere",
+            re.IGNORECASE,
+        )
+        for kind in KINDS:
+            assert outside.search(getattr(process, kind).source), kind
+
+    def test_are_made_ever_more_exactly(self) -> None:
+        for worse, better in pairwise(load_process(name) for name in BUILT_IN if name != "fdm"):
+            for kind in ("sphere_centre_um", "scale_isotropic_permille", "shell_shift_um"):
+                assert getattr(worse, kind).magnitude > getattr(better, kind).magnitude, kind
+
+    @pytest.mark.parametrize(
+        ("name", "limit_mm"),
+        [("fdm", 0.2), ("sls", 0.3), ("sla", 0.1), ("cnc", 0.02), ("diamond", 0.005)],
+    )
+    def test_centres_follow_from_the_tolerance_of_short_lengths(
+        self, name: str, limit_mm: float
+    ) -> None:
+        """Of a length between two mirrors the maker's limit is two standard deviations.
+
+        Farther apart than the correlation length, they share no warp.
+        """
+        got, drawing = process_errors(load_process(name)), np.random.default_rng(7)
+        centres = got.sphere_centre.sample(drawing, 2, 400_000)
+        ends = centres + got.sphere_radius.sample(drawing, 2, 400_000)
+        ends += got.warp.sample(drawing, 2, 400_000)
+        assert 2 * np.std(ends[0] - ends[1]) == pytest.approx(limit_mm, rel=0.01)
+
+    @pytest.mark.parametrize("name", BUILT_IN)
+    def test_what_is_bought_is_the_same_for_all(self, name: str) -> None:
+        for kind in ("camera_tilt_mrad", "camera_focal_permille", "rotation_angle_deg"):
+            assert getattr(load_process(name), kind) == getattr(load_process("fdm"), kind)
+
+    def test_cannot_be_changed(self) -> None:
+        with pytest.raises(ValidationError, match="frozen"):
+            load_process("sla").seat_um.magnitude = 1  # type: ignore[misc]
+
+    def test_plain_dict_is_json_and_leads_back(self) -> None:
+        for name in BUILT_IN:
+            process = load_process(name)
+            text = process.model_dump_json(by_alias=True)
+            assert Process.model_validate(json.loads(text)) == process
+
+
+class TestErrors:
+    def test_every_kind_is_one_of_the_models(self) -> None:
+        made = {kind.rpartition("_")[0] for kind in KINDS} | {"ball_radius"}
+        assert made == {field.name for field in fields(Errors)}
+
+    def test_units(self, file: Path) -> None:
+        file.write_text(table(2, 1), encoding="utf-8")
+        got = process_errors(load_process(str(file)))
+        thousandth, degree = Error(0.002, 0.001), math.pi / 180
+        per_thousand = ("sphere_centre", "sphere_radius", "scale_isotropic", "scale_axis")
+        per_thousand += ("shell_shift", "shell_tilt", "camera_shift", "camera_tilt")
+        per_thousand += ("camera_focal", "coating", "axis_runout", "axis_tilt", "seat", "cap_tilt")
+        for name in per_thousand:
+            assert getattr(got, name) == thousandth, name
+        assert got.facets == Error(2, 1)
+        assert got.warp == Error(0.002, length=50)
+        assert got.waviness == Error(0.002)
+        assert got.rotation_angle == Error(2 * degree, degree)
+        assert got.wind_up == Error(0.02, 0.01)
+
+    @pytest.mark.parametrize(
+        ("options", "said"),
+        [
+            (["warp_um.length_mm=5"], "warp_um.length_mm is 5"),
+            (["warp_um.mean=1"], "warp_um.mean is 1"),
+            (["warp_um.distribution=uniform"], "warp_um.distribution is 'uniform'"),
+            (["waviness_um=-1"], "waviness_um.magnitude is -1"),
+            (["waviness_um.mean=0.1"], "waviness_um.mean is 0.1"),
+        ],
+    )
+    def test_what_fields_cannot_have(self, options: list[str], said: str) -> None:
+        assert said in refusal("cnc", *options)
+
+    @pytest.mark.parametrize("kind", ["warp_um", "waviness_um"])
+    def test_a_file_without_a_field_is_refused_in_a_line(self, file: Path, kind: str) -> None:
+        whole = table(2, 1)
+        start = whole.index(f"[{kind}]")
+        end = whole.index("[", start + 1)
+        assert kind in refused(file, whole[:start] + whole[end:])
+
+    @pytest.mark.parametrize("name", BUILT_IN)
+    def test_a_part_of_one_mirror_keeps_its_share_of_the_limit(self, name: str) -> None:
+        """A quarter of the limit for its radius, as before neighbours shared errors (0007)."""
+        limit = {"fdm": 0.2, "sls": 0.3, "sla": 0.1, "cnc": 0.02, "diamond": 0.005}[name]
+        radius = process_errors(load_process(name)).whole_radius
+        assert radius.spread == pytest.approx(limit / 4, rel=0.01)
+
+    def test_distribution_is_kept(self) -> None:
+        changed = load_process("cnc", ["seat_um.distribution=uniform", "seat_um=10"])
+        assert process_errors(changed).seat == Error(0.01, 0.0, "uniform")
+
+    def test_of_the_coat_only_what_the_design_does_not_know(self) -> None:
+        process = load_process("fdm", ["coating_um.mean=40", "coating_um=15"])
+        assert process_errors(process).coating == Error(0.015, 0.04)
+        assert process_errors(process, known_coating_um=30).coating.mean == pytest.approx(0.01)
+        assert process_errors(process, known_coating_um=50).coating.mean == pytest.approx(-0.01)
+
+    def test_balls_are_those_of_iso_3290(self) -> None:
+        """G40: form 1 um of radius over the ball, lot 2 um of diameter; G10: 0.25 and 0.5."""
+        assert ball_radius_error("G40") == Error(pytest.approx(1.0e-3), 0.0, "uniform")
+        assert ball_radius_error("G10") == Error(pytest.approx(0.25e-3), 0.0, "uniform")
+        assert process_errors(
+            load_process("sla", ["ball_grade=G10"])
+        ).ball_radius == ball_radius_error("G10")
+
+
+class TestOwnFile:
+    def test_may_rest_on_a_built_in_one(self, file: Path) -> None:
+        file.write_text(
+            'based_on = "sla"\n[seat_um]\nmagnitude = 9\nsource = "measured"\n', encoding="utf-8"
+        )
+        process = load_process(str(file))
+        assert (process.name, process.seat_um.magnitude, process.seat_um.mean) == ("own", 9, 0)
+        assert process.sphere_centre_um == load_process("sla").sphere_centre_um
+
+    def test_replaces_a_whole_kind(self, file: Path) -> None:
+        """A figure must not inherit the mean, nor the source, of another."""
+        file.write_text(
+            'based_on = "fdm"\n[coating_um]\nmagnitude = 1\nsource = "measured"\n', encoding="utf-8"
+        )
+        assert load_process(str(file)).coating_um.mean == 0
+        said = refused(file, 'based_on = "fdm"\n[coating_um]\nmagnitude = 1\n')
+        assert said.startswith("coating_um.source is missing, allowed is text")
+
+    def test_rests_on_no_other(self, file: Path) -> None:
+        said = refused(file, 'based_on = "mine"\n')
+        assert said.startswith("based_on is 'mine', allowed is fdm or sls or sla or cnc or diamond")
+
+    def test_has_all_kinds_otherwise(self, file: Path) -> None:
+        said = refused(file, 'name = "x"\ntitle = "x"\nball_grade = "G40"\n')
+        assert said.startswith("sphere_centre_um is missing, allowed is a table")
+        assert said.endswith(f"(and {len(KINDS) - 3} more)")  # fillets may be left out
+
+    @pytest.mark.parametrize(
+        ("kind", "body", "said"),
+        [
+            ("seat_um", 'magnitude = -1\nsource = "x"', "is -1, allowed is a number from 0"),
+            ("seat_um", 'magnitude = 1e5\nsource = "x"', "from 0 to 10000: change it"),
+            ("seat_um", 'magnitude = nan\nsource = "x"', "is nan, allowed is a number"),
+            ("seat_um", 'magnitude = "1"\nsource = "x"', "is '1', allowed is a number"),
+            ("seat_um", 'magnitude = 1\nsource = " "', "is ' ', allowed is text that matches"),
+            ("seat_um", "magnitude = 1", "seat_um.source is missing, allowed is text"),
+            ("seat_um", 'source = "x"', "seat_um.magnitude is missing, allowed is a number"),
+            (
+                "seat_um",
+                'magnitude = 1\nsource = "x"\ndistribution = "flat"',
+                "distribution is 'flat', allowed is normal or uniform",
+            ),
+            (
+                "seat_um",
+                'magnitude = 1\nsource = "x"\nmeen = 1',
+                "unknown key seat_um.meen: did you mean seat_um.mean?",
+            ),
+            ("axis_tilt_mrad", 'magnitude = 501\nsource = "x"', "from 0 to 500: change it"),
+            ("rotation_angle_deg", 'magnitude = 46\nsource = "x"', "from 0 to 45: change it"),
+            ("scale_axis_permille", 'magnitude = 201\nsource = "x"', "from 0 to 200: change it"),
+            ("facets_mm", 'magnitude = 101\nsource = "x"', "from 0 to 100: change it"),
+        ],
+    )
+    def test_is_refused_in_one_line(self, file: Path, kind: str, body: str, said: str) -> None:
+        text = refused(file, table(1, 0, **{kind: body + "\n"}))
+        assert said in text
+        assert kind in text
+
+    def test_unknown_kind_names_the_nearest(self, file: Path) -> None:
+        said = refused(file, table(1, 0) + "[spere_centre_um]\nmagnitude = 1\n")
+        assert said.startswith("unknown key spere_centre_um: did you mean sphere_centre_um?")
+
+    def test_grade_and_schema(self, file: Path) -> None:
+        assert "ball_grade is 'G4', allowed is G3 or G5" in refused(
+            file, table(1, 0).replace('"G3"', '"G4"')
+        )
+        assert "schema is 2, allowed is 1" in refused(file, table(1, 0).replace("a = 1", "a = 2"))
+        assert "whole number 1" in refused(file, table(1, 0).replace("schema = 1", "schema = true"))
+
+    @pytest.mark.parametrize(
+        ("data", "said"),
+        [
+            (b"name = ", "not valid TOML"),
+            (b"name = '\xff'", "not UTF-8 text"),
+            (b"a = " + b"[" * 100_000, "nested too deeply"),
+            (b"#" * 1_000_001, "over 1 MB, too large for a process"),
+        ],
+    )
+    def test_that_is_no_toml(self, file: Path, data: bytes, said: str) -> None:
+        assert said in refused(file, data)
+
+    def test_that_is_not_there(self, tmp_path: Path) -> None:
+        assert "process 'SLA' is neither built in (fdm" in refusal("SLA")
+        assert refusal("slaa").endswith("did you mean sla?")
+        assert refusal(str(tmp_path)).endswith("name one of these or check the path")
+        assert "nor a file" in refusal("\0")
+
+
+class TestOptions:
+    def test_a_kind_is_its_magnitude(self) -> None:
+        process = load_process("sla", ["sphere_centre_um=12"])
+        assert process.sphere_centre_um.magnitude == 12
+        assert process.sphere_centre_um.source == BY_USER
+        assert process.sphere_radius_um == load_process("sla").sphere_radius_um
+
+    def test_other_keys_by_their_whole_name(self) -> None:
+        options = ["coating_um.mean=5", "coating_um.source=scale", "ball_grade=G5", "name=mine"]
+        process = load_process("sla", options)
+        assert process.coating_um.mean == 5
+        assert process.coating_um.magnitude == load_process("sla").coating_um.magnitude
+        assert process.coating_um.source == "scale"
+        assert (process.ball_grade, process.name) == ("G5", "mine")
+
+    def test_the_later_wins(self) -> None:
+        assert load_process("cnc", ["seat_um=1", "seat_um=2"]).seat_um.magnitude == 2
+
+    @pytest.mark.parametrize(
+        ("option", "said"),
+        [
+            ("seat_um", "option 'seat_um' is not kind=value: write for instance seat_um=20"),
+            ("=3", "option '=3' is not kind=value"),
+            ("seet_um=3", "option: unknown key seet_um: did you mean seat_um?"),
+            ("seat_um.meen=3", "option: unknown key seat_um.meen: did you mean seat_um.mean?"),
+            ("seat_um=-3", "option: seat_um.magnitude is -3, allowed is a number from 0 to 10000"),
+            ("seat_um=three", "option: seat_um.magnitude is 'three', allowed is a number"),
+        ],
+    )
+    def test_are_refused_in_one_line(self, option: str, said: str) -> None:
+        assert refusal("sla", option).startswith(said)

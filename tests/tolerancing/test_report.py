@@ -1,0 +1,354 @@
+"""The answer says what the figures say, in words, tables and JSON alike."""
+
+import csv
+import io
+import json
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.options.tolerances import ToleranceOptions
+from tbcad.results.study import SUMMARY_COLUMNS, study_files
+from tbcad.simulate.scene.reflector import reflectors
+from tbcad.spec.load import load_spec
+from tbcad.tolerancing.analysis import Analysis, ProcessOption
+from tbcad.tolerancing.margin import Margin
+from tbcad.tolerancing.montecarlo.builds import (
+    MonteCarloCase,
+    YieldEstimate,
+    estimate_yield,
+    simulate,
+)
+from tbcad.tolerancing.montecarlo.edge_model import edge_models
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sensitivity import SingleErrorEffect
+from tbcad.tolerancing.montecarlo.sharpness import Sharpness
+from tbcad.tolerancing.process.process import ErrorSpec, load_process
+from tbcad.tolerancing.prototype.windows import PrototypeResult
+from tbcad.tolerancing.report import UNITS, json_text, report_dict, summary_text, tolerance_study
+
+BUILDS, TARGET = 25, 60.0
+ALONE = (
+    SingleErrorEffect("sphere_centre", 1.25, 1.75, 0.375),
+    SingleErrorEffect("facets", 0.36, 0.36, 1.5),
+    SingleErrorEffect("camera_tilt", 0.0, 0.0, math.inf),
+)
+PROCESS_OPTIONS = (
+    ProcessOption(
+        "fdm", YieldEstimate(0.0, 0.0, 0.04), Margin(None, 0.2, "it would need more than 20 mm")
+    ),
+    ProcessOption("sla", YieldEstimate(0.25, 0.2, 0.3), Margin(3.71, 0.99)),
+    ProcessOption("diamond", YieldEstimate(1.0, 0.96, 1.0), Margin(0.56, 0.99)),
+)
+SHARP = Sharpness(np.array([0.9, 0.8]), np.array([[0.7, 0.6]]), np.array([[0.84, 0.74]]))
+
+
+@pytest.fixture(scope="module")
+def little() -> MirrorDesign:
+    return design(load_spec(None, ["n=4"]))
+
+
+@pytest.fixture(scope="module")
+def analysis(little: MirrorDesign) -> Analysis:
+    """Real builds, some good and some not; all else made up."""
+    cameras = reflectors(little)
+    models = edge_models(cameras)
+    errors = Errors(sphere_centre=Error(0.012))
+    return Analysis(
+        process=load_process("sla"),
+        options=ToleranceOptions("", builds=BUILDS, seed=4),
+        target=TARGET,
+        cameras=cameras,
+        edge_models=models,
+        result=simulate(MonteCarloCase(models, errors, 4), BUILDS),
+        single_errors=ALONE,
+        process_options=PROCESS_OPTIONS,
+        margin=PROCESS_OPTIONS[1].margin,
+        sharpness=SHARP,
+        prototype=None,
+    )
+
+
+def prototype_yield(plain: float, known: float, offset: float = 2.0) -> PrototypeResult:
+    """Ten prototypes each, the shares of which are good."""
+    offsets = np.full((10, 3), offset)
+    one, other = (
+        np.where(np.arange(10) < round(10 * share), 61.0, 59.0)[:, None] for share in (plain, known)
+    )
+    return PrototypeResult(one, offsets, other, offsets)
+
+
+def rows_of(analysis: Analysis, name: str) -> list[dict[str, str]]:
+    text = study_files(tolerance_study(analysis))[f"tolerance-{name}.csv"].decode()
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def percent(pattern: str, text: str) -> float:
+    return float(re.findall(pattern + r"([\d.]+)%", text)[0])
+
+
+class TestWords:
+    def test_builds(self, analysis: Analysis) -> None:
+        said, worst = summary_text(analysis), analysis.result.worst
+        share = estimate_yield(worst, TARGET)
+        assert 0 < share.share < 1
+        assert (
+            repr(analysis) == f"<Analysis of sla: yield {share.share:.1%} of {len(worst)} builds>"
+        )
+        assert percent(r"^Built by sla \(.*?\), ", said) == pytest.approx(
+            100 * share.share, abs=0.05
+        )
+        low, high = 100 * share.low, 100 * share.high
+        assert f"({low:.1f}% to {high:.1f}%) of the builds cover 60 mm" in said
+        assert f"covers {np.median(worst):.2f} mm (median" in said
+        assert f"1 % cover less than {np.quantile(worst, 0.01):.2f})" in said
+
+    def test_worst_kind_of_error(self, analysis: Analysis) -> None:
+        """In the unit of the process: 0.375 times the 5 micrometres of sla."""
+        assert (
+            "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
+            "of the builds are good above 1.88 micrometres (sla has 5)."
+        ) in summary_text(analysis)
+
+    def test_spread_of_rays_by_waviness(self, analysis: Analysis) -> None:
+        spread = report_dict(analysis)["ray_spread_mm"]
+        assert 0 < spread["median"] <= spread["largest"]
+        said = f"displaces a mirror's rays by {spread['median']:.2g} mm at the object"
+        assert said in summary_text(analysis)
+        smooth = replace(analysis, process=load_process("sla", ["waviness_um=0"]))
+        assert report_dict(smooth)["ray_spread_mm"]["largest"] == 0
+        assert "Waviness" not in summary_text(smooth)
+
+    @pytest.mark.parametrize(
+        ("factor", "words"),
+        [(1.01, "at 5 micrometres it is at its limit"), (1.5, "above 7.5 micrometres")],
+    )
+    def test_how_large_the_worst_may_be(
+        self, analysis: Analysis, factor: float, words: str
+    ) -> None:
+        worst = replace(ALONE[0], tolerable_factor=factor)
+        said = summary_text(replace(analysis, single_errors=(worst,)))
+        assert words in said
+        assert " times " not in said
+
+    def test_every_kind_has_a_unit(self, analysis: Analysis) -> None:
+        assert {key.rpartition("_")[2] for key, value in analysis.process
+                if isinstance(value, ErrorSpec)} == set(UNITS)  # fmt: skip
+
+    def test_nothing_is_lost(self, analysis: Analysis) -> None:
+        harmless = summary_text(replace(analysis, single_errors=ALONE[2:]))
+        assert "camera tilt: 0.00 mm by itself; harmless." in harmless
+        assert "times" not in harmless
+        assert "lost" not in summary_text(replace(analysis, single_errors=()))
+
+    def test_design_that_falls_short(self, analysis: Analysis) -> None:
+        said = summary_text(
+            replace(analysis, single_errors=(replace(ALONE[0], tolerable_factor=0.0),))
+        )
+        assert "the design itself falls short" in said
+        assert "may be" not in said
+
+    def test_margin(self, analysis: Analysis) -> None:
+        said = summary_text(analysis)
+        command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
+        assert f"A margin of 3.71 mm ({command}) makes 99.0%" in said
+        assert "No margin" not in said
+
+    def test_no_margin(self, analysis: Analysis) -> None:
+        said = summary_text(replace(analysis, margin=PROCESS_OPTIONS[0].margin))
+        assert "No margin was found that is enough: it would need more than 20 mm." in said
+        assert "A margin of" not in said
+
+    def test_processes(self, analysis: Analysis) -> None:
+        assert (
+            "Good builds, of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%. "
+            "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
+            "none was found for fdm."
+        ) in summary_text(analysis)
+        every = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
+        assert "diamond with 0.56 mm." in every
+        assert "none" not in every
+        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
+        assert "Margins needed for 99%: none found; none was found for fdm." in none
+
+    def test_margins_that_were_not_searched_for(self, analysis: Analysis) -> None:
+        options = tuple(replace(option, margin=None) for option in PROCESS_OPTIONS)
+        plain = replace(analysis, margin=None, process_options=options)
+        said = summary_text(plain)
+        assert "diamond 100.0%." in said
+        assert "argin" not in said
+        read = json.loads(json_text(plain))
+        assert read["margin_needed_mm"] is None
+        assert read["margin_reason"] == "not searched for: add --margins"
+        assert all(row["reason"] == read["margin_reason"] for row in rows_of(plain, "processes"))
+        names = {str(row[0]) for row in tolerance_study(plain).summary.rows}
+        assert "margin needed" not in names
+
+    def test_one_process_is_compared_with_none(self, analysis: Analysis) -> None:
+        alone = replace(PROCESS_OPTIONS[1], builds=BUILDS)
+        one = replace(analysis, process_options=(alone,))
+        assert "Good builds, of" not in summary_text(one)
+        (row,) = rows_of(one, "processes")
+        assert (row["process"], row["builds"]) == ("sla", str(BUILDS))
+
+    def test_pictures(self, analysis: Analysis) -> None:
+        assert "SSIM 0.850 as designed, 0.650 without calibration, 0.790 with it." in summary_text(
+            analysis
+        )
+
+    def test_prototype(self, analysis: Analysis) -> None:
+        assert "Prototype" not in summary_text(analysis)
+        said = summary_text(replace(analysis, prototype=prototype_yield(0.0, 0.7)))
+        assert percent("Prototype: ", said) == 0
+        assert percent("without calibration, ", said) == 70
+
+    @pytest.mark.parametrize(("wanted", "text"), [(0.995, "99.5%"), (0.999, "99.9%")])
+    def test_wanted_yield_is_told_as_it_was_asked(
+        self, analysis: Analysis, wanted: float, text: str
+    ) -> None:
+        """100 % is not 99.9 %."""
+        said = summary_text(
+            replace(analysis, options=replace(analysis.options, wanted_yield=wanted))
+        )
+        assert f"Margins needed for {text}:" in said
+
+    def test_changed_process_is_not_advised_under_the_old_name(self, analysis: Analysis) -> None:
+        """The built-in process of that name would get another margin."""
+        changed = load_process("sla", ["sphere_radius_um=0"])
+        said = summary_text(replace(analysis, process=changed, margin=Margin(1.82, 0.99)))
+        assert "--for-process sla --yield" not in said
+
+
+class TestJson:
+    def test_says_what_was_found(self, analysis: Analysis) -> None:
+        read = json.loads(json_text(analysis))
+        worst = analysis.result.worst
+        assert read["schema"] == "tbcad-tolerance/2"
+        assert read["summary"] == summary_text(analysis)
+        assert (read["builds"], read["seed"], read["target_mm"]) == (BUILDS, 4, TARGET)
+        assert read["yield"]["share"] == (worst >= TARGET).mean()
+        assert read["worst_camera_mm"]["0.5"] == np.median(worst)
+        assert read["margin_needed_mm"] == 3.71
+        assert [one["process"] for one in read["processes"]] == ["fdm", "sla", "diamond"]
+        assert read["processes"][0]["margin_needed_mm"] is None
+        assert read["ssim"]["calibration_residual_mrad"] == 0.5
+        assert read["prototype"] is None
+
+    def test_pointing(self, analysis: Analysis) -> None:
+        told, offset = report_dict(analysis)["pointing_mm"], analysis.result.offset
+        assert told["rms"] == pytest.approx(np.linalg.norm(offset) / np.sqrt(offset.size))
+        assert told["largest_median"] == np.median(offset.max(axis=1))
+        some = offset.copy()
+        some[::2, 3] = np.nan  # rays that pass their mirrors by
+        patchy = replace(analysis, result=replace(analysis.result, offset=some))
+        assert 0 < json.loads(json_text(patchy))["pointing_mm"]["rms"] < offset.max()
+
+    def test_what_may_be_anything_has_no_number(self, analysis: Analysis) -> None:
+        assert not re.search("NaN|Infinity", json_text(analysis))
+        told = {
+            one["kind"]: one["tolerable_factor"]
+            for one in json.loads(json_text(analysis))["single_errors"]
+        }
+        assert told == {"sphere_centre_um": 0.375, "facets_mm": 1.5, "camera_tilt_mrad": None}
+
+    def test_prototype(self, analysis: Analysis) -> None:
+        read = json.loads(json_text(replace(analysis, prototype=prototype_yield(0.1, 0.7))))[
+            "prototype"
+        ]
+        assert read["uncalibrated"]["yield"]["share"] == 0.1
+        assert read["calibrated"]["yield"]["share"] == 0.7
+        assert read["calibrated"]["pointing_mm"]["rms"] == 2
+        assert read["calibrated"]["worst_camera_mm"]["0.5"] == 61
+
+    def test_prototype_whose_windows_miss_balls(self, analysis: Analysis) -> None:
+        """Its pointing error is infinite (tbcad.tolerancing.prototype.windows)."""
+        lost = replace(analysis, prototype=prototype_yield(0.0, 0.0, math.inf))
+        json.loads(json_text(lost))
+
+
+class TestTables:
+    def test_summary(self, analysis: Analysis) -> None:
+        table = tolerance_study(analysis).summary
+        assert table.columns == SUMMARY_COLUMNS
+        assert summary_text(analysis) in table.notes
+        told = {str(row[0]): row[2] for row in table.rows}
+        read: dict[str, Any] = report_dict(analysis)
+        assert told["good builds"] == 100 * read["yield"]["share"]
+        assert told["worst camera, median"] == read["worst_camera_mm"]["0.5"]
+        assert told["worst camera, 1 % cover less"] == read["worst_camera_mm"]["0.01"]
+        assert told["margin needed"] == 3.71
+        for one in read["single_errors"]:
+            kind = one["kind"].rpartition("_")[0].replace("_", " ")
+            assert told[f"loss by {kind} alone"] == one["loss_mm"]
+        for one in read["processes"]:
+            assert told[f"good builds by {one['process']}"] == 100 * one["yield"]
+
+    def test_builds(self, analysis: Analysis) -> None:
+        rows, result = rows_of(analysis, "builds"), analysis.result
+        assert [int(row["build"]) for row in rows] == list(range(BUILDS))
+        assert [float(row["worst_coverage_mm"]) for row in rows] == result.worst.tolist()
+        for k, row in enumerate(rows):
+            at = result.coverage[k, int(row["worst_camera"])]
+            assert at == float(row["worst_coverage_mm"])
+        squares = [float(row["pointing_rms_mm"]) ** 2 for row in rows]
+        assert np.mean(squares) == pytest.approx(report_dict(analysis)["pointing_mm"]["rms"] ** 2)
+
+    def test_sensitivity(self, analysis: Analysis) -> None:
+        rows = rows_of(analysis, "sensitivity")
+        names = ["sphere_centre_um", "facets_mm", "camera_tilt_mrad"]
+        assert [row["kind"] for row in rows] == names
+        for row, one, key in zip(rows, report_dict(analysis)["single_errors"], names, strict=True):
+            assert float(row["loss_mm"]) == one["loss_mm"]
+            assert float(row["loss_at_yield_mm"]) == one["loss_at_yield_mm"]
+            assert float(row["magnitude"]) == getattr(analysis.process, key).magnitude
+            times = one["tolerable_factor"]
+            assert row["tolerable_factor"] == ("" if times is None else str(times))
+        assert [float(row["mean"]) for row in rows] == [0, 0.36, 0]
+        # Facets of sla: 0.36 mm in every build and no spread; 1.5 times that is no zero.
+        may = [(row["tolerable_magnitude"], row["tolerable_mean"]) for row in rows]
+        assert may == [(str(0.375 * 5), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
+
+    def test_processes(self, analysis: Analysis) -> None:
+        rows = rows_of(analysis, "processes")
+        assert [row["process"] for row in rows] == [one.name for one in PROCESS_OPTIONS]
+        for row, one in zip(rows, PROCESS_OPTIONS, strict=True):
+            assert float(row["yield"]) == one.estimate.share
+            assert float(row["yield_low"]) == one.estimate.low
+            assert float(row["yield_high"]) == one.estimate.high
+            assert row["margin_needed_mm"] == ("" if one.margin.mm is None else str(one.margin.mm))
+            assert row["reason"] == one.margin.reason
+
+    def test_cameras(self, analysis: Analysis, little: MirrorDesign) -> None:
+        rows, coverage = rows_of(analysis, "cameras"), analysis.result.coverage
+        assert len(rows) == coverage.shape[1]
+        short = [float(row["share_short"]) for row in rows]
+        assert short == (coverage < TARGET).mean(axis=0).tolist()
+        assert max(short) > 0
+        median = [float(row["median_mm"]) for row in rows]
+        assert median == np.median(coverage, axis=0).tolist()
+        assert all(float(row["five_percent_mm"]) < float(row["median_mm"]) for row in rows)
+        u = np.array([[float(row[name]) for name in ("ux", "uy", "uz")] for row in rows])
+        assert np.linalg.norm(u, axis=1) == pytest.approx(1, abs=1e-12)
+        assert np.array_equal(u[: len(little.arrays[0])], analysis.cameras[0].u)
+        # One for each direction of both halves.
+        every = np.concatenate([at.u for at in analysis.cameras])
+        apart = np.linalg.norm(every[:, None] - u, axis=2)
+        assert apart.min(axis=1) == pytest.approx(0, abs=1e-9)
+        assert (np.linalg.norm(u[:, None] - u, axis=2) + np.eye(len(u))).min() > 0.1
+
+    def test_plot_has_a_bar_for_each_kind(self, analysis: Analysis) -> None:
+        curve, bars, sky = tolerance_study(analysis).panels
+        assert curve.series[0].y[0] == 100
+        reached = np.interp(TARGET, curve.series[0].x, curve.series[0].y)
+        step = 100 / BUILDS
+        assert reached == pytest.approx(100 * analysis.estimate.share, abs=step + 1e-9)
+        assert bars.names == ("sphere centre", "facets", "camera tilt")
+        assert bars.series[0].x.tolist() == [1.25, 0.36, 0]
+        away = np.hypot(sky.series[0].x, sky.series[0].y)
+        u = np.concatenate([at.u for at in analysis.cameras])
+        assert away.max() == pytest.approx(np.degrees(np.arccos(u[:, 2].min())), abs=1e-9)
