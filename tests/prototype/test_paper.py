@@ -28,7 +28,7 @@ PARTS = load_parts()
 DRIVES = load_drives(PARTS)
 E24 = (10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30, 33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82)
 E24 += (91,)  # IEC 60063
-STEP = 30 / 27 + 1e-9  # of two neighbours, at most
+STEP = 15 / 13 + 1e-9  # of two neighbours, at most
 STANDARDS = {  # by the kind of part
     **{"M3x": "ISO 4762", "SET-": "ISO 4026", "WASHER-": "ISO 7089", "DOWEL-": "ISO 8734"},
     **{"COLLAR-": "DIN 705 A", "ROD-": "ISO 286-2", "SHAFT-": "ISO 286-2", "UNC": "ASME B18.3"},

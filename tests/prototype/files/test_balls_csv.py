@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -75,10 +73,3 @@ def test_what_they_show(layout: PrototypeLayout, read: Rows) -> None:
         assert float(row["coverage_mm"]) == fit.coverage[own].min()
         assert float(row["coverage_fixed_mm"]) == fit.coverage_fixed[own].min()
         assert float(row["error_deg"]) == np.degrees(layout.stops.error[own]).max()
-
-
-def test_no_carriage_return_and_no_minus_zero(layout: PrototypeLayout, tmp_path: Path) -> None:
-    write_table(tmp_path / "balls.csv", COLUMNS, ball_rows(layout))
-    data = (tmp_path / "balls.csv").read_bytes()
-    assert b"\r" not in data
-    assert b"-0.0," not in data

@@ -45,23 +45,6 @@ def test_every_mirror_of_both_cameras_once(layout: PrototypeLayout, plan: Rows) 
         assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(layout.array))]
 
 
-def test_round_trip(layout: PrototypeLayout, plan: Rows) -> None:
-    stops, ids = layout.stops, layout.array.ids
-    of_b = {f"b{other + 1:04d}": i for i, other in enumerate(layout.twin.tolist())}
-    number = {mirror: i for i, mirror in enumerate(ids)} | of_b
-    for row in plan:
-        i = number[row["mirror"]]
-        assert int(row["stop"]) == stops.stop[i] + 1
-        assert int(row["ball"]) == layout.fit.ball[i] + 1
-        for name, angle in {
-            "base_angle_deg": stops.angle[stops.stop[i]],
-            "polar_error_deg": stops.polar_error[i],
-            "azimuth_error_deg": stops.azimuth_error[i],
-            "error_deg": stops.error[i],
-        }.items():
-            assert np.radians(float(row[name])) == pytest.approx(angle, rel=1e-15, abs=1e-15)
-
-
 def test_each_run_goes_upward(plan: Rows) -> None:
     for turn in ("0", "180"):
         angle = [float(row["base_angle_deg"]) for row in plan if row["object_turn_deg"] == turn]
