@@ -14,11 +14,11 @@ from tbcad.formats.step_assembly import write_assembly
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.arrangement import arrangements
+from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
-from tbcad.prototype.base.cap_limits import cap_limits
+from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.prototype.drawings.lamps import lamp_sheet
 from tbcad.prototype.drawings.parts import Listed, listed, sheets
@@ -27,7 +27,7 @@ from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files import balls_csv, bom_csv, gcode, klipper, plan_csv, settings
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.light.shroud import pattern
-from tbcad.prototype.model import PrototypeModel, build_prototype_model
+from tbcad.prototype.model import build_prototype_model
 from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
 from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 from tbcad.prototype.purchased.prices import Prices, load_prices

@@ -20,13 +20,8 @@ from tbcad.geometry.vectors import dot, norm
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import seat_solids
-from tbcad.prototype.base.cap_solids import (
-    cap_parts,
-    cap_pocket,
-    cap_spigot,
-    cap_tilt,
-    flat_depth,
-)
+from tbcad.prototype.base.cap_solids import cap_parts
+from tbcad.prototype.base.caps import cap_pocket, cap_spigot, cap_tilt, flat_depth
 from tbcad.prototype.base.coupon import CouponRow, coupon_plates, coupon_rows, coupon_seats
 from tbcad.prototype.base.coupon_seat import (
     KEEL_MM,
