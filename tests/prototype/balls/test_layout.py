@@ -23,7 +23,7 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
 )
 from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
-from tbcad.prototype.files.plan_csv import picture_rows
+from tbcad.prototype.files.tables import picture_rows
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tests.helpers import segment_distances
