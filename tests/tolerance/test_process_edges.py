@@ -74,10 +74,11 @@ def test_edges_that_the_design_names_stay(edges: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(
         process_module, "design_for_process", lambda spec, *_: ProcessDesign(spec, 0.0)
     )
+    monkeypatch.setattr(process_module, "seeing_pixels", lambda _: SeeingPixels(1000, 100))
     process = {"valley": inserts(), "pedestal": load_process("diamond")}[edges]
     choice = edges_for_process(load_spec(None, named(edges)), process, WANTED)
     assert (choice.made.spec.shell.edges, choice.other) == (edges, None)
-    assert choice.pixels == seeing_pixels(choice.made.spec)
+    assert choice.pixels == SeeingPixels(1000, 100)
     assert edges_text(choice) == f"edges: {edges}, as the design says"
 
 
