@@ -467,6 +467,8 @@ class TestCoupon:
         rows = rows_of(base, BaseSpec(coupon_sizes=count))
         tried = list(dict.fromkeys(seats.radius[row.seat] for row in rows))
         assert len(tried) == count
+        for row in rows:  # by the diameter that is on it
+            assert float(row.name) == pytest.approx(2 * seats.radius[row.seat], abs=0.006)
         assert tried == sorted(tried, reverse=True)
         assert tried[0] == seats.radius.max()
         assert tried[-1] == (seats.radius.min() if count > 1 else seats.radius.max())

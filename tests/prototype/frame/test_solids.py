@@ -11,6 +11,7 @@ from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
+from tbcad.prototype.frame.brackets import CLEARANCE_HOLE_MM
 from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
 from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
@@ -165,6 +166,8 @@ class TestSolids:
         slots = 4 * frame.upright["slot_mm"] * SLOT_DEPTH_MM
         bar = (20 * 20 - slots) * frame.length
         assert volume(purchased["upright_left"]) == pytest.approx(bar, rel=1e-9)
+        radii = {round(radius, 6) for _, _, radius in cylinders(purchased["wheel"])}
+        assert CLEARANCE_HOLE_MM[3.0] / 2 in radii
         length, width, thick = frame.plate.sizes
         holes = len(frame.holes) * np.pi * 2.1**2 * thick
         assert volume(purchased["plate"]) == pytest.approx(length * width * thick - holes, rel=1e-9)
