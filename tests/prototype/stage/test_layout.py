@@ -17,7 +17,7 @@ from tbcad.geometry.primitives import (
     cylinder_between,
     enclosing_triangles,
 )
-from tbcad.geometry.rotations import rotated_about_x
+from tbcad.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.geometry.vectors import norm, unit
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
@@ -221,11 +221,13 @@ class TestKeepOut:
     def test_swept_holds_carrier_and_balls_at_all_angles(
         self, small_prototype: PrototypeLayout, carrier: BaseLayout, keep_out: KeepOut
     ) -> None:
-        seat = carrier.seats
+        seat, around = carrier.seats, unit_circle(even_angles(24))
+        rims = seat.centre + seat.back[:, None] * seat.axis
+        rims = rims[:, None] + seat.boss[:, None, None] * (around @ seat.axes[:, :2])
+        ends = rims.reshape(-1, 3)
         for angle in np.linspace(
             small_prototype.stops.angle[0], small_prototype.stops.angle[-1], 7
         ).tolist():
-            ends = seat.centre + seat.back[:, None] * seat.axis
             local = rotated_about_x(ends @ carrier.frame.T, np.full(len(ends), angle))
             assert (keep_out.to_swept(local @ carrier.frame) == 0).all()
             assert (keep_out.to_swept(small_prototype.body_centres(angle)) < -5).all()
