@@ -236,9 +236,9 @@ def _camera_place(built: PrototypeModel) -> records.CameraPlace | None:
             far_width=2 * sizes.far_half,
             hub_to_pinhole=float(norm(camera.pinhole)) - sizes.hub,
         ),
-        pictures=tuple(records.MarkPicture(**one) for one in marks_seen(gauge, built.base, camera)),
+        pictures=marks_seen(gauge, built.base, camera),
         error=records.PlaceError(**gauge.errors),
-        travel=records.CameraTravel(**mount.travel),
+        travel=mount.travel,
     )
 
 
