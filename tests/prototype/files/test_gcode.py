@@ -1,5 +1,6 @@
 """The program of random motions, run by the verification's controller."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -58,9 +59,13 @@ def test_what_a_controller_does(layout: PrototypeLayout, drive: Drive, motion: M
         assert "no room for a switch" in str(error)  # noqa: PT017
         return
     homed, lit = homing.homed + motion.home_trim_deg, phases(LEDS, motion)
-    program = "\n".join(gcode_program(layout, drive, motion, LEDS)) + "\n"
-    did = run_program(program, homing.switch, homed)
+    lines = gcode_program(layout, drive, motion, LEDS)
+    did = run_program("\n".join(lines) + "\n", homing.switch, homed)
     assert not did.faults
+    for line, following in pairwise(lines):  # outputs are switched when they are read
+        if line.startswith("G1 ") and len(lit) > 1:
+            assert following.startswith(("G4 P", "(stop", "M0", "G92.1"))
+            assert following != "G4 P0.000"
     homes = motion.controller == "grblhal"
     assert (did.homes, did.pauses) == (int(homes), ["pin" if homes else "base", "turn"])
     outputs = [set(), {1}, {2}, {3}, {4}, {0}] if homes else [set()]
