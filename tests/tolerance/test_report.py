@@ -146,6 +146,44 @@ class TestWords:
         said = summary_text(replace(analysis, process=changed, margin=Margin(1.82, 0.99)))
         assert "--for-process sla --yield" not in said
 
+    def test_worst_kind_of_error(self, analysis: Analysis) -> None:
+        """In the unit of the process: 0.375 times the 5 micrometres of sla."""
+        assert (
+            "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
+            "of the builds are good above 1.88 micrometres (sla has 5)."
+        ) in summary_text(analysis)
+
+    @pytest.mark.parametrize(
+        ("factor", "words"),
+        [(1.01, "at 5 micrometres it is at its limit"), (1.5, "above 7.5 micrometres")],
+    )
+    def test_how_large_the_worst_may_be(
+        self, analysis: Analysis, factor: float, words: str
+    ) -> None:
+        worst = replace(ALONE[0], tolerable_factor=factor)
+        said = summary_text(replace(analysis, single_errors=(worst,)))
+        assert words in said
+        assert " times " not in said
+
+    def test_design_that_falls_short(self, analysis: Analysis) -> None:
+        said = summary_text(
+            replace(analysis, single_errors=(replace(ALONE[0], tolerable_factor=0.0),))
+        )
+        assert "the design itself falls short" in said
+        assert "may be" not in said
+
+    def test_processes(self, analysis: Analysis) -> None:
+        assert (
+            "Good builds, of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%. "
+            "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
+            "none was found for fdm."
+        ) in summary_text(analysis)
+        every = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
+        assert "diamond with 0.56 mm." in every
+        assert "none" not in every
+        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
+        assert "Margins needed for 99%: none found; none was found for fdm." in none
+
 
 class TestJson:
     def test_says_what_was_found(self, analysis: Analysis) -> None:

@@ -81,6 +81,16 @@ def test_tilt_moves_the_front_by_its_lever(
         assert one.centre_shift_mm == pytest.approx(lever * np.sin(np.radians(one.tilt_deg)))
 
 
+def test_light_comes_in_at_the_angle_between_normal_and_camera(
+    limits: tuple[CapRecord, ...], layout: PrototypeLayout
+) -> None:
+    for one in limits:
+        k = one.ball - 1
+        to_camera = layout.array.camera.pinhole - layout.apices()[k]
+        cosine = float(layout.normals()[k] @ to_camera / np.linalg.norm(to_camera))
+        assert np.cos(np.radians(one.incidence_deg)) == pytest.approx(cosine)
+
+
 def test_the_sheet_says_the_limits(
     base: BaseLayout, limits: tuple[CapRecord, ...], layout: PrototypeLayout, tmp_path: Path
 ) -> None:
