@@ -9,7 +9,7 @@ from tbcad.formats.csv_table import write_table
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.record import write_record
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.files import balls_csv, plan_csv
+from tbcad.prototype.files import tables
 from tbcad.records.tables import StopRow
 from tbcad.simulate.prototype.plan import Plan
 from tests.prototype_records import write_prototype
@@ -36,9 +36,9 @@ def plan_of(made: PrototypeLayout) -> Plan:
 def write_export(folder: Path, little: MirrorDesign, made: PrototypeLayout) -> Path:
     """What the simulation needs of an export with its prototype, by the export's own writers."""
     write_record(folder, little, shells=False)
-    plan = plan_csv.picture_rows(made)
-    write_table(folder / "rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan)
-    write_table(folder / "balls.csv", balls_csv.COLUMNS, balls_csv.ball_rows(made))
+    plan = tables.picture_rows(made)
+    write_table(folder / "rotation_plan.csv", tables.PICTURE_COLUMNS, plan)
+    write_table(folder / "balls.csv", tables.BALL_COLUMNS, tables.ball_rows(made))
     axis, zero, third = made.array.ellipsoid.frame().tolist()
     write_prototype(
         folder,

@@ -148,7 +148,7 @@ def merge(options: MergeOptions) -> dict[str, Any]:
     check_is_any_calibration(known)
     if options.exports is not None:
         check_is_export(Path(options.exports))
-    from tbcad.machine.calibrated_export import export_of
+    from tbcad.machine.shells import export_of
     from tbcad.merged_run.files import write_merge
     from tbcad.merged_run.merge import prepared_merge
     from tbcad.output.folder import check_replaceable, replacing
@@ -180,7 +180,7 @@ def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     check_is_calibration(known)
     if options.exports is not None:
         check_is_export(Path(options.exports))
-    from tbcad.machine.calibrated_export import export_of
+    from tbcad.machine.shells import export_of
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 

@@ -6,6 +6,7 @@ turned. So photographs, calibrations and merges of shells and prototypes are mad
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,6 +17,7 @@ from tbcad.machine.designed import designed_shell
 from tbcad.machine.machine import Machine
 from tbcad.machine.photographed import TURNS
 from tbcad.optics.pedestals.walls import GrooveWalls
+from tbcad.records.calibration import NAME, CalibrationRecord
 from tbcad.records.exposure import Frame
 from tbcad.records.run import Geometry
 from tbcad.simulate.prototype.plan import HALF_TURN, Plan, read_plan
@@ -164,3 +166,18 @@ def _turned(draws: ShellDraws, flip: Floats) -> ShellDraws:
 
 def _flip(half: int) -> Floats:
     return HALF_TURN if half else np.ones(3)
+
+
+def export_of(calibration: Path) -> Path:
+    """The export that a calibration's record names.
+
+    Raises:
+        InputError: it names none.
+    """
+    files = [one / NAME for one in (calibration, *(calibration / name for name in CAMERAS))]
+    try:
+        return Path(CalibrationRecord.read(next(filter(Path.is_file, files), files[0])).exports)
+    except InputError:
+        raise InputError(
+            f"{calibration} does not name its export: name it with --exports"
+        ) from None

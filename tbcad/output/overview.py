@@ -12,7 +12,7 @@ import numpy as np
 from tbcad.geometry.primitives import Component, volume
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
-from tbcad.prototype.arrangement import Arrangement, arrange
+from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.files.bom_csv import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.shell.files import camera_a_mesh
@@ -145,7 +145,7 @@ def _shells(design: MirrorDesign) -> PrintEstimate:
     return _print_estimate(2 * float(np.einsum("tx,tx->", a, np.cross(b, c))) / 6, design.spec)
 
 
-def _prototype(arrangement: Arrangement) -> PrototypeOverview:
+def _prototype(arrangement: PrototypeModel) -> PrototypeOverview:
     layout, balls = arrangement.layout, arrangement.layout.balls
     return PrototypeOverview(
         balls=int((~balls.cap).sum()),
@@ -162,7 +162,7 @@ def _prototype(arrangement: Arrangement) -> PrototypeOverview:
     )
 
 
-def _printed_volume(arrangement: Arrangement) -> float:
+def _printed_volume(arrangement: PrototypeModel) -> float:
     """Volume of carrier, caps, stage and frame, mm^3."""
     density = arrangement.spec.printer.density_g_cm3
     turning = arrangement.balance.mass_g - arrangement.layout.mass_g

@@ -4,8 +4,11 @@ Number of balls, angle of the pads and hold are chosen together: the first combi
 of preference, in which balls, seats, base, stage and frame have room.
 """
 
+from collections import Counter
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +19,8 @@ from tbcad.prototype.balls.layout import (
     ball_counts,
     prototype_layout,
 )
+from tbcad.prototype.base.caps import cap_magnets
+from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.mass import carrier_masses
@@ -25,31 +30,36 @@ from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import base_torques, choose_drive
 from tbcad.prototype.drive.travel import OVERTRAVEL_DEG, home_angles
 from tbcad.prototype.electronics.wiring import Wiring, wiring_layout
-from tbcad.prototype.frame.layout import FrameLayout, frame_layout
+from tbcad.prototype.fasteners import Fastener, numbered
+from tbcad.prototype.frame.camera_gauge import CameraGauge
+from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
 from tbcad.prototype.purchased.parts import Parts, load_parts
-from tbcad.prototype.stage.layout import StageLayout, stage_layout
+from tbcad.prototype.stage.layout import StageLayout, stage_fasteners, stage_layout
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.spec.section import AUTO
 from tbcad.spec.sizes import led_places
+
+if TYPE_CHECKING:
+    from tbcad.prototype.printing.placing import PrintedPart
 
 OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 """Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""
 
 
 @dataclass(frozen=True)
-class Arrangement:
-    """All layouts of a prototype.
+class PrototypeModel:
+    """A prototype: all its layouts, and its printed parts once they are built.
 
     Attributes:
         spec: with a value for every key.
         layout: balls, their places, the plan of the stops.
         base: layout of the carrier.
         split: how the carrier is cut to fit the bed.
-        balance: of what turns with the base, with an estimate of the carrier's mass.
+        balance: of what turns with the base; the carrier's mass is an estimate until it is built.
         drive: that turns it.
         keep_out: what static parts must keep out of.
         stage: layout of the object stage.
@@ -57,6 +67,8 @@ class Arrangement:
         frame: layout of what holds stage, base and camera.
         shroud: round the rig, None without.
         parts: lists of purchased parts.
+        gauge: that shows where the camera's pinhole is; None without a camera, or unbuilt.
+        printed: all printed parts, when they are built.
     """
 
     spec: Spec
@@ -71,9 +83,34 @@ class Arrangement:
     frame: FrameLayout
     shroud: ShroudLayout | None
     parts: Parts
+    gauge: CameraGauge | None = None
+    printed: "tuple[PrintedPart, ...]" = ()
+
+    @cached_property
+    def fasteners(self) -> tuple[Fastener, ...]:
+        """All fasteners in their places, named."""
+        base, parts = self.base, self.parts
+        return numbered(
+            (
+                *base_fasteners(base, self.split, self.drive, parts),
+                *cap_magnets(base, self.layout, parts),
+                *self.frame.fasteners,
+                *stage_fasteners(self.stage, parts),
+            )
+        )
+
+    @property
+    def purchased(self) -> dict[str, int]:
+        """Quantity of purchased parts by name, without balls and drive."""
+        counts = Counter(one.part.name for one in self.fasteners)
+        counts.update(frame_purchased_parts(self.frame))
+        counts.update(self.wiring.purchased(self.frame.lamps))
+        if self.shroud:
+            counts[self.shroud.sheet.name] += self.shroud.sheets
+        return counts
 
 
-def arrangements(design: MirrorDesign) -> Iterator[Arrangement]:
+def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
     """Every arrangement that has room, the preferred first.
 
     Raises:
@@ -85,7 +122,7 @@ def arrangements(design: MirrorDesign) -> Iterator[Arrangement]:
     any_arranged = False
     for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
-        if isinstance(outcome, Arrangement):
+        if isinstance(outcome, PrototypeModel):
             any_arranged = True
             yield outcome
         elif first_error is None:
@@ -94,7 +131,7 @@ def arrangements(design: MirrorDesign) -> Iterator[Arrangement]:
         raise SpecError(f"{first_error}{_remedy(design, tried)}") from None
 
 
-def arrange(design: MirrorDesign) -> Arrangement:
+def arrange(design: MirrorDesign) -> PrototypeModel:
     """The preferred arrangement; raises as `arrangements`."""
     return next(arrangements(design))
 
@@ -112,7 +149,7 @@ def balance_and_drive(
     return balance, choose_drive(spec.prototype.base.drive, torques, load_drives(parts))
 
 
-Outcome = tuple[Spec, Arrangement | SpecError]
+Outcome = tuple[Spec, PrototypeModel | SpecError]
 """What was tried, and its arrangement or why it has none."""
 
 
@@ -236,11 +273,11 @@ def _arranged(
     keep_out: KeepOut,
     staged: tuple[StageLayout, Wiring],
     parts: Parts,
-) -> Arrangement:
+) -> PrototypeModel:
     (balance, drive), (stage, wiring) = estimate, staged
     frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
     shroud = shroud_round(spec, stage, frame, keep_out, parts)
-    return Arrangement(
+    return PrototypeModel(
         spec=_with_light(spec, frame.lamps, shroud),
         layout=layout,
         base=base,

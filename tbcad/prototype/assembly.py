@@ -8,8 +8,8 @@ import numpy as np
 from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
 from tbcad.cad.solids import pyramid, sphere
 from tbcad.geometry.vectors import norm
+from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
-from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.printing.placing import Role, component_solid
 
 METAL: Colour = (0.55, 0.56, 0.58, 1.0)

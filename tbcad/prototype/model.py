@@ -1,10 +1,8 @@
 """The whole prototype: the first arrangement that has the solids of all its printed parts."""
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,24 +14,21 @@ from tbcad.cad.brep import InvalidSolidError
 from tbcad.camera.requirements import camera_requirements
 from tbcad.geometry.primitives import Component
 from tbcad.prototype.arrangement import (
-    Arrangement,
+    PrototypeModel,
     balance_and_drive,
     shroud_round,
 )
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_solids import cap_magnets, cap_parts
+from tbcad.prototype.base.cap_solids import cap_parts
 from tbcad.prototype.base.coupon import coupon_plates
 from tbcad.prototype.base.coupon_seat import expected_downs, worst_pose
-from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
-from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
+from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.printing.placing import PlacedSolid, PrintedPart, Role, placed_components
-from tbcad.prototype.stage.layout import stage_fasteners
 from tbcad.spec.design import Spec
 from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
@@ -48,44 +43,8 @@ PartsOrError: TypeAlias = list[PlacedSolid] | SpecError | InvalidSolidError
 FutureParts: TypeAlias = "Future[PartsOrError]"
 
 
-@dataclass(frozen=True)
-class PrototypeModel(Arrangement):
-    """All of the prototype; the balance has the masses of its solids.
-
-    Attributes:
-        gauge: that shows where the camera's pinhole is; None without a camera.
-        printed: all printed parts.
-    """
-
-    gauge: CameraGauge | None
-    printed: tuple[PrintedPart, ...]
-
-    @cached_property
-    def fasteners(self) -> tuple[Fastener, ...]:
-        """All fasteners in their places, named."""
-        base, parts = self.base, self.parts
-        return numbered(
-            (
-                *base_fasteners(base, self.split, self.drive, parts),
-                *cap_magnets(base, self.layout, parts),
-                *self.frame.fasteners,
-                *stage_fasteners(self.stage, parts),
-            )
-        )
-
-    @property
-    def purchased(self) -> dict[str, int]:
-        """Quantity of purchased parts by name, without balls and drive."""
-        counts = Counter(one.part.name for one in self.fasteners)
-        counts.update(frame_purchased_parts(self.frame))
-        counts.update(self.wiring.purchased(self.frame.lamps))
-        if self.shroud:
-            counts[self.shroud.sheet.name] += self.shroud.sheets
-        return counts
-
-
 def build_prototype_model(
-    arranged: Iterable[Arrangement],
+    arranged: Iterable[PrototypeModel],
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
 ) -> PrototypeModel:
@@ -120,7 +79,7 @@ def build_prototype_model(
     raise next(iter(errors.values()))
 
 
-def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> PrototypeModel:
+def _model(arrangement: PrototypeModel, progress: Progress, submit: Submit) -> PrototypeModel:
     spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
     progress("prototype: base")
     carrier, coupons, on_stage = _base_and_stage(arrangement, submit)
@@ -147,14 +106,12 @@ def _model(arrangement: Arrangement, progress: Progress, submit: Submit) -> Prot
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
         *_components("tool", tools, on_tools),
     )
-    built = replace(
-        arrangement, balance=balance, parts=arrangement.parts | arrangement.wiring.parts
-    )
-    return PrototypeModel(**vars(built), gauge=gauge, printed=printed)
+    parts = arrangement.parts | arrangement.wiring.parts
+    return replace(arrangement, balance=balance, parts=parts, gauge=gauge, printed=printed)
 
 
 def _base_and_stage(
-    arrangement: Arrangement, submit: Submit
+    arrangement: PrototypeModel, submit: Submit
 ) -> tuple[list[PlacedSolid], FutureParts, FutureParts]:
     """The carrier, and what is built meanwhile: coupons in the carrier's worst pose, and stage."""
     base, split, printer = arrangement.base, arrangement.split, arrangement.spec.printer
@@ -171,7 +128,7 @@ def _base_and_stage(
     return carrier, coupons, on_stage
 
 
-def _with_drive(arrangement: Arrangement, drive: Drive) -> Arrangement:
+def _with_drive(arrangement: PrototypeModel, drive: Drive) -> PrototypeModel:
     """The arrangement with another drive, and the frame and shroud that it asks for."""
     spec, parts, stage = arrangement.spec, arrangement.parts, arrangement.stage
     keep_out, layout, base = arrangement.keep_out, arrangement.layout, arrangement.base
@@ -180,7 +137,7 @@ def _with_drive(arrangement: Arrangement, drive: Drive) -> Arrangement:
     return replace(arrangement, drive=drive, frame=frame, shroud=shroud)
 
 
-def _disc(arrangement: Arrangement) -> PlacedSolid:
+def _disc(arrangement: PrototypeModel) -> PlacedSolid:
     return _placed([arrangement.frame.homing.disc], arrangement.spec)[0]
 
 

@@ -62,6 +62,21 @@ class Machine:
     let_go: int = 0
 
 
+class FastTime:
+    """A time that runs faster than the clock."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed, self._since, self._until_then = speed, monotonic(), 0.0
+
+    @property
+    def now(self) -> float:
+        return self._until_then + (monotonic() - self._since) * self.speed
+
+    def run_at(self, speed: float) -> None:
+        """Let it run at another speed from now on."""
+        self._until_then, self._since, self.speed = self.now, monotonic(), speed
+
+
 @dataclass
 class _Motion:
     begin: float
@@ -74,7 +89,7 @@ class _Motion:
         return self.begin + share * (self.end - self.begin)
 
 
-class GrblDouble(threading.Thread):
+class GrblDouble(threading.Thread, FastTime):
     """A controller; `port` is the port to open."""
 
     lines_before = 12  # from the connection to the first photograph
@@ -100,14 +115,14 @@ class GrblDouble(threading.Thread):
             see: shown the machine whenever it rests and a line is done.
             released: shown the machine when the relay closes.
         """
-        super().__init__(daemon=True)
+        threading.Thread.__init__(self, daemon=True)
+        FastTime.__init__(self, speed)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._master)
         tty.setraw(self._slave)
         self.port = os.ttyname(self._slave)
         self.firmware, self.switch_deg = firmware, switch_deg
         self.greeting = BANNERS[firmware]
-        self._speed, self._since, self._until_then = speed, monotonic(), 0.0
         self.settings = dict(settings)
         self.machine = Machine(angle)
         self.see, self.released = see, released
@@ -138,20 +153,8 @@ class GrblDouble(threading.Thread):
         self._offset, self._feed, self._checking = 0.0, 0.0, False
 
     @property
-    def now(self) -> float:
-        return self._until_then + (monotonic() - self._since) * self._speed
-
-    @property
     def moving(self) -> bool:
         return self._motion is not None
-
-    @property
-    def speed(self) -> float:
-        return self._speed
-
-    def run_at(self, speed: float) -> None:
-        """Let its time run at another speed from now on."""
-        self._until_then, self._since, self._speed = self.now, monotonic(), speed
 
     def run(self) -> None:
         while not self._closing:

@@ -20,10 +20,10 @@ from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock, RLock, Thread
-from time import monotonic, sleep
+from time import sleep
 from typing import Any
 
-from tests.control.grbl_double import Fault, Machine
+from tests.control.grbl_double import FastTime, Fault, Machine
 
 AHEAD_S, QUEUE_S, TICK_S = 0.25, 1.0, 0.0005
 MOTOR = "manual_stepper base"
@@ -39,7 +39,7 @@ class Shutdown(Exception):
     """Klipper shut down while it did something."""
 
 
-class KlipperDouble:
+class KlipperDouble(FastTime):
     """A printer; `port` is what tbcad is given."""
 
     lines_before = 34  # from the connection to the first photograph
@@ -55,7 +55,7 @@ class KlipperDouble:
     ) -> None:
         """Control a machine whose switch is at an angle; as GrblDouble, but for its settings."""
         self.settings, self.switch_deg = settings, switch_deg
-        self._speed, self._since, self._until_then = speed, monotonic(), 0.0
+        super().__init__(speed)
         self.machine = Machine(angle)
         self.see, self.released = see, released
         self.fault: Fault = lambda number, line: None
@@ -88,21 +88,13 @@ class KlipperDouble:
         self._server.server_close()
 
     @property
-    def now(self) -> float:
-        return self._until_then + (monotonic() - self._since) * self._speed
-
-    @property
-    def speed(self) -> float:
-        return self._speed
-
-    @property
     def moving(self) -> bool:
         return self.now < self._motion[3] and self.now > self._motion[2]
 
     def run_at(self, speed: float) -> None:
         """Let its time run at another speed from now on."""
         with self._lock:
-            self._until_then, self._since, self._speed = self.now, monotonic(), speed
+            super().run_at(speed)
 
     def _forget(self) -> None:
         self.motor_on = False

@@ -38,15 +38,6 @@ def homed(grbl: Grbl) -> Grbl:
     return grbl
 
 
-def test_settings_are_read(grbl: Grbl) -> None:
-    assert grbl.settings() == SETTINGS
-
-
-def test_locked_before_homing(grbl: Grbl) -> None:
-    with pytest.raises(MachineFault, match="refuses 'G1 X1 F900': error:9: G-code is locked"):
-        grbl.command("G1 X1 F900")
-
-
 def test_motions_wait_for_each_other(homed: Grbl, double: GrblDouble) -> None:
     """More of them than the planner holds; the dwell is over when the last is."""
     double.run_at(200.0)
@@ -96,14 +87,6 @@ def test_hold_keeps_the_place(homed: Grbl, double: GrblDouble) -> None:
     homed.reset()
     assert double.state == "Idle"
     assert -98 < double.machine.angle < 0
-
-
-def test_reset_in_mid_motion_loses_the_place(homed: Grbl, double: GrblDouble) -> None:
-    double.run_at(1.0)
-    homed.command("G1 X90 F900")
-    until(lambda: double.moving)
-    homed.reset()
-    assert double.state == "Alarm"
 
 
 def test_leaving_check_mode_is_a_reset(homed: Grbl) -> None:

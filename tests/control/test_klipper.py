@@ -1,7 +1,6 @@
 """A run with Klipper: what it sends, and what it does when Klipper or people interfere."""
 
 import re
-import signal
 from itertools import pairwise
 from typing import Any
 
@@ -55,48 +54,6 @@ def test_motions_come_in_short_pieces(klipper_rig: Rig) -> None:
         r"MOVE=(\S+) SPEED=6 STOP_ON_ENDSTOP=2", "\n".join(klipper_rig.controller.lines)
     )
     assert max(float(a) - float(b) for a, b in pairwise(["0", *search])) <= 8.3
-
-
-def test_camera_at_the_relay(klipper_rig: Rig) -> None:
-    from tests.control.rig import put, scene_of
-
-    pictures = klipper_rig.folder / "pictures"
-    pictures.mkdir()
-    numbers = iter(range(1000))
-    klipper_rig.controller.released = lambda machine: put(
-        pictures / f"DSC_{next(numbers):04d}.JPG", scene_of(machine)
-    )
-    words = klipper_rig.words("--phases", "dark,lit", camera=f"folder:{pictures}", stops="1")
-    assert tbcad(words) == 0
-    check_every_photograph(klipper_rig.out, 4)
-
-
-@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
-def test_interrupt_ends_after_the_present_piece(klipper_rig: Rig, kind: signal.Signals) -> None:
-    controller = klipper_rig.controller
-
-    def slow(number: int, line: str) -> None:
-        if (
-            line.startswith("SET_PIN PIN=lamp VALUE=0")
-            and "SET_PIN PIN=lamp VALUE=1" in controller.lines
-        ):
-            controller.run_at(4.0)
-
-    controller.fault = slow
-    process = klipper_rig.start(klipper_rig.words("--phases", "lit", "--runs", "a", stops="1,30"))
-    until(lambda: controller.moving and controller.speed < FAST)
-    begun = len(moves(klipper_rig))
-    process.send_signal(kind)
-    out, err = process.communicate(timeout=600)
-    assert process.returncode == 1, err
-    assert "stopped by the operator" in out
-    assert "LOOK AT THE MACHINE" not in out
-    assert len(moves(klipper_rig)) == begun
-    assert controller.motor_on
-    controller.fault = lambda number, line: None
-    controller.run_at(FAST)
-    assert tbcad(klipper_rig.resume()) == 0
-    check_every_photograph(klipper_rig.out, 2)
 
 
 def at_line(rig: Rig, line: str, what: str | None, act: Any = lambda: None) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import socket
-import ssl
 from collections.abc import Iterator
 from dataclasses import astuple
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -121,12 +120,6 @@ def test_http_that_is_said_to_be_https(
     port = klipper_rig.controller.port.replace("http:", "https:")
     line = refused(words_to(klipper_rig, port), klipper_rig, capsys)
     assert "it does not speak https: say http://" in line
-
-
-def test_reasons() -> None:
-    text = moonraker._reason(ssl.SSLCertVerificationError("self-signed"))
-    assert "SSL_CERT_FILE" in text
-    assert "switched on" in moonraker._reason(TimeoutError())
 
 
 def test_key(

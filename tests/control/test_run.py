@@ -82,17 +82,17 @@ def test_plain_grbl_photographs_the_lit_object_only(plain_rig: Rig) -> None:
     assert not any(re.match(r"\$H|M6[45]", line) for line in plain_rig.controller.lines)
 
 
-def test_folder_that_the_released_camera_fills(rig: Rig) -> None:
-    pictures = rig.folder / "pictures"
+def test_folder_that_the_released_camera_fills(either_rig: Rig) -> None:
+    pictures = either_rig.folder / "pictures"
     pictures.mkdir()
     (pictures / "old.jpg").write_bytes(b"of another day")
     numbers = iter(range(1000))
-    rig.controller.released = lambda machine: put(
+    either_rig.controller.released = lambda machine: put(
         pictures / f"DSC_{next(numbers):04d}.JPG", scene_of(machine)
     )
-    words = rig.words("--phases", "dark,lit", camera=f"folder:{pictures}", stops="1")
+    words = either_rig.words("--phases", "dark,lit", camera=f"folder:{pictures}", stops="1")
     assert tbcad(words) == 0
-    check_every_photograph(rig.out, 4)
+    check_every_photograph(either_rig.out, 4)
 
 
 def test_release_that_brings_no_photograph(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:

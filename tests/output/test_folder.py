@@ -3,7 +3,6 @@
 import errno
 import json
 import os
-import random
 import subprocess
 import sys
 from collections.abc import Callable
@@ -191,12 +190,6 @@ class TestReplacing:
             export(out, 1)
         assert tree(out)[name] == b"mine"
 
-    def test_a_folder_or_link_with_a_kept_name_is_the_users(self, out: Path) -> None:
-        (out / "README.md").mkdir(parents=True)
-        (out / ".gitignore").symlink_to("../.gitignore")
-        with pytest.raises(InputError, match=r"\(\.gitignore, README\.md\).*--force"):
-            export(out, 1)
-
     def test_changed_files_are_the_users_and_kept_beside_the_new(self, out: Path) -> None:
         export(out, 1)
         stl = out / "shell_a.stl"
@@ -286,19 +279,6 @@ def test_a_checkout_has_a_folder_of_exports() -> None:
         cwd=ROOT, capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert ignored.stdout.split() == [f"exports/{name}" for name in NAMES]
-
-
-def test_the_system_exchanges_folders(tmp_path: Path) -> None:
-    one, other = tmp_path / "one", tmp_path / "other"
-    one.mkdir()
-    other.mkdir()
-    (one / "a").touch()
-    if not folder_module._exchange(one, other):
-        pytest.skip("this file system has no exchange")
-    assert (other / "a").exists()
-    assert not (one / "a").exists()
-    with pytest.raises(FileNotFoundError):
-        folder_module._exchange(one, tmp_path / "missing")
 
 
 class TestParents:
@@ -513,33 +493,3 @@ def test_a_kill_at_any_call_leaves_one_whole_export(
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout.split(maxsplit=1)[1].strip() == str(seen), run.stdout
-
-
-ENDLESS = """
-import sys
-sys.path[:0] = [{root!r}]
-from pathlib import Path
-from tests.output.test_folder import export
-for version in range(1, 10**9):
-    export(Path({out!r}), version)
-    print(version, flush=True)
-"""
-
-
-def test_a_kill_at_a_random_moment_leaves_one_whole_export(out: Path) -> None:
-    script = ENDLESS.format(root=str(ROOT), out=str(out))
-    moments = random.Random(2022)
-    for _ in range(6):
-        with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) as run:
-            assert run.stdout is not None
-            assert run.stdout.readline() == b"1\n"
-            with pytest.raises(subprocess.TimeoutExpired):
-                run.wait(moments.uniform(0, 0.05))
-            run.kill()
-            run.wait()
-            lines = run.stdout.read().split()
-        # At most one export more than was told can be in place.
-        told = int(lines[-1]) if lines else 1
-        assert version_of(out) in (told, told + 1)
-        export(out, 0)
-        assert hidden(out.parent) == []

@@ -3,7 +3,7 @@
 import pytest
 
 from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.prototype.arrangement import Arrangement, arrange, arrangements
+from tbcad.prototype.arrangement import PrototypeModel, arrange, arrangements
 from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.solid import carrier_parts
@@ -14,11 +14,11 @@ from tbcad.spec.prototype import PAD_ANGLES_DEG, Hold
 
 
 @pytest.fixture(scope="module")
-def small(small_design: MirrorDesign) -> Arrangement:
+def small(small_design: MirrorDesign) -> PrototypeModel:
     return arrange(small_design)
 
 
-def magnets_hold(arrangement: Arrangement, pad_angle_deg: float) -> bool:
+def magnets_hold(arrangement: PrototypeModel, pad_angle_deg: float) -> bool:
     """Whether magnets hold the balls of an arrangement on pads at an angle."""
     changed = {"hold": "magnet", "pad_angle_deg": pad_angle_deg}
     section = arrangement.spec.prototype.base.model_copy(update=changed)
@@ -30,17 +30,19 @@ def magnets_hold(arrangement: Arrangement, pad_angle_deg: float) -> bool:
 
 
 class TestChoice:
-    def test_leaves_no_key_open(self, small: Arrangement) -> None:
+    def test_leaves_no_key_open(self, small: PrototypeModel) -> None:
         prototype = spec_dict(small.spec)["prototype"]
         assert "auto" not in [*prototype.values(), *prototype["base"].values()]
 
-    def test_everything_keeps_its_clearance(self, small: Arrangement) -> None:
+    def test_everything_keeps_its_clearance(self, small: PrototypeModel) -> None:
         clearance = small.spec.prototype.frame.clearance_mm
         assert min(*small.frame.light.values(), *small.frame.swept.values()) >= clearance
         assert small.stage.swept >= clearance
         assert small.layout.fit.coverage.min() >= 60 - 1e-6
 
-    def test_is_the_same_every_time(self, small: Arrangement, small_design: MirrorDesign) -> None:
+    def test_is_the_same_every_time(
+        self, small: PrototypeModel, small_design: MirrorDesign
+    ) -> None:
         assert arrange(small_design).spec == small.spec
 
     def test_keeps_what_the_spec_sets(self) -> None:
@@ -49,7 +51,7 @@ class TestChoice:
         base = chosen.base
         assert (chosen.k, base.hold, base.pad_angle_deg, base.hub_boss_mm) == (3, "glue", 35, 30)
 
-    def test_magnets_are_preferred(self, small: Arrangement) -> None:
+    def test_magnets_are_preferred(self, small: PrototypeModel) -> None:
         assert small.spec.prototype.base.hold == "magnet"
 
     @pytest.mark.parametrize(("k", "hold"), [(1, "glue"), (3, "magnet")])
@@ -76,7 +78,7 @@ class TestChoice:
 
 
 class TestMass:
-    def test_estimate_agrees_with_the_solid(self, small: Arrangement) -> None:
+    def test_estimate_agrees_with_the_solid(self, small: PrototypeModel) -> None:
         """Flanges, numbers and overlaps of ribs are left out: some per cent."""
         printer = small.spec.printer
         solids = carrier_parts(small.base, small.split, printer, 0.1)

@@ -19,6 +19,8 @@ from tbcad.prototype.purchased.parts import load_parts, of_kind
 PARTS = load_parts()
 PLACE, ALONG = np.array([1.0, 2.0, 3.0]), np.array([0.6, 0.0, -0.8])
 LEVEL = np.array([0.6, 0.8, 0.0])
+LENGTHS = dict.fromkeys(("screws", "setscrews", "inserts", "dowels"), "length_mm")
+LENGTHS |= dict.fromkeys(("nuts", "magnets", "leds"), "height_mm")
 DRAWN = [one for kind in (*PROFILES, "tnuts") for one in of_kind(PARTS, kind)]
 
 
@@ -43,6 +45,8 @@ def test_bodies_are_in_their_places(part: object) -> None:
     head = one.part["head_height_mm"] if one.part.kind == "screws" else 0.0
     thickness = one.part["thickness_mm"] if one.part.kind == "washers" else 0.0
     assert along.min() == pytest.approx(0.5 if one.part.kind == "tnuts" else -head - thickness)
+    if (length := LENGTHS.get(one.part.kind)) is not None:
+        assert along.max() == pytest.approx(one.part[length])
     assert body.part == one.part.name
     if not body.removed:
         assert solid_volume(component_solid(body)) == pytest.approx(volume(body.added[0]), rel=1e-9)

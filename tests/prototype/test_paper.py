@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +15,6 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.electronics.wiring import wiring_layout, wiring_rows
 from tbcad.prototype.files.bom_csv import ALWAYS, PrintedItem, bom_rows, totals
-from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.purchased.prices import Prices, load_prices
@@ -28,7 +27,7 @@ PARTS = load_parts()
 DRIVES = load_drives(PARTS)
 E24 = (10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30, 33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82)
 E24 += (91,)  # IEC 60063
-STEP = 30 / 27 + 1e-9  # of two neighbours, at most
+STEP = 15 / 13 + 1e-9  # of two neighbours, at most
 STANDARDS = {  # by the kind of part
     **{"M3x": "ISO 4762", "SET-": "ISO 4026", "WASHER-": "ISO 7089", "DOWEL-": "ISO 8734"},
     **{"COLLAR-": "DIN 705 A", "ROD-": "ISO 286-2", "SHAFT-": "ISO 286-2", "UNC": "ASME B18.3"},
@@ -173,20 +172,18 @@ def test_what_is_bought_is_what_is_fastened(n: int, drive: str, hold: str, keys:
     options = [f"n={n}", f"base.drive={drive}", f"base.hold={hold}"]
     options += [f"prototype.{key}" for key in keys]
     try:
-        found = arrange(design(load_spec(None, options)))
+        model = arrange(design(load_spec(None, options)))
     except SpecError:
         return
-    layouts = {one.name: getattr(found, one.name) for one in fields(found)}
-    model = PrototypeModel(**layouts, gauge=None, printed=())
     bought, drawn = model.purchased, Counter(one.part.name for one in model.fasteners)
     assert all(bought[part] == count for part, count in drawn.items())
     assert len({one.name for one in model.fasteners}) == len(model.fasteners)
     begins = Counter(one.part.name.partition("-")[0] for one in model.fasteners)
-    leds = len(found.stage.leds)
+    leds = len(model.stage.leds)
     assert begins["LED"] == leds
-    assert (begins["MAGNET"] > 0) == (found.spec.prototype.base.hold == "magnet")
+    assert (begins["MAGNET"] > 0) == (model.spec.prototype.base.hold == "magnet")
     in_plate = [one for one in model.fasteners if one.through[-1] == "plate"]
-    assert len(in_plate) == len(found.frame.holes)
+    assert len(in_plate) == len(model.frame.holes)
     # Every insert and T-nut has a screw of its own.
     threads = [one for one in model.fasteners if one.part.name.startswith(("INSERT-", "TNUT-"))]
     screws = [one for one in model.fasteners if "x" in one.part.name and one not in threads]
@@ -196,8 +193,8 @@ def test_what_is_bought_is_what_is_fastened(n: int, drive: str, hold: str, keys:
             for screw in screws
             if screw.through[-1] == thread.through[-1]
         ), thread.name
-    lamps = found.frame.lamps
+    lamps = model.frame.lamps
     metres = len(lamps.places) * lamps.strips * lamps.length / 1e3 if lamps else 0.0
     assert bought.get(lamps.strip.name if lamps else "", 0) == math.ceil(metres - 1e-9)
-    if found.shroud:
-        assert bought[found.shroud.sheet.name] == found.shroud.sheets
+    if model.shroud:
+        assert bought[model.shroud.sheet.name] == model.shroud.sheets

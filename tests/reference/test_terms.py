@@ -38,15 +38,15 @@ def test_columns_are_those_of_an_export(prototype_columns: dict[str, set[str]]) 
 @pytest.fixture(scope="module")
 def prototype_columns() -> dict[str, set[str]]:
     """Columns by file: of the sample export, and of the modules that write a prototype's."""
-    from tbcad.prototype.files import balls_csv, plan_csv
+    from tbcad.prototype.files import tables
 
     with (ROOT / "docs" / "sample" / "mirrors.csv").open(encoding="utf-8") as stream:
         mirrors = set(next(csv.reader(stream)))
     return {
         "mirrors.csv": mirrors,
-        "balls.csv": set(balls_csv.COLUMNS),
-        "stops.csv": set(plan_csv.STOP_COLUMNS),
-        "rotation_plan.csv": set(plan_csv.PICTURE_COLUMNS),
+        "balls.csv": set(tables.BALL_COLUMNS),
+        "stops.csv": set(tables.STOP_COLUMNS),
+        "rotation_plan.csv": set(tables.PICTURE_COLUMNS),
     }
 
 

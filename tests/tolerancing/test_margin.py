@@ -16,7 +16,6 @@ from tbcad.tolerancing.margin import (
     STEP_MM,
     Margin,
     margin,
-    solved_designs,
     with_margin,
 )
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
@@ -134,33 +133,6 @@ class TestMadeUpLosses:
         found = margin(spec, Errors(), 0.99, losing(steady(np.array([0.1, 30.0]))))
         assert (found.mm, found.share) == (None, 0.5)
 
-    def test_each_try_is_told(self, spec: Spec) -> None:
-        told: list[str] = []
-        margin(spec, Errors(), 0.99, losing(steady(1.234)), told.append)
-        assert told == ["margin 0.60 mm", "margin 1.24 mm"]
-
-
-def test_designs_are_solved_once_for_all_processes(
-    spec: Spec, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Also those that cannot be made."""
-    solved: list[float] = []
-
-    def solving(spec: Spec) -> OnlySpec:
-        solved.append(spec.mirrors.margin_mm)
-        if spec.mirrors.margin_mm > 2:
-            raise SpecError("mirrors overlap")
-        return OnlySpec(spec.mirrors.margin_mm)
-
-    monkeypatch.setattr("tbcad.tolerancing.margin.design", solving)
-    as_model(monkeypatch)
-    designs = solved_designs()
-    for loss in (1.0, 1.5, 2.5, 2.5):
-        shared = margin(spec, Errors(), 0.99, losing(steady(loss)), designs=designs)
-        assert shared == margin(spec, Errors(), 0.99, losing(steady(loss)))
-    alone = [0.6, 1.0, 0.6, 1.5, 0.6, 2.5, 0.6, 2.5]
-    assert sorted(solved) == sorted([*alone, 0.6, 1.0, 1.5, 2.5, 2.5])
-
 
 def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
     def refusing(spec: Spec) -> OnlySpec:
@@ -193,25 +165,21 @@ class TestRealDesigns:
     def worst(errors: Errors, models: EdgeModels) -> np.ndarray:
         return simulate(MonteCarloCase(models, errors, 1), 40).worst
 
-    @pytest.mark.parametrize(
-        ("n", "process", "wanted"), [(4, "sla", 0.9), (4, "sls", 0.5), (5, "cnc", 0.9)]
-    )
-    def test_margin_gives_the_yield(self, n: int, process: str, wanted: float) -> None:
-        spec, made = load_spec(None, [f"n={n}"]), process_errors(load_process(process))
+    def test_margin_gives_the_yield(self, spec: Spec) -> None:
+        made, wanted = process_errors(load_process("sla")), 0.9
         found = margin(spec, made, wanted, self.worst)
         assert found.mm is not None
 
         def share(mm: float) -> float:
-            options = [f"n={n}", f"mirrors.margin_mm={mm:.2f}"]
+            options = ["n=4", f"mirrors.margin_mm={mm:.2f}"]
             models = edge_models(reflectors(design(load_spec(None, options))))
             return float((self.worst(made, models) >= TARGET).mean())
 
         assert share(found.mm) == found.share >= wanted
         assert share(found.mm - 2 * STEP_MM) < wanted
 
-    @pytest.mark.parametrize(("facets", "most"), [(0.0, 0.01), (0.36, 0.37), (1.005, 1.01)])
-    def test_loss_that_is_known(self, spec: Spec, facets: float, most: float) -> None:
+    def test_loss_that_is_known(self, spec: Spec) -> None:
         """Facets are taken off the coverage; radii are solved for, so a step may be needed more."""
-        found = margin(spec, Errors(facets=Error(0, facets)), 0.99, self.worst)
+        found = margin(spec, Errors(facets=Error(0, 0.36)), 0.99, self.worst)
         assert found.mm is not None
-        assert facets <= found.mm <= most + 1e-9
+        assert 0.36 <= found.mm <= 0.37 + 1e-9

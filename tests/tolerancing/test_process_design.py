@@ -58,16 +58,6 @@ def test_the_margin_is_enough_and_a_little_less_is_not(monkeypatch: pytest.Monke
     assert shares[0] >= wanted > shares[1]
 
 
-def test_a_looser_process_needs_more() -> None:
-    spec = load_spec(None, SMALL)
-    margins = [
-        design_for_process(spec, load_process(name), 0.9).even_mm
-        for name in ("diamond", "cnc", "sla")
-    ]
-    assert margins == sorted(margins)
-    assert margins[0] < margins[2]
-
-
 def test_own_margins_where_they_are_smaller() -> None:
     """At the same yield, and with more pixels that see the object."""
     spec, process, wanted = load_spec(None, ["n=6", "margin_mm=0"]), load_process("cnc"), 0.9
@@ -116,6 +106,7 @@ def test_what_margins_cost() -> None:
     assert costs_text(costs).count("minimum") == 2
 
 
+@pytest.mark.slow
 def test_what_margins_cost_in_views() -> None:
     """Many more pixels lost, worse views; what is said are the figures."""
     sensor = ["n=6", "camera.width_px=832", "camera.height_px=620"]
@@ -123,13 +114,6 @@ def test_what_margins_cost_in_views() -> None:
     assert list(costs) == ["with these margins", "with none"]
     assert 0.3 < costs["with these margins"] < costs["with none"] < 1
     assert ssim_text(costs).count(f"{costs['with none']:.3f} with none") == 1
-
-
-def test_margins_in_words() -> None:
-    spec = load_spec(None, ["n=4", "margin_mm=0.5", f"own_margins_mm={[0.5] * 48 + [0.99]}"])
-    text = margins_text(ProcessDesign(spec, 1.0))
-    assert text == "margins 0.50 to 0.99 mm, 0.51 on average (one for all mirrors: 1.00)"
-    assert margins_text(ProcessDesign(load_spec(None), 0.6)) == "margin 0.6 mm"
 
 
 @pytest.mark.parametrize(
@@ -147,6 +131,7 @@ def test_a_process_for_which_there_is_no_margin() -> None:
         design_for_process(load_spec(None, SMALL), rough, 0.9)
 
 
+@pytest.mark.slow
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The edges are chosen; the design in the record gives the same mirrors without the process."""
     out = tmp_path / "exports"

@@ -108,13 +108,6 @@ class TestWords:
         assert f"covers {np.median(worst):.2f} mm (median" in said
         assert f"1 % cover less than {np.quantile(worst, 0.01):.2f})" in said
 
-    def test_worst_kind_of_error(self, analysis: Analysis) -> None:
-        """In the unit of the process: 0.375 times the 5 micrometres of sla."""
-        assert (
-            "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
-            "of the builds are good above 1.88 micrometres (sla has 5)."
-        ) in summary_text(analysis)
-
     def test_spread_of_rays_by_waviness(self, analysis: Analysis) -> None:
         spread = report_dict(analysis)["ray_spread_mm"]
         assert 0 < spread["median"] <= spread["largest"]
@@ -124,57 +117,15 @@ class TestWords:
         assert report_dict(smooth)["ray_spread_mm"]["largest"] == 0
         assert "Waviness" not in summary_text(smooth)
 
-    @pytest.mark.parametrize(
-        ("factor", "words"),
-        [(1.01, "at 5 micrometres it is at its limit"), (1.5, "above 7.5 micrometres")],
-    )
-    def test_how_large_the_worst_may_be(
-        self, analysis: Analysis, factor: float, words: str
-    ) -> None:
-        worst = replace(ALONE[0], tolerable_factor=factor)
-        said = summary_text(replace(analysis, single_errors=(worst,)))
-        assert words in said
-        assert " times " not in said
-
     def test_every_kind_has_a_unit(self, analysis: Analysis) -> None:
         assert {key.rpartition("_")[2] for key, value in analysis.process
                 if isinstance(value, ErrorSpec)} == set(UNITS)  # fmt: skip
-
-    def test_nothing_is_lost(self, analysis: Analysis) -> None:
-        harmless = summary_text(replace(analysis, single_errors=ALONE[2:]))
-        assert "camera tilt: 0.00 mm by itself; harmless." in harmless
-        assert "times" not in harmless
-        assert "lost" not in summary_text(replace(analysis, single_errors=()))
-
-    def test_design_that_falls_short(self, analysis: Analysis) -> None:
-        said = summary_text(
-            replace(analysis, single_errors=(replace(ALONE[0], tolerable_factor=0.0),))
-        )
-        assert "the design itself falls short" in said
-        assert "may be" not in said
 
     def test_margin(self, analysis: Analysis) -> None:
         said = summary_text(analysis)
         command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
         assert f"A margin of 3.71 mm ({command}) makes 99.0%" in said
         assert "No margin" not in said
-
-    def test_no_margin(self, analysis: Analysis) -> None:
-        said = summary_text(replace(analysis, margin=PROCESS_OPTIONS[0].margin))
-        assert "No margin was found that is enough: it would need more than 20 mm." in said
-        assert "A margin of" not in said
-
-    def test_processes(self, analysis: Analysis) -> None:
-        assert (
-            "Good builds, of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%. "
-            "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
-            "none was found for fdm."
-        ) in summary_text(analysis)
-        every = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
-        assert "diamond with 0.56 mm." in every
-        assert "none" not in every
-        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
-        assert "Margins needed for 99%: none found; none was found for fdm." in none
 
     def test_margins_that_were_not_searched_for(self, analysis: Analysis) -> None:
         options = tuple(replace(option, margin=None) for option in PROCESS_OPTIONS)
@@ -189,39 +140,49 @@ class TestWords:
         names = {str(row[0]) for row in tolerance_study(plain).summary.rows}
         assert "margin needed" not in names
 
-    def test_one_process_is_compared_with_none(self, analysis: Analysis) -> None:
-        alone = replace(PROCESS_OPTIONS[1], builds=BUILDS)
-        one = replace(analysis, process_options=(alone,))
-        assert "Good builds, of" not in summary_text(one)
-        (row,) = rows_of(one, "processes")
-        assert (row["process"], row["builds"]) == ("sla", str(BUILDS))
-
-    def test_pictures(self, analysis: Analysis) -> None:
-        assert "SSIM 0.850 as designed, 0.650 without calibration, 0.790 with it." in summary_text(
-            analysis
-        )
-
-    def test_prototype(self, analysis: Analysis) -> None:
-        assert "Prototype" not in summary_text(analysis)
-        said = summary_text(replace(analysis, prototype=prototype_yield(0.0, 0.7)))
-        assert percent("Prototype: ", said) == 0
-        assert percent("without calibration, ", said) == 70
-
-    @pytest.mark.parametrize(("wanted", "text"), [(0.995, "99.5%"), (0.999, "99.9%")])
-    def test_wanted_yield_is_told_as_it_was_asked(
-        self, analysis: Analysis, wanted: float, text: str
-    ) -> None:
-        """100 % is not 99.9 %."""
-        said = summary_text(
-            replace(analysis, options=replace(analysis.options, wanted_yield=wanted))
-        )
-        assert f"Margins needed for {text}:" in said
-
     def test_changed_process_is_not_advised_under_the_old_name(self, analysis: Analysis) -> None:
         """The built-in process of that name would get another margin."""
         changed = load_process("sla", ["sphere_radius_um=0"])
         said = summary_text(replace(analysis, process=changed, margin=Margin(1.82, 0.99)))
         assert "--for-process sla --yield" not in said
+
+    def test_worst_kind_of_error(self, analysis: Analysis) -> None:
+        """In the unit of the process: 0.375 times the 5 micrometres of sla."""
+        assert (
+            "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
+            "of the builds are good above 1.88 micrometres (sla has 5)."
+        ) in summary_text(analysis)
+
+    @pytest.mark.parametrize(
+        ("factor", "words"),
+        [(1.01, "at 5 micrometres it is at its limit"), (1.5, "above 7.5 micrometres")],
+    )
+    def test_how_large_the_worst_may_be(
+        self, analysis: Analysis, factor: float, words: str
+    ) -> None:
+        worst = replace(ALONE[0], tolerable_factor=factor)
+        said = summary_text(replace(analysis, single_errors=(worst,)))
+        assert words in said
+        assert " times " not in said
+
+    def test_design_that_falls_short(self, analysis: Analysis) -> None:
+        said = summary_text(
+            replace(analysis, single_errors=(replace(ALONE[0], tolerable_factor=0.0),))
+        )
+        assert "the design itself falls short" in said
+        assert "may be" not in said
+
+    def test_processes(self, analysis: Analysis) -> None:
+        assert (
+            "Good builds, of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%. "
+            "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
+            "none was found for fdm."
+        ) in summary_text(analysis)
+        every = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
+        assert "diamond with 0.56 mm." in every
+        assert "none" not in every
+        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
+        assert "Margins needed for 99%: none found; none was found for fdm." in none
 
 
 class TestJson:
@@ -264,11 +225,6 @@ class TestJson:
         assert read["calibrated"]["yield"]["share"] == 0.7
         assert read["calibrated"]["pointing_mm"]["rms"] == 2
         assert read["calibrated"]["worst_camera_mm"]["0.5"] == 61
-
-    def test_prototype_whose_windows_miss_balls(self, analysis: Analysis) -> None:
-        """Its pointing error is infinite (tbcad.tolerancing.prototype.windows)."""
-        lost = replace(analysis, prototype=prototype_yield(0.0, 0.0, math.inf))
-        json.loads(json_text(lost))
 
 
 class TestTables:

@@ -1,8 +1,9 @@
-"""A prototype as its export describes it: bodies, fasteners and the list of parts."""
+"""A prototype as its export describes it: bodies, fasteners, list of parts; words of a step."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from tbcad.errors import InputError
 from tbcad.formats.csv_table import Row
@@ -91,6 +92,19 @@ class Machine:
     def body_ref(self, body: str) -> str:
         """A body's part with its number in the list."""
         return self.ref(self.bodies[body])
+
+
+class Text(NamedTuple):
+    """Words of a step: what is done, what must be true afterwards, and other fits."""
+
+    does: tuple[str, ...]
+    checks: tuple[str, ...]
+    fits: tuple[str, ...] = ()
+
+
+def lines(*texts: str) -> tuple[str, ...]:
+    """Those that are not empty."""
+    return tuple(text for text in texts if text)
 
 
 def read_machine(folder: Path) -> Machine:

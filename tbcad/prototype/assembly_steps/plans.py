@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from tbcad.prototype.assembly_steps import words_base, words_frame, words_rest
-from tbcad.prototype.assembly_steps.machine import RESISTORS, Machine
-from tbcad.prototype.assembly_steps.text import Text
+from tbcad.prototype.assembly_steps.machine import RESISTORS, Machine, Text
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Words of the steps of the base: seats, carrier, caps, hub and balls."""
 
-from tbcad.prototype.assembly_steps.machine import Machine
-from tbcad.prototype.assembly_steps.text import Text, lines
+from tbcad.prototype.assembly_steps.machine import Machine, Text, lines
 from tbcad.records.prototype import MATT_BLACK
 
 G_PER_KG = 1000.0
@@ -13,14 +12,12 @@ def coupon(machine: Machine) -> Text:
     return Text(
         lines(
             f"Print {', '.join(names)} before the carrier: it has the seats of the largest, a "
-            f"middle and "
-            "the smallest ball, as designed and offset, in the pose of the carrier's worst seat. "
-            "Supports on the build plate only, as for the carrier.",
+            "middle and the smallest ball, as designed and offset, in the pose of the carrier's "
+            "worst seat. Supports on the build plate only, as for the carrier.",
             "Put the balls in. The seat fits in which the ball touches its three pads and nothing "
             "else.",
             "Set prototype.base.pad_offset_mm to the offset of that seat and build the design "
-            "again. "
-            "Then print the carrier.",
+            "again. Then print the carrier.",
             _black_prints(machine),
         ),
         lines("In the seat chosen, the ball does not rock when it is pushed at its edge."),
@@ -45,13 +42,11 @@ def carrier(machine: Machine) -> Text:
     return Text(
         lines(
             "Remove supports. Pads are the three small flats in each cup: clean them, but do not "
-            "sand "
-            "them round.",
+            "sand them round.",
             _reamed(machine),
             f"Press the inserts into the holes of the {'hub and the joints' if cut else 'hub'}.",
             "Join the pieces in the order of the numbers at their joints: dowels first, then "
-            "screws, "
-            "all of them loosely, then tight."
+            "screws, all of them loosely, then tight."
             if cut
             else "",
             "Stack the magnets and mark the same pole of all with a pen. Glue one into each "
@@ -80,9 +75,8 @@ def _reamed(machine: Machine) -> str:
     part = machine.listed(machine.bodies["shaft"])
     size = f" {part['diameter_mm']:g} H7" if part else ""
     return (
-        f"Ream the hub's bore with a hand reamer{size}, turned one way only: printed "
-        f"holes come out "
-        "0.1 to 0.3 mm narrower than drawn."
+        f"Ream the hub's bore with a hand reamer{size}, turned one way only: printed holes come "
+        "out 0.1 to 0.3 mm narrower than drawn."
     )
 
 
@@ -95,8 +89,7 @@ def caps(machine: Machine) -> Text:
             "Print the caps front up in resin, or have them turned; polish and coat them as "
             f"{drawings} ask{'s' if len(caps) == 1 else ''}.",
             "Glue a magnet into each spigot, its north pole toward the front, so that the seat's "
-            "magnet "
-            "attracts it.",
+            "magnet attracts it.",
             "Fit the spigot into the pocket of its seat.",
         ),
         lines(
@@ -162,8 +155,7 @@ def balls(machine: Machine) -> Text:
             "Clean the balls with alcohol. Touch them only with gloves from now on.",
             "Push the caps into their seats, too." if machine.record.caps else "",
             "Put each into the seat with its number on the back, in any order. balls.csv lists "
-            "the balls "
-            "by number."
+            "the balls by number."
             if strongest
             else "Put a small drop of glue into the well of each seat, none on the pads, and the "
             "ball on it.",
@@ -179,8 +171,7 @@ def balls(machine: Machine) -> Text:
                 if one.ball in machine.sizes
             ),
             "Each touches its three pads and does not rock. It stays in its seat when the base is "
-            "turned "
-            f"through its whole travel; the base weighs {mass:.1f} kg now.",
+            f"turned through its whole travel; the base weighs {mass:.1f} kg now.",
         ),
     )
 

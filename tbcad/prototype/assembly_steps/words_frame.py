@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tbcad.prototype.assembly_steps.machine import Machine
-from tbcad.prototype.assembly_steps.text import Text, lines
+from tbcad.prototype.assembly_steps.machine import Machine, Text, lines
 from tbcad.prototype.base.hub import SOCKET_MM
 from tbcad.prototype.frame.head import GAP_MM
 from tbcad.prototype.frame.purchased import PLATE_MM
@@ -53,8 +52,7 @@ def frame(machine: Machine) -> Text:
             "the lower end of each slot for a foot, the others for what comes later (the picture "
             "shows which).",
             "Stand the uprights between the two feet, the feet's flanges against them. Screws "
-            "through the "
-            "feet into the T-nuts, loosely.",
+            "through the feet into the T-nuts, loosely.",
             "Screw the feet down on the plate, a washer under each head. Then tighten the T-nuts' "
             "screws.",
         ),
@@ -117,9 +115,8 @@ def shaft(machine: Machine) -> Text:
     return Text(
         lines(
             f"Push the shaft {machine.body_ref('shaft')} into the hub from behind until it ends "
-            f"in the bore. "
-            f"The last {SOCKET_MM:g} mm of the bore stay free: the gauge of the camera is plugged "
-            "in there later.",
+            f"in the bore. The last {SOCKET_MM:g} mm of the bore stay free: the gauge of the "
+            "camera is plugged in there later.",
             "Tighten the screws of the hub in turn.",
             "Lay the belt round the wheel now: once the shaft is in its bearings, it gets neither "
             "past the base nor past the head."
@@ -148,9 +145,8 @@ def motor(machine: Machine) -> Text:
             "Screws from the front, loosely in their slots."
             if pinion
             else "Motor behind the head's plate, screws from the front.",
-            "Belt on both wheels. Pull the motor away from the shaft until the belt has its "
-            "tone, then "
-            "tighten the screws in turn."
+            "Belt on both wheels. Pull the motor away from the shaft until the belt has its tone, "
+            "then tighten the screws in turn."
             if pinion
             else "",
             "Push the base with the coupling on the motor's shaft; tighten the set screws of the "
@@ -162,9 +158,8 @@ def motor(machine: Machine) -> Text:
             f"The axes of motor and base are {drive.belt_centre_mm:.1f} mm apart."
             if pinion
             else "",
-            f"A free side of the belt, plucked like a string, sounds at "
-            f"{drive.belt_tone_hz:.0f} Hz "
-            f"(a tuner app; a pull of {drive.belt_tension_n:.0f} N)."
+            f"A free side of the belt, plucked like a string, sounds at {drive.belt_tone_hz:.0f} "
+            f"Hz (a tuner app; a pull of {drive.belt_tension_n:.0f} N)."
             if pinion
             else "",
             f"{drive.ratio:g} turns of the motor turn the base once."
@@ -196,8 +191,7 @@ def homing(machine: Machine) -> Text:
     return Text(
         lines(
             "Screw the switch on its bracket, the roller toward the axis. Screw the bracket on "
-            "the head's "
-            "side.",
+            "the head's side.",
             "Turn the base by hand until the marks of disc and head are in line, and push the "
             f"zero pin {machine.ref(home.pin)} from behind through the head into the disc. That "
             "is base angle zero.",

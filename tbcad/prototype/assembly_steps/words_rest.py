@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from tbcad.prototype.assembly_steps.machine import Machine
-from tbcad.prototype.assembly_steps.text import Text, lines
+from tbcad.prototype.assembly_steps.machine import Machine, Text, lines
 from tbcad.prototype.frame.camera_mount import GAP_MM
 from tbcad.records.prototype_light import LampsRecord
 
@@ -101,17 +100,13 @@ def camera(machine: Machine) -> Text:
             "Press the inserts into the camera plate from behind.",
             "Bracket on the base plate with washers, in the middle of its slots.",
             "Three long screws with washers from behind through the bracket's slots; on each "
-            "between bracket and plate a "
-            "washer and two nuts, then into the plate's inserts. "
-            f"{GAP_MM:g} mm between plate and bracket. "
-            "The nut "
-            "at the plate locks the screw, the other one clamps the bracket.",
-            "Camera and lens are not in the list: camera.json has what they must do, and "
-            "tbcad camera "
-            "shows which on sale do it.",
+            "between bracket and plate a washer and two nuts, then into the plate's inserts. "
+            f"{GAP_MM:g} mm between plate and bracket. The nut at the plate locks the screw, the "
+            "other one clamps the bracket.",
+            "Camera and lens are not in the list: camera.json has what they must do, and tbcad "
+            "camera shows which on sale do it.",
             "Fence on the plate. Then your camera on the plate by its tripod thread, its back "
-            "against the "
-            "fence.",
+            "against the fence.",
         ),
         lines(
             f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",
@@ -125,17 +120,13 @@ def wiring(machine: Machine) -> Text:
     return Text(
         lines(
             "Controller, supply, relay and switch modules stand outside the shroud. Supply off.",
-            "Plus of the supply goes to each lamp, and through its resistor to each "
-            "LED's anode (odd "
-            "pin). Their other ends (an LED's cathode: even pin) go to the drain of "
-            "a switch module, "
-            "whose input is the controller's output.",
+            "Plus of the supply goes to each lamp, and through its resistor to each LED's anode "
+            "(odd pin). Their other ends (an LED's cathode: even pin) go to the drain of a switch "
+            "module, whose input is the controller's output.",
             *(_line(machine, row) for row in machine.wiring),
             _no_lamps(machine),
             "Never plug or unplug the motor with the supply on: that destroys drivers, and the "
-            "base falls. Zero pin in before the supply is switched off. No "
-            "wire goes "
-            "to the base.",
+            "base falls. Zero pin in before the supply is switched off. No wire goes to the base.",
         ),
         lines(
             "Before the supply is on: between its plus and minus, behind the fuse, are more than "
@@ -205,9 +196,8 @@ def zero(machine: Machine) -> Text:
             "set $3 as "
             "the file's comment says.",
             "Home ($H), send the program's line G92, and jog until the zero pin goes in. The "
-            "angle that the "
-            "controller shows, with a changed sign, is prototype.motion.home_trim_deg: build "
-            "again with it."
+            "angle that the controller shows, with a changed sign, is "
+            "prototype.motion.home_trim_deg: build again with it."
             if homes
             else "Jog until the zero pin goes in, and switch the controller on there: that is its "
             "zero.",
@@ -224,9 +214,8 @@ def zero(machine: Machine) -> Text:
             f"Homed, the base stops at {home.homed_deg:.1f} degrees, again and again."
             if homes
             else "",
-            "Sent to zero, the zero pin goes in: the error is at most "
-            f"{home.zero_error_deg:.1f} "
-            f"degrees.",
+            f"Sent to zero, the zero pin goes in: the error is at most {home.zero_error_deg:.1f} "
+            "degrees.",
         ),
     )
 
@@ -260,51 +249,39 @@ def gauge(machine: Machine) -> Text:
     return Text(
         lines(
             "Take the stage's post out of its clamp. Measure the gauge: both widths between the "
-            "edges that "
-            "face each other. Sand the near arm's ends, or tape them, until near_width is "
-            "far_width x "
-            "(H - hub_to_near) / (H - hub_to_far), H = hub_to_pinhole.",
-            "Gauge into the hub's bore, arms level and marked face up, flange flat "
-            "on the hub; hold "
-            "it with tape. Zero pin in at zero.",
+            "edges that face each other. Sand the near arm's ends, or tape them, until near_width "
+            "is far_width x (H - hub_to_near) / (H - hub_to_far), H = hub_to_pinhole.",
+            "Gauge into the hub's bore, arms level and marked face up, flange flat on the hub; "
+            "hold it with tape. Zero pin in at zero.",
             "Focus and stop the lens as camera.json has it: both move the pinhole.",
             "Base at zero: turn yaw, roll and pitch until the near marks are within 10 pixels of "
-            "the place "
-            "that the checks name.",
+            "the place that the checks name.",
             "Move the camera along its axis until the near arm's ends just touch the far arm's "
-            "edges in the picture. Gaps of one width: too far. Overlaps: too near. "
-            "If they differ, it "
-            "is the gauge or the place across, which the next pictures tell apart.",
-            "Zero pin out. Base at -90 and 90 degrees: marked faces in one line (across), "
-            "ends touching "
-            "(out). What is alike in both pictures with opposite signs is the gauge's error; their "
-            "mean is the camera's.",
+            "edges in the picture. Gaps of one width: too far. Overlaps: too near. If they "
+            "differ, it is the gauge or the place across, which the next pictures tell apart.",
+            "Zero pin out. Base at -90 and 90 degrees: marked faces in one line (across), ends "
+            "touching (out). What is alike in both pictures with opposite signs is the gauge's "
+            "error; their mean is the camera's.",
             "Repeat until every mean is below half a pixel (0.1 mm is about a pixel). Tighten all "
-            "screws, look once more. Take the gauge off, put the post back. The "
-            "camera may be taken "
-            "off later: the fence brings it back.",
+            "screws, look once more. Take the gauge off, put the post back. The camera may be "
+            "taken off later: the fence brings it back.",
         ),
         lines(
-            f"Before sanding: near_width {sizes.near_width:.2f}, far_width "
-            f"{sizes.far_width:.2f}, "
+            f"Before sanding: near_width {sizes.near_width:.2f}, far_width {sizes.far_width:.2f}, "
             f"hub_to_near {sizes.hub_to_near:.2f}, hub_to_far {sizes.hub_to_far:.2f}, "
-            f"hub_to_pinhole "
-            f"{sizes.hub_to_pinhole:.2f} mm.",
+            f"hub_to_pinhole {sizes.hub_to_pinhole:.2f} mm.",
             *(
-                f"Base at {one.base_angle_deg:.0f} degrees: the {one.side} mark appears at "
-                f"column "
+                f"Base at {one.base_angle_deg:.0f} degrees: the {one.side} mark appears at column "
                 f"{one.column_px:.0f}, row {one.row_px:.0f}."
                 for one in place.pictures
             ),
-            f"The pinhole is then known to {error.along_mm:.2f} mm along, "
-            f"{error.across_mm:.2f} across "
-            f"and {error.out_mm:.2f} out.",
+            f"The pinhole is then known to {error.along_mm:.2f} mm along, {error.across_mm:.2f} "
+            f"across and {error.out_mm:.2f} out.",
         ),
         lines(
             f"Travel: along {travel.along_axis_mm:g} mm, across {travel.across_mm:g}, out "
-            f"{travel.out_mm:g}, yaw {travel.yaw_deg:.0f} degrees, roll "
-            f"{travel.roll_deg:.0f}, pitch "
-            f"{travel.pitch_deg:.0f}"
+            f"{travel.out_mm:g}, yaw {travel.yaw_deg:.0f} degrees, roll {travel.roll_deg:.0f}, "
+            f"pitch {travel.pitch_deg:.0f}"
         ),
     )
 
@@ -320,10 +297,9 @@ def shroud(machine: Machine) -> Text:
                 for one in box.panels
             ),
             "Lay the floor under the plate first; cables go out through the notch of the back.",
-            "Score the dashed lines. Fold the flaps of front, back and right side "
-            "inward by 90 degrees and glue them. The "
-            "left side "
-            "is held by tape, so that it comes off: the object is placed and turned through it.",
+            "Score the dashed lines. Fold the flaps of front, back and right side inward by 90 "
+            "degrees and glue them. The left side is held by tape, so that it comes off: the "
+            "object is placed and turned through it.",
         ),
         lines(
             "No part touches the card over the whole travel of the base.",

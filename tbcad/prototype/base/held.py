@@ -1,12 +1,13 @@
 """How each ball and cap is held, in numbers: the force needed, and the force that there is."""
 
-from dataclasses import dataclass
-
-import numpy as np
-
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_solids import cap_pocket, cap_spigot
+from tbcad.prototype.base.caps import cap_pocket, cap_spigot
+from tbcad.prototype.base.fasteners import seat_magnets
 from tbcad.prototype.base.holding import (
+    DERATING,
+    GLUE_MPA,
+    MIN_RATIO,
+    REMANENCE_T,
     WIDER_GAP_MM,
     Motion,
     force_needed,
@@ -16,39 +17,41 @@ from tbcad.prototype.base.holding import (
 )
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import ball_masses
-from tbcad.types import Bools, Floats
+from tbcad.prototype.purchased.parts import Parts
+from tbcad.records.prototype import HeldBall, Holding
 
 
-@dataclass(frozen=True)
-class HeldBalls:
-    """Forces along the seats' axes of k balls.
-
-    Attributes:
-        needed: least force with which all three pads bear load at every base angle, N, (k,).
-        available: pull of the magnet, or what glue bears, N, (k,).
-        wider: the same with a gap that is wider by WIDER_GAP_MM, N, (k,).
-        glued: whether glue holds it, (k,).
-    """
-
-    needed: Floats
-    available: Floats
-    wider: Floats
-    glued: Bools
-
-
-def held_balls(base: BaseLayout, prototype: PrototypeLayout, motion: Motion) -> HeldBalls:
-    """What holds the balls in their seats, with the pads as they are turned."""
+def holding(base: BaseLayout, prototype: PrototypeLayout, motion: Motion, parts: Parts) -> Holding:
+    """What holds each ball in its seat, with the pads as they are turned, and assumptions."""
     seats, masses = base.seats, ball_masses(prototype, motion.cap_density)
     needed = force_needed(
         seats.pad_normals, seats.axis, seats.centre, masses.mass_g, base.frame, motion
+    ).tolist()
+    held = (_forces(base, prototype, k) for k in range(len(seats)))
+    rows = zip(needed, held, seat_magnets(base, parts), strict=True)
+    return Holding(
+        min_ratio=MIN_RATIO,
+        remanence_t=REMANENCE_T,
+        derating=DERATING,
+        glue_mpa=GLUE_MPA,
+        wider_gap_mm=WIDER_GAP_MM,
+        balls=tuple(
+            HeldBall(
+                ball=number,
+                by="glue" if wider is None else "magnet",
+                magnet=magnet.name if magnet else None,
+                force_needed_n=least,
+                force_available_n=force,
+                ratio=force / least,
+                wider_gap_n=force if wider is None else wider,
+            )
+            for number, (least, (force, wider), magnet) in enumerate(rows, 1)
+        ),
     )
-    forces = np.array([_forces(base, prototype, k) for k in range(len(seats))])
-    glued = np.isnan(forces[:, 1])
-    return HeldBalls(needed, forces[:, 0], np.where(glued, forces[:, 0], forces[:, 1]), glued)
 
 
-def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float, float]:
-    """Force with the gap as drawn and with a wider one, N; not a number with glue."""
+def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float, float | None]:
+    """Force with the gap as drawn and with a wider one, N; None with glue."""
     seats, gap = base.seats, base.spec.magnet_gap_mm
     magnet, height = float(seats.magnet[k]) / 2, float(seats.magnet_height[k])
     if prototype.balls.cap[k] and magnet:
@@ -65,4 +68,4 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
         radius = float(seats.radius[k])
         pulls = [pull_on_ball(radius, gap + w, magnet, height) for w in (0.0, WIDER_GAP_MM)]
         return pulls[0], pulls[1]
-    return float(glue_force(seats.pocket[k])), float("nan")
+    return float(glue_force(seats.pocket[k])), None

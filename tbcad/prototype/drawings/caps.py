@@ -7,9 +7,9 @@ import numpy as np
 from tbcad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
 from tbcad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_limits import MATERIAL, MIN_REFLECTANCE, CapLimits
-from tbcad.prototype.base.cap_solids import cap_pocket, cap_spigot, flat_depth
+from tbcad.prototype.base.caps import cap_edge, cap_pocket, cap_spigot, flat_depth
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.records.prototype import CapRecord
 
 VIEW_MM = 95.0, 95.0  # room of the section on paper
 MIDDLE_MM = 80.0, 128.0  # of the body's centre on paper
@@ -19,64 +19,73 @@ BEYOND_MM, APART_MM = 3.0, 5.0  # of centre lines beyond the section; of texts f
 EDGE_DEG = 45.0  # where front and body meet, on the body
 
 
-def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: CapLimits) -> Sheet:
+def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: CapRecord) -> Sheet:
     """The optical drawing of a cap.
 
     Args:
         design: for the title block.
         base: with its seat.
         prototype: with its body.
-        one: its sizes and limits.
+        one: its key and limits.
     """
-    scale = choose_scale((one.body, one.thickness), VIEW_MM)
-    name = f"cap {one.ball + 1}"
+    k = one.ball - 1
+    body = 2 * float(prototype.balls.body_radius[k])
+    scale = choose_scale((body, _thickness(prototype, one)), VIEW_MM)
+    name = f"cap {one.ball}"
     block = TitleBlock(
         title=f"Optical drawing of {name} (ISO 10110)",
         design=design,
         item=name,
         quantity=1,
-        material=MATERIAL,
+        material=one.material,
         view="section through the axis",
     )
     entities = [
         *sheet_frame(A4, scale, block),
         *_section(base, prototype, one, scale),
-        *_table(one),
+        *_table(one, float(prototype.balls.radius[k]), body),
     ]
-    return Sheet(one.drawing, block.title, name, A4, scale, MIDDLE_MM, tuple(entities))
+    return Sheet(
+        one.pdf.removesuffix(".pdf"), block.title, name, A4, scale, MIDDLE_MM, tuple(entities)
+    )
+
+
+def _thickness(prototype: PrototypeLayout, one: CapRecord) -> float:
+    """From the apex to the end of the spigot, mm."""
+    return float(prototype.balls.body_depth[one.ball - 1]) + one.spigot_end_mm
 
 
 def _section(
-    base: BaseLayout, prototype: PrototypeLayout, one: CapLimits, scale: float
+    base: BaseLayout, prototype: PrototypeLayout, one: CapRecord, scale: float
 ) -> Iterator[Entity]:
     """The section, its front up, its axis, and the diameter in use."""
-    (x, y), k, body = MIDDLE_MM, one.ball, one.body / 2
-    depth, flat = float(prototype.balls.body_depth[k]), flat_depth(base, k)
-    _, end = cap_spigot(base, k)
+    (x, y), k, balls = MIDDLE_MM, one.ball - 1, prototype.balls
+    body, radius = float(balls.body_radius[k]), float(balls.radius[k])
+    depth, flat = float(balls.body_depth[k]), flat_depth(base, k)
 
     def at(across: float, behind: float) -> Point:
         return x + scale * across, y - scale * behind
 
-    whole = one.radius <= body  # a ball to its apex
+    whole = radius <= body  # a ball to its apex
     if not whole:
-        front = float(np.degrees(np.arcsin(one.edge / 2 / one.radius)))
-        middle = at(0.0, one.radius - depth)
-        yield Arc(Layer.CUT, middle, scale * one.radius, 90.0 - front, 90.0 + front)
+        front = float(np.degrees(np.arcsin(cap_edge(prototype, k) / radius)))
+        middle = at(0.0, radius - depth)
+        yield Arc(Layer.CUT, middle, scale * radius, 90.0 - front, 90.0 + front)
     low = -float(np.degrees(np.arcsin(flat / body)))
     high = 90.0 if whole else EDGE_DEG
     yield Arc(Layer.CUT, at(0.0, 0.0), scale * body, low, high)
     yield Arc(Layer.CUT, at(0.0, 0.0), scale * body, 180.0 - high, 180.0 - low)
     yield Polyline(Layer.CUT, tuple(at(*corner) for corner in _back(base, k, depth)), closed=False)
-    below = end + BEYOND_MM / scale
+    below = one.spigot_end_mm + BEYOND_MM / scale
     yield Line(Layer.CENTRE, at(0.0, -depth - BEYOND_MM / scale), at(0.0, below))
     for side in (1, -1):
-        rim = at(side * one.aperture / 2, -depth)
+        rim = at(side * one.aperture_mm / 2, -depth)
         yield Line(Layer.DIMENSIONS, rim, (rim[0], rim[1] + BEYOND_MM))
     _, top = at(0.0, -depth)
-    used = f"effective diameter {one.aperture:.1f}"
+    used = f"effective diameter {one.aperture_mm:.1f}"
     yield Text(Layer.DIMENSIONS, (x, top + APART_MM), TEXT_MM, used, "centre")
     _, bottom = at(0.0, below)
-    length = f"length over all {one.thickness:.2f}"
+    length = f"length over all {_thickness(prototype, one):.2f}"
     yield Text(Layer.DIMENSIONS, (x, bottom - APART_MM), TEXT_MM, length, "centre")
 
 
@@ -91,10 +100,10 @@ def _back(base: BaseLayout, k: int, depth: float) -> list[Point]:
     return [*half, *((-across, behind) for across, behind in reversed(half))]
 
 
-def _table(one: CapLimits) -> Iterator[Entity]:
+def _table(one: CapRecord, radius: float, body: float) -> Iterator[Entity]:
     """Texts beside the section, a head and lines for front, material and body."""
     y = TOP_MM
-    for head, *texts in _blocks(one):
+    for head, *texts in _blocks(one, radius, body):
         yield Text(Layer.DIMENSIONS, (TABLE_X_MM, y), HEAD_MM, head)
         for text in texts:
             y -= LINE_MM
@@ -102,15 +111,15 @@ def _table(one: CapLimits) -> Iterator[Entity]:
         y -= 2 * LINE_MM
 
 
-def _blocks(one: CapLimits) -> tuple[tuple[str, ...], ...]:
+def _blocks(one: CapRecord, radius: float, diameter: float) -> tuple[tuple[str, ...], ...]:
     front = (
         "Front",
-        f"R {one.radius:.1f} +-{one.radius_tolerance:.2f} CX",
-        f"effective diameter {one.aperture:.1f}",
-        f"3/ -({one.irregularity:.1f}), fringes of 546 nm over it",
-        f"4/ centre of R within {one.centre_shift:.2f} of the spigot's axis",
-        f"Ra {one.roughness_um:g} um or better, polished",
-        f"coat: reflects {MIN_REFLECTANCE:.0%} or more, 400 to 700 nm at "
+        f"R {radius:.1f} +-{one.radius_tolerance_mm:.2f} CX",
+        f"effective diameter {one.aperture_mm:.1f}",
+        f"3/ -({one.irregularity_fringes:.1f}), fringes of 546 nm over it",
+        f"4/ centre of R within {one.centre_shift_mm:.2f} of the spigot's axis",
+        f"Ra {one.roughness_ra_um:g} um or better, polished",
+        f"coat: reflects {one.reflectance_min:.0%} or more, 400 to 700 nm at "
         f"{one.incidence_deg:.0f} degrees",
     )
     material = (
@@ -121,8 +130,8 @@ def _blocks(one: CapLimits) -> tuple[tuple[str, ...], ...]:
     )
     body = (
         "Body and spigot",
-        f"sphere {one.body:.3f} +-{2 * one.body_tolerance:.2f}, lies on three pads: no coat there",
-        f"spigot {one.spigot:.2f} in a pocket of {one.socket:.2f}: fit it,",
+        f"sphere {diameter:.3f} +-{one.body_tolerance_mm:.2f}, lies on three pads: no coat there",
+        f"spigot {one.spigot_mm:.2f} in a pocket of {one.socket_mm:.2f}: fit it,",
         f"play lets the cap tilt by {one.tilt_deg:.2f} degrees at most",
     )
     return front, material, body

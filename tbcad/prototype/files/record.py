@@ -5,19 +5,10 @@ import numpy as np
 from tbcad.drafting.sheet import Sheet
 from tbcad.formats.csv_table import Row
 from tbcad.geometry.vectors import norm
-from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_limits import FINISH, MATERIAL, MIN_REFLECTANCE, POLARITY, cap_limits
-from tbcad.prototype.base.fasteners import seat_magnets
-from tbcad.prototype.base.held import held_balls
-from tbcad.prototype.base.holding import (
-    DERATING,
-    GLUE_MPA,
-    MIN_RATIO,
-    REMANENCE_T,
-    WIDER_GAP_MM,
-    base_motion,
-)
-from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.arrangement import PrototypeModel
+from tbcad.prototype.base.caps import cap_limits
+from tbcad.prototype.base.held import holding
+from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.loads import (
@@ -36,16 +27,13 @@ from tbcad.prototype.files.bom_csv import totals
 from tbcad.prototype.frame.camera_gauge import marks_seen
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.model import PrototypeModel
 from tbcad.prototype.printing.placing import PrintedPart
-from tbcad.prototype.purchased.parts import Parts
 from tbcad.prototype.stage.calibration import calibration_estimate
 from tbcad.prototype.stage.layout import led_poses
 from tbcad.records import prototype as records
 from tbcad.records.prototype import MATT_BLACK, Prototype
 from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
 from tbcad.records.prototype_light import CardPanel, LampPlace, LampsRecord, ShroudRecord
-from tbcad.spec.design import Spec
 from tbcad.spec.prototype import MotionSpec
 
 STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
@@ -81,7 +69,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         balls=BALLS_FILE,
         alternatives=layout.alternatives,
         seats=_seats(built),
-        holding=_holding(built.spec, built.base, layout, built.parts),
+        holding=holding(built.base, layout, base_motion(built.spec), built.parts),
         parts=tuple(map(_part, built.printed)),
         leds=tuple(
             records.Led(name=name, position_mm=(place + 0.0).tolist(), direction=way.tolist())
@@ -93,7 +81,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
             axis=spec.motion.axis,
             phases=phases(len(built.stage.leds), spec.motion),
         ),
-        caps=_caps(built),
+        caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),
         home=Home(
             switch_deg=frame.homing.angles.switch,
@@ -207,32 +195,6 @@ def _seats(built: PrototypeModel) -> tuple[records.SeatRecord, ...]:
     )
 
 
-def _holding(
-    spec: Spec, base: BaseLayout, layout: PrototypeLayout, parts: Parts
-) -> records.Holding:
-    """Assumptions, and a row for each ball in the order of their numbers."""
-    held, magnets = held_balls(base, layout, base_motion(spec)), seat_magnets(base, parts)
-    return records.Holding(
-        min_ratio=MIN_RATIO,
-        remanence_t=REMANENCE_T,
-        derating=DERATING,
-        glue_mpa=GLUE_MPA,
-        wider_gap_mm=WIDER_GAP_MM,
-        balls=tuple(
-            records.HeldBall(
-                ball=k + 1,
-                by="glue" if held.glued[k] else "magnet",
-                magnet=magnet.name if magnet else None,
-                force_needed_n=float(held.needed[k]),
-                force_available_n=float(held.available[k]),
-                ratio=float(held.available[k] / held.needed[k]),
-                wider_gap_n=float(held.wider[k]),
-            )
-            for k, magnet in enumerate(magnets)
-        ),
-    )
-
-
 def _part(part: PrintedPart) -> records.PrintedPartRecord:
     """A printed part; y = x @ axes + origin is a point on the bed."""
     return records.PrintedPartRecord(
@@ -258,32 +220,6 @@ def _calibration(built: PrototypeModel) -> records.CentreEstimate | None:
     return calibration_estimate(stage, built.layout.array, built.stage.leds, capture).record()
 
 
-def _caps(built: PrototypeModel) -> tuple[records.CapRecord, ...]:
-    return tuple(
-        records.CapRecord(
-            ball=one.ball + 1,
-            spigot_mm=one.spigot,
-            socket_mm=one.socket,
-            spigot_end_mm=one.end,
-            tilt_deg=one.tilt_deg,
-            centre_shift_mm=one.centre_shift,
-            aperture_mm=one.aperture,
-            radius_tolerance_mm=one.radius_tolerance,
-            body_tolerance_mm=2 * one.body_tolerance,
-            irregularity_fringes=one.irregularity,
-            roughness_ra_um=one.roughness_um,
-            incidence_deg=one.incidence_deg,
-            reflectance_min=MIN_REFLECTANCE,
-            material=MATERIAL,
-            finish=FINISH,
-            polarity=POLARITY,
-            pdf=f"{one.drawing}.pdf",
-            dxf=f"{one.drawing}.dxf",
-        )
-        for one in cap_limits(built.spec, built.base, built.layout)
-    )
-
-
 def _camera_place(built: PrototypeModel) -> records.CameraPlace | None:
     """The mount's travel, the gauge's marks, its pictures and errors; None without a camera."""
     gauge, mount = built.gauge, built.frame.mount
@@ -300,9 +236,9 @@ def _camera_place(built: PrototypeModel) -> records.CameraPlace | None:
             far_width=2 * sizes.far_half,
             hub_to_pinhole=float(norm(camera.pinhole)) - sizes.hub,
         ),
-        pictures=tuple(records.MarkPicture(**one) for one in marks_seen(gauge, built.base, camera)),
+        pictures=marks_seen(gauge, built.base, camera),
         error=records.PlaceError(**gauge.errors),
-        travel=records.CameraTravel(**mount.travel),
+        travel=mount.travel,
     )
 
 

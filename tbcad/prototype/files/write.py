@@ -14,20 +14,20 @@ from tbcad.formats.step_assembly import write_assembly
 from tbcad.formats.stl import write_stl
 from tbcad.formats.threemf import write_3mf
 from tbcad.mirrors.array import MirrorDesign
-from tbcad.prototype.arrangement import arrangements
+from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
-from tbcad.prototype.base.cap_limits import cap_limits
+from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.prototype.drawings.lamps import lamp_sheet
 from tbcad.prototype.drawings.parts import Listed, listed, sheets
 from tbcad.prototype.drive.loads import DriveLoads, base_torques
 from tbcad.prototype.electronics import wiring
-from tbcad.prototype.files import balls_csv, bom_csv, gcode, klipper, plan_csv, settings
+from tbcad.prototype.files import bom_csv, gcode, klipper, settings, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.light.shroud import pattern
-from tbcad.prototype.model import PrototypeModel, build_prototype_model
+from tbcad.prototype.model import build_prototype_model
 from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
 from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 from tbcad.prototype.purchased.prices import Prices, load_prices
@@ -128,10 +128,10 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
     layout, motion = built.layout, built.spec.prototype.motion
     loads = DriveLoads(built.drive, base_torques(built.balance, layout.stops.range, motion))
     for name, columns, rows in (
-        (BALLS_FILE, balls_csv.COLUMNS, balls_csv.ball_rows(layout)),
-        ("rotation_plan.csv", plan_csv.PICTURE_COLUMNS, plan_csv.picture_rows(layout)),
-        ("stops.csv", plan_csv.STOP_COLUMNS, plan_csv.stop_rows(layout, built.balance, loads)),
-        ("plate_holes.csv", plan_csv.HOLE_COLUMNS, plan_csv.hole_rows(built.frame)),
+        (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),
+        ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),
+        ("stops.csv", tables.STOP_COLUMNS, tables.stop_rows(layout, built.balance, loads)),
+        ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame)),
         (
             "wiring.csv",
             wiring.COLUMNS,

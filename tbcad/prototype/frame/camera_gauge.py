@@ -10,7 +10,7 @@ Lengths are along the base's axis from the origin toward the camera, along the a
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from tbcad.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.geometry.vectors import norm
 from tbcad.optics.camera import Camera
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.records.prototype import MarkPicture
 from tbcad.types import Floats
 
 # The lines through near and far marks, from the base's axis; less where the picture is narrower.
@@ -42,7 +43,7 @@ MAST_HALF_MM, THICKNESS_MM = 7.0, 12.0
 ARM_MM, BLOCK_MM, STEP_MM = 8.0, 12.0, 6.0  # of the arms along the axis; of the far ends
 UNDERCUT_MM = 2.0  # by which far ends recede behind their marks, beyond the line of sight
 ROOT_MM = 1.0  # by which bodies reach into each other
-SIDES = "positive", "negative"
+SIDES: tuple[Literal["positive", "negative"], ...] = "positive", "negative"
 WHAT = "gauge for the camera's place, on the hub while the camera is aligned"
 
 
@@ -159,17 +160,17 @@ def _sights(
     ]
 
 
-def marks_seen(gauge: CameraGauge, base: BaseLayout, camera: Camera) -> list[dict[str, Any]]:
-    """Base angle, side, and column and row in pixels of every picture of a pair of marks."""
+def marks_seen(gauge: CameraGauge, base: BaseLayout, camera: Camera) -> tuple[MarkPicture, ...]:
+    """Every picture of a pair of marks."""
     low, middle, high = gauge.angles
     pictures = []
     for angle, side in ((low, 0), (middle, 0), (middle, 1), (high, 1)):
         turned = rotated_about_x(gauge.marks[side, 1] @ base.frame.T, np.radians(angle))
         column, row = camera.project(turned @ base.frame).tolist()
         pictures.append(
-            {"base_angle_deg": angle, "side": SIDES[side], "column_px": column, "row_px": row}
+            MarkPicture(base_angle_deg=angle, side=SIDES[side], column_px=column, row_px=row)
         )
-    return pictures
+    return tuple(pictures)
 
 
 def place_errors(sight: Sight, pitch: float, needed: CameraRequirements) -> dict[str, float]:

@@ -35,6 +35,7 @@ from tbcad.prototype.frame.brackets import (
     webs,
 )
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
+from tbcad.records.prototype import CameraTravel
 from tbcad.spec.errors import SpecError
 from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats
@@ -82,14 +83,14 @@ class CameraMount:
         plate: for the camera, on three screws.
         fence: on the plate, below the camera.
         fasteners: of them, without the screws in the base plate.
-        travel: how far the camera moves to either side, by name with unit.
+        travel: how far the camera moves to either side.
     """
 
     bracket: Bracket
     plate: Component
     fence: Component
     fasteners: tuple[Fastener, ...]
-    travel: dict[str, float]
+    travel: CameraTravel
 
 
 @dataclass(frozen=True)
@@ -207,15 +208,15 @@ def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts
         plate=_plate(place),
         fence=_fence(place),
         fasteners=_fasteners(place, parts),
-        travel={
-            "along_axis_mm": place.along,
-            "across_mm": ACROSS_MM,
-            "out_mm": OUT_MM,
-            "along_plate_mm": ALONG_PLATE_MM,
-            "yaw_deg": YAW_DEG,
-            "roll_deg": min(ROLL_DEG, play),
-            "pitch_deg": min(PITCH_DEG, play),
-        },
+        travel=CameraTravel(
+            along_axis_mm=place.along,
+            across_mm=ACROSS_MM,
+            out_mm=OUT_MM,
+            along_plate_mm=ALONG_PLATE_MM,
+            yaw_deg=YAW_DEG,
+            roll_deg=min(ROLL_DEG, play),
+            pitch_deg=min(PITCH_DEG, play),
+        ),
     )
 
 

@@ -15,13 +15,9 @@ from tbcad.formats.csv_table import write_table
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
 from tbcad.prototype.electronics.wiring import COLUMNS as WIRING
-from tbcad.prototype.electronics.wiring import HOME
 from tbcad.prototype.files.bom_csv import COLUMNS
 from tbcad.records.tables import BallRow
-from tbcad.report.assembly_page import page
 from tests.prototype_records import (
-    FRAME,
-    LAMP_SECTION,
     drive_section,
     printed_part,
     prototype_document,
@@ -142,87 +138,12 @@ def test_a_design_gets_the_steps_that_it_needs(machine: Machine) -> None:
     assert keys.index("hub") < keys.index("shaft") < keys.index("motor") < keys.index("wiring")
 
 
-def test_wiring_names_output_of_each_line(machine: Machine) -> None:
-    does = of(assembly_steps(machine), "wiring").does
-    assert "Line 1, lamp: lamp, at digital 0 by a switch module." in does
-
-
-def test_no_sentence_is_cut_off(machine: Machine) -> None:
-    texts = [text for step in assembly_steps(machine) for text in (*step.does, *step.checks)]
-    assert all(text == text.strip() and text.endswith(".") for text in texts)
-
-
 def test_the_belt_is_on_the_wheel_before_the_shaft_is_in_the_bearings(machine: Machine) -> None:
     steps = assembly_steps(machine)
     (belt,) = [step for step in steps if "GT2-240-6" in {use.part for use in step.parts}]
     does = " ".join(belt.does)
     assert belt.key == "shaft"
     assert 0 <= does.index("the belt round the wheel") < does.index("through both bearings")
-
-
-def test_the_wheel_is_centred_by_the_shaft(machine: Machine) -> None:
-    assert any("through wheel, disc and hub centres" in text for text in of_hub(machine))
-
-
-def of_hub(machine: Machine) -> tuple[str, ...]:
-    return of(assembly_steps(machine), "hub").does
-
-
-def test_where_the_pinion_is_on_the_motors_shaft(machine: Machine) -> None:
-    """9 mm of plate, a gap of 5 and 7 mm of teeth: a shaft of 24 mm looks out by 3."""
-    (pinion,) = [text for text in of(assembly_steps(machine), "motor").does if "Pinion" in text]
-    assert "21 mm from the motor's face" in pinion
-    assert "24 mm ends 3 mm beyond" in pinion
-
-
-@pytest.mark.parametrize("lamps", [None, LAMP_SECTION])
-def test_a_design_without_lamps_says_where_its_light_comes_from(
-    tmp_path: Path, lamps: Record | None
-) -> None:
-    folder = write(tmp_path, belt_design() | {"lamps": lamps}, LOOSE)
-    does = of(assembly_steps(read_machine(folder)), "wiring").does
-    assert any("no place for lamps of its own" in text for text in does) == (lamps is None)
-
-
-def test_nuts_are_counted_by_slot(tmp_path: Path) -> None:
-    design = belt_design() | {"frame": FRAME | {"axis": [0.7, 0.0, -0.7]}}
-    design["bought"] += [bought("upright_left", "2020-350"), bought("upright_right", "2020-350")]
-    for number, (upright, way) in enumerate(
-        (upright, way) for upright in ("left", "right") for way in (-1.0, -1.0, 1.0)
-    ):
-        nut = fastener("TNUT-M5-6", number, f"upright_{upright}", at=float(number))
-        design["fasteners"].append(nut | {"along": [way, 0.0, 0.0]})
-    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
-    assert "2 in the front one (toward the camera) of each and 1 in" in of(steps, "frame").does[0]
-
-
-def test_motor_and_supply_are_told_with_their_wires(tmp_path: Path) -> None:
-    folder = write(tmp_path, belt_design(), LOOSE)
-    with (folder / "wiring.csv").open("a", newline="") as file:
-        lines = csv.DictWriter(file, WIRING, lineterminator="\n")
-        own = {
-            "line": 2,
-            "signal": "motor",
-            "part": "NEMA17-40",
-            "current_ma": 2000,
-            "path": "four",
-        }
-        lines.writerow(own)
-    steps = assembly_steps(read_machine(folder))
-    item = read_machine(folder).items["NEMA17-40"]
-    assert f"Line 2, motor: NEMA17-40 ({item}), 2000 mA RMS; four." in of(steps, "wiring").does
-    assert any("rated current, 2.0 A," in text for text in of(steps, "zero").does)
-
-
-def test_the_switch_is_tried_before_homing_and_told_by_its_contacts(tmp_path: Path) -> None:
-    folder = write(tmp_path, belt_design(), LOOSE)
-    with (folder / "wiring.csv").open("a", newline="") as file:
-        lines = csv.DictWriter(file, WIRING, lineterminator="\n")
-        lines.writerow(HOME | {"line": 2, "output": "limit X"})
-    steps = assembly_steps(read_machine(folder))
-    (line,) = [text for text in of(steps, "wiring").does if "Line 2" in text]
-    assert "at limit X; common and normally closed contact" in line
-    assert "Before $H" in of(steps, "zero").checks[0]
 
 
 def test_the_base_is_held_by_pin_or_motor_once_it_is_up(machine: Machine) -> None:
@@ -239,23 +160,6 @@ def text_with(texts: tuple[str, ...], words: str) -> int:
     """Number of the only text that has some words."""
     (number,) = [k for k, text in enumerate(texts) if words in text]
     return number
-
-
-def test_the_page_says_why_parts_are_not_drawn(machine: Machine) -> None:
-    text = page(machine, assembly_steps(machine), {})
-    missing = text[text.index("Not drawn") :]
-    drawn = {*machine.bodies.values()} | {one.part for one in machine.fasteners}
-    for part in machine.items:
-        assert (machine.ref(part) in missing) == (part not in drawn)
-
-
-def test_tools_follow_the_list(machine: Machine, tmp_path: Path) -> None:
-    text = page(machine, assembly_steps(machine), {})
-    assert "spanner" not in text
-    design = belt_design()
-    design["fasteners"].append(fastener("NUT-M5", 1, "stage_foot", x=50.0))
-    other = read_machine(write(tmp_path, design, LOOSE))
-    assert "spanner" in page(other, assembly_steps(other), {})
 
 
 def direct(design: Record) -> None:

@@ -1,8 +1,5 @@
 """The prototype of the paper's design, and what is refused."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,11 +8,9 @@ from tbcad.geometry.vectors import dot, norm, unit
 from tbcad.mirrors.array import MirrorDesign
 from tbcad.mirrors.array import design as mirror_design
 from tbcad.optics.reflection import reflected_rays
-from tbcad.prototype.balls import layout
 from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
 from tbcad.prototype.balls.layout import (
     MORE_BALLS,
-    BallChoices,
     PrototypeLayout,
     ball_counts,
     prototype_layout,
@@ -24,13 +19,11 @@ from tbcad.prototype.balls.placement import greedy_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
-    Balls,
     ball_candidates,
     choose_balls,
 )
 from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
-from tbcad.prototype.files.plan_csv import picture_rows
-from tbcad.spec.design import Spec
+from tbcad.prototype.files.tables import picture_rows
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tests.helpers import segment_distances
@@ -55,24 +48,6 @@ def small(design: MirrorDesign, *options: str) -> PrototypeLayout:
 
 
 class TestBalls:
-    def test_a_search_and_its_layout_choose_them_once(
-        self, small_design: MirrorDesign, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        spec, asked = small_design.spec, []
-
-        def counted(candidates: BallCandidates, *rest: Any) -> Balls:
-            asked.append(len(candidates.groups))
-            return choose_balls(candidates, *rest)
-
-        monkeypatch.setattr(layout, "choose_balls", counted)
-        choices = BallChoices(spec, small_design.arrays[0])
-        count = next(ball_counts(spec, small_design, choices))
-        shared = prototype_layout(spec, small_design, count, choices)
-        assert len(set(asked)) == len(asked) > 0
-        alone = prototype_layout(spec, small_design, count)
-        assert (shared.balls.radius == alone.balls.radius).all()
-        assert (shared.fit.coverage == alone.fit.coverage).all()
-
     def test_all_mirrors_show_the_whole_target(self, prototype: PrototypeLayout) -> None:
         assert prototype.fit.coverage.min() > 60
         assert prototype.fit.coverable.all()
@@ -113,10 +88,6 @@ class TestBalls:
         drop = balls.radius[cap] - np.sqrt(balls.radius[cap] ** 2 - edge**2)
         on_ball = np.hypot(edge, balls.body_depth[cap] - drop)
         assert on_ball == pytest.approx(balls.body_radius[cap])
-
-    def test_a_balls_body_is_itself(self, prototype: PrototypeLayout) -> None:
-        bought = ~prototype.balls.cap
-        assert (prototype.balls.body_centre[bought] == prototype.balls.centre[bought]).all()
 
     def test_without_caps_the_largest_ball(
         self, prototype: PrototypeLayout, candidates: BallCandidates
@@ -163,16 +134,6 @@ class TestBalls:
             < alternatives["cover, with caps"].pixels_kept_share
         )
         assert alternatives["nearest, with caps"].mirrors_below_target > 10
-
-    def test_costs_do_not_depend_on_which_was_chosen(self, small_design: MirrorDesign) -> None:
-        spec, prototype = small_design.spec, small(small_design)
-        groups = (prototype.array, prototype.groups)
-        limits = spec.prototype.model_copy(update={"snap": "nearest", "caps": False})
-        candidates = ball_candidates(*groups, spec.optics.capture_diameter_mm)
-        balls = choose_balls(candidates, limits, prototype.balls.catalogue)
-        nearest = spec.model_copy(update={"prototype": limits})
-        chosen = ball_alternatives(nearest, *groups, balls, ball_fit(candidates, balls, limits))
-        assert chosen == ball_alternatives(spec, *groups, prototype.balls, prototype.fit)
 
 
 class TestPlaces:
@@ -260,10 +221,6 @@ class TestStops:
             angle = np.arccos(np.clip(unit(apex) @ prototype.array.u[i], -1, 1))
             assert prototype.stops.error[i] == pytest.approx(angle, abs=1e-7)
 
-    def test_stops_rise_within_the_swing(self, prototype: PrototypeLayout) -> None:
-        assert (np.diff(prototype.stops.angle) > 0).all()
-        assert np.abs(prototype.stops.angle).max() <= prototype.placement.swing / 2 + 1e-9
-
     def test_are_the_fewest_and_fewer_than_greedys(self, prototype: PrototypeLayout) -> None:
         requests = stop_requests(
             prototype.groups, prototype.array.azimuth, np.radians(LIMITS.stop_error_deg)
@@ -294,14 +251,6 @@ class TestStops:
 
 
 class TestAsked:
-    def test_same_numbers_every_time(
-        self, prototype: PrototypeLayout, paper_design: MirrorDesign
-    ) -> None:
-        again = prototype_layout(SPEC, paper_design)
-        assert again.placement.azimuth.tobytes() == prototype.placement.azimuth.tobytes()
-        assert again.stops.angle.tobytes() == prototype.stops.angle.tobytes()
-        assert again.balls.size == prototype.balls.size
-
     def test_auto_is_the_minimum_number_within_the_limits(self, small_design: MirrorDesign) -> None:
         auto = small(small_design, "prototype.k=auto")
         limits = small_design.spec.prototype
@@ -332,18 +281,6 @@ class TestAsked:
         counts = list(ball_counts(small_design.spec, small_design))
         assert sorted(counts) == list(range(1, counts[0] + MORE_BALLS + 1))
         assert counts[: MORE_BALLS + 1] == sorted(counts[: MORE_BALLS + 1])
-
-    def test_one_ball(self, small_design: MirrorDesign) -> None:
-        single = small(small_design, "prototype.k=1")
-        assert len(single) == 1
-        assert single.placement.swing / DEGREE < 180
-
-    def test_smaller_balls_are_lighter(self, small_design: MirrorDesign) -> None:
-        light, heavy = (
-            small(small_design, f"prototype.largest_ball_mm={size}") for size in (30, 60)
-        )
-        assert light.mass_g < heavy.mass_g
-        assert light.balls.cap.sum() > heavy.balls.cap.sum()
 
     def test_no_post_gives_more_room(self, small_design: MirrorDesign) -> None:
         problem = small(small_design, "post_diameter_mm=0", "camera_diameter_mm=0").problem
@@ -377,11 +314,3 @@ class TestRefused:
         spec = load_spec(None, ["n=4", "radius_rule=flat"])
         with pytest.raises(SpecError, match=r"needs curved mirrors.*traced or paper"):
             prototype_layout(spec, mirror_design(spec))
-
-    def test_an_empty_catalogue(self, small_design: MirrorDesign, tmp_path: Path) -> None:
-        path = tmp_path / "none.csv"
-        path.write_text("size,diameter_mm,standard,grades,mass_g,source\n")
-        limits = small_design.spec.prototype.model_copy(update={"catalogues": (str(path),)})
-        spec: Spec = small_design.spec.model_copy(update={"prototype": limits})
-        with pytest.raises(SpecError, match=r"none\.csv: an empty catalogue"):
-            prototype_layout(spec, small_design)

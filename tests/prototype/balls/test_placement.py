@@ -117,6 +117,13 @@ def test_of_equal_swings_the_minimum_outermost_azimuth() -> None:
     assert found.outermost == pytest.approx(1.4, abs=1e-4)
 
 
+def test_limits_hold_over_the_whole_swing() -> None:
+    """A ball at an azimuth a serves 0.1 to either side of zero by swings of a + 0.1."""
+    one = problem(np.zeros((1, 1)), np.array([0.1]), limit=1.0)
+    for azimuth, kept in ((0.44, True), (0.46, False), (-0.44, True), (-0.46, False)):
+        assert one.satisfied_by(np.array([azimuth])) == kept
+
+
 def test_margin_is_more_than_the_solvers_slack() -> None:
     assert 5 * SLACK < SOLVER_MARGIN
 

@@ -69,6 +69,13 @@ def test_a_plan_has_the_fewest_stops_within_the_error(mirrors: list[tuple[int, f
     assert (plan.error <= error + 1e-9).all()
 
 
+def test_a_stop_between_others_is_in_the_middle_of_its_mirrors() -> None:
+    groups = MirrorGroups(np.zeros(4, dtype=np.int64), np.array([1.4]), np.ones(1))
+    requests = stop_requests(groups, np.array([-1.0, 0.03, 0.05, 1.0]), 0.1)
+    plan = plan_stops(groups, np.full(4, 1.4), requests, np.zeros(1))
+    assert plan.angle[1] == pytest.approx(0.04)
+
+
 @given(st.floats(0.05, 3.09), st.floats(1e-3, 0.05))
 def test_a_ball_at_its_tolerance_has_the_whole_error(polar: float, error: float) -> None:
     groups = MirrorGroups(np.zeros(1, dtype=np.int64), np.array([polar]), np.ones(1))

@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_solids import cap_magnets, cap_pocket, cap_spigot
+from tbcad.prototype.base.caps import cap_magnets, cap_pocket, cap_spigot
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.split import UNCUT, BaseSplit, split_base

@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.geometry.rotations import rotated
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.held import held_balls
+from tbcad.prototype.base.held import holding
 from tbcad.prototype.base.holding import (
     AT_DEFAULT_SPEED,
     DERATING,
@@ -25,6 +25,8 @@ from tbcad.prototype.base.holding import (
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.pockets import pad_normals
 from tbcad.prototype.drive.balance import GRAVITY
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.records.prototype import HeldBall
 from tbcad.spec.errors import SpecError
 from tbcad.spec.load import load_spec
 from tbcad.spec.prototype import BaseSpec
@@ -136,13 +138,18 @@ class TestForceNeeded:
         assert 0 <= least < 1e-4 * needed[0]
 
 
+def held(
+    spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
+) -> tuple[HeldBall, ...]:
+    return holding(base_layout(spec, prototype), prototype, motion, load_parts()).balls
+
+
 class TestMagnets:
     def test_every_ball_is_held_twice(self, paper_prototype: PrototypeLayout) -> None:
-        base = base_layout(BaseSpec(), paper_prototype)
-        held = held_balls(base, paper_prototype, AT_DEFAULT_SPEED)
-        assert (held.available >= MIN_RATIO * held.needed).all()
-        assert (held.wider < held.available).all()
-        assert not held.glued.any()
+        for one in held(BaseSpec(), paper_prototype):
+            assert one.by == "magnet"
+            assert one.force_available_n >= MIN_RATIO * one.force_needed_n
+            assert one.wider_gap_n < one.force_available_n
 
     def test_strong_magnets_are_only_where_they_are_needed(
         self, paper_prototype: PrototypeLayout
@@ -161,17 +168,12 @@ class TestMagnets:
             base_layout(weak, paper_prototype)
 
     def test_a_quick_base_needs_more(self, small_prototype: PrototypeLayout) -> None:
-        base = base_layout(BaseSpec(), small_prototype)
         quick = replace(AT_DEFAULT_SPEED, acceleration=50.0)
-        assert (
-            held_balls(base, small_prototype, quick).needed
-            > held_balls(base, small_prototype, AT_DEFAULT_SPEED).needed
-        ).all()
+        rows = (held(BaseSpec(), small_prototype, motion) for motion in (quick, AT_DEFAULT_SPEED))
+        for more, less in zip(*rows, strict=True):
+            assert more.force_needed_n > less.force_needed_n
 
     def test_glue_holds_as_its_area_does(self, small_prototype: PrototypeLayout) -> None:
-        held = held_balls(
-            base_layout(BaseSpec(hold="glue"), small_prototype), small_prototype, AT_DEFAULT_SPEED
-        )
-        assert held.glued.all()
-        assert (held.wider == held.available).all()
-        assert (held.available >= MIN_RATIO * held.needed).all()
+        for one in held(BaseSpec(hold="glue"), small_prototype):
+            assert (one.by, one.magnet) == ("glue", None)
+            assert one.wider_gap_n == one.force_available_n >= MIN_RATIO * one.force_needed_n

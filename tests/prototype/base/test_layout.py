@@ -17,10 +17,6 @@ from tbcad.prototype.base.layout import _sector as sector
 from tbcad.prototype.base.profile import (
     LightSpheroid,
     distance_outside,
-    hull,
-    offset,
-    thinned,
-    trimmed,
 )
 from tbcad.prototype.base.seats import OFF_PATH_MM, insertion_clearance, seat_layout
 from tbcad.spec.errors import SpecError
@@ -125,26 +121,6 @@ class TestLight:
 
 
 class TestProfile:
-    def test_hull(self) -> None:
-        points = np.array([[0, 0], [1, 2], [2, 2.5], [3, 0], [1.5, 1]], dtype=float)
-        assert hull(points).tolist() == [[0, 0], [1, 2], [2, 2.5], [3, 0]]
-
-    def test_offset_lines_keep_their_distance(self, base: BaseLayout) -> None:
-        distance = distance_outside(base.inner, offset(base.inner, 5.0))
-        assert distance == pytest.approx(np.full(len(distance), 5.0))
-
-    def test_thinned_lines_go_round(self) -> None:
-        line = np.array([[0, 0], [2, 4], [2.5, 4.6], [6, 7], [12, 7]], dtype=float)
-        short = thinned(line, 2.0)
-        assert len(short) == 4
-        assert distance_outside(short, line).max() <= 1e-12
-        assert short[[0, -1]].tolist() == line[[0, -1]].tolist()
-
-    def test_trimmed_and_prolonged(self) -> None:
-        line = np.array([[0, 0], [2, 4], [6, 6]], dtype=float)
-        assert trimmed(line, 4.0).tolist() == [[0, 0], [2, 4], [4, 5]]
-        assert trimmed(line, 8.0).tolist() == [[0, 0], [2, 4], [8, 7]]
-
     def test_bosses_begin_inside_and_end_outside_of_the_wall(self, base: BaseLayout) -> None:
         seats, frame = base.seats, base.frame
         for length, sign in ((seats.front, -1), (seats.back, 1)):

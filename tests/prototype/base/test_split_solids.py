@@ -8,12 +8,10 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 from OCP.BRepCheck import BRepCheck_Analyzer
 
-from tbcad.cad.brep import InvalidSolidError, Solid
-from tbcad.cad.checks import check_mesh
+from tbcad.cad.brep import Solid
 from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height
 from tbcad.cad.measures import plane_faces, volume
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import meshed, volume_by_meshes
+from tbcad.cad.meshing import volume_by_meshes
 from tbcad.cad.solids import solids
 from tbcad.formats.step import write_step
 from tbcad.geometry.vectors import norm
@@ -24,7 +22,6 @@ from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.base.split_solids import piece_holes
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.spec.printer import PrinterSpec
 from tbcad.spec.prototype import BaseSpec
@@ -220,16 +217,3 @@ def first_hit(mesh: trimesh.Trimesh, at: np.ndarray, out: np.ndarray) -> float:
     """Distance along a ray to the first facet, infinite where there is none."""
     places, _, _ = mesh.ray.intersects_location([at + 1e-3 * out], [out])
     return float(norm(places - at).min()) if len(places) else float(np.inf)
-
-
-def test_holes_of_a_base_that_stays_whole(small: Cut) -> None:
-    base, *_ = small
-    plan = BaseSplit((np.zeros((0, 4)),), ())
-    assert piece_holes(base, plan, 0) == []
-
-
-def test_a_mesh_with_a_gap_is_noticed(small: Cut) -> None:
-    mesh = meshed(small[3][0].shape, 0.2)
-    check_mesh("piece", mesh)
-    with pytest.raises(InvalidSolidError, match="piece: the kernel's mesh of the solid is not"):
-        check_mesh("piece", Mesh(mesh.vertices, mesh.triangles[1:]))

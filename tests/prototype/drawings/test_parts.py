@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tbcad.drafting.dimensions import labels
-from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet, choose_scale, scale_text
+from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
 from tbcad.formats.entities import Circle, Dimension, Layer, Line, Polyline, Text, simple
-from tbcad.geometry.primitives import Cylinder, Prism
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drawings.lamps import LAMP, lamp_sheet
@@ -34,10 +33,6 @@ def drawn(frame: FrameLayout, carrier: BaseLayout) -> dict[str, Sheet]:
 def cut_circles(sheet: Sheet) -> list[Circle]:
     entities = sheet.full_size()
     return [one for one in entities if isinstance(one, Circle) and one.layer == Layer.CUT]
-
-
-def test_what_is_drawn(drawn: dict[str, Sheet]) -> None:
-    assert drawn.keys() == {PLATE, WHEEL, UPRIGHT, LAMP}
 
 
 def test_without_a_wheel_none_is_drawn(frame: FrameLayout, carrier: BaseLayout) -> None:
@@ -65,16 +60,6 @@ def test_the_wheels_holes_are_on_the_hubs(drawn: dict[str, Sheet], carrier: Base
     assert {round(2 * one.radius, 9) for one in holes} == {SCREW_MM}
 
 
-def test_a_hub_of_the_wheel_is_turned_off(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
-    """Screws' heads are in the gap, and a hub would rub on the head's plate."""
-    wheel = next(part for part in frame.purchased if part.name == "wheel").added[0]
-    assert isinstance(wheel, Cylinder)  # along the axis from the hub to the plate
-    back = -float((wheel.start + wheel.length * wheel.axis) @ wheel.axis)
-    gap = back - frame.head.plate.front
-    texts = [one.text for one in simple(drawn[WHEEL].entities) if isinstance(one, Text)]
-    assert f"Turn off a hub: the head's plate is {gap:g} mm behind." in texts
-
-
 def test_the_uprights_length(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
     outlines = [
         one
@@ -97,21 +82,6 @@ def test_every_strip_of_a_lamp_is_drawn(drawn: dict[str, Sheet], frame: FrameLay
     assert np.ptp(np.vstack(outlines), axis=0) == pytest.approx([lamps.length, lamps.width])
     words = [one.text for one in simple(drawn[LAMP].entities) if isinstance(one, Text)]
     assert any(text.startswith("Cut 8 pieces of 50 ± 0.5, 2 for each of 4 lamps") for text in words)
-
-
-def test_heights_of_the_lamps_screws_are_on_the_upright(
-    drawn: dict[str, Sheet], frame: FrameLayout
-) -> None:
-    """Those of the bodies that go through the holders, above the plate's face."""
-    plate = next(one for one in frame.purchased if one.name == "plate")
-    (body,) = plate.added
-    assert isinstance(body, Prism)
-    top = np.vstack([body.corners, body.corners + body.along])[:, 2].max()
-    words = [one.text for one in simple(drawn[UPRIGHT].entities) if isinstance(one, Text)]
-    screws = [one for one in frame.fasteners if "lamp_holder_3" in one.through]
-    assert screws
-    for screw in screws:
-        assert f"{screw.place[2] - top:.1f}" in words
 
 
 @pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
@@ -154,12 +124,3 @@ def test_labels_of_near_holes_keep_apart() -> None:
         for circle in circles:
             near = np.clip(circle.centre, (left, low), (right, high))
             assert math.dist(near, circle.centre) >= circle.radius
-
-
-@pytest.mark.parametrize(
-    ("size", "scale", "text"),
-    [((500, 200), 0.5, "1:2"), ((60, 40), 2, "2:1"), ((9e3, 1), 0.1, "1:10")],
-)
-def test_scales(size: tuple[float, float], scale: float, text: str) -> None:
-    assert choose_scale(size, (260, 200)) == scale
-    assert scale_text(scale) == text

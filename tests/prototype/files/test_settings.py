@@ -5,7 +5,7 @@ import pytest
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
-from tbcad.prototype.files.settings import settings, settings_lines
+from tbcad.prototype.files.settings import settings
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.prototype import MotionSpec
 
@@ -75,11 +75,3 @@ def test_another_life_of_the_board_is_undone(drive: Drive, controller: str) -> N
 def test_homing_is_no_faster_than_the_base(drive: Drive) -> None:
     found = of(drive, MotionSpec(feed_deg_min=40))
     assert found[24] <= found[25] <= 40
-
-
-def test_lines(drive: Drive) -> None:
-    lines = list(settings_lines("title", settings(drive, MotionSpec(), ANGLES)))
-    assert lines[0] == "(title)"
-    assert lines[3:5] == ["(motor always on, for the base falls without it)", "$1=255"]
-    assert max(map(len, lines)) < 80
-    assert all(line.startswith(("(", "$")) for line in lines)

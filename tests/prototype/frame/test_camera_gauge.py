@@ -51,11 +51,11 @@ def test_pictures_are_those_of_the_turned_marks(
     low, left, right, high = marks_seen(gauge, carrier, camera)
     middle = (camera.width_px - 1) / 2
     turn = abs(gauge.angles[0])
-    assert abs(low["column_px"] - middle) < 0.05 * camera.width_px * (90.5 - turn)
-    assert abs(high["column_px"] - middle) < 0.05 * camera.width_px * (90.5 - turn)
-    assert left["column_px"] + right["column_px"] == pytest.approx(2 * middle)
+    assert abs(low.column_px - middle) < 0.05 * camera.width_px * (90.5 - turn)
+    assert abs(high.column_px - middle) < 0.05 * camera.width_px * (90.5 - turn)
+    assert left.column_px + right.column_px == pytest.approx(2 * middle)
     expected = camera.project(gauge.marks[0, 0])
-    assert [left["column_px"], left["row_px"]] == pytest.approx(expected.tolist())
+    assert [left.column_px, left.row_px] == pytest.approx(expected.tolist())
 
 
 def test_the_pinhole_found_is_as_near_as_stated(gauge: CameraGauge, camera: Camera) -> None:

@@ -1,6 +1,5 @@
 """The frame in frame: where its bodies are, what is bought, and what is refused."""
 
-from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -153,25 +152,6 @@ class TestFrame:
         assert min(found.swept.values()) > 3
         assert min(found.light.values()) > 3
         assert whole.stage.swept > 20
-
-    def test_what_is_bought(self, around: Surroundings, frame: FrameLayout) -> None:
-        found = Counter(frame_purchased_parts(frame))
-        found.update(one.part.name for one in frame.fasteners)
-        assert set(found) <= set(PARTS)
-        kinds = Counter({PARTS[name].kind: 0 for name in found})
-        for name, count in found.items():
-            kinds[PARTS[name].kind] += count
-        assert kinds["bearings"] == 2
-        assert kinds["shafts"] == 2  # the base's, and the rod of angle zero
-        assert kinds["collars"] == kinds["plates"] == 1
-        assert kinds["extrusions"] == 2
-        assert kinds["tnuts"] == 8 + 4  # feet and head, and two lamps
-        # Every hole of the plate has a screw, every T-nut one, the motor four, clamp,
-        # camera, bracket and switch two each; three tilt the camera's plate, two hold its fence.
-        assert kinds["screws"] == len(frame.holes) + 12 + 4 + 1 + 1 + 2 + 2 + 3 + 2
-        assert kinds["nuts"] == 3 * 2 + 2
-        assert found["INSERT-M5"] == 3
-        assert found["WASHER-5"] == len(frame.holes) + kinds["nuts"]
 
     def test_uprights_are_cut_from_what_is_sold(self, frame: FrameLayout) -> None:
         bars = [item for item in frame.purchased if item.name.startswith("upright")]

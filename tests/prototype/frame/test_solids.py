@@ -1,26 +1,23 @@
 """The frame as solids: axes, pinhole and clearances, all from the shapes themselves."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
-import trimesh
 from OCP.TopoDS import TopoDS_Shape
-from scipy.spatial import cKDTree
 
 from tbcad.cad.measures import volume
-from tbcad.cad.meshing import meshed
-from tbcad.geometry.rotations import rotated_about_x
 from tbcad.geometry.vectors import norm
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout, frame_layout
-from tbcad.prototype.keepout import KeepOut
+from tbcad.prototype.frame.brackets import CLEARANCE_HOLE_MM
+from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
 from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.spec.errors import SpecError
 from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Floats
 from tests.helpers import as_trimesh, cylinders, manifold
 from tests.prototype.conftest import SMALL
@@ -72,11 +69,6 @@ class TestSolids:
             assert mesh.is_winding_consistent
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
-
-    def test_each_fits_on_the_bed(self, solids: dict[str, PlacedSolid]) -> None:
-        for part in solids.values():
-            size = np.ptp(meshed(part.on_bed, 0.1).vertices, axis=0)
-            assert (size < np.array(PRINTER.bed_mm) - PRINTER.bed_margin_mm).all()
 
     def test_bearing_seats_and_bearings_are_on_the_axis(
         self,
@@ -174,6 +166,8 @@ class TestSolids:
         slots = 4 * frame.upright["slot_mm"] * SLOT_DEPTH_MM
         bar = (20 * 20 - slots) * frame.length
         assert volume(purchased["upright_left"]) == pytest.approx(bar, rel=1e-9)
+        radii = {round(radius, 6) for _, _, radius in cylinders(purchased["wheel"])}
+        assert CLEARANCE_HOLE_MM[3.0] / 2 in radii
         length, width, thick = frame.plate.sizes
         holes = len(frame.holes) * np.pi * 2.1**2 * thick
         assert volume(purchased["plate"]) == pytest.approx(length * width * thick - holes, rel=1e-9)
@@ -193,84 +187,18 @@ class TestSolids:
 
 
 class TestClearance:
-    def test_nothing_meets_the_base(
-        self,
-        small_prototype: PrototypeLayout,
-        carrier: BaseLayout,
-        solids: dict[str, PlacedSolid],
-        purchased: dict[str, TopoDS_Shape],
-        frame: FrameLayout,
-    ) -> None:
-        """Points of the base in many positions, and points of the meshes."""
-        still = [part.shape for part in solids.values()]
-        still += [purchased[name] for name in purchased if name in frame.swept and name != "camera"]
-        mesh = trimesh.util.concatenate([as_trimesh(shape) for shape in still])
-        frame_ = carrier.frame
-        seat = carrier.seats
-        ends = (seat.centre + seat.back[:, None] * seat.axis) @ frame_.T
-        outline = np.column_stack([carrier.outline, 0 * carrier.outline[:, 0]])
-        found = []
-        low, high = small_prototype.stops.angle[[0, -1]]
-        for angle in np.linspace(low, high, 25).tolist():
-            found.append(rotated_about_x(ends, np.full(len(ends), angle)) @ frame_)
-            for azimuth in np.linspace(*carrier.sector, 5).tolist():
-                found.append(
-                    rotated_about_x(outline, np.full(len(outline), azimuth + angle)) @ frame_
-                )
-        points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=4)
-        away = np.asarray(cKDTree(points).query(np.vstack(found))[0])
-        assert away.min() > FRAME.clearance_mm
-        assert away.min() < 25  # so near that the distance means something
-
-    def test_no_ray_hits_the_frame(
-        self,
-        small_prototype: PrototypeLayout,
-        solids: dict[str, PlacedSolid],
-        purchased: dict[str, TopoDS_Shape],
-        stage: StageLayout,
-    ) -> None:
-        shapes = [part.shape for part in solids.values()]
-        stage_parts = printed_solids(stage)
-        shapes += [stage_parts[name].shape for name in ("stage_crown", "stage_post")]
-        shapes += [shape for name, shape in purchased.items() if name not in ("camera", "shaft")]
-        mesh = trimesh.util.concatenate([as_trimesh(shape) for shape in shapes])
-        frame_, stops = small_prototype.array.ellipsoid.frame(), small_prototype.stops
-        pinhole = small_prototype.array.camera.pinhole
-        for mirror in range(len(small_prototype.array)):
-            ball = int(small_prototype.fit.ball[mirror])
-            turn = small_prototype.placement.azimuth[ball] + stops.angle[stops.stop[mirror]]
-            rim = small_prototype.balls.outline[ball]
-            points = rotated_about_x(rim, np.full(len(rim), turn)) @ frame_
-            hits, rays, _ = mesh.ray.intersects_location(points, pinhole - points)
-            assert (norm(hits - points[rays]) > norm(pinhole - points[rays])).all()
-            # To the capture sphere's near edge, no farther.
-            way = -points / norm(points)[:, None]
-            hits, rays, _ = mesh.ray.intersects_location(points, way)
-            assert (norm(hits - points[rays]) > norm(points[rays]) - 30).all()
-
-    @pytest.mark.parametrize("teeth", [60, 120])
     def test_printed_and_purchased_parts_do_not_overlap(
         self,
-        spec: PrototypeSpec,
-        small_prototype: PrototypeLayout,
-        carrier: BaseLayout,
-        keep_out: KeepOut,
+        solids: dict[str, PlacedSolid],
+        purchased: dict[str, TopoDS_Shape],
         stage: StageLayout,
-        teeth: int,
     ) -> None:
-        drive = next(d for d in load_drives(PARTS) if d.wheel and d.wheel["teeth"] == teeth)
-        near = spec.model_copy(
-            update={"frame": spec.frame.model_copy(update={"clearance_mm": 0.5})}
-        )
-        frame = frame_layout(near, small_prototype, carrier, stage, drive, keep_out, PARTS)
-        parts = printed_solids(frame) | printed_solids(stage)
-        shapes = {name: part.shape for name, part in parts.items()} | purchased_solids(frame)
+        parts = solids | printed_solids(stage)
+        shapes = {name: part.shape for name, part in parts.items()} | purchased
         bodies = {name: manifold(shape) for name, shape in shapes.items()}
-        names = list(bodies)
-        for i, one in enumerate(names):
-            for other in names[:i]:
-                shared = (bodies[one] ^ bodies[other]).volume()
-                assert shared < allowed({one, other}), (one, other, shared)
+        for one, other in combinations(bodies, 2):
+            shared = (bodies[one] ^ bodies[other]).volume()
+            assert shared < allowed({one, other}), (one, other, shared)
 
 
 def allowed(pair: set[str]) -> float:

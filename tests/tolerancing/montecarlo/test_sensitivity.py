@@ -18,8 +18,6 @@ from tbcad.tolerancing.montecarlo.sensitivity import (
     FACTOR_TOLERANCE,
     LARGEST_FACTOR,
     one_at_a_time,
-    only_kind,
-    present_kinds,
     scaled,
     tolerable_factor,
 )
@@ -41,18 +39,6 @@ def synthetic(loss: Callable[[float], float]) -> Callable[[Errors], np.ndarray]:
 
 def real(halves: EdgeModels, builds: int) -> Callable[[Errors], np.ndarray]:
     return lambda errors: simulate(MonteCarloCase(halves, errors, 3), builds).worst
-
-
-def test_kinds_are_those_of_which_there_are_any() -> None:
-    assert present_kinds(MIXED) == ["sphere_centre", "coating", "facets", "seat"]
-    assert present_kinds(Errors()) == []
-
-
-def test_only_leaves_one_kind_as_it_is() -> None:
-    for kind in present_kinds(MIXED):
-        one = only_kind(MIXED, kind)
-        assert present_kinds(one) == [kind]
-        assert getattr(one, kind) == getattr(MIXED, kind)
 
 
 def test_scaled_multiplies_spread_and_mean_and_nothing_else() -> None:

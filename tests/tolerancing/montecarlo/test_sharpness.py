@@ -1,7 +1,6 @@
 """Pictures of builds that are off: where their mirrors are, and what calibration gives back."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from tbcad.simulate.scene.viewpoint import camera_around_object
 from tbcad.simulate.views.viewpoints import ground_truths
 from tbcad.spec.load import load_spec
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
-from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sharpness import (
@@ -223,12 +222,3 @@ class TestSharpness:
         exactly, roughly = (found(Errors(), residual) for residual in (0.0, 0.02))
         assert (roughly.calibrated < exactly.calibrated - 0.01).all()
         assert np.array_equal(roughly.uncalibrated, exactly.uncalibrated)
-
-    def test_each_build_is_reported(
-        self, cameras: Cameras, scene: Scene, reference: ReferenceViews
-    ) -> None:
-        told: list[str] = []
-        drawn: tuple[ShellDraws, ShellDraws] = builds(cameras, Errors(), 2)
-        one = replace(reference, views=reference.views[:1], truths=reference.truths[:1])
-        sharpness(cameras, drawn, scene, one, 0.0, progress=told.append)
-        assert told == ["build 1 of 2", "build 2 of 2"]

@@ -18,20 +18,14 @@ from tbcad.tolerancing.montecarlo.builds import CoverageResult, simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerancing.prototype.rays import (
-    COARSE,
-    _minimum_of_side,
-    _miss,
     highlights,
-    minimum_miss_distances,
 )
 from tbcad.tolerancing.prototype.windows import (
     PrototypeCase,
     PrototypeResult,
     PrototypeWindows,
-    calibrated_pose,
     prototype_model,
     prototype_result,
-    run_pose,
 )
 from tests.prototype_exports import plan_of
 from tests.sphere_misses import sphere_miss_distances
@@ -246,13 +240,6 @@ class TestMotions:
         assert offset.max() < 1e-6
         assert fixed.min() < exact.min() - 1
 
-    def test_known_errors_cost_less(self, model: PrototypeWindows) -> None:
-        draws = draws_of(model, 2, **SPREAD)
-        fixed, known = (
-            coverage_of(model, draws, calibrated=known).min(axis=1) for known in (False, True)
-        )
-        assert (fixed < known).all()
-
     def test_a_known_tilt_of_a_cap_costs_little(self, model: PrototypeWindows) -> None:
         """What the limit of the caps' tilt is taken from: a share of the coverage once known."""
         exact = draws_of(model, 1)
@@ -265,45 +252,6 @@ class TestMotions:
         )
         assert unknown > 1.0
         assert known < 0.1
-
-
-class TestSearchForTheMinimum:
-    @pytest.mark.parametrize("calibrated", [False, True])
-    @pytest.mark.parametrize("size", [0.0, 0.2, 1.0, 5.0])
-    def test_same_as_on_every_side(
-        self, model: PrototypeWindows, size: float, calibrated: bool
-    ) -> None:
-        """The sides that are not searched hold no minimum: the same bits as of all of them."""
-        scaled = {kind: Error(size * error.spread) for kind, error in SPREAD.items()}
-        draws = draws_of(model, 2, **scaled)
-        for build, half in ((0, 0), (1, 1)):
-            run, pose = model.runs[half], run_pose(model, draws, build, half)
-            pose = calibrated_pose(model, half, pose) if calibrated else pose
-            at = (pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius)
-            fast = minimum_miss_distances((run.side, run.coarse, run.first), run.outward, *at)
-            slow = every_side_searched(run.side, run.first, *at[1:])
-            assert (fast > 0).any()
-            assert np.array_equal(fast[fast > 0], slow[fast > 0])
-
-
-def every_side_searched(
-    side: np.ndarray,
-    first: np.ndarray,
-    lens: np.ndarray,
-    pinhole: np.ndarray,
-    centre: np.ndarray,
-    radius: np.ndarray,
-) -> np.ndarray:
-    """Minimum miss distance of each window, each of its sides searched to the end."""
-    result = np.empty(len(radius))
-    for i in range(len(radius)):
-        at, found = (lens[i], pinhole, centre[i], float(radius[i])), [np.inf]
-        for one in side[first[i] : first[i + 1]]:
-            coarse = [_miss(ray, *at) for ray in one[::COARSE]]
-            best = int(np.argmin(coarse))
-            found.append(_minimum_of_side(one, COARSE * best, coarse[best], *at))
-        result[i] = np.sqrt(min(found))
-    return result
 
 
 class TestDraws:

@@ -1,5 +1,8 @@
+"""Tables of balls, pictures and stops: read back, they are the layout."""
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.formats.csv_table import write_table
@@ -7,7 +10,14 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.drive.loads import DriveLoads, base_torques
-from tbcad.prototype.files.plan_csv import PICTURE_COLUMNS, STOP_COLUMNS, picture_rows, stop_rows
+from tbcad.prototype.files.tables import (
+    BALL_COLUMNS,
+    PICTURE_COLUMNS,
+    STOP_COLUMNS,
+    ball_rows,
+    picture_rows,
+    stop_rows,
+)
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.spec.load import load_spec
 from tests.exported_files import Rows, read_csv
@@ -43,23 +53,6 @@ def test_every_mirror_of_both_cameras_once(layout: PrototypeLayout, plan: Rows) 
     for turn, camera in (("0", "a"), ("180", "b")):
         own = [row["mirror"] for row in plan if row["object_turn_deg"] == turn]
         assert sorted(own) == [f"{camera}{i + 1:04d}" for i in range(len(layout.array))]
-
-
-def test_round_trip(layout: PrototypeLayout, plan: Rows) -> None:
-    stops, ids = layout.stops, layout.array.ids
-    of_b = {f"b{other + 1:04d}": i for i, other in enumerate(layout.twin.tolist())}
-    number = {mirror: i for i, mirror in enumerate(ids)} | of_b
-    for row in plan:
-        i = number[row["mirror"]]
-        assert int(row["stop"]) == stops.stop[i] + 1
-        assert int(row["ball"]) == layout.fit.ball[i] + 1
-        for name, angle in {
-            "base_angle_deg": stops.angle[stops.stop[i]],
-            "polar_error_deg": stops.polar_error[i],
-            "azimuth_error_deg": stops.azimuth_error[i],
-            "error_deg": stops.error[i],
-        }.items():
-            assert np.radians(float(row[name])) == pytest.approx(angle, rel=1e-15, abs=1e-15)
 
 
 def test_each_run_goes_upward(plan: Rows) -> None:
@@ -101,3 +94,70 @@ def test_stops_tell_what_gravity_does(layout: PrototypeLayout, stops: Rows) -> N
     beyond = wind_up[:-1] - wind_up[-1]
     assert [float(row["wind_up_deg"]) for row in stops] == pytest.approx(beyond, abs=1e-12)
     assert np.ptp(beyond) > 0.01
+
+
+@pytest.fixture(scope="module")
+def balls(layout: PrototypeLayout, tmp_path_factory: pytest.TempPathFactory) -> Rows:
+    path = tmp_path_factory.mktemp("balls") / "balls.csv"
+    write_table(path, BALL_COLUMNS, ball_rows(layout))
+    return read_csv(path)
+
+
+def column(balls: Rows, *names: str) -> NDArray[np.float64]:
+    return np.array([[float(row[name]) for name in names] for row in balls]).squeeze()
+
+
+def test_one_row_a_ball(layout: PrototypeLayout, balls: Rows) -> None:
+    assert tuple(balls[0]) == BALL_COLUMNS
+    assert [int(row["number"]) for row in balls] == list(range(1, len(layout) + 1))
+    assert [row["size"] for row in balls] == list(layout.balls.size)
+
+
+def test_places_are_exact(layout: PrototypeLayout, balls: Rows) -> None:
+    for names, expected in {
+        ("px", "py", "pz"): layout.apices(),
+        ("nx", "ny", "nz"): layout.normals(),
+        ("cx", "cy", "cz"): layout.centres(),
+        ("bx", "by", "bz"): layout.body_centres(),
+    }.items():
+        assert np.array_equal(column(balls, *names), expected)
+    assert np.array_equal(column(balls, "radius_mm"), layout.balls.radius)
+    assert np.array_equal(column(balls, "body_radius_mm"), layout.balls.body_radius)
+    assert np.radians(column(balls, "azimuth_deg")) == pytest.approx(
+        layout.placement.azimuth, abs=1e-15, rel=1e-15
+    )
+
+
+def test_the_table_alone_gives_the_spheres(balls: Rows) -> None:
+    apex, normal = column(balls, "px", "py", "pz"), column(balls, "nx", "ny", "nz")
+    centre, radius = column(balls, "cx", "cy", "cz"), column(balls, "radius_mm")
+    assert apex - radius[:, None] * normal == pytest.approx(centre)
+    pinhole = np.array([100.0, 0, -100])
+    away = np.linalg.norm(apex, axis=1) + np.linalg.norm(apex - pinhole, axis=1)
+    assert away == pytest.approx(np.full(len(balls), away[0]))
+
+
+def test_balls_have_grade_and_mass_caps_have_none(layout: PrototypeLayout, balls: Rows) -> None:
+    kinds = [row["kind"] for row in balls]
+    assert set(kinds) == {"ball", "cap"}
+    for row, cap, mass in zip(balls, layout.balls.cap, layout.balls.mass_g, strict=True):
+        assert row["kind"] == ("cap" if cap else "ball")
+        if cap:
+            assert row["grade"] == row["standard"] == row["mass_g"] == ""
+        else:
+            assert (row["grade"], row["standard"]) == ("G40", "ISO 3290-1")
+            assert float(row["mass_g"]) == mass
+            assert float(row["diameter_mm"]) == 2 * float(row["radius_mm"])
+
+
+def test_what_they_show(layout: PrototypeLayout, balls: Rows) -> None:
+    fit = layout.fit
+    assert sum(int(row["mirrors"]) for row in balls) == len(layout.array)
+    assert column(balls, "pixels").sum() == pytest.approx(fit.pixels.sum())
+    assert column(balls, "pixels_shell").sum() == pytest.approx(fit.pixels_shell.sum())
+    for j, row in enumerate(balls):
+        own = fit.ball == j
+        assert int(row["mirrors"]) == own.sum()
+        assert float(row["coverage_mm"]) == fit.coverage[own].min()
+        assert float(row["coverage_fixed_mm"]) == fit.coverage_fixed[own].min()
+        assert float(row["error_deg"]) == np.degrees(layout.stops.error[own]).max()

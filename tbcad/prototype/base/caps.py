@@ -1,0 +1,135 @@
+"""Caps in numbers: key and magnet in the seat, and limits from the coverage that is set aside.
+
+Pads fix the centre of a ball, which is all a ball needs; a cap could tilt on them, and its front's
+centre with it. A spigot in the pocket of the seat's magnet takes that up.
+
+At the rim of the part in use, e from the apex, a ray is reflected past the capture sphere's edge.
+A change of the normal there by a small angle a moves it at the object, at a distance L, by 2 L a,
+and coverage, which is twice its distance from the origin, by 4 L a. The margin of the mirrors is
+shared equally (root sum of squares) by radius, figure, tilt and seat.
+"""
+
+import numpy as np
+
+from tbcad.geometry.vectors import norm
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.fasteners import magnet_part
+from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.purchased.parts import Parts
+from tbcad.records.prototype import CapRecord
+from tbcad.spec.design import Spec
+
+WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
+FRONT_MM = 2.0  # minimum material before the pocket
+SPIGOT_GAP_MM = 0.2  # between a spigot and the magnet or well behind it
+SHOULDER_MM = 0.1  # of the flat round the spigot
+SHARES = 4  # of the margin: radius, figure, tilt, seat
+MIN_MARGIN_MM = 0.3
+FRINGE_MM = 546.07e-6 / 2  # ISO 10110-5: half a wavelength of the green mercury line
+MIN_REFLECTANCE = 0.55  # of polished steel, as the balls
+MATERIAL = "resin"
+FINISH = "polished and coated with aluminium as its drawing asks"
+POLARITY = "north pole toward the object, as all magnets of the seats"
+
+
+def cap_spigot(base: BaseLayout, k: int) -> tuple[float, float]:
+    """Radius of a cap's spigot, and distance of its end behind the centre of the body, mm."""
+    spec, seats = base.spec, base.seats
+    gap = min(SPIGOT_GAP_MM, spec.magnet_gap_mm / 2)
+    end = float(seats.radius[k]) + spec.magnet_gap_mm - gap
+    return float(seats.pocket[k]) - spec.cap_play_mm / 2, end
+
+
+def cap_tilt(base: BaseLayout, k: int) -> float:
+    """Largest tilt of a cap on its pads, until its spigot touches the pocket, radians."""
+    _, end = cap_spigot(base, k)
+    return float(np.arcsin(base.spec.cap_play_mm / 2 / end))
+
+
+def flat_depth(base: BaseLayout, k: int) -> float:
+    """Distance of the flat behind the centre of the body, clear of the pads, mm."""
+    seats, (spigot, _) = base.seats, cap_spigot(base, k)
+    radius = float(seats.radius[k])
+    angle = seats.tilt - np.arcsin((seats.pad[k] + WEB_MM) / radius)
+    wide = float(np.sqrt(radius**2 - (spigot + SHOULDER_MM) ** 2))
+    return min(float(radius * np.cos(angle)), wide)
+
+
+def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
+    """Radius and depth of the pocket for the cap's own magnet, mm; zeros where there is none.
+
+    Args:
+        base: with the seats.
+        k: number of the seat.
+        depth: of the body's centre behind the apex, mm.
+    """
+    spec, (spigot, end) = base.spec, cap_spigot(base, k)
+    largest = spigot - WEB_MM
+    radii = [(size + spec.magnet_play_mm) / 2 for size in spec.magnets_mm]
+    fitting = [radius for radius in radii if radius <= largest]
+    if spec.holds[0] == "glue" or not fitting or depth + end < spec.magnet_height_mm + FRONT_MM:
+        return 0.0, 0.0
+    return max(fitting), spec.magnet_height_mm
+
+
+def cap_magnets(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> list[Fastener]:
+    """Magnets in the caps' own pockets.
+
+    Raises:
+        SpecError: when one is in no list.
+    """
+    seats, spec, magnets = base.seats, base.spec, []
+    for k in np.flatnonzero(prototype.balls.cap).tolist():
+        radius, height = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
+        if radius:
+            part = magnet_part(2 * radius - spec.magnet_play_mm, height, parts)
+            place = seats.centre[k] + cap_spigot(base, k)[1] * seats.axis[k]
+            magnets.append(Fastener(part, place, -seats.axis[k], (f"cap_{k + 1}",), rotates=True))
+    return magnets
+
+
+def cap_limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout) -> tuple[CapRecord, ...]:
+    """Key and limits of all caps by the number of their ball; tolerances are to either side."""
+    caps = np.flatnonzero(prototype.balls.cap).tolist()
+    return tuple(_limits(spec, base, prototype, k) for k in caps)
+
+
+def cap_edge(prototype: PrototypeLayout, k: int) -> float:
+    """Radius of the circle in which a cap's front and body meet, mm."""
+    balls = prototype.balls
+    return float(min(balls.body_radius[k] / np.sqrt(2), balls.radius[k]))
+
+
+def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) -> CapRecord:
+    balls, apex = prototype.balls, prototype.apices()[k]
+    radius, depth = float(balls.radius[k]), float(balls.body_depth[k])
+    used = cap_edge(prototype, k) - spec.prototype.cap_rim_mm
+    distance = float(norm(apex))
+    share = max(spec.mirrors.margin_mm, MIN_MARGIN_MM) / np.sqrt(SHARES)
+    slope = share / (4 * distance)
+    (spigot, end), tilt = cap_spigot(base, k), cap_tilt(base, k)
+    to_camera = prototype.array.camera.pinhole - apex
+    # Object and pinhole are seen from an apex at the same angle from its normal.
+    between = float(-apex @ to_camera / distance / norm(to_camera))
+    drawing = f"drawing_cap_{k + 1}"
+    return CapRecord(
+        ball=k + 1,
+        spigot_mm=2 * spigot,
+        socket_mm=2 * float(base.seats.pocket[k]),
+        spigot_end_mm=end,
+        tilt_deg=float(np.degrees(tilt)),
+        centre_shift_mm=abs(radius - depth) * float(np.sin(tilt)),
+        aperture_mm=2 * used,
+        radius_tolerance_mm=slope * radius**2 / used,
+        body_tolerance_mm=2 * (slope * radius * float(np.cos(base.seats.tilt))),
+        irregularity_fringes=slope * used / 2 / FRINGE_MM,
+        roughness_ra_um=prototype.grade.roughness_ra_um,
+        incidence_deg=float(np.degrees(np.arccos(between))) / 2,
+        reflectance_min=MIN_REFLECTANCE,
+        material=MATERIAL,
+        finish=FINISH,
+        polarity=POLARITY,
+        pdf=f"{drawing}.pdf",
+        dxf=f"{drawing}.dxf",
+    )
