@@ -59,17 +59,12 @@ class Build(InFolder):
 
 @dataclass(frozen=True)
 class Plan:
-    """A build that can be begun.
+    """A build that can be begun."""
 
-    Attributes:
-        spec: as asked for, before a process changes it.
-        parts: that are built, but no prototype where it is not asked for and cannot be.
-        process: that edges and margins are chosen for.
-    """
-
-    spec: Spec
+    spec: Spec  # as asked for, before a process changes it
+    # that are built, but no prototype where it is not asked for and cannot be
     parts: tuple[str, ...]
-    process: Process | None
+    process: Process | None  # that edges and margins are chosen for
 
 
 def planned(options: BuildOptions) -> Plan:

@@ -42,21 +42,13 @@ def capture(options: CaptureOptions) -> LightField:
 
 @dataclass(frozen=True)
 class Photographs:
-    """Both photographs before they are taken: light is traced when their bands are asked for.
+    """Both photographs before they are taken: light is traced when their bands are asked for."""
 
-    Attributes:
-        cameras: each camera with what gives its bands of pixel rows.
-        subject: the object before the cameras.
-        capture_mm: diameter of the capture sphere.
-        facts: how they are taken: design, n, geometry, samples.
-        sources: files and folders that they are made from.
-    """
-
-    cameras: CameraPhotographs
-    subject: SceneObject
-    capture_mm: float
-    facts: dict[str, Any]
-    sources: tuple[AnyPath | None, ...] = ()
+    cameras: CameraPhotographs  # each camera with what gives its bands of pixel rows
+    subject: SceneObject  # the object before the cameras
+    capture_mm: float  # diameter of the capture sphere
+    facts: dict[str, Any]  # how they are taken: design, n, geometry, samples
+    sources: tuple[AnyPath | None, ...] = ()  # files and folders that they are made from
 
 
 def photograph(options: CaptureOptions) -> Photographs:

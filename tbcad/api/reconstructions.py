@@ -31,19 +31,12 @@ READ_S, EPOCH_S, SURFACE_S, CHOICE_EPOCHS = 2e-6, 2e-8, 10.0, 6
 
 @dataclass(frozen=True)
 class Reconstructed:
-    """A field that was written.
+    """A field that was written."""
 
-    Attributes:
-        file: where.
-        field: itself.
-        kept: whether it was there already.
-        meshes: each file with its surface, and what is known of that.
-    """
-
-    file: Path
-    field: Field
-    kept: bool
-    meshes: dict[str, Any]
+    file: Path  # where
+    field: Field  # itself
+    kept: bool  # whether it was there already
+    meshes: dict[str, Any]  # each file with its surface, and what is known of that
 
     def record(self) -> dict[str, Any]:
         """For other programs."""

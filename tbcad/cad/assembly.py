@@ -21,19 +21,12 @@ DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25
 
 @dataclass(frozen=True)
 class ColouredSolid:
-    """One solid.
+    """One solid."""
 
-    Attributes:
-        name: unique in the assembly.
-        shape: in its place, the base at angle zero.
-        colour: red, green, blue (sRGB) and opacity, from 0 to 1.
-        mesh: of the shape; None where none is known.
-    """
-
-    name: str
-    shape: TopoDS_Solid
-    colour: Colour
-    mesh: Mesh | None = None
+    name: str  # unique in the assembly
+    shape: TopoDS_Solid  # in its place, the base at angle zero
+    colour: Colour  # red, green, blue (sRGB) and opacity, from 0 to 1
+    mesh: Mesh | None = None  # of the shape; None where none is known
 
     def copy(self, name: str, axes: Floats, origin: Floats) -> "ColouredSolid":
         """One like it under another name, moved: axes are what x, y and z become, as rows."""

@@ -47,16 +47,11 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Solid:
-    """A solid and the names of its faces.
+    """A solid and the names of its faces."""
 
-    Attributes:
-        name: of the part.
-        shape: the closed solid.
-        faces: name and face, mirrors first in the order of their ids.
-    """
-
-    name: str
-    shape: TopoDS_Solid
+    name: str  # of the part
+    shape: TopoDS_Solid  # the closed solid
+    # name and face, mirrors first in the order of their ids
     faces: tuple[tuple[str, TopoDS_Face], ...]
 
 

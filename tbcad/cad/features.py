@@ -31,25 +31,15 @@ PLANE_COS = 1 - 1e-9
 
 @dataclass(frozen=True)
 class RoundFace:
-    """Cylindrical faces on one axis, with one radius.
+    """Cylindrical faces on one axis, with one radius."""
 
-    Attributes:
-        start: of the axis within them, mm, (3,).
-        end: of it.
-        radius: mm.
-        turn_deg: angle of all faces together; 360 for a whole hole or pin.
-        hollow: a hole, not a pin.
-        open_start: whether there is no material beyond the start.
-        open_end: likewise.
-    """
-
-    start: Floats
-    end: Floats
-    radius: float
-    turn_deg: float
-    hollow: bool
-    open_start: bool = False
-    open_end: bool = False
+    start: Floats  # of the axis within them, mm, (3,)
+    end: Floats  # of it
+    radius: float  # mm
+    turn_deg: float  # angle of all faces together; 360 for a whole hole or pin
+    hollow: bool  # a hole, not a pin
+    open_start: bool = False  # whether there is no material beyond the start
+    open_end: bool = False  # likewise
 
     @property
     def axis(self) -> Floats:

@@ -17,17 +17,11 @@ from tbcad.types import Floats
 
 @dataclass(frozen=True)
 class SolidProperties:
-    """What integrals over a homogeneous solid give.
+    """What integrals over a homogeneous solid give."""
 
-    Attributes:
-        volume: mm^3.
-        area: of the surface, mm^2.
-        centroid: x, y and z, mm.
-    """
-
-    volume: float
-    area: float
-    centroid: tuple[float, float, float]
+    volume: float  # mm^3
+    area: float  # of the surface, mm^2
+    centroid: tuple[float, float, float]  # x, y and z, mm
 
     def mirrored(self) -> "SolidProperties":
         """Those of the mirror image in the plane x = 0."""
@@ -58,19 +52,13 @@ def properties(shape: TopoDS_Shape) -> SolidProperties:
 
 @dataclass(frozen=True)
 class FaceIntegrals:
-    """Integrals over faces, by which they add up to those of a solid.
+    """Integrals over faces, by which they add up to those of a solid."""
 
-    Attributes:
-        origin: any point near the faces, mm, (3,): the nearer, the less errors of the kernel count.
-        volume: between the origin and the faces, mm^3.
-        volume_moment: of the distance from the origin over that volume, mm^4, (3,).
-        area: mm^2.
-    """
-
+    # any point near the faces, mm, (3,): the nearer, the less errors of the kernel count
     origin: Floats
-    volume: float
-    volume_moment: Floats
-    area: float
+    volume: float  # between the origin and the faces, mm^3
+    volume_moment: Floats  # of the distance from the origin over that volume, mm^4, (3,)
+    area: float  # mm^2
 
     def __add__(self, other: "FaceIntegrals") -> "FaceIntegrals":
         """Those of both together; they have the same origin."""

@@ -10,15 +10,10 @@ from tbcad.types import Floats, Ints
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed triangle mesh.
+    """A closed triangle mesh."""
 
-    Attributes:
-        vertices: mm, (v, 3).
-        triangles: counter-clockwise seen from outside the solid, (t, 3).
-    """
-
-    vertices: Floats
-    triangles: Ints
+    vertices: Floats  # mm, (v, 3)
+    triangles: Ints  # counter-clockwise seen from outside the solid, (t, 3)
 
     @property
     def volume(self) -> float:

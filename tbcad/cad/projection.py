@@ -60,15 +60,10 @@ Curve: TypeAlias = Segment | Round | Chain
 
 @dataclass(frozen=True)
 class Projection:
-    """Edges of a solid in a view, x to the right and y up, mm.
+    """Edges of a solid in a view, x to the right and y up, mm."""
 
-    Attributes:
-        visible: edges and outlines in front.
-        hidden: those behind the solid.
-    """
-
-    visible: tuple[Curve, ...]
-    hidden: tuple[Curve, ...]
+    visible: tuple[Curve, ...]  # edges and outlines in front
+    hidden: tuple[Curve, ...]  # those behind the solid
 
 
 def project(shape: TopoDS_Shape, axes: Floats, *, hidden: bool = True) -> Projection:

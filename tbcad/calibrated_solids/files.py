@@ -42,19 +42,12 @@ TICKS = 5
 
 @dataclass(frozen=True)
 class Deviations:
-    """Deviations of k balls from the designed base, moved as a whole to fit best.
+    """Deviations of k balls from the designed base, moved as a whole to fit best."""
 
-    Attributes:
-        offset: of the centres, in the frame of the design, mm, (k, 3).
-        radius: measured less designed, mm, (k,).
-        shift: of the whole base, mm, (3,).
-        turn: rotation vector of the whole base about the origin, radians, (3,).
-    """
-
-    offset: Floats
-    radius: Floats
-    shift: Floats
-    turn: Floats
+    offset: Floats  # of the centres, in the frame of the design, mm, (k, 3)
+    radius: Floats  # measured less designed, mm, (k,)
+    shift: Floats  # of the whole base, mm, (3,)
+    turn: Floats  # rotation vector of the whole base about the origin, radians, (3,)
 
     @property
     def distance_um(self) -> Floats:

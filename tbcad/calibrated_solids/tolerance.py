@@ -27,27 +27,16 @@ PERCENT = 95.0
 
 @dataclass(frozen=True)
 class AsBuiltTolerance:
-    """Coverage and pointing of a calibrated machine, over m mirrors of both cameras.
+    """Coverage and pointing of a calibrated machine, over m mirrors of both cameras."""
 
-    Attributes:
-        target: coverage that is wanted, mm.
-        ids: of the mirrors whose stops are calibrated, (m,).
-        absent: of the others.
-        coverage: with windows where the balls are, mm, (m,).
-        place: root mean square distance at the object of a ray from the true one, mm, (m,).
-        turn: likewise its direction, mrad, (m,).
-        pixel: width of a pixel at the object, mm, (m,).
-        worst: minimum coverage of each simulated truth, mm, (s,).
-    """
-
-    target: float
-    ids: tuple[str, ...]
-    absent: tuple[str, ...]
-    coverage: Floats
-    place: Floats
-    turn: Floats
-    pixel: Floats
-    worst: Floats
+    target: float  # coverage that is wanted, mm
+    ids: tuple[str, ...]  # of the mirrors whose stops are calibrated, (m,)
+    absent: tuple[str, ...]  # of the others
+    coverage: Floats  # with windows where the balls are, mm, (m,)
+    place: Floats  # root mean square distance at the object of a ray from the true one, mm, (m,)
+    turn: Floats  # likewise its direction, mrad, (m,)
+    pixel: Floats  # width of a pixel at the object, mm, (m,)
+    worst: Floats  # minimum coverage of each simulated truth, mm, (s,)
 
     @property
     def share(self) -> float:

@@ -32,19 +32,13 @@ HALVES = {"angles": "frame", "LEDs": "led"}
 
 @dataclass(frozen=True)
 class Setup:
-    """A machine before it is calibrated: a prototype, or of a shell see `ShellSetup`.
-
-    Attributes:
-        frames: that are photographed, in the order of the machine's.
-        designed: the machine, at the angles of these frames.
-        lens: of its camera, where it is known.
-    """
+    """A machine before it is calibrated: a prototype, or of a shell see `ShellSetup`."""
 
     export: ExportedDesign
     plan: Plan
-    frames: tuple[Frame, ...]
-    designed: Machine
-    lens: CalibratedLens | None = None
+    frames: tuple[Frame, ...]  # that are photographed, in the order of the machine's
+    designed: Machine  # the machine, at the angles of these frames
+    lens: CalibratedLens | None = None  # of its camera, where it is known
 
     def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
         """Means and standard deviations by its process and by radii that are measured."""
@@ -117,32 +111,21 @@ def prepared_setup(
 
 @dataclass(frozen=True)
 class MirrorRays:
-    """The middle rays of the mirrors whose stops were photographed, over m of them.
-
-    Attributes:
-        absent: ids of the mirrors whose frames the run does not have.
-    """
+    """The middle rays of the mirrors whose stops were photographed, over m of them."""
 
     ids: tuple[str, ...]
     known: RayUncertainty
-    absent: tuple[str, ...]
+    absent: tuple[str, ...]  # ids of the mirrors whose frames the run does not have
 
 
 @dataclass(frozen=True)
 class Halves:
-    """How two halves of the highlights agree, by rays at angles that are known.
+    """How two halves of the highlights agree, by rays at angles that are known."""
 
-    Attributes:
-        by: what is apart: "angles" or "LEDs".
-        counts: highlights of each half.
-        found_mm: root mean square distance of both halves' rays at the object's centre.
-        expected_mm: as their covariances say.
-    """
-
-    by: str
-    counts: tuple[int, int]
-    found_mm: float
-    expected_mm: float
+    by: str  # what is apart: "angles" or "LEDs"
+    counts: tuple[int, int]  # highlights of each half
+    found_mm: float  # root mean square distance of both halves' rays at the object's centre
+    expected_mm: float  # as their covariances say
 
     @property
     def ratio(self) -> float:

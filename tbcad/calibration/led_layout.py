@@ -33,16 +33,13 @@ DIGITS = 2  # of places in mm
 
 @dataclass(frozen=True)
 class SphereInformation:
-    """Of m spheres, centre x, y, z and radius.
+    """Of m spheres, centre x, y, z and radius."""
 
-    Attributes:
-        by_led: of one highlight of each of l LEDs with noise of one pixel, 1/mm^2, (l, m, 4, 4);
-            zero where the LED is not seen.
-        rays: derivatives of the rays to the object's centre: place along two directions, mm, and
-            rotation, radians, (m, 4, 4).
-    """
-
+    # of one highlight of each of l LEDs with noise of one pixel, 1/mm^2, (l, m, 4, 4); zero where
+    # the LED is not seen
     by_led: Floats
+    # derivatives of the rays to the object's centre: place along two directions, mm, and rotation,
+    # radians, (m, 4, 4)
     rays: Floats
 
 
@@ -109,21 +106,13 @@ def _ray_slopes(camera: LensCamera, centre: Floats, radius: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class LedRoom:
-    """The room for LEDs on a stage.
+    """The room for LEDs on a stage."""
 
-    Attributes:
-        inner: least distance from the axis, mm.
-        outer: radius about the origin within which an LED and its pillar stay, mm.
-        lowest: least height z, mm.
-        apart: least distance of two pillars' axes, mm.
-        pillar: radius of a pillar, mm.
-    """
-
-    inner: float
-    outer: float
-    lowest: float
-    apart: float
-    pillar: float
+    inner: float  # least distance from the axis, mm
+    outer: float  # radius about the origin within which an LED and its pillar stay, mm
+    lowest: float  # least height z, mm
+    apart: float  # least distance of two pillars' axes, mm
+    pillar: float  # radius of a pillar, mm
 
     def places(self) -> Floats:
         """Places that are tried: one of each pair, mm, (p, 3)."""
@@ -196,15 +185,10 @@ def _pair(place: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Layout:
-    """Places of LEDs.
+    """Places of LEDs."""
 
-    Attributes:
-        name: "design" or "best".
-        leds: mm, (l, 3).
-    """
-
-    name: str
-    leds: Floats
+    name: str  # "design" or "best"
+    leds: Floats  # mm, (l, 3)
 
 
 def layouts(export: ExportedDesign, progress: Progress) -> list[Layout]:

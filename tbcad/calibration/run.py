@@ -39,18 +39,14 @@ READING, DETECTING, ESTIMATING, WRITING = (
 
 @dataclass(frozen=True)
 class WrittenCalibration(InFolder):
-    """A calibration whose files are written.
-
-    Attributes:
-        others: of a shell's other camera.
-    """
+    """A calibration whose files are written."""
 
     folder: Path
     result: MachineCalibration
     verdict: CalibrationVerdict
     text: str
     record: dict[str, Any]
-    others: tuple["WrittenCalibration", ...] = ()
+    others: tuple["WrittenCalibration", ...] = ()  # of a shell's other camera
 
     def __fspath__(self) -> str:
         return str(self.folder.parent if self.others else self.folder)

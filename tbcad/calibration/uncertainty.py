@@ -35,13 +35,10 @@ APART_MM = 10.0
 
 @dataclass(frozen=True)
 class RayCovariance:
-    """Of m rays, from the sphere to the object.
+    """Of m rays, from the sphere to the object."""
 
-    Attributes:
-        covariance: of the place in the plane through the object's centre along two directions, mm,
-            and of the rotation toward these, radians, (m, 4, 4).
-    """
-
+    # of the place in the plane through the object's centre along two directions, mm, and of the
+    # rotation toward these, radians, (m, 4, 4)
     covariance: Floats
 
     @property
@@ -57,26 +54,17 @@ class RayCovariance:
 
 @dataclass(frozen=True)
 class RayUncertainty:
-    """Of the rays that show the object's centre, over m of them.
+    """Of the rays that show the object's centre, over m of them."""
 
-    Attributes:
-        frame: in which each is photographed, (m,).
-        sphere: that shows it, (m,).
-        direction: unit vectors from the sphere toward the object, (m, 3).
-        whole: in the frame of the design.
-        relative: besides what a motion of the whole machine would do.
-        in_run: besides a motion of its own in each run: what the rays of one run know of each
-            other, wherever the axis of the object's half turn is.
-        pixel_mm: width of a pixel of the photograph at the object's centre, mm, (m,).
-    """
-
-    frame: Ints
-    sphere: Ints
-    direction: Floats
-    whole: RayCovariance
-    relative: RayCovariance
+    frame: Ints  # in which each is photographed, (m,)
+    sphere: Ints  # that shows it, (m,)
+    direction: Floats  # unit vectors from the sphere toward the object, (m, 3)
+    whole: RayCovariance  # in the frame of the design
+    relative: RayCovariance  # besides what a motion of the whole machine would do
+    # besides a motion of its own in each run: what the rays of one run know of each other, wherever
+    # the axis of the object's half turn is
     in_run: RayCovariance
-    pixel_mm: Floats
+    pixel_mm: Floats  # width of a pixel of the photograph at the object's centre, mm, (m,)
 
 
 def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:

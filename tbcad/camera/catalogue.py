@@ -28,27 +28,16 @@ ADAPTERS = {
 
 @dataclass(frozen=True)
 class CameraBody:
-    """A camera with square pixels.
+    """A camera with square pixels."""
 
-    Attributes:
-        name: maker and model.
-        mount: of lenses.
-        width_mm: of the sensor's picture.
-        height_mm: of it.
-        width_px: its columns.
-        height_px: its rows.
-        control: by which a computer triggers it.
-        source: of the figures.
-    """
-
-    name: str
-    mount: str
-    width_mm: float
-    height_mm: float
-    width_px: float
-    height_px: float
-    control: str
-    source: str
+    name: str  # maker and model
+    mount: str  # of lenses
+    width_mm: float  # of the sensor's picture
+    height_mm: float  # of it
+    width_px: float  # its columns
+    height_px: float  # its rows
+    control: str  # by which a computer triggers it
+    source: str  # of the figures
 
     @property
     def pixel_mm(self) -> float:
@@ -58,29 +47,17 @@ class CameraBody:
 
 @dataclass(frozen=True)
 class RectilinearLens:
-    """A lens that keeps straight lines straight.
+    """A lens that keeps straight lines straight."""
 
-    Attributes:
-        name: maker and model.
-        mounts: in which it is sold.
-        focal_min_mm: shortest focal length, for a distant object.
-        focal_max_mm: longest; the same where it does not zoom.
-        f_number_min: fully open at the shortest focal length.
-        f_number_max: fully stopped down.
-        min_focus_mm: smallest distance from the sensor to what is in focus.
-        image_circle_mm: diagonal of the sensor that it covers.
-        source: of the figures.
-    """
-
-    name: str
-    mounts: tuple[str, ...]
-    focal_min_mm: float
-    focal_max_mm: float
-    f_number_min: float
-    f_number_max: float
-    min_focus_mm: float
-    image_circle_mm: float
-    source: str
+    name: str  # maker and model
+    mounts: tuple[str, ...]  # in which it is sold
+    focal_min_mm: float  # shortest focal length, for a distant object
+    focal_max_mm: float  # longest; the same where it does not zoom
+    f_number_min: float  # fully open at the shortest focal length
+    f_number_max: float  # fully stopped down
+    min_focus_mm: float  # smallest distance from the sensor to what is in focus
+    image_circle_mm: float  # diagonal of the sensor that it covers
+    source: str  # of the figures
 
     def fits(self, mount: str) -> bool:
         """Whether it sits on a mount, by itself or by an adapter without optics."""

@@ -8,19 +8,12 @@ AIRY_FACTOR = 2.44  # diameter of the Airy disc in wavelengths times F-number
 
 @dataclass(frozen=True)
 class Lens:
-    """A thin lens without aberrations, its stop at the lens, and the pixels behind it.
+    """A thin lens without aberrations, its stop at the lens, and the pixels behind it."""
 
-    Attributes:
-        pixel: width of a pixel, mm.
-        image: distance from lens to sensor, mm.
-        wide_open: F-number with the stop fully open.
-        wavelength: mm.
-    """
-
-    pixel: float
-    image: float
-    wide_open: float
-    wavelength: float
+    pixel: float  # width of a pixel, mm
+    image: float  # distance from lens to sensor, mm
+    wide_open: float  # F-number with the stop fully open
+    wavelength: float  # mm
 
 
 @dataclass(frozen=True)

@@ -24,21 +24,15 @@ class VirtualImages:
     """Images of the object on the mirrors' principal rays, over m mirrors.
 
     A principal ray runs from the camera over the apex to the centre of the capture sphere.
-
-    Attributes:
-        array: the camera and its mirrors.
-        to_mirror: from camera to apex, mm, (m,).
-        incidence: at the apex, radians, (m,).
-        distance: from camera to the image of the sphere's nearest point, centre and farthest
-            point, by the tangential and by the sagittal fan, mm, (m, 3, 2).
-        depth: the same along the camera's optical axis, mm, (m, 3, 2).
     """
 
-    array: MirrorArray
-    to_mirror: Floats
-    incidence: Floats
+    array: MirrorArray  # the camera and its mirrors
+    to_mirror: Floats  # from camera to apex, mm, (m,)
+    incidence: Floats  # at the apex, radians, (m,)
+    # from camera to the image of the sphere's nearest point, centre and farthest point, by the
+    # tangential and by the sagittal fan, mm, (m, 3, 2)
     distance: Floats
-    depth: Floats
+    depth: Floats  # the same along the camera's optical axis, mm, (m, 3, 2)
 
 
 def image_distances(
@@ -77,34 +71,21 @@ def virtual_images(array: MirrorArray, radius: float) -> VirtualImages:
 
 @dataclass(frozen=True)
 class CameraRequirements:
-    """What the camera and lens of either pinhole must do; a rectilinear lens is assumed.
+    """What the camera and lens of either pinhole must do; a rectilinear lens is assumed."""
 
-    Attributes:
-        hfov_deg: angle of view across that just holds all mirrors.
-        vfov_deg: angle of view down.
-        width_px: pixels across it, at least.
-        height_px: pixels down it, at least.
-        near_mm: depth, from the entrance pupil along the optical axis, of the nearest virtual
-            image of the capture sphere.
-        far_mm: depth of the farthest.
-        focus_mm: depth to focus on, where the blur at both ends is the same.
-        pupil_mm: diameter of the entrance pupil with the least blur at both ends.
-        blur_px: circle of confusion there at both ends, in pixels of this design.
-        airy_px: diameter of the Airy disc there, 550 nm.
-        total_px: root of the sum of both squares.
-    """
-
-    hfov_deg: float
-    vfov_deg: float
-    width_px: int
-    height_px: int
+    hfov_deg: float  # angle of view across that just holds all mirrors
+    vfov_deg: float  # angle of view down
+    width_px: int  # pixels across it, at least
+    height_px: int  # pixels down it, at least
+    # depth, from the entrance pupil along the optical axis, of the nearest virtual image of the
+    # capture sphere
     near_mm: float
-    far_mm: float
-    focus_mm: float
-    pupil_mm: float
-    blur_px: float
-    airy_px: float
-    total_px: float
+    far_mm: float  # depth of the farthest
+    focus_mm: float  # depth to focus on, where the blur at both ends is the same
+    pupil_mm: float  # diameter of the entrance pupil with the least blur at both ends
+    blur_px: float  # circle of confusion there at both ends, in pixels of this design
+    airy_px: float  # diameter of the Airy disc there, 550 nm
+    total_px: float  # root of the sum of both squares
 
     @property
     def depths(self) -> DepthRange:

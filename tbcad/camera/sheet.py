@@ -29,31 +29,18 @@ SHOWN = 6  # candidates that the lines list
 
 @dataclass(frozen=True)
 class Candidate:
-    """A camera with a lens set as the design asks, and what it lacks.
+    """A camera with a lens set as the design asks, and what it lacks."""
 
-    Attributes:
-        camera: the body.
-        lens: on it.
-        focal_mm: focal length to set.
-        magnification: of what is in focus.
-        view: share of the required angle's tangent that the sensor shows, at most 1.
-        pixels_across: pixels over the required angle of view.
-        f_number: to set.
-        total_px: blur with diffraction at both ends of the depth, in pixels of the design.
-        close_up_dpt: power of the close-up lens without which it does not focus; 0: none.
-        faults: why it does not do; empty: it does.
-    """
-
-    camera: CameraBody
-    lens: RectilinearLens
-    focal_mm: float
-    magnification: float
-    view: float
-    pixels_across: float
-    f_number: float
-    total_px: float
-    close_up_dpt: float
-    faults: tuple[str, ...]
+    camera: CameraBody  # the body
+    lens: RectilinearLens  # on it
+    focal_mm: float  # focal length to set
+    magnification: float  # of what is in focus
+    view: float  # share of the required angle's tangent that the sensor shows, at most 1
+    pixels_across: float  # pixels over the required angle of view
+    f_number: float  # to set
+    total_px: float  # blur with diffraction at both ends of the depth, in pixels of the design
+    close_up_dpt: float  # power of the close-up lens without which it does not focus; 0: none
+    faults: tuple[str, ...]  # why it does not do; empty: it does
 
 
 def candidates(

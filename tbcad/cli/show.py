@@ -111,19 +111,12 @@ def show(
 
 
 class _Shown(NamedTuple):
-    """What is shown.
+    """What is shown."""
 
-    Attributes:
-        file: of the light field, or of a field without one.
-        pictured: what views are made from.
-        tiles: the light field; None: there is a field alone.
-        method: of views of a light field.
-    """
-
-    file: Path
-    pictured: "MirrorTiles | Field"
-    tiles: "MirrorTiles | None"
-    method: "MethodAtRest" = "depth"
+    file: Path  # of the light field, or of a field without one
+    pictured: "MirrorTiles | Field"  # what views are made from
+    tiles: "MirrorTiles | None"  # the light field; None: there is a field alone
+    method: "MethodAtRest" = "depth"  # of views of a light field
 
     @property
     def how(self) -> str:

@@ -16,17 +16,11 @@ if TYPE_CHECKING:
 
 
 class ViewFiles(NamedTuple):
-    """Files that are asked for.
+    """Files that are asked for."""
 
-    Attributes:
-        depth: PNG or PLY.
-        normals: PNG, of a field.
-        opacity: PNG, of a field.
-    """
-
-    depth: tuple[Path, ...]
-    normals: Path | None = None
-    opacity: Path | None = None
+    depth: tuple[Path, ...]  # PNG or PLY
+    normals: Path | None = None  # PNG, of a field
+    opacity: Path | None = None  # PNG, of a field
 
     @property
     def of_field(self) -> bool:

@@ -31,13 +31,9 @@ class CameraFault(_Fault):
 
 
 class DrivenMachine(Protocol):
-    """Motions and lights of one machine; all but `secure` raise MachineFault when it fails.
+    """Motions and lights of one machine; all but `secure` raise MachineFault when it fails."""
 
-    Attributes:
-        switch_s: that it needs for the lights of a photograph.
-    """
-
-    switch_s: float
+    switch_s: float  # that it needs for the lights of a photograph
 
     def connect(self) -> None:
         """Wait until the controller answers."""

@@ -93,16 +93,12 @@ UNKNOWN = "its meaning is in the manual of the controller's firmware"
 
 @dataclass(frozen=True)
 class Status:
-    """A status report.
+    """A status report."""
 
-    Attributes:
-        state: Idle, Run, Hold, Jog, Alarm, Door, Check, Home, Sleep or Tool.
-        substate: number behind the state's colon; 0 in Hold: at rest. None: not said.
-        places: MPos, WPos and WCO as far as they are reported, each by axis.
-    """
-
-    state: str
+    state: str  # Idle, Run, Hold, Jog, Alarm, Door, Check, Home, Sleep or Tool
+    # number behind the state's colon; 0 in Hold: at rest. None: not said.
     substate: int | None = None
+    # MPos, WPos and WCO as far as they are reported, each by axis
     places: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
@@ -119,15 +115,11 @@ class Status:
 
 @dataclass(frozen=True)
 class Message:
-    """A line of the controller.
-
-    Attributes:
-        code: of an error or alarm, or the setting's number.
-    """
+    """A line of the controller."""
 
     kind: Kind
     text: str
-    code: int = 0
+    code: int = 0  # of an error or alarm, or the setting's number
     value: float = 0.0
     status: Status | None = None
 

@@ -14,24 +14,15 @@ SHOWN_STOPS = 3
 
 @dataclass(frozen=True)
 class Outcome(InFolder):
-    """What a run came to.
-
-    Attributes:
-        wanted: number of photographs that are wanted in all.
-        taken: number that are there.
-        new: number that were taken now.
-        missed: for each photograph that was tried in vain, why, by name.
-        stopped: why the run ended before its end; empty if it did not.
-        unsafe: what could not be switched off or held; empty if all was.
-    """
+    """What a run came to."""
 
     folder: Path
-    wanted: int
-    taken: int
-    new: int
-    missed: dict[str, str]
-    stopped: str
-    unsafe: str
+    wanted: int  # number of photographs that are wanted in all
+    taken: int  # number that are there
+    new: int  # number that were taken now
+    missed: dict[str, str]  # for each photograph that was tried in vain, why, by name
+    stopped: str  # why the run ended before its end; empty if it did not
+    unsafe: str  # what could not be switched off or held; empty if all was
     seconds: float
 
     @property

@@ -38,26 +38,17 @@ _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
 
 @dataclass(frozen=True)
 class ControlPlan:
-    """All that a run needs of an export.
+    """All that a run needs of an export."""
 
-    Attributes:
-        sha256: of each file that it depends on, by name.
-        size_px: columns and rows of the design's camera.
-        firmware: of the controller, "grblhal" or "grbl".
-        phases: of a stop, in order.
-        settings: of the controller, by number.
-        frames: of both runs, in order.
-    """
-
-    sha256: dict[str, str]
-    size_px: tuple[int, int]
-    firmware: Literal["grblhal", "grbl"]
+    sha256: dict[str, str]  # of each file that it depends on, by name
+    size_px: tuple[int, int]  # columns and rows of the design's camera
+    firmware: Literal["grblhal", "grbl"]  # of the controller, "grblhal" or "grbl"
     axis: str
-    phases: tuple[Phase, ...]
+    phases: tuple[Phase, ...]  # of a stop, in order
     motion: MotionSpec
-    settings: dict[int, float]
+    settings: dict[int, float]  # of the controller, by number
     program: Program
-    frames: tuple[Frame, ...]
+    frames: tuple[Frame, ...]  # of both runs, in order
 
     @property
     def outputs(self) -> tuple[int, ...]:

@@ -45,18 +45,12 @@ class LightState(StrEnum):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a photograph shows.
-
-    Attributes:
-        peak: level of its brightest light, of the largest number.
-        saturated: share of the highlights, or of the lit pixels, that are.
-        highlights: number of them; None where no single LED shines.
-    """
+    """What a photograph shows."""
 
     state: LightState
-    peak: float
-    saturated: float
-    highlights: int | None = None
+    peak: float  # level of its brightest light, of the largest number
+    saturated: float  # share of the highlights, or of the lit pixels, that are
+    highlights: int | None = None  # number of them; None where no single LED shines
 
     @property
     def factor(self) -> float:

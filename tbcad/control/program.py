@@ -22,39 +22,24 @@ _HOME = "$H"
 
 @dataclass(frozen=True)
 class Move:
-    """A motion of the base.
-
-    Attributes:
-        angle_deg: base angle that it ends at.
-    """
+    """A motion of the base."""
 
     line: str
-    angle_deg: float
+    angle_deg: float  # base angle that it ends at
 
 
 @dataclass(frozen=True)
 class Program:
-    """The motions of rotation_plan.nc.
+    """The motions of rotation_plan.nc."""
 
-    Attributes:
-        ready: what a person must have done before the start.
-        known_angle: lines that bring the base to a known angle and set it.
-        known_deg: that angle.
-        homes: whether the controller finds that angle by its switch.
-        start: below the first stop: stops are reached from there, from one side.
-        stops: by their numbers.
-        turn: what a person must do between both runs.
-        end: where the base is left.
-    """
-
-    ready: str
-    known_angle: tuple[str, ...]
-    known_deg: float
-    homes: bool
-    start: Move
-    stops: dict[int, Move]
-    turn: str
-    end: Move
+    ready: str  # what a person must have done before the start
+    known_angle: tuple[str, ...]  # lines that bring the base to a known angle and set it
+    known_deg: float  # that angle
+    homes: bool  # whether the controller finds that angle by its switch
+    start: Move  # below the first stop: stops are reached from there, from one side
+    stops: dict[int, Move]  # by their numbers
+    turn: str  # what a person must do between both runs
+    end: Move  # where the base is left
 
 
 def read_program(folder: Path) -> Program:

@@ -27,18 +27,12 @@ MINUTE, HOUR = 60, 3600
 
 @dataclass(frozen=True)
 class RunSelection:
-    """What is photographed, and how.
+    """What is photographed, and how."""
 
-    Attributes:
-        frames: positions in order.
-        phases: lights at each, in order.
-        size_px: columns and rows that photographs must have.
-        times: of exposure, as far as the camera is told them.
-    """
-
-    frames: tuple[Frame, ...]
-    phases: tuple[Phase, ...]
-    size_px: tuple[int, int]
+    frames: tuple[Frame, ...]  # positions in order
+    phases: tuple[Phase, ...]  # lights at each, in order
+    size_px: tuple[int, int]  # columns and rows that photographs must have
+    # of exposure, as far as the camera is told them
     times: PhaseTimes = field(default_factory=PhaseTimes)
 
     @property
@@ -95,14 +89,10 @@ def _numbers(text: str, last: int) -> Iterable[int]:
 
 @dataclass(frozen=True)
 class Shots:
-    """Photographs that are still to be taken at one position.
-
-    Attributes:
-        phases: names of their lights, in order.
-    """
+    """Photographs that are still to be taken at one position."""
 
     frame: Frame
-    phases: tuple[str, ...]
+    phases: tuple[str, ...]  # names of their lights, in order
 
     @property
     def title(self) -> str:

@@ -24,15 +24,12 @@ OF_EXPOSURE = (SHUTTER, "shutterspeed2", "exposure_s")  # settings that an expos
 
 @dataclass(frozen=True)
 class Photograph:
-    """A photograph that can be read.
-
-    Attributes:
-        asked_s: exposure time that the camera was told, s; None: it keeps its own.
-    """
+    """A photograph that can be read."""
 
     shot: Shot
     facts: ImageFacts
     seconds: float
+    # exposure time that the camera was told, s; None: it keeps its own
     asked_s: float | None = None
 
     @property

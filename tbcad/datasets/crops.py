@@ -14,15 +14,10 @@ from tbcad.types import Bools, Bytes, Floats, Ints
 
 @dataclass(frozen=True)
 class MirrorId:
-    """A mirror of a light field.
+    """A mirror of a light field."""
 
-    Attributes:
-        frame: "a" or "b".
-        index: its place in the frame, from 0.
-    """
-
-    frame: str
-    index: int
+    frame: str  # "a" or "b"
+    index: int  # its place in the frame, from 0
 
     @property
     def name(self) -> str:
@@ -32,21 +27,13 @@ class MirrorId:
 
 @dataclass(frozen=True)
 class Crop:
-    """A rectangle of h x w pixels that holds all of a mirror's.
+    """A rectangle of h x w pixels that holds all of a mirror's."""
 
-    Attributes:
-        colour: (h, w, 3).
-        origin: where rays leave the mirror, mm, (h, w, 3).
-        direction: unit vectors, (h, w, 3).
-        valid: whether a pixel is of this mirror, (h, w).
-        meets: whether it is, and its ray meets the capture sphere, (h, w).
-    """
-
-    colour: Bytes
-    origin: Floats
-    direction: Floats
-    valid: Bools
-    meets: Bools
+    colour: Bytes  # (h, w, 3)
+    origin: Floats  # where rays leave the mirror, mm, (h, w, 3)
+    direction: Floats  # unit vectors, (h, w, 3)
+    valid: Bools  # whether a pixel is of this mirror, (h, w)
+    meets: Bools  # whether it is, and its ray meets the capture sphere, (h, w)
 
     @property
     def rays(self) -> tuple[Floats, Floats]:

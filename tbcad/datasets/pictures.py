@@ -125,19 +125,13 @@ def _fill_triangle(place: Floats, colour: Bytes, corners: Ints, total: Colours, 
 
 @dataclass(frozen=True)
 class Pictures:
-    """Pictures of m pinhole cameras, of one size.
+    """Pictures of m pinhole cameras, of one size."""
 
-    Attributes:
-        cameras: (m,).
-        picture: (m, h, w, 3).
-        mask: where it is known, (m, h, w).
-        reprojection_px: distance of each ray's place from where its point of the object appears
-            through the pinhole, of all rays that hit the object; None without the object.
-    """
-
-    cameras: list[Camera]
-    picture: Bytes
-    mask: Bools
+    cameras: list[Camera]  # (m,)
+    picture: Bytes  # (m, h, w, 3)
+    mask: Bools  # where it is known, (m, h, w)
+    # distance of each ray's place from where its point of the object appears through the pinhole,
+    # of all rays that hit the object; None without the object
     reprojection_px: Floats | None
 
 
@@ -203,23 +197,14 @@ def reprojection_errors(crop: Crop, camera: Camera, scene: Scene) -> Floats:
 
 @dataclass(frozen=True)
 class PinholePictures:
-    """Pictures of m virtual cameras that look at the origin.
+    """Pictures of m virtual cameras that look at the origin."""
 
-    Attributes:
-        centre: of the pinholes, mm, (m, 3).
-        axes: rows: along the rows, down the columns, forward, (m, 3, 3).
-        focal_px: (m,).
-        picture: (m, s, s, 3).
-        mask: where it is known, (m, s, s).
-        capture_mm: diameter of the capture sphere.
-    """
-
-    centre: Floats
-    axes: Floats
-    focal_px: Floats
-    picture: Bytes
-    mask: Bools
-    capture_mm: float
+    centre: Floats  # of the pinholes, mm, (m, 3)
+    axes: Floats  # rows: along the rows, down the columns, forward, (m, 3, 3)
+    focal_px: Floats  # (m,)
+    picture: Bytes  # (m, s, s, 3)
+    mask: Bools  # where it is known, (m, s, s)
+    capture_mm: float  # diameter of the capture sphere
 
 
 def pinhole_pictures(source: LightField, progress: Progress = lambda _: None) -> PinholePictures:

@@ -21,21 +21,13 @@ SCALES = np.array([0.01] * 5 + [1.0] * 2)
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A pinhole camera with its own focal length along rows and columns.
+    """A pinhole camera with its own focal length along rows and columns."""
 
-    Attributes:
-        centre: mm, (3,).
-        axes: rows: unit vectors along the rows, down the columns, and forward, (3, 3).
-        focal_px: along the rows and down the columns, (2,).
-        principal_px: column and row of the axis, (2,); the first pixel's centre is (0.5, 0.5).
-        size_px: columns and rows.
-    """
-
-    centre: Floats
-    axes: Floats
-    focal_px: Floats
-    principal_px: Floats
-    size_px: tuple[int, int]
+    centre: Floats  # mm, (3,)
+    axes: Floats  # rows: unit vectors along the rows, down the columns, and forward, (3, 3)
+    focal_px: Floats  # along the rows and down the columns, (2,)
+    principal_px: Floats  # column and row of the axis, (2,); the first pixel's centre is (0.5, 0.5)
+    size_px: tuple[int, int]  # columns and rows
 
     @property
     def camera_to_world(self) -> list[list[float]]:

@@ -24,15 +24,10 @@ DARK_SHARE = 0.05
 
 @dataclass(frozen=True)
 class SeedPoints:
-    """Points on and in the object.
+    """Points on and in the object."""
 
-    Attributes:
-        points: mm, (n, 3).
-        colours: median of what the virtual cameras see there, (n, 3).
-    """
-
-    points: Floats
-    colours: Bytes
+    points: Floats  # mm, (n, 3)
+    colours: Bytes  # median of what the virtual cameras see there, (n, 3)
 
 
 def seed_points(

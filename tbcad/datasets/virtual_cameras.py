@@ -30,28 +30,18 @@ MIN_DISTANCE = 1.05
 
 @dataclass(frozen=True)
 class FittedCameras:
-    """m virtual cameras of a light field, and how well each is central.
+    """m virtual cameras of a light field, and how well each is central."""
 
-    Attributes:
-        mirrors: which mirrors they are.
-        centre: best common points of their rays, mm, (m, 3).
-        rays: how many rays of each meet the capture sphere, (m,).
-        pitch_mm: distance of neighbouring rays in the plane through the origin, (m,).
-        rms_mm: root mean square distance of the rays from the centre, (m,).
-        worst_mm: largest distance of a ray from the centre, (m,).
-        central_error_mm: most that a ray of the pinhole is off the captured one a capture radius
-            before and behind the middle, (m,).
-        left_out: reason by name of each mirror that gives no camera.
-    """
-
-    mirrors: tuple[MirrorId, ...]
-    centre: Floats
-    rays: Floats
-    pitch_mm: Floats
-    rms_mm: Floats
-    worst_mm: Floats
+    mirrors: tuple[MirrorId, ...]  # which mirrors they are
+    centre: Floats  # best common points of their rays, mm, (m, 3)
+    rays: Floats  # how many rays of each meet the capture sphere, (m,)
+    pitch_mm: Floats  # distance of neighbouring rays in the plane through the origin, (m,)
+    rms_mm: Floats  # root mean square distance of the rays from the centre, (m,)
+    worst_mm: Floats  # largest distance of a ray from the centre, (m,)
+    # most that a ray of the pinhole is off the captured one a capture radius before and behind the
+    # middle, (m,)
     central_error_mm: Floats
-    left_out: dict[str, str]
+    left_out: dict[str, str]  # reason by name of each mirror that gives no camera
 
     def __len__(self) -> int:
         return len(self.mirrors)

@@ -50,20 +50,13 @@ def depth_ply(view: Camera, depth: Floats, image: Bytes) -> bytes:
 
 @dataclass(frozen=True)
 class DepthMap:
-    """Depth of a view.
+    """Depth of a view."""
 
-    Attributes:
-        view: the camera of the depth's pixels.
-        depth: mm behind the plane through the origin that faces the view, (h, w); NaN where
-            nothing shows it.
-        confidence: by how much colours differ more on other planes, (h, w).
-        capture_mm: diameter of the capture sphere.
-    """
-
-    view: Camera
+    view: Camera  # the camera of the depth's pixels
+    # mm behind the plane through the origin that faces the view, (h, w); NaN where nothing shows it
     depth: Floats
-    confidence: Floats
-    capture_mm: float
+    confidence: Floats  # by how much colours differ more on other planes, (h, w)
+    capture_mm: float  # diameter of the capture sphere
 
     def along_rays(self, origin: Floats, direction: Floats) -> Floats:
         """Distance (n,) along rays (n, 3) of the view's pinhole to the surface, mm."""
@@ -145,17 +138,11 @@ def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> D
 
 @dataclass(frozen=True)
 class DepthViews:
-    """What views of a light field are made from, one after the other.
+    """What views of a light field are made from, one after the other."""
 
-    Attributes:
-        tiles: the light field.
-        pictures: of its virtual cameras.
-        sweep: how fine the depth is looked for.
-    """
-
-    tiles: MirrorTiles
-    pictures: PinholePictures
-    sweep: Sweep = FINE
+    tiles: MirrorTiles  # the light field
+    pictures: PinholePictures  # of its virtual cameras
+    sweep: Sweep = FINE  # how fine the depth is looked for
 
     def of(
         self, view: Camera, shown: MirrorTiles | None = None

@@ -30,17 +30,11 @@ ROWS_PER_CHUNK = 8
 
 
 class Sweep(NamedTuple):
-    """How fine a sweep is. docs/depth.md has what other numbers give.
+    """How fine a sweep is. docs/depth.md has what other numbers give."""
 
-    Attributes:
-        step_px: pixels of a view for one of its depth.
-        planes: that are tried.
-        window_px: over which differences are averaged, pixels of the depth.
-    """
-
-    step_px: int
-    planes: int
-    window_px: int
+    step_px: int  # pixels of a view for one of its depth
+    planes: int  # that are tried
+    window_px: int  # over which differences are averaged, pixels of the depth
 
 
 # Mirrors show a tenth of a view's resolution at most.

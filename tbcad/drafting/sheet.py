@@ -41,52 +41,30 @@ LEAST_MM = 1.6  # height of a text that is read without a lens
 
 @dataclass(frozen=True)
 class TitleBlock:
-    """What the title block says.
+    """What the title block says."""
 
-    Attributes:
-        title: of the drawing.
-        design: that the part belongs to.
-        item: number and name in the parts list.
-        quantity: of the part.
-        material: of it.
-        view: from where it is seen; empty for several views, in first-angle projection.
-        sheet: number of this sheet and of all of the drawing.
-        tolerances: of what has none of its own.
-    """
-
-    title: str
-    design: str
-    item: str
-    quantity: int
-    material: str
-    view: str = ""
-    sheet: str = "1 of 1"
-    tolerances: str = TOLERANCES
+    title: str  # of the drawing
+    design: str  # that the part belongs to
+    item: str  # number and name in the parts list
+    quantity: int  # of the part
+    material: str  # of it
+    view: str = ""  # from where it is seen; empty for several views, in first-angle projection
+    sheet: str = "1 of 1"  # number of this sheet and of all of the drawing
+    tolerances: str = TOLERANCES  # of what has none of its own
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A drawing.
+    """A drawing."""
 
-    Attributes:
-        name: of its files.
-        title: in words.
-        part: that it shows, by its name in the parts list.
-        paper: size, mm.
-        scale: of the part on paper.
-        origin: of the part's coordinates on paper, mm.
-        entities: on paper, mm.
-        to_scale: whether anything is.
-    """
-
-    name: str
-    title: str
-    part: str
-    paper: tuple[float, float]
-    scale: float
-    origin: Point
-    entities: tuple[Entity, ...]
-    to_scale: bool = True
+    name: str  # of its files
+    title: str  # in words
+    part: str  # that it shows, by its name in the parts list
+    paper: tuple[float, float]  # size, mm
+    scale: float  # of the part on paper
+    origin: Point  # of the part's coordinates on paper, mm
+    entities: tuple[Entity, ...]  # on paper, mm
+    to_scale: bool = True  # whether anything is
 
     def full_size(self) -> list[Entity]:
         """All entities with the part at full size and its origin at (0, 0)."""

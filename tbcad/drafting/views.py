@@ -36,17 +36,11 @@ def isometric() -> Floats:
 
 @dataclass(frozen=True)
 class View:
-    """A view and its place.
+    """A view and its place."""
 
-    Attributes:
-        axes: right, up and toward the eye in the part's frame, as rows, (3, 3).
-        origin: of the part's coordinates on paper, mm.
-        scale: of the view.
-    """
-
-    axes: Floats
-    origin: Point
-    scale: float
+    axes: Floats  # right, up and toward the eye in the part's frame, as rows, (3, 3)
+    origin: Point  # of the part's coordinates on paper, mm
+    scale: float  # of the view
 
     def at(self, point: Floats) -> Point:
         """Where a point of the part (mm, (3,)) is on paper, mm."""

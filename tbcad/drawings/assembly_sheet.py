@@ -51,14 +51,10 @@ HEAD, WIDTHS_MM = ("no.", "qty", "part"), (9.0, 9.0, 42.0)
 
 @dataclass(frozen=True)
 class LinePicture:
-    """What is seen of bodies from a direction.
+    """What is seen of bodies from a direction."""
 
-    Attributes:
-        lines: visible edges, x to the right and y up, mm.
-        anchors: of each body that is seen: a visible point in its middle, mm.
-    """
-
-    lines: tuple[Segment, ...]
+    lines: tuple[Segment, ...]  # visible edges, x to the right and y up, mm
+    # of each body that is seen: a visible point in its middle, mm
     anchors: dict[str, tuple[float, float]]
 
 
@@ -136,21 +132,13 @@ def _anchor(
 
 @dataclass(frozen=True)
 class AssemblyJob:
-    """What the assembly's sheets follow from.
+    """What the assembly's sheets follow from."""
 
-    Attributes:
-        path: GLB file of all bodies.
-        parts: part of each body.
-        items: number of each part.
-        quantities: of each part.
-        title: of the design.
-    """
-
-    path: Path
-    parts: dict[str, str]
-    items: dict[str, int]
-    quantities: dict[str, int]
-    title: str
+    path: Path  # GLB file of all bodies
+    parts: dict[str, str]  # part of each body
+    items: dict[str, int]  # number of each part
+    quantities: dict[str, int]  # of each part
+    title: str  # of the design
 
 
 def assembly_job(export: DrawnExport, machine: Machine) -> AssemblyJob:

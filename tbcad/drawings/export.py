@@ -21,21 +21,13 @@ PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
 
 @dataclass(frozen=True)
 class DrawnExport:
-    """An export that is drawn.
+    """An export that is drawn."""
 
-    Attributes:
-        folder: of it.
-        manifest: its files.
-        design: design.json.
-        machine: its prototype, None where it has none.
-        shells: names of the shells that it has.
-    """
-
-    folder: Path
-    manifest: Manifest
-    design: DesignRecord
-    machine: Machine | None
-    shells: tuple[str, ...]
+    folder: Path  # of it
+    manifest: Manifest  # its files
+    design: DesignRecord  # design.json
+    machine: Machine | None  # its prototype, None where it has none
+    shells: tuple[str, ...]  # names of the shells that it has
 
     @property
     def mandrels(self) -> tuple[str, ...]:

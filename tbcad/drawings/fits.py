@@ -43,17 +43,11 @@ ON_PART_MM = 0.5  # of a pad's place from the part, offset as the coupon asks
 
 @dataclass(frozen=True)
 class SheetTable:
-    """A table of a column.
+    """A table of a column."""
 
-    Attributes:
-        head: what the columns are.
-        widths: of the columns, mm.
-        rows: below the head.
-    """
-
-    head: Row
-    widths: tuple[float, ...]
-    rows: tuple[Row, ...]
+    head: Row  # what the columns are
+    widths: tuple[float, ...]  # of the columns, mm
+    rows: tuple[Row, ...]  # below the head
 
 
 def in_columns(tables: Sequence[SheetTable], first: int, others: int) -> list[list[SheetTable]]:
@@ -90,26 +84,16 @@ def drawn(corner: Point, tables: Sequence[SheetTable]) -> Iterator[Entity]:
 
 @dataclass(frozen=True)
 class Mate:
-    """What goes into a hole.
+    """What goes into a hole."""
 
-    Attributes:
-        name: of the part.
-        place: on its axis, mm, (3,).
-        along: its axis, a unit vector, (3,).
-        size: its diameter, mm.
-        hole: diameter of the hole that it is made for, mm.
-        tolerance: of its diameter, such as h6; empty where none is known.
-        how: it is held.
-        reamed: tolerance that its hole is reamed to, such as H7; empty where it stays as printed.
-    """
-
-    name: str
-    place: Floats
-    along: Floats
-    size: float
-    hole: float
-    tolerance: str = ""
-    how: str = ""
+    name: str  # of the part
+    place: Floats  # on its axis, mm, (3,)
+    along: Floats  # its axis, a unit vector, (3,)
+    size: float  # its diameter, mm
+    hole: float  # diameter of the hole that it is made for, mm
+    tolerance: str = ""  # of its diameter, such as h6; empty where none is known
+    how: str = ""  # it is held
+    # tolerance that its hole is reamed to, such as H7; empty where it stays as printed
     reamed: str = ""
 
 
@@ -166,25 +150,15 @@ def _cells(hole: DrawnHole, mate: Mate) -> Row:
 
 @dataclass(frozen=True)
 class ListedSeat:
-    """A seat.
+    """A seat."""
 
-    Attributes:
-        number: of its ball.
-        takes: what lies in it.
-        radius: of the body's sphere, mm.
-        centre: of that, mm, (3,).
-        axis: of the seat, a unit vector, (3,).
-        contacts: with the pads, mm, (3, 3).
-        pad: diameter of the pads, mm.
-    """
-
-    number: int
-    takes: str
-    radius: float
-    centre: Floats
-    axis: Floats
-    contacts: Floats
-    pad: float
+    number: int  # of its ball
+    takes: str  # what lies in it
+    radius: float  # of the body's sphere, mm
+    centre: Floats  # of that, mm, (3,)
+    axis: Floats  # of the seat, a unit vector, (3,)
+    contacts: Floats  # with the pads, mm, (3, 3)
+    pad: float  # diameter of the pads, mm
 
 
 def seats_table(shape: Shape, seats: Sequence[ListedSeat]) -> SheetTable:

@@ -19,21 +19,14 @@ PARALLEL_COS, NEAR_MM, SAME_MM = 1 - 1e-6, 0.1, 1e-3
 
 @dataclass(frozen=True)
 class DrawnHole:
-    """A hole or slot.
+    """A hole or slot."""
 
-    Attributes:
-        cylinder: its wall; of a slot one end's.
-        mouth: middle of its end toward the eye, mm, (3,).
-        view: letter of the view in which it is round, or else the nearest to that.
-        slot: from the middle of the slot's end to that of the other, mm, (3,); zero for a hole.
-        takes: name of the part that goes in, empty where none does.
-    """
-
-    cylinder: RoundFace
-    mouth: Floats
-    view: str
+    cylinder: RoundFace  # its wall; of a slot one end's
+    mouth: Floats  # middle of its end toward the eye, mm, (3,)
+    view: str  # letter of the view in which it is round, or else the nearest to that
+    # from the middle of the slot's end to that of the other, mm, (3,); zero for a hole
     slot: Floats
-    takes: str
+    takes: str  # name of the part that goes in, empty where none does
 
     @property
     def is_tilted(self) -> bool:

@@ -43,23 +43,14 @@ SCALES_NOTE = "In the plane y = 0, x to the right, z up; all is to scale."
 
 @dataclass(frozen=True)
 class LayoutMirrors:
-    """Mirrors of camera a whose directions are in the plane y = 0, by their angle.
+    """Mirrors of camera a whose directions are in the plane y = 0, by their angle."""
 
-    Attributes:
-        apex: x and z, mm, (m, 2).
-        centre: x and z of the sphere, mm, (m, 2).
-        radius: mm, (m,); PLANAR_MM for planar ones.
-        direction: x and z of u, (m, 2).
-        theta: theta_0 and theta_1, deg, (m, 2).
-        ids: numbers of the mirrors.
-    """
-
-    apex: Floats
-    centre: Floats
-    radius: Floats
-    direction: Floats
-    theta: Floats
-    ids: tuple[str, ...]
+    apex: Floats  # x and z, mm, (m, 2)
+    centre: Floats  # x and z of the sphere, mm, (m, 2)
+    radius: Floats  # mm, (m,); PLANAR_MM for planar ones
+    direction: Floats  # x and z of u, (m, 2)
+    theta: Floats  # theta_0 and theta_1, deg, (m, 2)
+    ids: tuple[str, ...]  # numbers of the mirrors
 
     def edges(self) -> Floats:
         """Where neighbours' circles meet, nearest to their apices, mm, (m - 1, 2)."""

@@ -57,17 +57,11 @@ SAME_MM = 0.01
 
 @dataclass(frozen=True)
 class PartText:
-    """What a part's sheets say besides its shape.
+    """What a part's sheets say besides its shape."""
 
-    Attributes:
-        name: of the files.
-        block: title block, its sheet open.
-        notes: lines.
-    """
-
-    name: str
-    block: TitleBlock
-    notes: tuple[str, ...]
+    name: str  # of the files
+    block: TitleBlock  # title block, its sheet open
+    notes: tuple[str, ...]  # lines
 
 
 @dataclass(frozen=True)

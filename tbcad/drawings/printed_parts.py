@@ -33,27 +33,17 @@ AXES = {"axis": "axis of rotation, lowest face", "vertical": "axis of the stage,
 
 @dataclass(frozen=True)
 class PartJob:
-    """All that the sheets of a printed part follow from, to be sent to another process.
+    """All that the sheets of a printed part follow from, to be sent to another process."""
 
-    Attributes:
-        path: STEP file.
-        text: of the sheets; the note on the origin is added.
-        axes: what x, y and z become in the drawing, as rows, (3, 3).
-        lines: what may be the datum: its name, a point and a direction, in the drawing's frame.
-        origin: what the machine's origin becomes, (3,).
-        fasteners: that go into it, in the drawing's frame.
-        mates: what fits into its holes, likewise.
-        seats: that may be on it, likewise.
-    """
-
-    path: Path
-    text: PartText
-    axes: Floats
-    origin: Floats
+    path: Path  # STEP file
+    text: PartText  # of the sheets; the note on the origin is added
+    axes: Floats  # what x, y and z become in the drawing, as rows, (3, 3)
+    origin: Floats  # what the machine's origin becomes, (3,)
+    # what may be the datum: its name, a point and a direction, in the drawing's frame
     lines: tuple[tuple[str, Floats, Floats], ...]
-    fasteners: tuple[Fastener, ...]
-    mates: tuple[Mate, ...] = ()
-    seats: tuple[ListedSeat, ...] = ()
+    fasteners: tuple[Fastener, ...]  # that go into it, in the drawing's frame
+    mates: tuple[Mate, ...] = ()  # what fits into its holes, likewise
+    seats: tuple[ListedSeat, ...] = ()  # that may be on it, likewise
 
 
 def part_job(export: DrawnExport, part: PrintedPartRecord) -> PartJob:

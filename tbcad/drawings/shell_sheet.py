@@ -34,19 +34,12 @@ UP_DEG = 45.0
 
 @dataclass(frozen=True)
 class ShellJob:
-    """What the sheet of a shell follows from.
+    """What the sheet of a shell follows from."""
 
-    Attributes:
-        path: STEP file.
-        block: title block.
-        notes: lines.
-        name: of the shell.
-    """
-
-    path: Path
-    block: TitleBlock
-    notes: tuple[str, ...]
-    name: str
+    path: Path  # STEP file
+    block: TitleBlock  # title block
+    notes: tuple[str, ...]  # lines
+    name: str  # of the shell
 
 
 def shell_job(export: DrawnExport, name: str) -> ShellJob:

@@ -23,21 +23,13 @@ OPTICAL_LAYOUT, ASSEMBLY = "optical_layout", "assembly"
 
 @dataclass(frozen=True)
 class WrittenSheet:
-    """A sheet that was written.
+    """A sheet that was written."""
 
-    Attributes:
-        name: of its files.
-        title: in its title block.
-        part: that it shows.
-        paper: A3 or A4.
-        scale: such as 1:2; None where nothing is to scale.
-    """
-
-    name: str
-    title: str
-    part: str
-    paper: str
-    scale: str | None
+    name: str  # of its files
+    title: str  # in its title block
+    part: str  # that it shows
+    paper: str  # A3 or A4
+    scale: str | None  # such as 1:2; None where nothing is to scale
 
     @property
     def files(self) -> list[str]:
@@ -47,17 +39,11 @@ class WrittenSheet:
 
 @dataclass(frozen=True)
 class Job:
-    """Sheets that one process draws.
+    """Sheets that one process draws."""
 
-    Attributes:
-        name: of the part, or of what is drawn.
-        draw: function of a module.
-        arguments: of it.
-    """
-
-    name: str
-    draw: Callable[..., list[Sheet]]
-    arguments: tuple[Any, ...]
+    name: str  # of the part, or of what is drawn
+    draw: Callable[..., list[Sheet]]  # function of a module
+    arguments: tuple[Any, ...]  # of it
 
 
 def write_drawings(

@@ -28,25 +28,15 @@ COUNT = np.dtype("<u8")
 
 @dataclass(frozen=True)
 class SparseModel:
-    """m images, each of its own pinhole camera, and n points without matched features.
+    """m images, each of its own pinhole camera, and n points without matched features."""
 
-    Attributes:
-        names: of the image files, (m,).
-        size_px: columns and rows of every image.
-        intrinsics: focal lengths in x and y, principal point in x and y, pixels, (m, 4).
-        rotation: from world to camera, (m, 3, 3).
-        centre: of the cameras, in the world, (m, 3).
-        points: (n, 3).
-        colours: red, green, blue, (n, 3).
-    """
-
-    names: tuple[str, ...]
-    size_px: tuple[int, int]
-    intrinsics: Floats
-    rotation: Floats
-    centre: Floats
-    points: Floats
-    colours: Bytes
+    names: tuple[str, ...]  # of the image files, (m,)
+    size_px: tuple[int, int]  # columns and rows of every image
+    intrinsics: Floats  # focal lengths in x and y, principal point in x and y, pixels, (m, 4)
+    rotation: Floats  # from world to camera, (m, 3, 3)
+    centre: Floats  # of the cameras, in the world, (m, 3)
+    points: Floats  # (n, 3)
+    colours: Bytes  # red, green, blue, (n, 3)
 
     @property
     def quaternion(self) -> Floats:

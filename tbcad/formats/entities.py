@@ -67,23 +67,14 @@ class Polyline:
 
 @dataclass(frozen=True)
 class Text:
-    """A line of text.
+    """A line of text."""
 
-    Attributes:
-        layer: of it.
-        place: on the base line: its beginning, middle or end, as align says.
-        height: of capital letters.
-        text: what it says.
-        align: of the text to its place.
-        turn_deg: counterclockwise from the x axis.
-    """
-
-    layer: Layer
-    place: Point
-    height: float
-    text: str
-    align: Align = "left"
-    turn_deg: float = 0.0
+    layer: Layer  # of it
+    place: Point  # on the base line: its beginning, middle or end, as align says
+    height: float  # of capital letters
+    text: str  # what it says
+    align: Align = "left"  # of the text to its place
+    turn_deg: float = 0.0  # counterclockwise from the x axis
 
 
 Simple: TypeAlias = Line | Circle | Arc | Polyline | Text
@@ -100,30 +91,19 @@ class Measured(StrEnum):
 
 @dataclass(frozen=True)
 class Dimension:
-    """A dimension: what it measures, and how it is drawn.
+    """A dimension: what it measures, and how it is drawn."""
 
-    Attributes:
-        layer: of it.
-        kind: of it.
-        start: of what is measured, or the datum.
-        end: of what is measured.
-        line: where the dimension line meets the extension line from the end; of a running
-            dimension the end of its line, of a diameter that of its leader.
-        turn_deg: direction that is measured along, from the x axis: 0 or 90.
-        size: the number that is written.
-        form: of the text, with <> for the number.
-        drawn: lines, arrows and text.
-    """
-
-    layer: Layer
-    kind: Measured
-    start: Point
-    end: Point
+    layer: Layer  # of it
+    kind: Measured  # of it
+    start: Point  # of what is measured, or the datum
+    end: Point  # of what is measured
+    # where the dimension line meets the extension line from the end; of a running dimension the end
+    # of its line, of a diameter that of its leader
     line: Point
-    turn_deg: float
-    size: str
-    form: str
-    drawn: tuple[Simple, ...]
+    turn_deg: float  # direction that is measured along, from the x axis: 0 or 90
+    size: str  # the number that is written
+    form: str  # of the text, with <> for the number
+    drawn: tuple[Simple, ...]  # lines, arrows and text
 
     @property
     def measured(self) -> float:

@@ -54,22 +54,17 @@ RADIUS = XCAFDimTolObjects_DimensionType.XCAFDimTolObjects_DimensionType_Size_Sp
 
 @dataclass(frozen=True)
 class FaceTolerances:
-    """What some faces of a solid may be off.
+    """What some faces of a solid may be off."""
 
-    Attributes:
-        datums: name of each datum ("A" ...) and its face, in the order of their precedence.
-        flatness: of faces, mm.
-        profile: width of the zone about each face, in the frame of all datums, mm.
-        common_profile: the same for each of some faces that have one zone's width in common, mm.
-        radius: of spherical faces and what it may be off either way, mm.
-        notes: what each is about, and its text.
-    """
-
+    # name of each datum ("A" ...) and its face, in the order of their precedence
     datums: Mapping[str, str]
-    flatness: Mapping[str, float]
+    flatness: Mapping[str, float]  # of faces, mm
+    # width of the zone about each face, in the frame of all datums, mm
     profile: Mapping[str, float]
+    # of spherical faces and what it may be off either way, mm
     radius: Mapping[str, tuple[float, float]]
-    notes: Mapping[str, str]
+    notes: Mapping[str, str]  # what each is about, and its text
+    # the same for each of some faces that have one zone's width in common, mm
     common_profile: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
 
@@ -198,23 +193,15 @@ def _entity(pattern: str, text: str) -> str:
 
 @dataclass(frozen=True)
 class ReadTolerance:
-    """A tolerance or dimension as a reader of the file gets it.
+    """A tolerance or dimension as a reader of the file gets it."""
 
-    Attributes:
-        kind: "flatness", "profile" or "radius".
-        value: width of the zone, or what the radius may be off, mm.
-        centre: of the sphere that its face is on, mm; None on other faces.
-        planes: that its faces are on, a point (mm) and a unit normal each, either way.
-        datums: names of the datums of its frame, in their order.
-        nominal: radius, mm; 0 for tolerances.
-    """
-
-    kind: str
-    value: float
-    centre: Triple | None
+    kind: str  # "flatness", "profile" or "radius"
+    value: float  # width of the zone, or what the radius may be off, mm
+    centre: Triple | None  # of the sphere that its face is on, mm; None on other faces
+    # that its faces are on, a point (mm) and a unit normal each, either way
     planes: tuple[tuple[Triple, Triple], ...] = ()
-    datums: tuple[str, ...] = ()
-    nominal: float = 0.0
+    datums: tuple[str, ...] = ()  # names of the datums of its frame, in their order
+    nominal: float = 0.0  # radius, mm; 0 for tolerances
 
 
 def read_tolerances(path: Path) -> list[ReadTolerance]:

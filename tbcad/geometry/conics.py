@@ -18,17 +18,11 @@ SUPPORT_SAMPLES = 1001
 
 @dataclass(frozen=True)
 class Ellipse:
-    """The points centre + cos(t) major + sin(t) minor.
+    """The points centre + cos(t) major + sin(t) minor."""
 
-    Attributes:
-        centre: mm, (3,).
-        major: semi-major axis vector, mm, (3,).
-        minor: semi-minor axis vector, mm, (3,), perpendicular to it.
-    """
-
-    centre: Floats
-    major: Floats
-    minor: Floats
+    centre: Floats  # mm, (3,)
+    major: Floats  # semi-major axis vector, mm, (3,)
+    minor: Floats  # semi-minor axis vector, mm, (3,), perpendicular to it
 
     def at(self, t: ArrayLike) -> Floats:
         """Points (..., 3) at parameters t (...), radians."""
@@ -88,15 +82,10 @@ class EllipseArc:
 
 @dataclass(frozen=True)
 class Spheroid:
-    """The spheroid outside an ellipsoid with the same centre and axis, both semi-axes longer.
+    """The spheroid outside an ellipsoid with the same centre and axis, both semi-axes longer."""
 
-    Attributes:
-        ellipsoid: the optical ellipsoid.
-        offset: added to both semi-axes, mm.
-    """
-
-    ellipsoid: Ellipsoid
-    offset: float
+    ellipsoid: Ellipsoid  # the optical ellipsoid
+    offset: float  # added to both semi-axes, mm
 
     @property
     def centre(self) -> Floats:

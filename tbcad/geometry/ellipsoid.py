@@ -10,15 +10,10 @@ from tbcad.types import Floats
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """Prolate ellipsoid of revolution with one focus at the origin (DESIGN.md section 2).
+    """Prolate ellipsoid of revolution with one focus at the origin (DESIGN.md section 2)."""
 
-    Attributes:
-        pinhole: second focus, the camera's pinhole, mm, shape (3,).
-        semi_minor: b, mm.
-    """
-
-    pinhole: Floats
-    semi_minor: float
+    pinhole: Floats  # second focus, the camera's pinhole, mm, shape (3,)
+    semi_minor: float  # b, mm
 
     @property
     def linear_eccentricity(self) -> float:

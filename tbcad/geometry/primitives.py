@@ -49,19 +49,12 @@ class Revolved:
 
 @dataclass(frozen=True)
 class Slot:
-    """A prism between two half cylinders, in which a screw can be moved.
+    """A prism between two half cylinders, in which a screw can be moved."""
 
-    Attributes:
-        middle: of the near face, mm, (3,).
-        step: vector to the middle of one end, mm, (3,).
-        radius: of the ends, mm.
-        along: vector from the near face to the far one, across the step, mm, (3,).
-    """
-
-    middle: Floats
-    step: Floats
-    radius: float
-    along: Floats
+    middle: Floats  # of the near face, mm, (3,)
+    step: Floats  # vector to the middle of one end, mm, (3,)
+    radius: float  # of the ends, mm
+    along: Floats  # vector from the near face to the far one, across the step, mm, (3,)
 
 
 Primitive: TypeAlias = Cylinder | Prism | Revolved | Slot
@@ -69,25 +62,16 @@ Primitive: TypeAlias = Cylinder | Prism | Revolved | Slot
 
 @dataclass(frozen=True)
 class Component:
-    """A part in its place, in the frame of the shell.
+    """A part in its place, in the frame of the shell."""
 
-    Attributes:
-        name: of the part.
-        what: what it is, for lists of parts.
-        added: primitives it is the union of.
-        removed: primitives that are cut out of it.
-        downs: unit directions (3,) that may point down when it is printed; none: it is bought.
-        part: its name in the lists of purchased parts; None: it is printed.
-        rotates: whether it rotates with the base.
-    """
-
-    name: str
-    what: str
-    added: tuple[Primitive, ...]
-    removed: tuple[Primitive, ...] = ()
+    name: str  # of the part
+    what: str  # what it is, for lists of parts
+    added: tuple[Primitive, ...]  # primitives it is the union of
+    removed: tuple[Primitive, ...] = ()  # primitives that are cut out of it
+    # unit directions (3,) that may point down when it is printed; none: it is bought
     downs: tuple[Floats, ...] = ()
-    part: str | None = None
-    rotates: bool = False
+    part: str | None = None  # its name in the lists of purchased parts; None: it is printed
+    rotates: bool = False  # whether it rotates with the base
 
 
 def cylinder_between(start: Floats, end: Floats, radius: float) -> Cylinder:

@@ -15,19 +15,12 @@ from tbcad.types import Floats
 
 @dataclass(frozen=True)
 class RoundCones:
-    """Hulls of two spheres each, centres in a half-plane at the axis, over m of them.
+    """Hulls of two spheres each, centres in a half-plane at the axis, over m of them."""
 
-    Attributes:
-        start: centre of one sphere, along the axis and out from it (>= 0), mm, (m, 2).
-        end: centre of the other, mm, (m, 2).
-        start_radius: mm, (m,).
-        end_radius: mm, (m,).
-    """
-
-    start: Floats
-    end: Floats
-    start_radius: Floats
-    end_radius: Floats
+    start: Floats  # centre of one sphere, along the axis and out from it (>= 0), mm, (m, 2)
+    end: Floats  # centre of the other, mm, (m, 2)
+    start_radius: Floats  # mm, (m,)
+    end_radius: Floats  # mm, (m,)
 
     def __len__(self) -> int:
         """Number of hulls."""

@@ -33,33 +33,21 @@ OTHER_STREAM = 2000
 
 @dataclass(frozen=True)
 class BuiltPrototype:
-    """A prototype with its k bodies, which caps have beside their reflecting spheres.
-
-    Attributes:
-        body_centre: of the spheres in the seats at base angle zero, mm, (k, 3).
-        body_radius: mm, (k,).
-        walls: that end the mirrors of a shell; they do not turn with the base.
-    """
+    """A prototype with its k bodies, which caps have beside their reflecting spheres."""
 
     machine: Machine
-    body_centre: Floats
-    body_radius: Floats
-    walls: GrooveWalls = NO_WALLS
+    body_centre: Floats  # of the spheres in the seats at base angle zero, mm, (k, 3)
+    body_radius: Floats  # mm, (k,)
+    walls: GrooveWalls = NO_WALLS  # that end the mirrors of a shell; they do not turn with the base
 
 
 @dataclass(frozen=True)
 class OtherErrors:
-    """Errors that are no process's; see tbcad.machine.built.
+    """Errors that are no process's; see tbcad.machine.built."""
 
-    Attributes:
-        leds: mm, (l, 3).
-        distortion: k1, k2, p1, p2, k3, (5,).
-        principal: pixels, (2,).
-    """
-
-    leds: Floats
-    distortion: Floats
-    principal: Floats
+    leds: Floats  # mm, (l, 3)
+    distortion: Floats  # k1, k2, p1, p2, k3, (5,)
+    principal: Floats  # pixels, (2,)
 
 
 def designed_build(designed: Machine, plan: Plan) -> BuiltPrototype:

@@ -18,25 +18,16 @@ from tbcad.types import Floats, Ints
 
 @dataclass(frozen=True)
 class Machine:
-    """The state of a machine with k spheres, f frames and l LEDs.
-
-    Attributes:
-        axis: unit vector of the axis that the base rotates about, (3,).
-        axis_point: a point of the axis, mm, (3,).
-        angle: of the base in each frame, radians, (f,).
-        centre: of the reflecting spheres at base angle zero, mm, (k, 3).
-        radius: of the reflecting spheres, mm, (k,).
-        leds: where each LED shines from, mm, (l, 3).
-        shift: of the base in each frame, beside its rotation, mm, (f, 3); None for nowhere.
-    """
+    """The state of a machine with k spheres, f frames and l LEDs."""
 
     camera: LensCamera
-    axis: Floats
-    axis_point: Floats
-    angle: Floats
-    centre: Floats
-    radius: Floats
-    leds: Floats
+    axis: Floats  # unit vector of the axis that the base rotates about, (3,)
+    axis_point: Floats  # a point of the axis, mm, (3,)
+    angle: Floats  # of the base in each frame, radians, (f,)
+    centre: Floats  # of the reflecting spheres at base angle zero, mm, (k, 3)
+    radius: Floats  # of the reflecting spheres, mm, (k,)
+    leds: Floats  # where each LED shines from, mm, (l, 3)
+    # of the base in each frame, beside its rotation, mm, (f, 3); None for nowhere
     shift: Floats | None = None
 
     def centres(self, frame: Ints, sphere: Ints) -> Floats:
@@ -69,21 +60,13 @@ class Machine:
 
 @dataclass(frozen=True)
 class Highlights:
-    """Measured reflections of LEDs in spheres, over n of them.
+    """Measured reflections of LEDs in spheres, over n of them."""
 
-    Attributes:
-        frame: from 0, (n,).
-        sphere: from 0, (n,).
-        led: from 0, (n,).
-        pixel: column and row; whole numbers are pixel centres, (n, 2).
-        sigma: standard deviation of column and of row, pixels, (n,).
-    """
-
-    frame: Ints
-    sphere: Ints
-    led: Ints
-    pixel: Floats
-    sigma: Floats
+    frame: Ints  # from 0, (n,)
+    sphere: Ints  # from 0, (n,)
+    led: Ints  # from 0, (n,)
+    pixel: Floats  # column and row; whole numbers are pixel centres, (n, 2)
+    sigma: Floats  # standard deviation of column and of row, pixels, (n,)
 
     def __len__(self) -> int:
         return len(self.frame)

@@ -34,16 +34,11 @@ from tbcad.types import Bools, Floats, Ints, Progress
 
 @dataclass(frozen=True)
 class HalfMerge:
-    """One run of the base, for one camera of the shell.
+    """One run of the base, for one camera of the shell."""
 
-    Attributes:
-        run: where camera and balls are.
-        pixels: of each mirror with a ray, filled in as the merge goes on, (m,).
-    """
-
-    run: PrototypeRun
+    run: PrototypeRun  # where camera and balls are
     photographs: CorrectedPhotographs
-    pixels: Ints
+    pixels: Ints  # of each mirror with a ray, filled in as the merge goes on, (m,)
 
     @property
     def camera_id(self) -> str:
@@ -75,18 +70,13 @@ class HalfMerge:
 
 @dataclass(frozen=True)
 class Merge:
-    """Both runs of a folder, or the one that was photographed.
+    """Both runs of a folder, or the one that was photographed."""
 
-    Attributes:
-        halves: for each camera of the shell that photographs were taken for.
-        capture_mm: diameter of the capture sphere.
-        ray_sigma_mm: root mean square error of the rays of each mirror at the object, by camera;
-            None where the calibration does not say.
-    """
-
-    halves: tuple[HalfMerge, ...]
-    capture_mm: float
+    halves: tuple[HalfMerge, ...]  # for each camera of the shell that photographs were taken for
+    capture_mm: float  # diameter of the capture sphere
     facts: dict[str, Any]
+    # root mean square error of the rays of each mirror at the object, by camera; None where the
+    # calibration does not say
     ray_sigma_mm: dict[str, list[float | None]]
 
     def cameras(self, progress: Progress) -> CameraPhotographs:

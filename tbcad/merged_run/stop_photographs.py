@@ -29,14 +29,10 @@ FULL_LIGHT, LEAST_LIGHT = 0.99, 0.02
 
 @dataclass(frozen=True)
 class Corrections:
-    """Corrections of all photographs of a run.
-
-    Attributes:
-        gain: factor of each pixel's light, (h, w, 3) or (h, w, 1); None for one.
-    """
+    """Corrections of all photographs of a run."""
 
     encoding: Encoding
-    gain: Singles | None
+    gain: Singles | None  # factor of each pixel's light, (h, w, 3) or (h, w, 1); None for one
     brightness: float
 
     def light(self, image: Image16, pixel: Ints) -> Singles:
@@ -114,23 +110,18 @@ def _table(kind: np.dtype[np.uint8] | np.dtype[np.uint16], encoding: Encoding) -
 
 @dataclass(frozen=True)
 class CorrectedPhotographs:
-    """What the photographs of one run of the base show.
-
-    Attributes:
-        frames: of each stop; None where the run or the machine has none.
-        exposure_s: to which exposure times are brought; None where they are unknown.
-        missing: for each stop without a photograph, from 0, why; filled as they are read.
-        without_dark: names of photographs whose dark one is missing or exposed too short to be
-            subtracted; filled as they are read.
-        dark_scaled: names of those whose dark one had another exposure, and was scaled; likewise.
-    """
+    """What the photographs of one run of the base show."""
 
     run: Run
-    frames: tuple[Frame | None, ...]
+    frames: tuple[Frame | None, ...]  # of each stop; None where the run or the machine has none
     corrections: Corrections
-    exposure_s: float | None
+    exposure_s: float | None  # to which exposure times are brought; None where they are unknown
+    # for each stop without a photograph, from 0, why; filled as they are read
     missing: dict[int, str] = field(default_factory=dict)
+    # names of photographs whose dark one is missing or exposed too short to be subtracted; filled
+    # as they are read
     without_dark: list[str] = field(default_factory=list)
+    # names of those whose dark one had another exposure, and was scaled; likewise
     dark_scaled: list[str] = field(default_factory=list)
 
     @property

@@ -44,21 +44,15 @@ WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um")  # of mirrors on pedestals
 
 @dataclass(frozen=True)
 class Half:
-    """One half of the shell, as its solid is.
+    """One half of the shell, as its solid is."""
 
-    Attributes:
-        name: of its solid, "shell_a".
-        surfaces: of the solid, below the coat.
-        dowel_mm: diameter of the holes for dowel pins.
-        walls: of each mirror's pedestal: names of the faces, with a point (mm) and the normal of
-            their planes, (6,); none where spheres meet.
-    """
-
-    name: str
+    name: str  # of its solid, "shell_a"
     ids: tuple[str, ...]
-    surfaces: Surfaces
+    surfaces: Surfaces  # of the solid, below the coat
     limits: MirrorLimits
-    dowel_mm: float
+    dowel_mm: float  # diameter of the holes for dowel pins
+    # of each mirror's pedestal: names of the faces, with a point (mm) and the normal of their
+    # planes, (6,); none where spheres meet
     walls: tuple[dict[str, Floats], ...]
 
     @property

@@ -26,19 +26,12 @@ SEAT_STEP_UM = 10.0
 
 @dataclass(frozen=True)
 class Deviation:
-    """Deviations of all mirrors of one half, the apex being the point that stays in its place.
+    """Deviations of all mirrors of one half, the apex being the point that stays in its place."""
 
-    Attributes:
-        offset: of the apex along the normal, toward the light, micrometres, (..., m).
-        tilt: of the normal about two axes across it, mrad, (..., m, 2).
-        radius: by which the sphere is too large, its apex in place, mm, (..., m).
-        wall: of all walls of the mirror's pedestal out of it, micrometres, (..., m).
-    """
-
-    offset: Floats
-    tilt: Floats
-    radius: Floats
-    wall: Floats
+    offset: Floats  # of the apex along the normal, toward the light, micrometres, (..., m)
+    tilt: Floats  # of the normal about two axes across it, mrad, (..., m, 2)
+    radius: Floats  # by which the sphere is too large, its apex in place, mm, (..., m)
+    wall: Floats  # of all walls of the mirror's pedestal out of it, micrometres, (..., m)
 
     @classmethod
     def none(cls, builds: int, mirrors: int) -> "Deviation":
@@ -87,22 +80,15 @@ def independent_classes(neighbours: list[Ints]) -> Ints:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Coverage that k pairs of a virtual camera and a mirror lose for a deviation of the mirror.
+    """Coverage that k pairs of a virtual camera and a mirror lose for a deviation of the mirror."""
 
-    Attributes:
-        camera: number of the virtual camera, (k,).
-        mirror: number of the mirror, a's first, (k,).
-        loss: by each kind of deviation that there is, in the worse sense: offset (mm/um), tilt
-            (mm/mrad), radius (mm/mm), and of pedestals the walls (mm/um), (k, kinds).
-        seat: lost when both halves sit wrong by a micrometre, mm/um, (v,).
-        coverage: of each virtual camera as designed, mm, (v,).
-    """
-
-    camera: Ints
-    mirror: Ints
+    camera: Ints  # number of the virtual camera, (k,)
+    mirror: Ints  # number of the mirror, a's first, (k,)
+    # by each kind of deviation that there is, in the worse sense: offset (mm/um), tilt (mm/mrad),
+    # radius (mm/mm), and of pedestals the walls (mm/um), (k, kinds)
     loss: Floats
-    seat: Floats
-    coverage: Floats
+    seat: Floats  # lost when both halves sit wrong by a micrometre, mm/um, (v,)
+    coverage: Floats  # of each virtual camera as designed, mm, (v,)
 
     def total(self, power: int = 1) -> Floats:
         """Sum over a virtual camera's mirrors of the powers of its losses, (v, kinds)."""

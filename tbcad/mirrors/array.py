@@ -112,15 +112,10 @@ class MirrorArray:
 
 @dataclass(frozen=True)
 class MirrorDesign:
-    """The mirrors of both cameras.
+    """The mirrors of both cameras."""
 
-    Attributes:
-        spec: that they follow from, with the angle of view that was chosen.
-        arrays: camera a's mirrors (x >= 0) and camera b's (x <= 0).
-    """
-
-    spec: Spec
-    arrays: tuple[MirrorArray, MirrorArray]
+    spec: Spec  # that they follow from, with the angle of view that was chosen
+    arrays: tuple[MirrorArray, MirrorArray]  # camera a's mirrors (x >= 0) and camera b's (x <= 0)
 
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:

@@ -30,27 +30,17 @@ NAMED_MIRRORS = 5
 
 @dataclass(frozen=True)
 class RadiusProblem:
-    """What a radius rule starts from: poses, bounding planes and a first dual triangulation.
+    """What a radius rule starts from: poses, bounding planes and a first dual triangulation."""
 
-    Attributes:
-        mirrors: surfaces with the curvatures of eq. 2, zero or less where flat is enough, (m,).
-        planes: the seam and the foot plane.
-        triangles: dual triangulation, (t, 3).
-        pinhole: of the camera, mm, (3,).
-        min_curvature: smallest curvature a sphere may have, 1/mm, (m,).
-        diameter: of the capture sphere, mm.
-        margin: that the rule traced adds to it for each mirror, mm, (m,).
-        groove: width of the grooves between mirrors on pedestals, mm; None: neighbouring spheres
-            meet.
-    """
-
+    # surfaces with the curvatures of eq. 2, zero or less where flat is enough, (m,).
     mirrors: Surfaces
-    planes: Surfaces
-    triangles: Ints
-    pinhole: Floats
-    min_curvature: Floats
-    diameter: float
-    margin: Floats
+    planes: Surfaces  # the seam and the foot plane
+    triangles: Ints  # dual triangulation, (t, 3)
+    pinhole: Floats  # of the camera, mm, (3,)
+    min_curvature: Floats  # smallest curvature a sphere may have, 1/mm, (m,)
+    diameter: float  # of the capture sphere, mm
+    margin: Floats  # that the rule traced adds to it for each mirror, mm, (m,)
+    # width of the grooves between mirrors on pedestals, mm; None: neighbouring spheres meet
     groove: float | None = None
 
     @property

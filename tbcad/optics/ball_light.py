@@ -39,17 +39,11 @@ BISECTIONS = 50
 
 @dataclass(frozen=True)
 class BallPoses:
-    """Balls in the half-plane of azimuth zero, over k of them.
+    """Balls in the half-plane of azimuth zero, over k of them."""
 
-    Attributes:
-        polar: polar angles about the axis, radians, (k,).
-        apex: points on the ellipsoid, mm, (k, 3), the third zero.
-        normal: inward unit normals there, (k, 3), the third zero.
-    """
-
-    polar: Floats
-    apex: Floats
-    normal: Floats
+    polar: Floats  # polar angles about the axis, radians, (k,)
+    apex: Floats  # points on the ellipsoid, mm, (k, 3), the third zero
+    normal: Floats  # inward unit normals there, (k, 3), the third zero
 
 
 def ball_poses(ellipsoid: Ellipsoid, polar: Floats) -> BallPoses:

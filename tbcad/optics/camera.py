@@ -23,23 +23,14 @@ ROOT_ROUNDING = 1e-9  # imaginary part of a real root of a polynomial
 
 @dataclass(frozen=True)
 class Camera:
-    """Pinhole camera with square pixels.
+    """Pinhole camera with square pixels."""
 
-    Attributes:
-        pinhole: mm, (3,).
-        forward: unit vector along the optical axis, (3,).
-        right: unit vector along the rows, (3,); down the columns is forward x right.
-        width_px: columns.
-        height_px: rows.
-        hfov: angle of view across the columns, radians.
-    """
-
-    pinhole: Floats
-    forward: Floats
-    right: Floats
-    width_px: int
-    height_px: int
-    hfov: float
+    pinhole: Floats  # mm, (3,)
+    forward: Floats  # unit vector along the optical axis, (3,)
+    right: Floats  # unit vector along the rows, (3,); down the columns is forward x right
+    width_px: int  # columns
+    height_px: int  # rows
+    hfov: float  # angle of view across the columns, radians
 
     @property
     def half_sizes(self) -> Floats:
@@ -136,25 +127,15 @@ def fitting_view_angle_deg(pinhole: Floats, points: Floats, width_px: int, heigh
 
 @dataclass(frozen=True)
 class LensCamera:
-    """Camera whose lens distorts as OpenCV's model says (calib3d, "Detailed Description").
+    """Camera whose lens distorts as OpenCV's model says (calib3d, "Detailed Description")."""
 
-    Attributes:
-        pinhole: mm, (3,).
-        axes: rows: unit vectors along the rows, down the columns, and forward, (3, 3).
-        focal: focal lengths along rows and columns, pixels, (2,).
-        principal: column and row of the optical axis; whole numbers are pixel centres, (2,).
-        distortion: k1, k2, p1, p2, k3, (5,).
-        width_px: columns.
-        height_px: rows.
-    """
-
-    pinhole: Floats
-    axes: Floats
-    focal: Floats
-    principal: Floats
-    distortion: Floats
-    width_px: int
-    height_px: int
+    pinhole: Floats  # mm, (3,)
+    axes: Floats  # rows: unit vectors along the rows, down the columns, and forward, (3, 3)
+    focal: Floats  # focal lengths along rows and columns, pixels, (2,)
+    principal: Floats  # column and row of the optical axis; whole numbers are pixel centres, (2,)
+    distortion: Floats  # k1, k2, p1, p2, k3, (5,)
+    width_px: int  # columns
+    height_px: int  # rows
 
     def project(self, points: Floats) -> Floats:
         """Column and row (..., 2) where points (..., 3) appear."""

@@ -21,21 +21,13 @@ PARAMETER, STEP = (NODES + 1) / 2, WEIGHTS / 2  # from 0 to 1
 
 @dataclass(frozen=True)
 class CellMoments:
-    """Integrals over m cells on spheres, with n the unit normal away from the sphere's centre.
+    """Integrals over m cells on spheres, with n the unit normal away from the sphere's centre."""
 
-    Attributes:
-        centre: of the sphere from the origin, mm, (m, 3).
-        radius: mm, (m,).
-        area: integral of 1, mm^2, (m,).
-        first: integral of n, mm^2, (m, 3).
-        second: integral of n n^T, mm^2, (m, 3, 3).
-    """
-
-    centre: Floats
-    radius: Floats
-    area: Floats
-    first: Floats
-    second: Floats
+    centre: Floats  # of the sphere from the origin, mm, (m, 3)
+    radius: Floats  # mm, (m,)
+    area: Floats  # integral of 1, mm^2, (m,)
+    first: Floats  # integral of n, mm^2, (m, 3)
+    second: Floats  # integral of n n^T, mm^2, (m, 3, 3)
 
     @property
     def volume(self) -> float:

@@ -23,16 +23,11 @@ class Cells:
 
     Faces are the m mirrors, then the seam and the foot plane. Three faces meet at every corner;
     where four cells meet in one point two corners coincide.
-
-    Attributes:
-        surfaces: the m mirrors and the two planes.
-        triangles: the three faces at each corner, counter-clockwise from outside, (t, 3).
-        corners: points, mm, (t, 3).
     """
 
-    surfaces: Surfaces
-    triangles: Ints
-    corners: Floats
+    surfaces: Surfaces  # the m mirrors and the two planes
+    triangles: Ints  # the three faces at each corner, counter-clockwise from outside, (t, 3)
+    corners: Floats  # points, mm, (t, 3)
 
     @property
     def mirrors(self) -> int:
@@ -84,25 +79,16 @@ class Cells:
 
 @dataclass(frozen=True)
 class Arcs:
-    """Circular arcs as rational quadratic curves, which hold straight lines too, over e arcs.
+    """Circular arcs as rational quadratic curves, which hold straight lines too, over e arcs."""
 
-    Attributes:
-        left: face that has the arc counter-clockwise (from outside) from start to end, (e,).
-        right: the other face, (e,).
-        start: corner indices, (e,).
-        end: corner indices, (e,).
-        points: start, control and end points, mm, (e, 3, 3).
-        weight: weight of the control point, the cosine of half the arc's angle, (e,).
-        side_of_half_edge: for each directed edge of the dual triangulation 2 a or 2 a + 1 for
-            arc a forward or back; -1 between the two planes and where corners were merged.
-    """
-
-    left: Ints
-    right: Ints
-    start: Ints
-    end: Ints
-    points: Floats
-    weight: Floats
+    left: Ints  # face that has the arc counter-clockwise (from outside) from start to end, (e,)
+    right: Ints  # the other face, (e,)
+    start: Ints  # corner indices, (e,)
+    end: Ints  # corner indices, (e,)
+    points: Floats  # start, control and end points, mm, (e, 3, 3)
+    weight: Floats  # weight of the control point, the cosine of half the arc's angle, (e,)
+    # for each directed edge of the dual triangulation 2 a or 2 a + 1 for arc a forward or back; -1
+    # between the two planes and where corners were merged
     side_of_half_edge: Ints
 
     def __len__(self) -> int:

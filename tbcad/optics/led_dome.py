@@ -23,21 +23,14 @@ RINGS, SPOKES = 5, 16  # of samples of a dome
 
 @dataclass(frozen=True)
 class DomeImages:
-    """The images of domes in spheres, over n of them.
+    """The images of domes in spheres, over n of them."""
 
-    Attributes:
-        place: column and row of the dome's centre, (n, 2).
-        direction: unit vectors from the pinhole in which it appears, (n, 3).
-        centroid: of the lit part's image, from there, pixels, (n, 2).
-        spread: mean square of the lit part's image about its centroid, square pixels, (n, 2, 2).
-        area: of the lit part's image, square pixels, (n,).
-    """
-
-    place: Floats
-    direction: Floats
-    centroid: Floats
+    place: Floats  # column and row of the dome's centre, (n, 2)
+    direction: Floats  # unit vectors from the pinhole in which it appears, (n, 3)
+    centroid: Floats  # of the lit part's image, from there, pixels, (n, 2)
+    # mean square of the lit part's image about its centroid, square pixels, (n, 2, 2)
     spread: Floats
-    area: Floats
+    area: Floats  # of the lit part's image, square pixels, (n,)
 
 
 @dataclass(frozen=True)

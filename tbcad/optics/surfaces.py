@@ -18,17 +18,11 @@ from tbcad.types import Floats, Ints
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Mirror surfaces (and bounding planes) as arrays over m of them.
+    """Mirror surfaces (and bounding planes) as arrays over m of them."""
 
-    Attributes:
-        apex: points P on the surfaces, mm, (m, 3).
-        normal: unit normals N at the apices toward the light, (m, 3).
-        curvature: k = 1 / r >= 0, 1/mm, (m,).
-    """
-
-    apex: Floats
-    normal: Floats
-    curvature: Floats
+    apex: Floats  # points P on the surfaces, mm, (m, 3)
+    normal: Floats  # unit normals N at the apices toward the light, (m, 3)
+    curvature: Floats  # k = 1 / r >= 0, 1/mm, (m,)
 
     def __len__(self) -> int:
         return len(self.curvature)

@@ -109,18 +109,12 @@ class Windows:
     A cell halved by the seam has no side there: the other half belongs to the other camera and
     shows what this one does not. Windows can be rotated about axes through the pinhole, each by
     an axis (m, 3) of unit length and an angle (m,) in radians.
-
-    Attributes:
-        cells: of the m mirrors.
-        pinhole: mm, (3,).
-        mirror: mirror of each side, (e,).
-        arc: arc of each side, (e,).
     """
 
-    cells: Cells
-    pinhole: Floats
-    mirror: Ints
-    arc: Ints
+    cells: Cells  # of the m mirrors
+    pinhole: Floats  # mm, (3,)
+    mirror: Ints  # mirror of each side, (e,)
+    arc: Ints  # arc of each side, (e,)
 
     def only(self, mirrors: Bools) -> "Windows":
         """The sides of some mirrors (m,)."""

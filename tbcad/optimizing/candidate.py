@@ -33,36 +33,22 @@ Record: TypeAlias = dict[str, object]
 
 @dataclass(frozen=True)
 class Figures:
-    """What a design gives.
+    """What a design gives."""
 
-    Attributes:
-        minimum_px: pixels that show the capture sphere, of the virtual camera with fewest.
-        median_px: of all virtual cameras.
-        mean_log_px: mean of the natural logarithm of the pixels of all virtual cameras.
-        variation: standard deviation of the pixels over their mean.
-        size_mm: longest side of the box round all mirrors' apices and both pinholes.
-        view_angle_deg: that the lenses need, across the columns.
-        ssim: mean over the stated views; None where it was not measured.
-    """
-
-    minimum_px: float
-    median_px: float
-    mean_log_px: float
-    variation: float
-    size_mm: float
-    view_angle_deg: float
-    ssim: float | None = None
+    minimum_px: float  # pixels that show the capture sphere, of the virtual camera with fewest
+    median_px: float  # of all virtual cameras
+    mean_log_px: float  # mean of the natural logarithm of the pixels of all virtual cameras
+    variation: float  # standard deviation of the pixels over their mean
+    size_mm: float  # longest side of the box round all mirrors' apices and both pinholes
+    view_angle_deg: float  # that the lenses need, across the columns
+    ssim: float | None = None  # mean over the stated views; None where it was not measured
 
 
 @dataclass(frozen=True)
 class MachineLimits:
-    """What a candidate may need at most.
+    """What a candidate may need at most."""
 
-    Attributes:
-        size_mm: longest side of the machine.
-    """
-
-    size_mm: float
+    size_mm: float  # longest side of the machine
     view_angle_deg: float
 
     def excess(self, figures: Figures) -> float:
@@ -74,16 +60,11 @@ class MachineLimits:
 
 @dataclass(frozen=True)
 class DesignCandidate:
-    """A place and what it gives.
-
-    Attributes:
-        figures: None where it cannot be made.
-        reason: why it cannot, in one line.
-    """
+    """A place and what it gives."""
 
     place: Place
-    figures: Figures | None
-    reason: str = ""
+    figures: Figures | None  # None where it cannot be made
+    reason: str = ""  # why it cannot, in one line
 
 
 def place_of(spec: Spec) -> Place:

@@ -50,17 +50,13 @@ LOSSES: dict[Objective, Callable[[Figures], float]] = {
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a search found.
-
-    Attributes:
-        candidates: all that were judged, in the order in which they were.
-        on_front: which of them no other one that keeps the limits betters in all objectives.
-    """
+    """What a search found."""
 
     start: DesignCandidate
     limits: MachineLimits
     best: DesignCandidate
-    candidates: tuple[DesignCandidate, ...]
+    candidates: tuple[DesignCandidate, ...]  # all that were judged, in the order in which they were
+    # which of them no other one that keeps the limits betters in all objectives
     on_front: tuple[bool, ...]
 
 

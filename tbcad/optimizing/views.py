@@ -36,15 +36,11 @@ _one_at_a_time = Lock()  # candidates that begin together share the truth
 
 @dataclass(frozen=True)
 class Truth:
-    """What real cameras would see of the built-in object.
-
-    Attributes:
-        pictures: from each, (h, w, 3).
-    """
+    """What real cameras would see of the built-in object."""
 
     scene: Scene
     cameras: list[Camera]
-    pictures: list[Bytes]
+    pictures: list[Bytes]  # from each, (h, w, 3)
 
 
 def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:

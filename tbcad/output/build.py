@@ -27,17 +27,11 @@ from tbcad.types import Progress
 
 @dataclass(frozen=True)
 class Export:
-    """What was written.
+    """What was written."""
 
-    Attributes:
-        spec: the design's, with a value for every key that was chosen on the way.
-        parts: some of PARTS.
-        note: why a part was left out, or cannot be used in every way; empty otherwise.
-    """
-
-    spec: Spec
-    parts: tuple[str, ...]
-    note: str = ""
+    spec: Spec  # the design's, with a value for every key that was chosen on the way
+    parts: tuple[str, ...]  # some of PARTS
+    note: str = ""  # why a part was left out, or cannot be used in every way; empty otherwise
 
 
 def write_export(

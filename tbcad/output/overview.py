@@ -31,77 +31,45 @@ MM3_PER_CM3 = 1000.0
 
 @dataclass(frozen=True)
 class PrintEstimate:
-    """An estimate of what is printed.
+    """An estimate of what is printed."""
 
-    Attributes:
-        volume_cm3: of the solids.
-        mass_g: of the filament.
-        hours: on an FDM printer.
-        price: of the filament by the spec's list of prices, by currency; empty without one.
-    """
-
-    volume_cm3: float
-    mass_g: float
-    hours: float
+    volume_cm3: float  # of the solids
+    mass_g: float  # of the filament
+    hours: float  # on an FDM printer
+    # of the filament by the spec's list of prices, by currency; empty without one
     price: dict[str, float]
 
 
 @dataclass(frozen=True)
 class PrototypeOverview:
-    """A prototype before its solids.
+    """A prototype before its solids."""
 
-    Attributes:
-        balls: bought, number.
-        caps: to be made, number.
-        stops: number.
-        swing_deg: of the base.
-        minimum_coverage_mm: diameter that every mirror's ball shows.
-        kept_share: of the shell's pixels.
-        ball_mass_g: of the bought balls.
-        ball_price: of the bought balls, by currency.
-        turning_mass_g: of all that turns with the base.
-        motor: part of the drive.
-        prints: carrier, caps, stage and frame, without the coupon.
-    """
-
-    balls: int
-    caps: int
-    stops: int
-    swing_deg: float
-    minimum_coverage_mm: float
-    kept_share: float
-    ball_mass_g: float
-    ball_price: dict[str, float]
-    turning_mass_g: float
-    motor: str
-    prints: PrintEstimate
+    balls: int  # bought, number
+    caps: int  # to be made, number
+    stops: int  # number
+    swing_deg: float  # of the base
+    minimum_coverage_mm: float  # diameter that every mirror's ball shows
+    kept_share: float  # of the shell's pixels
+    ball_mass_g: float  # of the bought balls
+    ball_price: dict[str, float]  # of the bought balls, by currency
+    turning_mass_g: float  # of all that turns with the base
+    motor: str  # part of the drive
+    prints: PrintEstimate  # carrier, caps, stage and frame, without the coupon
 
 
 @dataclass(frozen=True)
 class Overview:
-    """What a build would give.
+    """What a build would give."""
 
-    Attributes:
-        spec: the design's, with a value for every key that is chosen.
-        mirrors: number, of both cameras.
-        virtual_cameras: number; mirrors halved by the seam make one together.
-        radius_mm: minimum and maximum; None with planar mirrors.
-        minimum_coverage_mm: diameter that every mirror shows.
-        view_angle_deg: of the cameras' lenses, across the columns.
-        shell_prints: both halves; None without shells.
-        prototype: None without one.
-        note: why the prototype is left out; empty when it is not.
-    """
-
-    spec: Spec
-    mirrors: int
-    virtual_cameras: int
-    radius_mm: tuple[float, float] | None
-    minimum_coverage_mm: float
-    view_angle_deg: float
-    shell_prints: PrintEstimate | None
-    prototype: PrototypeOverview | None
-    note: str
+    spec: Spec  # the design's, with a value for every key that is chosen
+    mirrors: int  # number, of both cameras
+    virtual_cameras: int  # number; mirrors halved by the seam make one together
+    radius_mm: tuple[float, float] | None  # minimum and maximum; None with planar mirrors
+    minimum_coverage_mm: float  # diameter that every mirror shows
+    view_angle_deg: float  # of the cameras' lenses, across the columns
+    shell_prints: PrintEstimate | None  # both halves; None without shells
+    prototype: PrototypeOverview | None  # None without one
+    note: str  # why the prototype is left out; empty when it is not
 
 
 def overview(

@@ -52,39 +52,24 @@ OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 
 @dataclass(frozen=True)
 class PrototypeModel:
-    """A prototype: all its layouts, and its printed parts once they are built.
+    """A prototype: all its layouts, and its printed parts once they are built."""
 
-    Attributes:
-        spec: with a value for every key.
-        layout: balls, their places, the plan of the stops.
-        base: layout of the carrier.
-        split: how the carrier is cut to fit the bed.
-        balance: of what turns with the base; the carrier's mass is an estimate until it is built.
-        drive: that turns it.
-        keep_out: what static parts must keep out of.
-        stage: layout of the object stage.
-        wiring: of lamp and LEDs.
-        frame: layout of what holds stage, base and camera.
-        shroud: round the rig, None without.
-        parts: lists of purchased parts.
-        gauge: that shows where the camera's pinhole is; None without a camera, or unbuilt.
-        printed: all printed parts, when they are built.
-    """
-
-    spec: Spec
-    layout: PrototypeLayout
-    base: BaseLayout
-    split: BaseSplit
+    spec: Spec  # with a value for every key
+    layout: PrototypeLayout  # balls, their places, the plan of the stops
+    base: BaseLayout  # layout of the carrier
+    split: BaseSplit  # how the carrier is cut to fit the bed
+    # of what turns with the base; the carrier's mass is an estimate until it is built
     balance: BaseBalance
-    drive: Drive
-    keep_out: KeepOut
-    stage: StageLayout
-    wiring: Wiring
-    frame: FrameLayout
-    shroud: ShroudLayout | None
-    parts: Parts
+    drive: Drive  # that turns it
+    keep_out: KeepOut  # what static parts must keep out of
+    stage: StageLayout  # layout of the object stage
+    wiring: Wiring  # of lamp and LEDs
+    frame: FrameLayout  # layout of what holds stage, base and camera
+    shroud: ShroudLayout | None  # round the rig, None without
+    parts: Parts  # lists of purchased parts
+    # that shows where the camera's pinhole is; None without a camera, or unbuilt
     gauge: CameraGauge | None = None
-    printed: "tuple[PrintedPart, ...]" = ()
+    printed: "tuple[PrintedPart, ...]" = ()  # all printed parts, when they are built
 
     @cached_property
     def fasteners(self) -> tuple[Fastener, ...]:

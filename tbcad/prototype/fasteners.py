@@ -41,24 +41,16 @@ LEVEL = 1e-9  # upward part of a direction that is level
 
 @dataclass(frozen=True)
 class Fastener:
-    """A screw, set screw, washer, nut, insert, dowel, magnet or LED.
+    """A screw, set screw, washer, nut, insert, dowel, magnet or LED."""
 
-    Attributes:
-        part: from the lists.
-        place: the point of its axis from which its body goes along, mm, (3,); of a screw and a
-            washer it is on the face that they press on.
-        along: unit vector in which it goes in, (3,).
-        through: names of the bodies that it goes through and into, in this order.
-        name: of its body, unique; empty until all are numbered.
-        rotates: whether it rotates with the base.
-    """
-
-    part: PurchasedPart
+    part: PurchasedPart  # from the lists
+    # the point of its axis from which its body goes along, mm, (3,); of a screw and a washer it is
+    # on the face that they press on
     place: Floats
-    along: Floats
-    through: tuple[str, ...]
-    name: str = ""
-    rotates: bool = False
+    along: Floats  # unit vector in which it goes in, (3,)
+    through: tuple[str, ...]  # names of the bodies that it goes through and into, in this order
+    name: str = ""  # of its body, unique; empty until all are numbered
+    rotates: bool = False  # whether it rotates with the base
 
 
 def numbered(fasteners: Iterable[Fastener]) -> tuple[Fastener, ...]:

@@ -37,17 +37,11 @@ MAX_SPLITS = 60
 
 @dataclass(frozen=True)
 class SweptSection:
-    """A cross-section that is turned about the axis.
+    """A cross-section that is turned about the axis."""
 
-    Attributes:
-        polygon: (z along the axis, r), mm, (p, 2).
-        low: smallest azimuth it reaches, radians.
-        high: largest one.
-    """
-
-    polygon: Floats
-    low: float
-    high: float
+    polygon: Floats  # (z along the axis, r), mm, (p, 2)
+    low: float  # smallest azimuth it reaches, radians
+    high: float  # largest one
 
     @property
     def azimuths(self) -> tuple[float, float]:
@@ -57,28 +51,18 @@ class SweptSection:
 
 @dataclass(frozen=True)
 class KeepOut:
-    """The volume that static parts must keep out of; azimuths in radians.
+    """The volume that static parts must keep out of; azimuths in radians."""
 
-    Attributes:
-        frame: rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3).
-        capture: radius of the capture sphere, mm.
-        cones: all light, first capture sphere to ball, then ball to pinhole, (2 k,).
-        used: smallest and largest azimuth at which each cone is in use, (2 k, 2).
-        centre: of the balls, (z, r), mm, (k, 2).
-        radius: of the balls, mm, (k,).
-        swung: smallest and largest azimuth of each ball, (k, 2).
-        sections: wall, ribs and bosses over the whole swing, and the hub all round.
-        at_stops: the same while the base is at its stops or between them; None: this is that.
-    """
-
-    frame: Floats
-    capture: float
-    cones: RoundCones
-    used: Floats
-    centre: Floats
-    radius: Floats
-    swung: Floats
+    frame: Floats  # rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3)
+    capture: float  # radius of the capture sphere, mm
+    cones: RoundCones  # all light, first capture sphere to ball, then ball to pinhole, (2 k,)
+    used: Floats  # smallest and largest azimuth at which each cone is in use, (2 k, 2)
+    centre: Floats  # of the balls, (z, r), mm, (k, 2)
+    radius: Floats  # of the balls, mm, (k,)
+    swung: Floats  # smallest and largest azimuth of each ball, (k, 2)
+    # wall, ribs and bosses over the whole swing, and the hub all round
     sections: tuple[SweptSection, ...]
+    # the same while the base is at its stops or between them; None: this is that
     at_stops: "KeepOut | None" = None
 
     def to_light(self, points: Floats) -> Floats:

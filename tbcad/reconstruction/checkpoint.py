@@ -21,19 +21,12 @@ ANEW = "begin anew with --force"
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A fit under way.
+    """A fit under way."""
 
-    Attributes:
-        asked: all that the result follows from: options, light field, version.
-        settings: that were chosen.
-        trials: by which.
-        state: after its last epoch.
-    """
-
-    asked: dict[str, Any]
-    settings: Settings
-    trials: list[dict[str, Any]]
-    state: State
+    asked: dict[str, Any]  # all that the result follows from: options, light field, version
+    settings: Settings  # that were chosen
+    trials: list[dict[str, Any]]  # by which
+    state: State  # after its last epoch
 
 
 def part_file(out: Path) -> Path:

@@ -20,15 +20,10 @@ ORDER_GAIN = 0.05  # likewise, and view dependence, which also costs twice the t
 
 @dataclass(frozen=True)
 class Trial:
-    """A fit that was tried.
+    """A fit that was tried."""
 
-    Attributes:
-        settings: its settings.
-        loss: mean squared error of held-out rays, summed over the colours.
-    """
-
-    settings: Settings
-    loss: float
+    settings: Settings  # its settings
+    loss: float  # mean squared error of held-out rays, summed over the colours
 
 
 def held_out(rays: CapturedRays) -> Bools:

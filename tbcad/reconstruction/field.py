@@ -46,18 +46,13 @@ ROWS_APART = 64  # of those whose rays are part of a fingerprint
 
 @dataclass(frozen=True)
 class Field:
-    """Density and colour.
+    """Density and colour."""
 
-    Attributes:
-        grid: its nodes; their cube holds the capture sphere.
-        values: of the nodes: number of the density, red, green, blue, 0 to 1, and of a field of
-            first order nine slopes, (v, 4 or 13).
-        facts: how it was made.
-    """
-
-    grid: Grid
+    grid: Grid  # its nodes; their cube holds the capture sphere
+    # of the nodes: number of the density, red, green, blue, 0 to 1, and of a field of first order
+    # nine slopes, (v, 4 or 13)
     values: Singles
-    facts: dict[str, Any] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)  # how it was made
 
     @property
     def order(self) -> int:

@@ -21,27 +21,18 @@ CORNER = np.float32(0.3)  # of the total variation, 1/mm^2
 
 
 class Pixels(NamedTuple):
-    """Photographed rays as the loops take them.
+    """Photographed rays as the loops take them."""
 
-    Attributes:
-        entry: where they enter the capture sphere, mm, (n, 3).
-        direction: unit vectors, (n, 3).
-        first: where they may meet something, mm from the entry, (n,).
-        last: up to where, (n,).
-        colour: that was photographed, 0 to 1, (n, 3).
-        weight: of their squared errors, (n,).
-        footprint: change of entry and direction for a pixel's step right and down, (n, 4, 3), or
-            (1, 4, 3) of zeros.
-        places: of k rays in a pixel, from its centre, pixels, (p, k, 2); one of p for each pixel.
-    """
-
-    entry: Singles
-    direction: Singles
-    first: Singles
-    last: Singles
-    colour: Singles
-    weight: Singles
+    entry: Singles  # where they enter the capture sphere, mm, (n, 3)
+    direction: Singles  # unit vectors, (n, 3)
+    first: Singles  # where they may meet something, mm from the entry, (n,)
+    last: Singles  # up to where, (n,)
+    colour: Singles  # that was photographed, 0 to 1, (n, 3)
+    weight: Singles  # of their squared errors, (n,)
+    # change of entry and direction for a pixel's step right and down, (n, 4, 3), or (1, 4, 3) of
+    # zeros
     footprint: Singles
+    # of k rays in a pixel, from its centre, pixels, (p, k, 2); one of p for each pixel
     places: Singles
 
 
@@ -193,19 +184,12 @@ class Moments(NamedTuple):
 
 
 class ColumnSteps(NamedTuple):
-    """Limits and weights of the columns of a field's values, (c,) each.
+    """Limits and weights of the columns of a field's values, (c,) each."""
 
-    Attributes:
-        size: of the step.
-        smooth: weight of the differences to neighbours.
-        least: smallest value.
-        most: largest value.
-    """
-
-    size: Singles
-    smooth: Singles
-    least: Singles
-    most: Singles
+    size: Singles  # of the step
+    smooth: Singles  # weight of the differences to neighbours
+    least: Singles  # smallest value
+    most: Singles  # largest value
 
 
 def unbiased_size(size: Singles, step: int) -> Singles:

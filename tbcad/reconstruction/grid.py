@@ -19,16 +19,11 @@ class Grid:
     """Nodes of a cubic lattice about the origin; v of its n^3 nodes are there.
 
     Between them values are interpolated linearly, in cells that have all eight corners.
-
-    Attributes:
-        n: nodes along each edge of the cube.
-        width_mm: of the cube.
-        place: of the nodes in the lattice, in ascending order, (v, 3).
     """
 
-    n: int
-    width_mm: float
-    place: NDArray[np.uint16]
+    n: int  # nodes along each edge of the cube
+    width_mm: float  # of the cube
+    place: NDArray[np.uint16]  # of the nodes in the lattice, in ascending order, (v, 3)
 
     @staticmethod
     def about(wanted: Bools, width_mm: float) -> "Grid":

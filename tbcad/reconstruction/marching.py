@@ -26,21 +26,13 @@ GLOSSY = 13  # and three of each colour, which the direction multiplies
 
 
 class Medium(NamedTuple):
-    """A field as the loops take it.
+    """A field as the loops take it."""
 
-    Attributes:
-        width: of the grid's cube, mm.
-        step: between samples, mm.
-        rows: of the grid, (n, n, n).
-        leap: of the grid, (n-1, n-1, n-1).
-        values: of the nodes, (v, 4 or 13).
-    """
-
-    width: float
-    step: float
-    rows: NDArray[np.int32]
-    leap: NDArray[np.uint8]
-    values: Singles
+    width: float  # of the grid's cube, mm
+    step: float  # between samples, mm
+    rows: NDArray[np.int32]  # of the grid, (n, n, n)
+    leap: NDArray[np.uint8]  # of the grid, (n-1, n-1, n-1)
+    values: Singles  # of the nodes, (v, 4 or 13)
 
 
 @compiled_sum

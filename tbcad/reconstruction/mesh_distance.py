@@ -23,21 +23,15 @@ class MeshDistance:
     Means are over the points of both; a Hausdorff distance is the largest of any point to the
     other surface. Distances of points are exact; between the points a Hausdorff distance may be
     larger by no more than their distance, about 0.25 mm.
-
-    Attributes:
-        mean_mm: of points that some captured ray meets first.
-        percentile_95_mm: of the same.
-        hausdorff_mm: of the same.
-        whole_mean_mm: of points spread evenly over all of both surfaces, the underside and what
-            lies inside included, which no ray shows.
-        whole_hausdorff_mm: of the same.
     """
 
-    mean_mm: float
-    percentile_95_mm: float
-    hausdorff_mm: float
+    mean_mm: float  # of points that some captured ray meets first
+    percentile_95_mm: float  # of the same
+    hausdorff_mm: float  # of the same
+    # of points spread evenly over all of both surfaces, the underside and what lies inside
+    # included, which no ray shows
     whole_mean_mm: float
-    whole_hausdorff_mm: float
+    whole_hausdorff_mm: float  # of the same
 
 
 def mesh_distance(mesh: trimesh.Trimesh, truth: SceneObject, rays: CapturedRays) -> MeshDistance:

@@ -36,17 +36,12 @@ _one_at_a_time = Lock()  # a fit takes all cores, and much memory
 
 @dataclass(frozen=True)
 class FieldPicture:
-    """A view of a field.
+    """A view of a field."""
 
-    Attributes:
-        image: red, green, blue on the black background, (h, w, 3).
-        opacity: 0 to 1, (h, w).
-        distance: along each pixel's ray from the pinhole to where it becomes half opaque, mm,
-            (h, w); NaN where it does not.
-    """
-
-    image: Bytes
-    opacity: Singles
+    image: Bytes  # red, green, blue on the black background, (h, w, 3)
+    opacity: Singles  # 0 to 1, (h, w)
+    # along each pixel's ray from the pinhole to where it becomes half opaque, mm, (h, w); NaN where
+    # it does not
     distance: Floats
 
     def depth(self, view: Camera) -> Floats:

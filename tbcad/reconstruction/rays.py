@@ -24,28 +24,18 @@ GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 @dataclass(frozen=True)
 class CapturedRays:
-    """n rays and what was photographed along them.
+    """n rays and what was photographed along them."""
 
-    Attributes:
-        entry: where they enter the capture sphere, mm, (n, 3).
-        direction: unit vectors, (n, 3).
-        length: of their way through the sphere, mm, (n,).
-        colour: red, green, blue, 0 to 1, (n, 3).
-        mirror: number of their mirror among those of all cameras, (n,).
-        weight: of their squared errors in a fit, (n,).
-        footprint: change of entry and of direction for a pixel's step right and down, (n, 4, 3);
-            or (1, 4, 3) of zeros where a pixel is a single ray.
-        capture_mm: diameter of the capture sphere.
-    """
-
-    entry: Singles
-    direction: Singles
-    length: Singles
-    colour: Singles
-    mirror: NDArray[np.int32]
-    weight: Singles
+    entry: Singles  # where they enter the capture sphere, mm, (n, 3)
+    direction: Singles  # unit vectors, (n, 3)
+    length: Singles  # of their way through the sphere, mm, (n,)
+    colour: Singles  # red, green, blue, 0 to 1, (n, 3)
+    mirror: NDArray[np.int32]  # number of their mirror among those of all cameras, (n,)
+    weight: Singles  # of their squared errors in a fit, (n,)
+    # change of entry and of direction for a pixel's step right and down, (n, 4, 3); or (1, 4, 3) of
+    # zeros where a pixel is a single ray
     footprint: Singles
-    capture_mm: float
+    capture_mm: float  # diameter of the capture sphere
 
     def __len__(self) -> int:
         return len(self.length)

@@ -35,71 +35,44 @@ HULL_PARTS = 8  # of the rays, whatever the number of threads
 
 @dataclass(frozen=True)
 class Level:
-    """One grid of the fit.
+    """One grid of the fit."""
 
-    Attributes:
-        nodes: along each edge.
-        epochs: how often each ray is used.
-    """
-
-    nodes: int
-    epochs: int
+    nodes: int  # along each edge
+    epochs: int  # how often each ray is used
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a field is fitted.
+    """How a field is fitted."""
 
-    Attributes:
-        levels: from coarse to fine.
-        order: of the view dependence of colours, 0 or 1.
-        smooth_density: weight of the total variation of the numbers, against the squared errors of
-            as many rays as there are nodes.
-        smooth_colour: weight of the squared differences of colours, likewise.
-        sparse: weight of the density's logarithm, likewise.
-        batch: rays of a step, at most.
-        steps: of the numbers and of the colours, largest.
-        last_steps: of both at the end.
-        stride: between samples of a ray, in distances of nodes.
-        places: of the rays of a pixel on the finest grid, (p, k, 2); coarser ones, which do not
-            resolve a pixel, take its central ray.
-        seed: of the random order.
-    """
-
-    levels: tuple[Level, ...] = (Level(60, 2), Level(100, 3), Level(144, 5))
-    order: int = 0
+    levels: tuple[Level, ...] = (Level(60, 2), Level(100, 3), Level(144, 5))  # from coarse to fine
+    order: int = 0  # of the view dependence of colours, 0 or 1
+    # weight of the total variation of the numbers, against the squared errors of as many rays as
+    # there are nodes
     smooth_density: float = 5e-5
-    smooth_colour: float = 5e-4
-    sparse: float = 5e-4
-    batch: int = 30_000
-    steps: tuple[float, float] = (0.5, 0.03)
-    last_steps: tuple[float, float] = (0.005, 0.0005)
-    stride: float = 0.6
+    smooth_colour: float = 5e-4  # weight of the squared differences of colours, likewise
+    sparse: float = 5e-4  # weight of the density's logarithm, likewise
+    batch: int = 30_000  # rays of a step, at most
+    steps: tuple[float, float] = (0.5, 0.03)  # of the numbers and of the colours, largest
+    last_steps: tuple[float, float] = (0.005, 0.0005)  # of both at the end
+    stride: float = 0.6  # between samples of a ray, in distances of nodes
+    # of the rays of a pixel on the finest grid, (p, k, 2); coarser ones, which do not resolve a
+    # pixel, take its central ray
     places: Singles = field(default_factory=lambda: CENTRAL)
-    seed: int = 0
+    seed: int = 0  # of the random order
 
 
 @dataclass
 class State:
-    """A fit under way, after some epochs.
+    """A fit under way, after some epochs."""
 
-    Attributes:
-        level: number of the present level.
-        epoch: number of epochs of it that are done.
-        grid: of that level.
-        values: of its nodes, as of a field; two copies, of which a step reads one.
-        moments: of Adam.
-        step: number of steps of the level that are done.
-        loss: mean squared error of the last epoch, summed over the colours.
-    """
-
-    level: int
-    epoch: int
-    grid: Grid
-    values: Singles
-    moments: Moments
-    step: int = 0
-    loss: float = np.nan
+    level: int  # number of the present level
+    epoch: int  # number of epochs of it that are done
+    grid: Grid  # of that level
+    values: Singles  # of its nodes, as of a field; two copies, of which a step reads one
+    moments: Moments  # of Adam
+    step: int = 0  # number of steps of the level that are done
+    loss: float = np.nan  # mean squared error of the last epoch, summed over the colours
 
     def field(self) -> Field:
         """As a field."""

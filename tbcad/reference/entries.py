@@ -17,19 +17,12 @@ LIKENESS = 0.6
 
 @dataclass(frozen=True)
 class ReferenceEntry:
-    """One thing that is explained.
+    """One thing that is explained."""
 
-    Attributes:
-        kind: "term", "key", "section" or "check".
-        name: its own.
-        facts: text or list of texts of each heading.
-        names: all that it is found by, besides its own.
-    """
-
-    kind: str
-    name: str
-    facts: dict[str, str | list[str]]
-    names: tuple[str, ...] = field(default=())
+    kind: str  # "term", "key", "section" or "check"
+    name: str  # its own
+    facts: dict[str, str | list[str]]  # text or list of texts of each heading
+    names: tuple[str, ...] = field(default=())  # all that it is found by, besides its own
 
     @property
     def record(self) -> dict[str, object]:

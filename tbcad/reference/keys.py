@@ -37,22 +37,14 @@ TYPES = {int: "whole number", float: "number", bool: "true or false", str: "text
 
 @dataclass(frozen=True)
 class Key:
-    """One key of a design.
+    """One key of a design."""
 
-    Attributes:
-        name: dotted.
-        type: "number", "one of several words" ...
-        default: as TOML.
-        unit: empty where it has none.
-        description: one sentence or two.
-    """
-
-    name: str
-    type: str
-    default: str
-    unit: str
+    name: str  # dotted
+    type: str  # "number", "one of several words" ...
+    default: str  # as TOML
+    unit: str  # empty where it has none
     allowed: str
-    description: str
+    description: str  # one sentence or two
 
 
 @dataclass(frozen=True)

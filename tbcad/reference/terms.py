@@ -10,31 +10,19 @@ PAGE_HEAD = "<!-- Written by docs/reference.py from tbcad/reference/terms.toml: 
 
 @dataclass(frozen=True)
 class Term:
-    """One term; what does not apply to it is empty.
+    """One term; what does not apply to it is empty."""
 
-    Attributes:
-        name: as the documentation has it.
-        meaning: Markdown.
-        aliases: other ways to type the name.
-        symbol: in equations.
-        equation: that defines it.
-        unit: of it.
-        source: of the definition.
-        keys: of a design, that set it.
-        files: of an export, with the columns that hold it: "mirrors.csv: px, py, pz".
-        code: dotted names of what computes it.
-    """
-
-    name: str
-    meaning: str
-    aliases: tuple[str, ...] = ()
-    symbol: str = ""
-    equation: str = ""
-    unit: str = ""
-    source: str = ""
-    keys: tuple[str, ...] = ()
+    name: str  # as the documentation has it
+    meaning: str  # Markdown
+    aliases: tuple[str, ...] = ()  # other ways to type the name
+    symbol: str = ""  # in equations
+    equation: str = ""  # that defines it
+    unit: str = ""  # of it
+    source: str = ""  # of the definition
+    keys: tuple[str, ...] = ()  # of a design, that set it
+    # of an export, with the columns that hold it: "mirrors.csv: px, py, pz"
     files: tuple[str, ...] = ()
-    code: tuple[str, ...] = ()
+    code: tuple[str, ...] = ()  # dotted names of what computes it
 
 
 @dataclass(frozen=True)

@@ -132,15 +132,10 @@ def _cross(height: int, width: int) -> LightPixels:
 
 @dataclass(frozen=True)
 class Environment:
-    """Light from above the horizon; what lies below lights no lamp.
+    """Light from above the horizon; what lies below lights no lamp."""
 
-    Attributes:
-        direction: unit vectors toward it, (p, 3).
-        light: red, green, blue, times the solid angle it comes from, (p, 3).
-    """
-
-    direction: Floats
-    light: Floats
+    direction: Floats  # unit vectors toward it, (p, 3)
+    light: Floats  # red, green, blue, times the solid angle it comes from, (p, 3)
 
     def by_nearest(self, direction: Floats) -> Floats:
         """Sums of light (l, 3) over what is nearest to each of some unit directions (l, 3)."""

@@ -43,19 +43,12 @@ TRUE_LIGHTS = 512
 
 @dataclass(frozen=True)
 class ReflectanceField:
-    """A reflectance field in an open file.
+    """A reflectance field in an open file."""
 
-    Attributes:
-        lamps: (l,).
-        pixel: of each camera, numbers of the rays that meet the object, (r,).
-        transport: of each camera, (l, r, 3), read by slices.
-        facts: how it was made.
-    """
-
-    lamps: LampPlaces
-    pixel: Mapping[str, Any]
-    transport: Mapping[str, Any]
-    facts: dict[str, Any]
+    lamps: LampPlaces  # (l,)
+    pixel: Mapping[str, Any]  # of each camera, numbers of the rays that meet the object, (r,)
+    transport: Mapping[str, Any]  # of each camera, (l, r, 3), read by slices
+    facts: dict[str, Any]  # how it was made
 
     def lit(self, camera: str, colour: Floats) -> Colours:
         """Light (r, 3) along a camera's rays when the lamps have colours (l, 3)."""
@@ -108,19 +101,12 @@ def _read(store: StoredGroup) -> ReflectanceField:
 
 @dataclass(frozen=True)
 class Relit:
-    """A light field in another light.
+    """A light field in another light."""
 
-    Attributes:
-        field: with other colours, in memory; its rays stay in the file.
-        lamps: that it is lit by.
-        points: whether these shine alike in all directions.
-        exposure: by which light was multiplied to be shown, 1 as white.
-    """
-
-    field: LightField
-    lamps: PointLights
-    points: bool
-    exposure: float
+    field: LightField  # with other colours, in memory; its rays stay in the file
+    lamps: PointLights  # that it is lit by
+    points: bool  # whether these shine alike in all directions
+    exposure: float  # by which light was multiplied to be shown, 1 as white
 
 
 def relit(source: LightField, reflectance: ReflectanceField, light: Environment) -> Relit:

@@ -40,15 +40,10 @@ STEPS, LAST_STEP = 60, 1e-12
 
 @dataclass(frozen=True)
 class LampPlaces:
-    """Lamps.
+    """Lamps."""
 
-    Attributes:
-        name: of the mirror, or lamp0001 ...
-        place: mm, (l, 3).
-    """
-
-    name: tuple[str, ...]
-    place: Floats
+    name: tuple[str, ...]  # of the mirror, or lamp0001 ...
+    place: Floats  # mm, (l, 3)
 
 
 def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
@@ -94,23 +89,14 @@ def _second_half(source: LightField, mirror: MirrorId) -> bool:
 
 @dataclass(frozen=True)
 class MirrorPixels:
-    """The pixels of a projector that one mirror throws onto the object.
+    """The pixels of a projector that one mirror throws onto the object."""
 
-    Attributes:
-        camera: the projector's pinhole and pixels.
-        number: of the mirror, from 1.
-        owner: number of the mirror that each pixel is on, (h, w).
-        centre: of the sphere, mm, (3,).
-        radius: mm.
-        at_origin: how far light spreads until it is at the origin, mm2.
-    """
-
-    camera: Camera
-    number: int
-    owner: NDArray[np.uint16]
-    centre: Floats
-    radius: float
-    at_origin: float
+    camera: Camera  # the projector's pinhole and pixels
+    number: int  # of the mirror, from 1
+    owner: NDArray[np.uint16]  # number of the mirror that each pixel is on, (h, w)
+    centre: Floats  # of the sphere, mm, (3,)
+    radius: float  # mm
+    at_origin: float  # how far light spreads until it is at the origin, mm2
 
     def light(self, embree: Any, spots: Spots) -> Floats:
         """Light on spots (k,), if a white surface at the origin that faces it gets 1."""
@@ -135,12 +121,9 @@ class MirrorPixels:
 
 @dataclass(frozen=True)
 class Projectors:
-    """The mirrors of some lamps.
+    """The mirrors of some lamps."""
 
-    Attributes:
-        mirrors: of each lamp: one, or both halves of one on the seam.
-    """
-
+    # of each lamp: one, or both halves of one on the seam
     mirrors: tuple[tuple[MirrorPixels, ...], ...]
 
     def light(self, embree: Any, lamp: int, spots: Spots) -> Floats:

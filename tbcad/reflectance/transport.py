@@ -29,17 +29,11 @@ Light = Callable[[int, Spots], Floats]
 
 @dataclass(frozen=True)
 class SeenSpots:
-    """What a camera's rays see of the object.
+    """What a camera's rays see of the object."""
 
-    Attributes:
-        pixel: row * width + column, ascending, (r,).
-        spots: where they meet it, (r,).
-        albedo: colours there, 0 to 1, (r, 3).
-    """
-
-    pixel: Ints
-    spots: Spots
-    albedo: Floats
+    pixel: Ints  # row * width + column, ascending, (r,)
+    spots: Spots  # where they meet it, (r,)
+    albedo: Floats  # colours there, 0 to 1, (r, 3)
 
 
 def write_reflectance(

@@ -20,34 +20,21 @@ BEYOND = 0.35  # shown beyond the outer apices, of the distance of apices
 
 @dataclass(frozen=True)
 class Edge:
-    """Where a section passes from one mirror to the next.
+    """Where a section passes from one mirror to the next."""
 
-    Attributes:
-        bottom: lowest point, mm, (2,).
-        depth: of it below the line over the crests of both mirrors, mm.
-        words: its shape.
-    """
-
-    bottom: Floats
-    depth: float
-    words: str
+    bottom: Floats  # lowest point, mm, (2,)
+    depth: float  # of it below the line over the crests of both mirrors, mm
+    words: str  # its shape
 
 
 @dataclass(frozen=True)
 class EdgeSection:
-    """A section in its own plane: along it, and up toward the light.
+    """A section in its own plane: along it, and up toward the light."""
 
-    Attributes:
-        mirrors: numbers of the three, from 0.
-        points: of the outline, from one side to the other, mm, (p, 2).
-        apexes: of the mirrors, mm, (3, 2).
-        edges: between them.
-    """
-
-    mirrors: tuple[int, int, int]
-    points: Floats
-    apexes: Floats
-    edges: tuple[Edge, Edge]
+    mirrors: tuple[int, int, int]  # numbers of the three, from 0
+    points: Floats  # of the outline, from one side to the other, mm, (p, 2)
+    apexes: Floats  # of the mirrors, mm, (3, 2)
+    edges: tuple[Edge, Edge]  # between them
 
 
 def section_of(export: ExportedDesign, middle: int) -> EdgeSection:

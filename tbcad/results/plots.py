@@ -17,43 +17,26 @@ MARKER_POINTS, CROSS_POINTS = 4, 7
 
 @dataclass(frozen=True)
 class Series:
-    """Points or a line.
+    """Points or a line."""
 
-    Attributes:
-        label: for the legend; "" for none.
-        x: values, (k,).
-        y: values, (k,); NaN where there is none.
-        style: matplotlib's letters for colour, marker and line; "bars" for bars from zero.
-        shade: values that colour the points, (k,); None for one colour.
-        shade_label: what they are, with their unit.
-    """
-
-    label: str
-    x: Floats
-    y: Floats
-    style: str = "-"
-    shade: Floats | None = None
-    shade_label: str = ""
+    label: str  # for the legend; "" for none
+    x: Floats  # values, (k,)
+    y: Floats  # values, (k,); NaN where there is none
+    style: str = "-"  # matplotlib's letters for colour, marker and line; "bars" for bars from zero
+    shade: Floats | None = None  # values that colour the points, (k,); None for one colour
+    shade_label: str = ""  # what they are, with their unit
 
 
 @dataclass(frozen=True)
 class PlotPanel:
-    """One pair of axes.
+    """One pair of axes."""
 
-    Attributes:
-        title: what is shown.
-        x_label: with its unit.
-        y_label: with its unit.
-        series: what is drawn, the first lowest.
-        logarithmic: axes that are: "", "x", "y" or "xy".
-        names: of the places 0, 1, 2 ... on the y axis, the first on top; () for numbers.
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    series: tuple[Series, ...]
-    logarithmic: str = ""
+    title: str  # what is shown
+    x_label: str  # with its unit
+    y_label: str  # with its unit
+    series: tuple[Series, ...]  # what is drawn, the first lowest
+    logarithmic: str = ""  # axes that are: "", "x", "y" or "xy"
+    # of the places 0, 1, 2 ... on the y axis, the first on top; () for numbers.
     names: tuple[str, ...] = ()
 
 

@@ -15,40 +15,24 @@ SUMMARY_COLUMNS = ("quantity", "unit", "tbcad", "paper", "where")
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure that a study measured, beside the paper's.
+    """A figure that a study measured, beside the paper's."""
 
-    Attributes:
-        quantity: what it is.
-        unit: "" for numbers without one.
-        value: as measured; None where there is none.
-        paper: as the paper states it; None where it does not.
-        where: place in the paper.
-    """
-
-    quantity: str
-    unit: str
-    value: Cell
-    paper: Cell = None
-    where: str = ""
+    quantity: str  # what it is
+    unit: str  # "" for numbers without one
+    value: Cell  # as measured; None where there is none
+    paper: Cell = None  # as the paper states it; None where it does not
+    where: str = ""  # place in the paper
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study's findings.
+    """A study's findings."""
 
-    Attributes:
-        name: of its files.
-        figures: the most important ones, beside the paper's.
-        tables: all figures.
-        panels: of the plot.
-        notes: what the figures mean, besides the notes of the tables.
-    """
-
-    name: str
-    figures: tuple[Figure, ...]
-    tables: tuple[Table, ...]
-    panels: tuple[PlotPanel, ...]
-    notes: tuple[str, ...] = ()
+    name: str  # of its files
+    figures: tuple[Figure, ...]  # the most important ones, beside the paper's
+    tables: tuple[Table, ...]  # all figures
+    panels: tuple[PlotPanel, ...]  # of the plot
+    notes: tuple[str, ...] = ()  # what the figures mean, besides the notes of the tables
 
     @property
     def summary(self) -> Table:

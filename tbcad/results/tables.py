@@ -17,19 +17,12 @@ Record = dict[str, Cell]
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table."""
 
-    Attributes:
-        name: of its file, without the ending.
-        columns: names; units are in them.
-        rows: cells in the columns' order; None where there is no value.
-        notes: what the figures mean and assume, a sentence or two each.
-    """
-
-    name: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    notes: tuple[str, ...] = ()
+    name: str  # of its file, without the ending
+    columns: tuple[str, ...]  # names; units are in them
+    rows: tuple[tuple[Cell, ...], ...]  # cells in the columns' order; None where there is no value
+    notes: tuple[str, ...] = ()  # what the figures mean and assume, a sentence or two each
 
     @staticmethod
     def of_columns(

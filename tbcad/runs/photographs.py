@@ -16,19 +16,12 @@ AGAIN = Exposure.MISSING
 
 @dataclass(frozen=True)
 class Run(InFolder):
-    """A run's folder.
+    """A run's folder."""
 
-    Attributes:
-        folder: where it lies.
-        record: what was to be photographed.
-        exposures: what has been, by name.
-        faults: for each name that is missing or unusable, why, in one line.
-    """
-
-    folder: Path
-    record: RunRecord
-    exposures: Mapping[str, Exposure]
-    faults: Mapping[str, str]
+    folder: Path  # where it lies
+    record: RunRecord  # what was to be photographed
+    exposures: Mapping[str, Exposure]  # what has been, by name
+    faults: Mapping[str, str]  # for each name that is missing or unusable, why, in one line
 
     def exposure(self, frame: Frame, phase: str) -> Exposure | None:
         """The exposure of a frame in a phase, if it is usable."""

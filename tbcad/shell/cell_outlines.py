@@ -14,30 +14,18 @@ class CellOutlines:
 
     Outlines run counter-clockwise seen from outside, one cell after another. A vertex is at one
     place in the outline of each cell that it belongs to.
-
-    Attributes:
-        vertices: mm, (v, 3); corners first, then the arcs' inner points.
-        first_inner: first inner vertex of each arc, (e,).
-        segments: number of segments of each arc, (e,).
-        start: vertex at the start of each arc, (e,).
-        end: vertex at its end, (e,).
-        cell: whose outline each place is in, (b,).
-        vertex: at each place, (b,).
-        following: next place of the same outline, (b,).
-        corner: whether two arcs meet at the place, (b,).
-        last_segment: whether the last segment of an arc begins there, (b,).
     """
 
-    vertices: Floats
-    first_inner: Ints
-    segments: Ints
-    start: Ints
-    end: Ints
-    cell: Ints
-    vertex: Ints
-    following: Ints
-    corner: Bools
-    last_segment: Bools
+    vertices: Floats  # mm, (v, 3); corners first, then the arcs' inner points
+    first_inner: Ints  # first inner vertex of each arc, (e,)
+    segments: Ints  # number of segments of each arc, (e,)
+    start: Ints  # vertex at the start of each arc, (e,)
+    end: Ints  # vertex at its end, (e,)
+    cell: Ints  # whose outline each place is in, (b,)
+    vertex: Ints  # at each place, (b,)
+    following: Ints  # next place of the same outline, (b,)
+    corner: Bools  # whether two arcs meet at the place, (b,)
+    last_segment: Bools  # whether the last segment of an arc begins there, (b,)
 
     @property
     def points(self) -> Floats:

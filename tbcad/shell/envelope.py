@@ -27,17 +27,11 @@ MAX_WIDENINGS = 100
 
 @dataclass(frozen=True)
 class Holes:
-    """Round through holes in a flange.
+    """Round through holes in a flange."""
 
-    Attributes:
-        centre: on the joining face, mm, (k, 3).
-        direction: into the flange, length its thickness, mm, (3,).
-        radius: mm, (k,).
-    """
-
-    centre: Floats
-    direction: Floats
-    radius: Floats
+    centre: Floats  # on the joining face, mm, (k, 3)
+    direction: Floats  # into the flange, length its thickness, mm, (3,)
+    radius: Floats  # mm, (k,)
 
     @property
     def sizes(self) -> tuple[Floats, Floats, Floats]:
@@ -50,26 +44,16 @@ class Envelope:
     """What closes camera a's cells to a solid; all arcs run from lower to higher y.
 
     The joining faces are x = 0 (seam) and z = foot; the seam flange stands on the foot flange.
-
-    Attributes:
-        back: the spheroid of the smooth back.
-        foot: height of the foot plane, mm.
-        seam_back: edge of back and seam flange, in x = seam thickness.
-        foot_back: edge of back and foot flange, in z = foot + thickness.
-        seam_rim: outer edge of the seam flange at x = 0; at x = thickness it is moved.
-        foot_rim: outer edge of the foot flange at z = foot; on top it is moved.
-        seam_holes: holes along x.
-        foot_holes: holes along z.
     """
 
-    back: Spheroid
-    foot: float
-    seam_back: EllipseArc
-    foot_back: EllipseArc
-    seam_rim: EllipseArc
-    foot_rim: EllipseArc
-    seam_holes: Holes
-    foot_holes: Holes
+    back: Spheroid  # the spheroid of the smooth back
+    foot: float  # height of the foot plane, mm
+    seam_back: EllipseArc  # edge of back and seam flange, in x = seam thickness
+    foot_back: EllipseArc  # edge of back and foot flange, in z = foot + thickness
+    seam_rim: EllipseArc  # outer edge of the seam flange at x = 0; at x = thickness it is moved
+    foot_rim: EllipseArc  # outer edge of the foot flange at z = foot; on top it is moved
+    seam_holes: Holes  # holes along x
+    foot_holes: Holes  # holes along z
 
     @property
     def seam_thickness(self) -> Floats:

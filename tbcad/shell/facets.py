@@ -77,19 +77,12 @@ def _deepest_step(start: Floats, axes: Floats, point: Floats, inward: Floats) ->
 
 @dataclass(frozen=True)
 class Facets:
-    """Vertices and triangles of all cells.
+    """Vertices and triangles of all cells."""
 
-    Attributes:
-        vertices: mm, (v, 3); those of the outlines first.
-        triangles: counter-clockwise seen from the light, (t, 3).
-        mirror: whose facet each is, (t,).
-        outlines: of the cells.
-    """
-
-    vertices: Floats
-    triangles: Ints
-    mirror: Ints
-    outlines: CellOutlines
+    vertices: Floats  # mm, (v, 3); those of the outlines first
+    triangles: Ints  # counter-clockwise seen from the light, (t, 3)
+    mirror: Ints  # whose facet each is, (t,)
+    outlines: CellOutlines  # of the cells
 
 
 def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
@@ -129,17 +122,11 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
 
 @dataclass(frozen=True)
 class _Ring:
-    """One ring of vertices in each cell that has so many.
+    """One ring of vertices in each cell that has so many."""
 
-    Attributes:
-        place: in the outlines, of each place of the ring, (p,).
-        vertex: at each place, (p,).
-        following: next place of the same cell's ring, (p,).
-    """
-
-    place: Ints
-    vertex: Ints
-    following: Ints
+    place: Ints  # in the outlines, of each place of the ring, (p,)
+    vertex: Ints  # at each place, (p,)
+    following: Ints  # next place of the same cell's ring, (p,)
 
     def inner(self, kept: Bools, vertex: Ints) -> "_Ring":
         """The next ring, in the cells kept."""
@@ -149,21 +136,13 @@ class _Ring:
 
 @dataclass(frozen=True)
 class _RingMesh:
-    """Rings of vertices from the outline of each cell to its middle.
+    """Rings of vertices from the outline of each cell to its middle."""
 
-    Attributes:
-        outlines: the outer rings.
-        mirrors: surfaces of the m cells.
-        middle: middle point of each cell, (m, 3).
-        strip: points of the second ring, by place in the outlines, (b, 3).
-        count: rings inside the outline, the strip's included, at least 1, (m,).
-    """
-
-    outlines: CellOutlines
-    mirrors: Surfaces
-    middle: Floats
-    strip: Floats
-    count: Ints
+    outlines: CellOutlines  # the outer rings
+    mirrors: Surfaces  # surfaces of the m cells
+    middle: Floats  # middle point of each cell, (m, 3)
+    strip: Floats  # points of the second ring, by place in the outlines, (b, 3)
+    count: Ints  # rings inside the outline, the strip's included, at least 1, (m,)
 
     def facets(self) -> Facets:
         """Quads between the rings, and a fan about the middle."""

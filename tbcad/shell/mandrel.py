@@ -42,15 +42,10 @@ REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)
 
 @dataclass(frozen=True)
 class Draft:
-    """How a shell comes off its negative.
+    """How a shell comes off its negative."""
 
-    Attributes:
-        pull: unit vector along which the shell is drawn, (3,).
-        angle: least angle between the negative's surface and the pull, rad; below 0 it catches.
-    """
-
-    pull: Floats
-    angle: float
+    pull: Floats  # unit vector along which the shell is drawn, (3,)
+    angle: float  # least angle between the negative's surface and the pull, rad; below 0 it catches
 
 
 def draft_of(cells: Cells) -> Draft:
@@ -113,19 +108,12 @@ def _wall_normals(cells: Cells) -> Floats:
 
 @dataclass(frozen=True)
 class Mandrel:
-    """What closes camera a's cells to a negative.
+    """What closes camera a's cells to a negative."""
 
-    Attributes:
-        foot: height of the foot plane, mm.
-        seam_holes: blind holes along +x.
-        foot_holes: blind holes along +z.
-        draft: how the shell comes off.
-    """
-
-    foot: float
-    seam_holes: Holes
-    foot_holes: Holes
-    draft: Draft
+    foot: float  # height of the foot plane, mm
+    seam_holes: Holes  # blind holes along +x
+    foot_holes: Holes  # blind holes along +z
+    draft: Draft  # how the shell comes off
 
 
 def mandrel_of(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Mandrel:

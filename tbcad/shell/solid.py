@@ -34,19 +34,12 @@ FAR_RIMS = {"seam": "seam_rim_back", "foot": "foot_rim_top"}
 
 @dataclass(frozen=True)
 class FrontEdges:
-    """Kernel vertices and edges of camera a's cells.
+    """Kernel vertices and edges of camera a's cells."""
 
-    Attributes:
-        maker: that made them.
-        cells: of the mirrors.
-        vertices: by corner index.
-        edges: by arc index.
-    """
-
-    maker: Maker
-    cells: Cells
-    vertices: dict[int, TopoDS_Vertex]
-    edges: list[TopoDS_Edge]
+    maker: Maker  # that made them
+    cells: Cells  # of the mirrors
+    vertices: dict[int, TopoDS_Vertex]  # by corner index
+    edges: list[TopoDS_Edge]  # by arc index
 
     def faces(self) -> list[TopoDS_Face]:
         """One face for each cell, on its sphere or plane, in the order of the mirrors."""

@@ -33,14 +33,11 @@ FAINT_PX2 = 2e-3
 
 @dataclass(frozen=True)
 class Occluders:
-    """Meshes before LEDs.
+    """Meshes before LEDs."""
 
-    Attributes:
-        subject: scene of the object, as it stands in the first run; None without an object.
-        stage: scene of the stage, which does not turn; None where its meshes are not there.
-    """
-
+    # scene of the object, as it stands in the first run; None without an object
     subject: Any | None
+    # scene of the stage, which does not turn; None where its meshes are not there
     stage: Any | None
 
     def hide(self, point: Floats, led: Floats, turned: bool) -> Bools:
@@ -86,17 +83,12 @@ def _placed(folder: Path, part: PrintedPartRecord) -> Floats:
 
 @dataclass(frozen=True)
 class LightPoints:
-    """Points of light in a picture, over n of them.
+    """Points of light in a picture, over n of them."""
 
-    Attributes:
-        led: that each is of, from 0, (n,).
-        pixel: column and row, (n, 2).
-        area: square pixels that each stands for, (n,); its light, if its surface is as bright as
-            fills a pixel.
-    """
-
-    led: Ints
-    pixel: Floats
+    led: Ints  # that each is of, from 0, (n,)
+    pixel: Floats  # column and row, (n, 2)
+    # square pixels that each stands for, (n,); its light, if its surface is as bright as fills a
+    # pixel
     area: Floats
 
     def of(self, led: int) -> tuple[Floats, Floats]:

@@ -39,15 +39,10 @@ REACH = 4.0  # standard deviations beyond which a point gives no light
 
 @dataclass(frozen=True)
 class PointSpread:
-    """Spread of a point's light, the same along rows and columns.
+    """Spread of a point's light, the same along rows and columns."""
 
-    Attributes:
-        separation_px: of the low-pass filter's images.
-        lens_px: standard deviation of the lens's spread.
-    """
-
-    separation_px: float = 1.0
-    lens_px: float = 0.4
+    separation_px: float = 1.0  # of the low-pass filter's images
+    lens_px: float = 0.4  # standard deviation of the lens's spread
 
     @property
     def half_px(self) -> int:
@@ -57,23 +52,16 @@ class PointSpread:
 
 @dataclass(frozen=True)
 class ImagingChain:
-    """From light to numbers.
+    """From light to numbers."""
 
-    Attributes:
-        sensor: of the camera.
-        spread: of a point's light.
-        dome: radius of the LEDs' domes, mm.
-        led_light: of each LED, on the optical axis, 1 fills a pixel in an exposure of
-            `EXPOSURE_S`; one for all, or (l,).
-        object_light: of the lit object where it is white, likewise.
-        times: of exposure; `EXPOSURE_S` where they are not said.
-    """
-
-    sensor: SimulatedSensor = field(default_factory=SimulatedSensor)
-    spread: PointSpread = field(default_factory=PointSpread)
-    dome: float = DOME_MM
+    sensor: SimulatedSensor = field(default_factory=SimulatedSensor)  # of the camera
+    spread: PointSpread = field(default_factory=PointSpread)  # of a point's light
+    dome: float = DOME_MM  # radius of the LEDs' domes, mm
+    # of each LED, on the optical axis, 1 fills a pixel in an exposure of `EXPOSURE_S`; one for all,
+    # or (l,)
     led_light: float | tuple[float, ...] = LED_LIGHT
-    object_light: float = OBJECT_LIGHT
+    object_light: float = OBJECT_LIGHT  # of the lit object where it is white, likewise
+    # of exposure; `EXPOSURE_S` where they are not said
     times: PhaseTimes = field(default_factory=PhaseTimes)
 
     def exposure(self, phase: str) -> float:
@@ -83,23 +71,14 @@ class ImagingChain:
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """A prototype that is photographed.
+    """A prototype that is photographed."""
 
-    Attributes:
-        built: the prototype.
-        frames: in the order of the machine's.
-        scene: the lit object.
-        occluders: what may hide LEDs.
-        chain: from light to numbers.
-        seed: of noise, dust and hot pixels.
-    """
-
-    built: BuiltPrototype
-    frames: tuple[Frame, ...]
-    scene: Scene
-    occluders: Occluders
-    chain: ImagingChain
-    seed: int
+    built: BuiltPrototype  # the prototype
+    frames: tuple[Frame, ...]  # in the order of the machine's
+    scene: Scene  # the lit object
+    occluders: Occluders  # what may hide LEDs
+    chain: ImagingChain  # from light to numbers
+    seed: int  # of noise, dust and hot pixels
 
     @cached_property
     def maps(self) -> PixelMaps:

@@ -25,27 +25,16 @@ EMPTY = 0.5  # electrons: less light than this is as none
 
 @dataclass(frozen=True)
 class SimulatedSensor:
-    """A sensor; figures as of data sheets of pixels of 3.45 um.
+    """A sensor; figures as of data sheets of pixels of 3.45 um."""
 
-    Attributes:
-        full_electrons: that fill a pixel, and give the largest number.
-        read_electrons: standard deviation of the read noise.
-        dark_electrons: mean dark signal of an exposure of 1 s.
-        hot_share: share of pixels with a large dark signal.
-        hot_electrons: their mean dark signal, likewise, exponentially distributed.
-        grains: of dust, on the whole sensor.
-        bits: 8 or 16 a channel; 16 without colour.
-        noise: factor of all noise; 0 for none.
-    """
-
-    full_electrons: float = 10_000.0
-    read_electrons: float = 4.0
-    dark_electrons: float = 2.0
-    hot_share: float = 1e-5
-    hot_electrons: float = 400.0
-    grains: int = 30
-    bits: int = 8
-    noise: float = 1.0
+    full_electrons: float = 10_000.0  # that fill a pixel, and give the largest number
+    read_electrons: float = 4.0  # standard deviation of the read noise
+    dark_electrons: float = 2.0  # mean dark signal of an exposure of 1 s
+    hot_share: float = 1e-5  # share of pixels with a large dark signal
+    hot_electrons: float = 400.0  # their mean dark signal, likewise, exponentially distributed
+    grains: int = 30  # of dust, on the whole sensor
+    bits: int = 8  # 8 or 16 a channel; 16 without colour
+    noise: float = 1.0  # factor of all noise; 0 for none
 
     @property
     def largest(self) -> int:
@@ -55,17 +44,11 @@ class SimulatedSensor:
 
 @dataclass(frozen=True)
 class PixelMaps:
-    """What is fixed to the pixels (h, w) of one camera.
+    """What is fixed to the pixels (h, w) of one camera."""
 
-    Attributes:
-        transmission: of lens and dust, 0 to 1, (h, w).
-        hot: numbers of the hot pixels, counted row by row, (p,).
-        hot_electrons: of each, (p,).
-    """
-
-    transmission: Signal
-    hot: Ints
-    hot_electrons: Floats
+    transmission: Signal  # of lens and dust, 0 to 1, (h, w)
+    hot: Ints  # numbers of the hot pixels, counted row by row, (p,)
+    hot_electrons: Floats  # of each, (p,)
 
 
 def pixel_directions(camera: LensCamera) -> Floats:

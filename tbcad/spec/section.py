@@ -26,12 +26,9 @@ class OrWord:
     """Annotation of a key that may hold a word instead of a value of its type.
 
     The key keeps the type of its values: before they are used, tbcad puts one in the word's place.
-
-    Attributes:
-        word: for instance "auto".
     """
 
-    word: str
+    word: str  # for instance "auto"
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

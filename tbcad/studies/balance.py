@@ -50,21 +50,13 @@ NOTES = (
 
 @dataclass(frozen=True)
 class Subject:
-    """One object with its truth.
+    """One object with its truth."""
 
-    Attributes:
-        surface: "matt" or "glossy".
-        radius_mm: of the ball.
-        scene: the ball.
-        truths: from each viewpoint, (h, w, 3).
-        masks: where they show it, (h, w).
-    """
-
-    surface: str
-    radius_mm: float
-    scene: Scene
-    truths: list[Bytes]
-    masks: list[Bools]
+    surface: str  # "matt" or "glossy"
+    radius_mm: float  # of the ball
+    scene: Scene  # the ball
+    truths: list[Bytes]  # from each viewpoint, (h, w, 3)
+    masks: list[Bools]  # where they show it, (h, w)
 
     @property
     def name(self) -> str:

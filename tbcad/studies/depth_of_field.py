@@ -75,17 +75,11 @@ MAX_OPTION = 1000
 
 @dataclass(frozen=True)
 class LensOptions:
-    """The lens and its pixels.
+    """The lens and its pixels."""
 
-    Attributes:
-        blur_px: largest blur circle allowed.
-        pixel_um: width of a pixel, micrometres.
-        wide_open: F-number of the lens fully open.
-    """
-
-    blur_px: float = 1.0
-    pixel_um: float = 3.45
-    wide_open: float = 2.8
+    blur_px: float = 1.0  # largest blur circle allowed
+    pixel_um: float = 3.45  # width of a pixel, micrometres
+    wide_open: float = 2.8  # F-number of the lens fully open
 
     def checked(self) -> "LensOptions":
         """These, when all are above 0 to 1000.

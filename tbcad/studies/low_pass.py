@@ -54,33 +54,21 @@ NOTES = (
 
 @dataclass(frozen=True)
 class Blur:
-    """What blurs the photographs of one case.
+    """What blurs the photographs of one case."""
 
-    Attributes:
-        geometry: of the mirrors.
-        name: none, filter or lens.
-        px: separation or diameter, pixels.
-        samples: rays of a pixel.
-    """
-
-    geometry: str
-    name: str
-    px: float
-    samples: Samples
+    geometry: str  # of the mirrors
+    name: str  # none, filter or lens
+    px: float  # separation or diameter, pixels
+    samples: Samples  # rays of a pixel
 
 
 @dataclass(frozen=True)
 class BlurOptions:
-    """The blurs that are tried, pixels.
+    """The blurs that are tried, pixels."""
 
-    Attributes:
-        separations_px: of the low-pass filter's images.
-        lens_px: diameters of the lens's blur circle.
-        samples: a pixel, in each of the filter's images, is the mean of samples x samples rays.
-    """
-
-    separations_px: tuple[float, ...] = (0.75, 1.0, 2.0)
-    lens_px: tuple[float, ...] = (2.4,)
+    separations_px: tuple[float, ...] = (0.75, 1.0, 2.0)  # of the low-pass filter's images
+    lens_px: tuple[float, ...] = (2.4,)  # diameters of the lens's blur circle
+    # a pixel, in each of the filter's images, is the mean of samples x samples rays
     samples: int = 2
 
     def checked(self) -> "BlurOptions":

@@ -11,38 +11,23 @@ from tbcad.spec.design import FIT, Spec
 
 @dataclass(frozen=True)
 class Claim:
-    """A figure of the paper.
+    """A figure of the paper."""
 
-    Attributes:
-        where: figure, table or section.
-        text: what is claimed.
-        value: the figure.
-        unit: of the figure; "" for a number.
-    """
-
-    where: str
-    text: str
-    value: float
-    unit: str
+    where: str  # figure, table or section
+    text: str  # what is claimed
+    value: float  # the figure
+    unit: str  # of the figure; "" for a number
 
 
 @dataclass(frozen=True)
 class BalancedSensor:
-    """A row of Table II, the columns as they are headed there.
+    """A row of Table II, the columns as they are headed there."""
 
-    Attributes:
-        width_px: columns of the image sensor.
-        height_px: its rows.
-        n: subdivision whose two resolutions are closest.
-        number_of_virtual_camera: the column of that name.
-        average_of_virtual_camera_resolution: the column of that name.
-    """
-
-    width_px: int
-    height_px: int
-    n: int
-    number_of_virtual_camera: int
-    average_of_virtual_camera_resolution: int
+    width_px: int  # columns of the image sensor
+    height_px: int  # its rows
+    n: int  # subdivision whose two resolutions are closest
+    number_of_virtual_camera: int  # the column of that name
+    average_of_virtual_camera_resolution: int  # the column of that name
 
     @property
     def printed(self) -> tuple[int, int]:

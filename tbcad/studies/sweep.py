@@ -19,15 +19,10 @@ MAX_N = 60
 
 @dataclass(frozen=True)
 class DesignAttempt:
-    """A design, or why there is none.
+    """A design, or why there is none."""
 
-    Attributes:
-        design: None where the spec was refused.
-        reason: what the refusal says, else "".
-    """
-
-    design: MirrorDesign | None
-    reason: str = ""
+    design: MirrorDesign | None  # None where the spec was refused
+    reason: str = ""  # what the refusal says, else ""
 
     @property
     def array(self) -> MirrorArray | None:

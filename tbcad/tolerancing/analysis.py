@@ -55,16 +55,11 @@ PHOTOGRAPHED_BUILDS = 2
 
 @dataclass(frozen=True)
 class ProcessOption:
-    """A process as an alternative for this design.
-
-    Attributes:
-        estimate: yield with the design as it is.
-        margin: that it needs for the wanted yield; None where it was not searched for.
-    """
+    """A process as an alternative for this design."""
 
     name: str
-    estimate: YieldEstimate
-    margin: Margin | None
+    estimate: YieldEstimate  # yield with the design as it is
+    margin: Margin | None  # that it needs for the wanted yield; None where it was not searched for
     builds: int = SEARCH_BUILDS
 
 

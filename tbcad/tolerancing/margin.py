@@ -27,17 +27,11 @@ STEP_MM = 0.01  # margins are rounded up to a multiple of it
 
 @dataclass(frozen=True)
 class Margin:
-    """The margin that a process needs.
+    """The margin that a process needs."""
 
-    Attributes:
-        mm: margin beyond the capture diameter; None where no feasible margin is enough.
-        share: of good builds at that margin, or at the last one tried.
-        reason: why there is none, else "".
-    """
-
-    mm: float | None
-    share: float
-    reason: str = ""
+    mm: float | None  # margin beyond the capture diameter; None where no feasible margin is enough
+    share: float  # of good builds at that margin, or at the last one tried
+    reason: str = ""  # why there is none, else ""
 
 
 SolvedDesigns: TypeAlias = Callable[[Spec], EdgeModels]

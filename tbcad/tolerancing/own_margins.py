@@ -39,33 +39,23 @@ FLIP_Y = np.array([1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class OwnMargins:
-    """Margins of the m mirrors of one camera.
+    """Margins of the m mirrors of one camera."""
 
-    Attributes:
-        mm: margin of each, (m,).
-        average_mm: of those that are not nearly flat, whose coverage is no more than they need.
-        share: of good builds, of those judged, of the design with these margins.
-    """
-
-    mm: Floats
-    average_mm: float
-    share: float
+    mm: Floats  # margin of each, (m,)
+    average_mm: float  # of those that are not nearly flat, whose coverage is no more than they need
+    share: float  # of good builds, of those judged, of the design with these margins
 
 
 @dataclass(frozen=True)
 class MirrorLosses:
-    """Coverage that the m mirrors of both halves lose in s builds.
+    """Coverage that the m mirrors of both halves lose in s builds."""
 
-    Attributes:
-        loss: of mirror i of camera a, then of camera b, mm, (s, 2, m).
-        spare: loss up to which the design covers enough whatever its margins, because a mirror is
-            nearly flat, mm; minus infinity for all others, (m,).
-        partner: number of the mirror at the same place on the other side of y = 0, its own where
-            the design has no such symmetry, (m,).
-    """
-
-    loss: Floats
+    loss: Floats  # of mirror i of camera a, then of camera b, mm, (s, 2, m)
+    # loss up to which the design covers enough whatever its margins, because a mirror is nearly
+    # flat, mm; minus infinity for all others, (m,)
     spare: Floats
+    # number of the mirror at the same place on the other side of y = 0, its own where the design
+    # has no such symmetry, (m,)
     partner: Ints
 
     @property

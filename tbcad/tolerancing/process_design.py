@@ -35,15 +35,10 @@ WORTH = 1.01
 
 @dataclass(frozen=True)
 class ProcessDesign:
-    """A design with the margins that a process needs.
+    """A design with the margins that a process needs."""
 
-    Attributes:
-        spec: with margins of single mirrors, or with one for all where those gain nothing.
-        even_mm: the one margin for all that reaches the same yield.
-    """
-
-    spec: Spec
-    even_mm: float
+    spec: Spec  # with margins of single mirrors, or with one for all where those gain nothing
+    even_mm: float  # the one margin for all that reaches the same yield
 
     @property
     def is_even(self) -> bool:
@@ -138,33 +133,25 @@ def _coverage(errors: Errors, models: EdgeModels) -> Floats:
 
 @dataclass(frozen=True)
 class TriedEdges:
-    """A design with one kind of edges, for a process.
-
-    Attributes:
-        made: with the margins that the process needs; None where there are none, or where even
-            without them too few pixels are left.
-        pixels: of a virtual camera of it, or of the most that any margins leave; None where there
-            is no design.
-        error: why there is no design, or None.
-    """
+    """A design with one kind of edges, for a process."""
 
     edges: EdgeKind
+    # with the margins that the process needs; None where there are none, or where even without them
+    # too few pixels are left
     made: ProcessDesign | None
+    # of a virtual camera of it, or of the most that any margins leave; None where there is no
+    # design
     pixels: SeeingPixels | None
-    error: InputError | None = None
+    error: InputError | None = None  # why there is no design, or None
 
 
 @dataclass(frozen=True)
 class EdgeChoice:
-    """The design for a process, and the edges that were tried and not taken.
-
-    Attributes:
-        other: with other edges; None where the design says which edges it has.
-    """
+    """The design for a process, and the edges that were tried and not taken."""
 
     made: ProcessDesign
     pixels: SeeingPixels
-    other: TriedEdges | None
+    other: TriedEdges | None  # with other edges; None where the design says which edges it has
 
 
 def edges_for_process(

@@ -21,27 +21,16 @@ MIN_RADII = 1.5
 
 @dataclass(frozen=True)
 class Query:
-    """One view.
+    """One view."""
 
-    Attributes:
-        azimuth: degrees.
-        elevation: degrees.
-        distance: of the camera from the middle of the object, mm.
-        aperture: diameter of the lens, mm; 0 for a pinhole.
-        focus: sharp plane, mm from the middle of the object toward the camera.
-        width: columns.
-        height: rows.
-        still: 1 for the best picture, 0 for the quickest.
-    """
-
-    azimuth: float = 0.0
-    elevation: float = 30.0
-    distance: float = 640.0
-    aperture: float = 0.0
-    focus: float = 0.0
-    width: int = 640
-    height: int = 480
-    still: int = 0
+    azimuth: float = 0.0  # degrees
+    elevation: float = 30.0  # degrees
+    distance: float = 640.0  # of the camera from the middle of the object, mm
+    aperture: float = 0.0  # diameter of the lens, mm; 0 for a pinhole
+    focus: float = 0.0  # sharp plane, mm from the middle of the object toward the camera
+    width: int = 640  # columns
+    height: int = 480  # rows
+    still: int = 0  # 1 for the best picture, 0 for the quickest
 
     def check(self, capture_mm: float) -> "Query":
         """This query, if all of its values are allowed.

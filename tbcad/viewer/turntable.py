@@ -34,21 +34,13 @@ KIND = "data:image/webp;base64,"
 
 @dataclass(frozen=True)
 class Turntable:
-    """Which pictures a turntable has.
+    """Which pictures a turntable has."""
 
-    Attributes:
-        columns: views once around.
-        elevations_deg: a row of views each.
-        distance: of the camera from the middle of the object, mm.
-        size: columns and rows of a picture.
-        method: how those of a light field are made.
-    """
-
-    columns: int
-    elevations_deg: tuple[float, ...]
-    distance: float
-    size: tuple[int, int]
-    method: MethodAtRest
+    columns: int  # views once around
+    elevations_deg: tuple[float, ...]  # a row of views each
+    distance: float  # of the camera from the middle of the object, mm
+    size: tuple[int, int]  # columns and rows of a picture
+    method: MethodAtRest  # how those of a light field are made
 
 
 def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:

@@ -50,19 +50,13 @@ LARGEST_8_BIT = 255.0
 
 @dataclass(frozen=True)
 class _Read:
-    """What a frame's photographs show.
-
-    Attributes:
-        photographed: which LEDs' photographs could be read, (l,).
-        faults: of the others, and of the dark one.
-        dark: the dark photograph, if it could be read.
-    """
+    """What a frame's photographs show."""
 
     spots: BrightSpots
     unmeasured: Unmeasured
-    photographed: Bools
-    faults: tuple[str, ...]
-    dark: Image16 | None
+    photographed: Bools  # which LEDs' photographs could be read, (l,)
+    faults: tuple[str, ...]  # of the others, and of the dark one
+    dark: Image16 | None  # the dark photograph, if it could be read
 
 
 @dataclass(frozen=True)

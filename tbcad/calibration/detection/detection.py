@@ -52,33 +52,23 @@ class Rejection(StrEnum):
 
 @dataclass(frozen=True)
 class Rejected:
-    """A highlight that is not used.
+    """A highlight that is not used."""
 
-    Attributes:
-        frame: from 0.
-        sphere: from 0.
-        led: from 0.
-    """
-
-    frame: int
-    sphere: int
-    led: int
+    frame: int  # from 0
+    sphere: int  # from 0
+    led: int  # from 0
     reason: Rejection
 
 
 @dataclass(frozen=True)
 class Detection:
-    """The result of a detection.
+    """The result of a detection."""
 
-    Attributes:
-        highlights: that can be used; their pixels are where the LEDs' own positions appear, the
-            centroids' offsets from that taken off.
-        rejected: highlights that were expected and are not used, each once.
-        faults: of photographs, LEDs and frames, each in one line that names what, and what is done.
-    """
-
+    # that can be used; their pixels are where the LEDs' own positions appear, the centroids'
+    # offsets from that taken off
     highlights: Highlights
-    rejected: tuple[Rejected, ...]
+    rejected: tuple[Rejected, ...]  # highlights that were expected and are not used, each once
+    # of photographs, LEDs and frames, each in one line that names what, and what is done
     faults: tuple[str, ...]
 
 

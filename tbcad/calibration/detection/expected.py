@@ -15,44 +15,26 @@ MARGIN_PX = 6.0  # of the picture: highlights nearer to its edge are not whole
 
 @dataclass(frozen=True)
 class Room:
-    """What an object on the stage may fill: an upright cylinder about z.
+    """What an object on the stage may fill: an upright cylinder about z."""
 
-    Attributes:
-        radius: mm.
-        bottom: height z of the disc that it stands on, mm.
-        top: height z, mm.
-    """
-
-    radius: float
-    bottom: float
-    top: float
+    radius: float  # mm
+    bottom: float  # height z of the disc that it stands on, mm
+    top: float  # height z, mm
 
 
 @dataclass(frozen=True)
 class Expected:
-    """Highlights that a machine shows, over n of them.
+    """Highlights that a machine shows, over n of them."""
 
-    Attributes:
-        frame: from 0, (n,).
-        sphere: from 0, (n,).
-        led: from 0, (n,).
-        pixel: column and row of the LED's own place, (n, 2).
-        centroid: of its dome's image, from there, pixels, (n, 2).
-        spread: mean square of that image about its centroid, square pixels, (n, 2, 2).
-        brighter: share by which the lens lets more light through a pixel on, (n, 2).
-        light: area of the image times the lens's share of light there, square pixels, (n,).
-        inside: whether it is whole in the picture, (n,).
-    """
-
-    frame: Ints
-    sphere: Ints
-    led: Ints
-    pixel: Floats
-    centroid: Floats
-    spread: Floats
-    brighter: Floats
-    light: Floats
-    inside: Bools
+    frame: Ints  # from 0, (n,)
+    sphere: Ints  # from 0, (n,)
+    led: Ints  # from 0, (n,)
+    pixel: Floats  # column and row of the LED's own place, (n, 2)
+    centroid: Floats  # of its dome's image, from there, pixels, (n, 2)
+    spread: Floats  # mean square of that image about its centroid, square pixels, (n, 2, 2)
+    brighter: Floats  # share by which the lens lets more light through a pixel on, (n, 2)
+    light: Floats  # area of the image times the lens's share of light there, square pixels, (n,)
+    inside: Bools  # whether it is whole in the picture, (n,)
 
 
 def expected_highlights(machine: Machine, dome: float) -> Expected:

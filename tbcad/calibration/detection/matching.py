@@ -148,15 +148,10 @@ def _estimated(
 
 @dataclass(frozen=True)
 class CameraMove:
-    """A move of the camera.
+    """A move of the camera."""
 
-    Attributes:
-        first: number of the first frame after it.
-        kept: whether each frame is on the side that is kept, (f,).
-    """
-
-    first: int
-    kept: Bools
+    first: int  # number of the first frame after it
+    kept: Bools  # whether each frame is on the side that is kept, (f,)
 
 
 def find_move(estimate: Estimate, frames: int, spots: Floats) -> CameraMove | None:

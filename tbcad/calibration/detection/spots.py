@@ -37,30 +37,18 @@ PHOTOGRAPH_PX = 1e5  # apart: spots of different photographs never pair
 
 @dataclass(frozen=True)
 class BrightSpots:
-    """Bright spots, over n of them.
+    """Bright spots, over n of them."""
 
-    Attributes:
-        frame: from 0, (n,).
-        led: that shone, from 0, (n,).
-        pixel: column and row of the centroid, (n, 2).
-        light: sum over the disc, (n,).
-        radius: of the disc, pixels, (n,).
-        shot: sum of light times the squared distance from the centroid, of one way, (n,).
-        spread: the same of ones where there is light: what other noise counts by, (n,).
-        colours: sum of squared differences of colours, scaled to the same sum, less what rounding
-            adds, (n,).
-        full: largest number of a pixel as a share of the largest possible, (n,).
-    """
-
-    frame: Ints
-    led: Ints
-    pixel: Floats
-    light: Floats
-    radius: Floats
-    shot: Floats
-    spread: Floats
+    frame: Ints  # from 0, (n,)
+    led: Ints  # that shone, from 0, (n,)
+    pixel: Floats  # column and row of the centroid, (n, 2)
+    light: Floats  # sum over the disc, (n,)
+    radius: Floats  # of the disc, pixels, (n,)
+    shot: Floats  # sum of light times the squared distance from the centroid, of one way, (n,)
+    spread: Floats  # the same of ones where there is light: what other noise counts by, (n,)
+    # sum of squared differences of colours, scaled to the same sum, less what rounding adds, (n,)
     colours: Floats
-    full: Floats
+    full: Floats  # largest number of a pixel as a share of the largest possible, (n,)
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -72,19 +60,12 @@ class BrightSpots:
 
 @dataclass(frozen=True)
 class Unmeasured:
-    """Numbers of what is bright and no spot.
+    """Numbers of what is bright and no spot."""
 
-    Attributes:
-        large: clusters larger than a highlight.
-        saturated: of these, with a pixel at the largest number.
-        flooded: photographs with more bright pixels than LEDs in balls give.
-        black: photographs without any.
-    """
-
-    large: int = 0
-    saturated: int = 0
-    flooded: int = 0
-    black: int = 0
+    large: int = 0  # clusters larger than a highlight
+    saturated: int = 0  # of these, with a pixel at the largest number
+    flooded: int = 0  # photographs with more bright pixels than LEDs in balls give
+    black: int = 0  # photographs without any
 
     def __add__(self, other: "Unmeasured") -> "Unmeasured":
         return Unmeasured(

@@ -21,21 +21,13 @@ from tbcad.types import Floats, Ints
 
 @dataclass(frozen=True)
 class Covariance:
-    """Of free parameters in prior standard deviations.
+    """Of free parameters in prior standard deviations."""
 
-    Attributes:
-        inner: numbers of the parameters E, (e,).
-        outer: numbers of the parameters R, (r,).
-        inverse: of H_EE, (e, e).
-        follows: K, (e, r).
-        of_outer: C_RR, (r, r).
-    """
-
-    inner: Ints
-    outer: Ints
-    inverse: csr_array
-    follows: Floats
-    of_outer: Floats
+    inner: Ints  # numbers of the parameters E, (e,)
+    outer: Ints  # numbers of the parameters R, (r,)
+    inverse: csr_array  # of H_EE, (e, e)
+    follows: Floats  # K, (e, r)
+    of_outer: Floats  # C_RR, (r, r)
 
     def of(self, slopes: csr_array, size: int) -> Floats:
         """Covariance of n groups of figures, in the square of their unit, (n, size, size).

@@ -16,15 +16,10 @@ SMALL = 1e-6  # radians: below, series replace quotients
 
 @dataclass(frozen=True)
 class Slopes:
-    """Derivatives of figures (n, d) by groups of parameters.
+    """Derivatives of figures (n, d) by groups of parameters."""
 
-    Attributes:
-        columns: numbers of the parameters, one array (n, c) or (c,) for each group.
-        values: derivatives, one array (n, d, c) for each group.
-    """
-
-    columns: tuple[Ints, ...]
-    values: tuple[Floats, ...]
+    columns: tuple[Ints, ...]  # numbers of the parameters, one array (n, c) or (c,) for each group
+    values: tuple[Floats, ...]  # derivatives, one array (n, d, c) for each group
 
     def matrix(self, prior: Prior) -> csr_array:
         """Rows n * d, by free parameters in prior standard deviations."""
@@ -52,17 +47,11 @@ def highlights_with_slopes(
 
 @dataclass(frozen=True)
 class LightImages:
-    """Where spheres show lights.
+    """Where spheres show lights."""
 
-    Attributes:
-        pixel: column and row, (n, 2).
-        by_light: derivatives by the light's place, px/mm, (n, 2, 3).
-        slopes: derivatives by all parameters but the LEDs.
-    """
-
-    pixel: Floats
-    by_light: Floats
-    slopes: Slopes
+    pixel: Floats  # column and row, (n, 2)
+    by_light: Floats  # derivatives by the light's place, px/mm, (n, 2, 3)
+    slopes: Slopes  # derivatives by all parameters but the LEDs
 
 
 def light_images(

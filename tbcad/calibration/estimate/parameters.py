@@ -45,25 +45,19 @@ CAMERA = (Block.CAMERA_TURN, Block.PINHOLE, Block.FOCAL, Block.PRINCIPAL, Block.
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a machine before it is photographed: means, and standard deviations.
+    """What is known of a machine before it is photographed: means, and standard deviations."""
 
-    Attributes:
-        mean: the machine, without shift.
-        series: number of the series that each frame belongs to, each with an offset of its angles
-            of its own, (f,).
-        sigma: standard deviations, by block; zero fixes:
-            camera_turn about the camera's own axes, radians, (3,); pinhole, mm, (3,);
-            focal: logarithm of both, and of columns over rows, (2,); principal, px, (2,);
-            distortion (5,); axis_tilt about two directions across the axis, through the origin
-            and with all spheres, radians, (2,);
-            axis_point along both, mm, (2,); angle_offset of each series, radians, (r,);
-            carrier: growth of the spheres' places about the origin, as a share, and their shift
-            along the axis, mm, (2,); leds mm, (l, 3); centres mm, (k, 3); radii mm, (k,);
-            angles of single frames, radians, (f,); runout across the axis, mm, (f, 2).
-    """
-
-    mean: Machine
+    mean: Machine  # the machine, without shift
+    # number of the series that each frame belongs to, each with an offset of its angles of its own,
+    # (f,)
     series: Ints
+    # standard deviations, by block; zero fixes: camera_turn about the camera's own axes, radians,
+    # (3,); pinhole, mm, (3,); focal: logarithm of both, and of columns over rows, (2,); principal,
+    # px, (2,); distortion (5,); axis_tilt about two directions across the axis, through the origin
+    # and with all spheres, radians, (2,); axis_point along both, mm, (2,); angle_offset of each
+    # series, radians, (r,); carrier: growth of the spheres' places about the origin, as a share,
+    # and their shift along the axis, mm, (2,); leds mm, (l, 3); centres mm, (k, 3); radii mm, (k,);
+    # angles of single frames, radians, (f,); runout across the axis, mm, (f, 2)
     sigma: dict[str, Floats]
 
     @cached_property

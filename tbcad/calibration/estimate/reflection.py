@@ -26,21 +26,13 @@ LENS = 9  # focal lengths 2, principal point 2, distortion 5
 
 @dataclass(frozen=True)
 class Reflections:
-    """Points of reflection of n highlights, with their derivatives, rows by columns.
+    """Points of reflection of n highlights, with their derivatives, rows by columns."""
 
-    Attributes:
-        point: mm, (n, 3).
-        by_centre: (n, 3, 3).
-        by_radius: (n, 3).
-        by_light: (n, 3, 3).
-        by_pinhole: (n, 3, 3).
-    """
-
-    point: Floats
-    by_centre: Floats
-    by_radius: Floats
-    by_light: Floats
-    by_pinhole: Floats
+    point: Floats  # mm, (n, 3)
+    by_centre: Floats  # (n, 3, 3)
+    by_radius: Floats  # (n, 3)
+    by_light: Floats  # (n, 3, 3)
+    by_pinhole: Floats  # (n, 3, 3)
 
 
 def reflections(centre: Floats, radius: Floats, light: Floats, pinhole: Floats) -> Reflections:

@@ -36,25 +36,16 @@ MIN_FREEDOM = 20  # figures beyond the parameters that they fix, to measure thei
 
 @dataclass(frozen=True)
 class Estimate:
-    """The machine that explains the highlights best.
-
-    Attributes:
-        used: which of them are no outliers, (n,).
-        values: free parameters in prior standard deviations, (q,).
-        residual: highlight less prediction, pixels, (n, 2).
-        information: inverse of the parameters' covariance in these units, (q, q).
-        noise_factor: by which the noise is larger than the highlights say; 1 if not larger.
-        freedom: number of figures of the used highlights, less the parameters that they fix.
-    """
+    """The machine that explains the highlights best."""
 
     prior: Prior
     highlights: Highlights
-    used: Bools
-    values: Floats
-    residual: Floats
-    information: csc_array
-    noise_factor: float
-    freedom: float
+    used: Bools  # which of them are no outliers, (n,)
+    values: Floats  # free parameters in prior standard deviations, (q,)
+    residual: Floats  # highlight less prediction, pixels, (n, 2)
+    information: csc_array  # inverse of the parameters' covariance in these units, (q, q)
+    noise_factor: float  # by which the noise is larger than the highlights say; 1 if not larger
+    freedom: float  # number of figures of the used highlights, less the parameters that they fix
     steps: int
 
     @property

@@ -28,16 +28,11 @@ DICTIONARY = re.compile(r"(?:DICT_)?([4-7]X[4-7])_(50|100|250|1000)", re.IGNOREC
 
 @dataclass(frozen=True)
 class Board:
-    """A board of squares.
+    """A board of squares."""
 
-    Attributes:
-        squares: columns and rows.
-        size_mm: width of a square.
-        dictionary: of the markers of a ChArUco board, as OpenCV names it; None: a checkerboard.
-    """
-
-    squares: tuple[int, int]
-    size_mm: float
+    squares: tuple[int, int]  # columns and rows
+    size_mm: float  # width of a square
+    # of the markers of a ChArUco board, as OpenCV names it; None: a checkerboard
     dictionary: str | None = None
     marker_mm: float | None = None
 
@@ -67,16 +62,12 @@ class Board:
 
 @dataclass(frozen=True)
 class BoardCorners:
-    """Corners of a board in one photograph.
+    """Corners of a board in one photograph."""
 
-    Attributes:
-        places: on the board, mm, float32, (n, 3), z = 0. Of a checkerboard that is partly out of
-            the picture, counted from its first corner that is seen.
-        pixels: column and row, float32, (n, 2).
-    """
-
+    # on the board, mm, float32, (n, 3), z = 0. Of a checkerboard that is partly out of the picture,
+    # counted from its first corner that is seen.
     places: Any
-    pixels: Any
+    pixels: Any  # column and row, float32, (n, 2)
 
     def but(self, dropped: Any) -> "BoardCorners":
         """Without some, a mask of (n,)."""

@@ -36,25 +36,17 @@ NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 
 @dataclass(frozen=True)
 class SolvedLens:
-    """A lens with what tells how good it is.
-
-    Attributes:
-        boards: photographs that were used.
-        unused: names of those in which no board was found.
-        outliers: corners left out, which are far from where the solution shows them.
-        rms_px: root mean square distance of corners from where the solution shows them.
-        sigma: standard deviations of `NAMES`, (9,), by leaving out one photograph after the other.
-        reach: how far out corners lie, as a share of the distance from centre to corner.
-    """
+    """A lens with what tells how good it is."""
 
     lens: CalibratedLens
-    boards: int
-    unused: tuple[str, ...]
+    boards: int  # photographs that were used
+    unused: tuple[str, ...]  # names of those in which no board was found
     corners: int
-    outliers: int
-    rms_px: float
+    outliers: int  # corners left out, which are far from where the solution shows them
+    rms_px: float  # root mean square distance of corners from where the solution shows them
+    # standard deviations of `NAMES`, (9,), by leaving out one photograph after the other
     sigma: Floats
-    reach: float
+    reach: float  # how far out corners lie, as a share of the distance from centre to corner
 
     def facts(self) -> dict[str, float | int | str]:
         """Further keys of its file."""

@@ -23,17 +23,11 @@ INSTALL = "pip install 'tbcad[machine]'"
 
 @dataclass(frozen=True)
 class CalibratedLens:
-    """Focal lengths, principal point and distortion by OpenCV's model.
+    """Focal lengths, principal point and distortion by OpenCV's model."""
 
-    Attributes:
-        focal: along rows and columns, pixels, (2,).
-        principal: column and row of the optical axis; whole numbers are pixel centres, (2,).
-        distortion: k1, k2, p1, p2, k3, (5,).
-    """
-
-    focal: Floats
-    principal: Floats
-    distortion: Floats
+    focal: Floats  # along rows and columns, pixels, (2,)
+    principal: Floats  # column and row of the optical axis; whole numbers are pixel centres, (2,)
+    distortion: Floats  # k1, k2, p1, p2, k3, (5,)
     width_px: int
     height_px: int
 

@@ -28,21 +28,13 @@ BESIDES = "centres besides a motion and growth of all"
 
 @dataclass(frozen=True)
 class Kind:
-    """Errors of one kind, over n figures.
+    """Errors of one kind, over n figures."""
 
-    Attributes:
-        name: what they are of.
-        unit: of all three.
-        injected: by which the build differs from the design, (n,).
-        recovered: by which the calibrated machine does, (n,).
-        sigma: standard deviation that the calibration gives, (n,).
-    """
-
-    name: str
-    unit: str
-    injected: Floats
-    recovered: Floats
-    sigma: Floats
+    name: str  # what they are of
+    unit: str  # of all three
+    injected: Floats  # by which the build differs from the design, (n,)
+    recovered: Floats  # by which the calibrated machine does, (n,)
+    sigma: Floats  # standard deviation that the calibration gives, (n,)
 
     @property
     def sigmas_off(self) -> Floats:
@@ -216,17 +208,11 @@ def _sigma(result: MachineCalibration, known: Covariance, block: str) -> Floats:
 
 @dataclass(frozen=True)
 class RayErrors:
-    """Errors of m rays that show the object's centre: place in mm, direction in radians.
+    """Errors of m rays that show the object's centre: place in mm, direction in radians."""
 
-    Attributes:
-        whole: in the frame of the design, (m, 4).
-        relative: besides the motion of all rays that fits them best, (m, 4).
-        in_run: besides such a motion in each run, (m, 4).
-    """
-
-    whole: Floats
-    relative: Floats
-    in_run: Floats
+    whole: Floats  # in the frame of the design, (m, 4)
+    relative: Floats  # besides the motion of all rays that fits them best, (m, 4)
+    in_run: Floats  # besides such a motion in each run, (m, 4)
 
 
 def place_mm(errors: Floats) -> Floats:

@@ -35,30 +35,20 @@ class Answer(StrEnum):
 
 @dataclass(frozen=True)
 class CalibrationVerdict:
-    """What to think of a calibration.
-
-    Attributes:
-        place_mm: root mean square error of the rays at the object's centre, median and 95 %, mm,
-            besides a motion of all of them.
-        turn_mrad: of their directions, mrad.
-        in_run: the same of both among the rays of one run, medians, mm and mrad.
-        whole_mm: the same in the frame of the design, mm.
-        whole_mrad: likewise, mrad.
-        needed_mm: half a pixel at the object, median of the mirrors, mm.
-        short: share of the rays that are less well known than half of their pixel.
-        doubts: why it may not be trusted, one line each.
-        pulled: parameters that the process does not explain, by name and prior deviations.
-    """
+    """What to think of a calibration."""
 
     answer: Answer
+    # root mean square error of the rays at the object's centre, median and 95 %, mm, besides a
+    # motion of all of them
     place_mm: tuple[float, float]
-    turn_mrad: tuple[float, float]
-    in_run: tuple[float, float]
-    whole_mm: tuple[float, float]
-    whole_mrad: tuple[float, float]
-    needed_mm: float
-    short: float
-    doubts: tuple[str, ...]
+    turn_mrad: tuple[float, float]  # of their directions, mrad
+    in_run: tuple[float, float]  # the same of both among the rays of one run, medians, mm and mrad
+    whole_mm: tuple[float, float]  # the same in the frame of the design, mm
+    whole_mrad: tuple[float, float]  # likewise, mrad
+    needed_mm: float  # half a pixel at the object, median of the mirrors, mm
+    short: float  # share of the rays that are less well known than half of their pixel
+    doubts: tuple[str, ...]  # why it may not be trusted, one line each
+    # parameters that the process does not explain, by name and prior deviations
     pulled: tuple[tuple[str, float], ...]
     steps: tuple[str, ...]
 

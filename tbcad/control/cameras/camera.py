@@ -13,27 +13,17 @@ _TIME = re.compile(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?\s*s?$")
 
 @dataclass(frozen=True)
 class Shot:
-    """A photograph as the camera gives it.
+    """A photograph as the camera gives it."""
 
-    Attributes:
-        data: bytes of the image file, unchanged.
-        suffix: of its name, in small letters, with the dot.
-        settings: that the camera itself reports for it; the file may tell more.
-    """
-
-    data: bytes
-    suffix: str
-    settings: dict[str, Setting]
+    data: bytes  # bytes of the image file, unchanged
+    suffix: str  # of its name, in small letters, with the dot
+    settings: dict[str, Setting]  # that the camera itself reports for it; the file may tell more
 
 
 class RunCamera(Protocol):
-    """A camera that is connected; what most need not do is done by default.
+    """A camera that is connected; what most need not do is done by default."""
 
-    Attributes:
-        released: whether the controller's relay releases it.
-    """
-
-    released: bool
+    released: bool  # whether the controller's relay releases it
 
     def expose(self, seconds: float) -> None:
         """Set the exposure time of the photographs that follow."""

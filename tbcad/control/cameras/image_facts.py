@@ -38,19 +38,13 @@ LOCKED = {
 
 @dataclass(frozen=True)
 class ImageFacts:
-    """What a photograph's file says.
-
-    Attributes:
-        model: of the camera; empty if the file does not say.
-        exposure_s: exposure time; None if the file does not say.
-        settings: that must not change in a run, as far as the file says them.
-    """
+    """What a photograph's file says."""
 
     width_px: int
     height_px: int
-    model: str
-    exposure_s: float | None
-    settings: dict[str, Setting]
+    model: str  # of the camera; empty if the file does not say
+    exposure_s: float | None  # exposure time; None if the file does not say
+    settings: dict[str, Setting]  # that must not change in a run, as far as the file says them
 
 
 def image_facts(data: bytes, suffix: str) -> ImageFacts:

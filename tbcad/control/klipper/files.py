@@ -28,31 +28,20 @@ LEAST_IDLE_S = 86_400.0  # a run pauses for as long as the operator likes
 
 @dataclass(frozen=True)
 class Homing:
-    """Search for the home switch.
+    """Search for the home switch."""
 
-    Attributes:
-        travel_deg: of the search, negative.
-        speed_deg_s: of the search.
-        word: of STOP_ON_ENDSTOP, for a part of the search.
-        switch_deg: base angle of the switch.
-    """
-
-    travel_deg: float
-    speed_deg_s: float
-    word: str
-    switch_deg: float
+    travel_deg: float  # of the search, negative
+    speed_deg_s: float  # of the search
+    word: str  # of STOP_ON_ENDSTOP, for a part of the search
+    switch_deg: float  # base angle of the switch
 
 
 @dataclass(frozen=True)
 class KlipperFiles:
-    """Files of a build for Klipper.
-
-    Attributes:
-        config: values of klipper.cfg, by section and option.
-    """
+    """Files of a build for Klipper."""
 
     homing: Homing
-    config: dict[str, dict[str, str]]
+    config: dict[str, dict[str, str]]  # values of klipper.cfg, by section and option
 
 
 def read_klipper_files(folder: Path) -> KlipperFiles:

@@ -58,17 +58,12 @@ class Refused(MachineFault):
 
 @dataclass(frozen=True)
 class Address:
-    """Where Moonraker listens.
-
-    Attributes:
-        path: before those of the API, without a slash at its end.
-        secure: whether by https.
-    """
+    """Where Moonraker listens."""
 
     host: str
     port: int
-    path: str
-    secure: bool
+    path: str  # before those of the API, without a slash at its end
+    secure: bool  # whether by https
 
 
 def read_address(text: str) -> Address:

@@ -27,52 +27,37 @@ ON_PLANE_MM = 1e-9
 
 @dataclass(frozen=True)
 class CellPairs:
-    """All pairs of a cell and a neighbour, or a bounding plane, over e of them.
+    """All pairs of a cell and a neighbour, or a bounding plane, over e of them."""
 
-    Attributes:
-        faces: the cell that has their border counter-clockwise (from outside), and the other face,
-            (e, 2).
-        triangles: at the start and the end of the border, (e, 2).
-        half_edges: of the triangles, that of the first face and its twin, (e, 2).
-    """
-
+    # the cell that has their border counter-clockwise (from outside), and the other face, (e, 2)
     faces: Ints
-    triangles: Ints
-    half_edges: Ints
+    triangles: Ints  # at the start and the end of the border, (e, 2)
+    half_edges: Ints  # of the triangles, that of the first face and its twin, (e, 2)
 
 
 @dataclass(frozen=True)
 class Corners:
-    """Corners c of the borders; those of very short borders are joined.
+    """Corners c of the borders; those of very short borders are joined."""
 
-    Attributes:
-        flat: where planar mirrors meet, mm, (c, 3).
-        top: above the corner of a groove's bottom, on the lowest of the mirrors there, mm, (c, 3).
-        bottom: the corner of the groove's bottom, mm, (c, 3); where no groove ends, the corner of
-            the mirror there.
-    """
-
-    flat: Floats
+    flat: Floats  # where planar mirrors meet, mm, (c, 3)
+    # above the corner of a groove's bottom, on the lowest of the mirrors there, mm, (c, 3)
     top: Floats
+    # the corner of the groove's bottom, mm, (c, 3); where no groove ends, the corner of the mirror
+    # there
     bottom: Floats
 
 
 @dataclass(frozen=True)
 class Borders:
-    """Borders between two cells, or a cell and a bounding plane, over k of them.
+    """Borders between two cells, or a cell and a bounding plane, over k of them."""
 
-    Attributes:
-        pair: index of the pair of cells, (k,).
-        faces: the cell that has the border counter-clockwise (from outside) from start to end, and
-            the other face, (k, 2).
-        ends: corners at which it starts and ends, (k, 2).
-        normal: for either face, the unit normal into its cell of the plane that ends it, (k, 2, 3);
-            zero for a bounding plane.
-    """
-
-    pair: Ints
+    pair: Ints  # index of the pair of cells, (k,)
+    # the cell that has the border counter-clockwise (from outside) from start to end, and the other
+    # face, (k, 2)
     faces: Ints
-    ends: Ints
+    ends: Ints  # corners at which it starts and ends, (k, 2)
+    # for either face, the unit normal into its cell of the plane that ends it, (k, 2, 3); zero for
+    # a bounding plane
     normal: Floats
 
     def between_mirrors(self, mirrors: int) -> Bools:
@@ -82,25 +67,15 @@ class Borders:
 
 @dataclass(frozen=True)
 class PedestalLayout:
-    """Where pedestals stand, whatever mirrors they carry.
+    """Where pedestals stand, whatever mirrors they carry."""
 
-    Attributes:
-        flat: cells of planar mirrors with the same apices, see also `pedestal_rims`.
-        mirrors: as designed, (m,).
-        pinhole: that the grooves are seen from, mm, (3,).
-        groove: width of the grooves at the mirrors' corners, mm.
-        pairs: of the cells.
-        corners: of the borders.
-        borders: between the cells.
-    """
-
-    flat: Cells
-    mirrors: Surfaces
-    pinhole: Floats
-    groove: float
-    pairs: CellPairs
-    corners: Corners
-    borders: Borders
+    flat: Cells  # cells of planar mirrors with the same apices, see also `pedestal_rims`
+    mirrors: Surfaces  # as designed, (m,)
+    pinhole: Floats  # that the grooves are seen from, mm, (3,)
+    groove: float  # width of the grooves at the mirrors' corners, mm
+    pairs: CellPairs  # of the cells
+    corners: Corners  # of the borders
+    borders: Borders  # between the cells
 
     def with_planes(self, mirrors: Surfaces) -> Surfaces:
         """Mirrors (m of them), followed by the two bounding planes."""

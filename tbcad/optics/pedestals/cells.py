@@ -26,20 +26,13 @@ class PedestalCells(Cells):
 
     Faces are the m mirrors, the seam, the foot plane, then w walls. Corners are those of the
     mirrors in the order of `rings`, then those of the grooves' bottoms.
-
-    Attributes:
-        layout: where the pedestals stand.
-        edges: see `arcs`.
-        outlines: see `rings`.
-        walls: for each wall the mirror above it and the one across its groove, (w, 2).
-        wall_rings: sides of each wall, counter-clockwise from outside, (w, 4).
     """
 
-    layout: PedestalLayout
-    edges: Arcs
-    outlines: tuple[Ints, Ints]
-    walls: Ints
-    wall_rings: Ints
+    layout: PedestalLayout  # where the pedestals stand
+    edges: Arcs  # see `arcs`
+    outlines: tuple[Ints, Ints]  # see `rings`
+    walls: Ints  # for each wall the mirror above it and the one across its groove, (w, 2)
+    wall_rings: Ints  # sides of each wall, counter-clockwise from outside, (w, 4)
 
     @property
     def mirrors(self) -> int:

@@ -134,21 +134,13 @@ def _raised(cells: Cells, edge: Ints, rise: float) -> Cells:
 
 @dataclass(frozen=True)
 class PedestalPlan:
-    """What pedestals have in common for all mirrors with the same apices.
+    """What pedestals have in common for all mirrors with the same apices."""
 
-    Attributes:
-        flat: cells of planar mirrors, see also `rims`.
-        pairs: of these cells, over e of them.
-        short: which pairs have too short a border: its corners are joined, (e,).
-        pinhole: of the camera, mm, (3,).
-        groove: width at the mirrors' corners, mm, above 0.
-    """
-
-    flat: Cells
-    pairs: CellPairs
-    short: Bools
-    pinhole: Floats
-    groove: float
+    flat: Cells  # cells of planar mirrors, see also `rims`
+    pairs: CellPairs  # of these cells, over e of them
+    short: Bools  # which pairs have too short a border: its corners are joined, (e,)
+    pinhole: Floats  # of the camera, mm, (3,)
+    groove: float  # width at the mirrors' corners, mm, above 0
 
     @classmethod
     def of(cls, flat: Cells, pinhole: Floats, groove: float) -> "PedestalPlan":

@@ -17,28 +17,18 @@ class Sides:
     """Sides of all mirrors on pedestals, one cell after another, q of them.
 
     They run counter-clockwise, seen from outside.
-
-    Attributes:
-        offsets: where each cell's sides start, (m + 1,).
-        cell: (q,).
-        border: (q,).
-        back: whether the cell follows the border from end to start, (q,).
-        following: next side of the cell, (q,).
-        corner: at which each side starts, (q,).
-        normal: of the plane that ends the cell, into the cell, (q, 3).
-        point: where the side starts on the mirror, mm, (q, 3).
-        length: along the border, mm, on the mirror or between the bottoms of the grooves at its
-            ends, whichever is shorter, (q,).
     """
 
-    offsets: Ints
-    cell: Ints
-    border: Ints
-    back: Ints
-    following: Ints
-    corner: Ints
-    normal: Floats
-    point: Floats
+    offsets: Ints  # where each cell's sides start, (m + 1,)
+    cell: Ints  # (q,)
+    border: Ints  # (q,)
+    back: Ints  # whether the cell follows the border from end to start, (q,)
+    following: Ints  # next side of the cell, (q,)
+    corner: Ints  # at which each side starts, (q,)
+    normal: Floats  # of the plane that ends the cell, into the cell, (q, 3)
+    point: Floats  # where the side starts on the mirror, mm, (q, 3)
+    # along the border, mm, on the mirror or between the bottoms of the grooves at its ends,
+    # whichever is shorter, (q,)
     length: Floats
 
 

@@ -16,15 +16,11 @@ MIDDLE = 0.5
 
 @dataclass(frozen=True)
 class GrooveWalls:
-    """Walls of one half, w of them, mirror after mirror; none where neighbouring spheres meet.
+    """Walls of one half, w of them, mirror after mirror; none where neighbouring spheres meet."""
 
-    Attributes:
-        mirror: that each ends, (w,).
-        table: the middle of that mirror's edge at the wall, the unit normal into the mirror's
-            cell, and a curvature of 0, (w, 7).
-    """
-
-    mirror: Ints
+    mirror: Ints  # that each ends, (w,)
+    # the middle of that mirror's edge at the wall, the unit normal into the mirror's cell, and a
+    # curvature of 0, (w, 7)
     table: Floats
 
     @classmethod
@@ -87,17 +83,11 @@ def groove_walls(cells: Cells) -> GrooveWalls:
 
 @dataclass(frozen=True)
 class WallMoments:
-    """Integrals over w walls.
+    """Integrals over w walls."""
 
-    Attributes:
-        area: mm^2, (w,).
-        first: integral of the place, from the origin, mm^3, (w, 3).
-        normal: out of the solid, (w, 3).
-    """
-
-    area: Floats
-    first: Floats
-    normal: Floats
+    area: Floats  # mm^2, (w,)
+    first: Floats  # integral of the place, from the origin, mm^3, (w, 3)
+    normal: Floats  # out of the solid, (w, 3)
 
     @property
     def volume(self) -> float:

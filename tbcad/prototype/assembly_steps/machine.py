@@ -21,21 +21,14 @@ RESISTORS, OWN = "resistors", "own"
 
 @dataclass(frozen=True)
 class Machine:
-    """What a prototype consists of.
+    """What a prototype consists of."""
 
-    Attributes:
-        rows: of its list of parts.
-        record: prototype.json.
-        wiring: lines of wiring.csv.
-        sizes: diameter text of each purchased ball by its number, as in the list of parts.
-        parts: tbcad's lists of purchased parts.
-    """
-
-    rows: tuple[Row, ...]
-    record: Prototype
-    wiring: tuple[dict[str, str], ...]
+    rows: tuple[Row, ...]  # of its list of parts
+    record: Prototype  # prototype.json
+    wiring: tuple[dict[str, str], ...]  # lines of wiring.csv
+    # diameter text of each purchased ball by its number, as in the list of parts
     sizes: dict[int, str]
-    parts: Parts
+    parts: Parts  # tbcad's lists of purchased parts
 
     @cached_property
     def items(self) -> dict[str, int]:

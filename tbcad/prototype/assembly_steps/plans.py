@@ -10,25 +10,15 @@ from tbcad.prototype.assembly_steps.machine import RESISTORS, Machine, Text
 
 @dataclass(frozen=True)
 class Plan:
-    """A step as it is planned for all designs.
+    """A step as it is planned for all designs."""
 
-    Attributes:
-        key: name for files.
-        title: of the step.
-        text: its words for a prototype.
-        bodies: patterns of names of the bodies that it mounts.
-        loose: parts, or kinds of them, without bodies that it takes.
-        near: bodies that the picture shows, too.
-        always: whether it is needed without any of its bodies.
-    """
-
-    key: str
-    title: str
-    text: Callable[[Machine], Text]
-    bodies: tuple[str, ...] = ()
-    loose: tuple[str, ...] = ()
-    near: tuple[str, ...] = ()
-    always: bool = False
+    key: str  # name for files
+    title: str  # of the step
+    text: Callable[[Machine], Text]  # its words for a prototype
+    bodies: tuple[str, ...] = ()  # patterns of names of the bodies that it mounts
+    loose: tuple[str, ...] = ()  # parts, or kinds of them, without bodies that it takes
+    near: tuple[str, ...] = ()  # bodies that the picture shows, too
+    always: bool = False  # whether it is needed without any of its bodies
 
     def needed(self, machine: Machine) -> bool:
         """Whether a prototype has any of its bodies, or needs it always."""

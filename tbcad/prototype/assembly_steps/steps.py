@@ -34,44 +34,26 @@ SHAFTS = ("shaft", "motor")  # the first of them is locked in the hub
 
 @dataclass(frozen=True)
 class Use:
-    """Parts that a step takes.
+    """Parts that a step takes."""
 
-    Attributes:
-        item: number in the list of parts.
-        part: its name there.
-        quantity: that this step takes.
-        bodies: of the assembly that they are; empty for what is not drawn.
-    """
-
-    item: int
-    part: str
-    quantity: int
-    bodies: tuple[str, ...]
+    item: int  # number in the list of parts
+    part: str  # its name there
+    quantity: int  # that this step takes
+    bodies: tuple[str, ...]  # of the assembly that they are; empty for what is not drawn
 
 
 @dataclass(frozen=True)
 class Step:
-    """A step of assembly.
+    """A step of assembly."""
 
-    Attributes:
-        number: from 1.
-        key: name for files.
-        title: of the step.
-        parts: that it takes.
-        does: what is done, in this order.
-        fits: torque or fit of each kind of joint.
-        checks: what must be true afterwards.
-        near: bodies, mounted before, that the parts are joined to.
-    """
-
-    number: int
-    key: str
-    title: str
-    parts: tuple[Use, ...]
-    does: tuple[str, ...]
-    fits: tuple[str, ...]
-    checks: tuple[str, ...]
-    near: tuple[str, ...]
+    number: int  # from 1
+    key: str  # name for files
+    title: str  # of the step
+    parts: tuple[Use, ...]  # that it takes
+    does: tuple[str, ...]  # what is done, in this order
+    fits: tuple[str, ...]  # torque or fit of each kind of joint
+    checks: tuple[str, ...]  # what must be true afterwards
+    near: tuple[str, ...]  # bodies, mounted before, that the parts are joined to
 
 
 def assembly_steps(machine: Machine) -> tuple[Step, ...]:

@@ -23,23 +23,14 @@ MAX_MASS_G = 1e7
 
 @dataclass(frozen=True)
 class StockBall:
-    """A ball on sale.
+    """A ball on sale."""
 
-    Attributes:
-        size: name of the size.
-        diameter_mm: nominal diameter.
-        standard: standard that names the grades.
-        grades: grades it is sold in.
-        mass_g: mass of one ball.
-        source: where these figures come from.
-    """
-
-    size: str
-    diameter_mm: float
-    standard: str
-    grades: frozenset[str]
-    mass_g: float
-    source: str
+    size: str  # name of the size
+    diameter_mm: float  # nominal diameter
+    standard: str  # standard that names the grades
+    grades: frozenset[str]  # grades it is sold in
+    mass_g: float  # mass of one ball
+    source: str  # where these figures come from
 
 
 COLUMNS = tuple(field.name for field in fields(StockBall))

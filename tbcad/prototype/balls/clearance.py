@@ -25,15 +25,10 @@ NEAR_AXIS_MM = 1e-9
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Something that does not rotate with the base.
+    """Something that does not rotate with the base."""
 
-    Attributes:
-        cone: its hull, (1,).
-        azimuth: of the half-plane that contains it, radians in (0, 2 pi).
-    """
-
-    cone: RoundCones
-    azimuth: float
+    cone: RoundCones  # its hull, (1,)
+    azimuth: float  # of the half-plane that contains it, radians in (0, 2 pi)
 
 
 def min_separations(

@@ -31,27 +31,18 @@ SELECTION_RULES = {
 
 @dataclass(frozen=True)
 class BallFit:
-    """How well balls replace mirrors, m mirrors.
+    """How well balls replace mirrors, m mirrors."""
 
-    Attributes:
-        ball: that replaces the mirror, (m,).
-        polar_error: polar angle of the ball less that of the mirror, radians, (m,).
-        coverage: coverage diameter within the mirror's cell moved with the ball, mm, (m,).
-        coverage_fixed: the same within the cell left in its place; zero where the ball shows the
-            origin outside of it, mm, (m,).
-        coverable: whether any ball on sale shows the whole target with the pictures as the spec
-            has them, (m,).
-        pixels_shell: pixels of the capture sphere in the shell's picture, (m,).
-        pixels: the same in the ball's picture, (m,).
-    """
-
-    ball: Ints
-    polar_error: Floats
-    coverage: Floats
+    ball: Ints  # that replaces the mirror, (m,)
+    polar_error: Floats  # polar angle of the ball less that of the mirror, radians, (m,)
+    coverage: Floats  # coverage diameter within the mirror's cell moved with the ball, mm, (m,)
+    # the same within the cell left in its place; zero where the ball shows the origin outside of
+    # it, mm, (m,)
     coverage_fixed: Floats
+    # whether any ball on sale shows the whole target with the pictures as the spec has them, (m,)
     coverable: Bools
-    pixels_shell: Floats
-    pixels: Floats
+    pixels_shell: Floats  # pixels of the capture sphere in the shell's picture, (m,)
+    pixels: Floats  # the same in the ball's picture, (m,)
 
     @property
     def kept_share(self) -> float:

@@ -15,17 +15,11 @@ SAME_DEG = 1e-6
 
 @dataclass(frozen=True)
 class MirrorGroups:
-    """Groups of m mirrors by rising polar angle, k of them.
+    """Groups of m mirrors by rising polar angle, k of them."""
 
-    Attributes:
-        group_of: group of each mirror, (m,).
-        polar: mean polar angle of each group, radians, (k,).
-        radius: mean radius, mm, (k,).
-    """
-
-    group_of: Ints
-    polar: Floats
-    radius: Floats
+    group_of: Ints  # group of each mirror, (m,)
+    polar: Floats  # mean polar angle of each group, radians, (k,)
+    radius: Floats  # mean radius, mm, (k,)
 
     def __len__(self) -> int:
         """Number of groups."""

@@ -50,30 +50,19 @@ class PrototypeLayout:
 
     At base angle b ball j is at azimuth placement.azimuth[j] + b; positions are in the frame of
     the shell (z up), as are those of the mirrors.
-
-    Attributes:
-        spec: of the design, with the number of balls.
-        array: camera a and its mirrors.
-        grade: deviations that the balls' grade allows.
-        groups: mirrors that share a ball.
-        balls: in the half-plane of azimuth zero.
-        fit: how well they replace the mirrors.
-        problem: limits of their azimuths.
-        placement: azimuths of the balls on the base, swing.
-        stops: the plan of rotation.
-        twin: mirror of camera b, by number, whose direction mirror i shows when the object is
-            turned by 180 degrees about z, (m,).
     """
 
-    spec: Spec
-    array: MirrorArray
-    grade: Grade
-    groups: MirrorGroups
-    balls: Balls
-    fit: BallFit
-    problem: PlacementProblem
-    placement: Placement
-    stops: StopPlan
+    spec: Spec  # of the design, with the number of balls
+    array: MirrorArray  # camera a and its mirrors
+    grade: Grade  # deviations that the balls' grade allows
+    groups: MirrorGroups  # mirrors that share a ball
+    balls: Balls  # in the half-plane of azimuth zero
+    fit: BallFit  # how well they replace the mirrors
+    problem: PlacementProblem  # limits of their azimuths
+    placement: Placement  # azimuths of the balls on the base, swing
+    stops: StopPlan  # the plan of rotation
+    # mirror of camera b, by number, whose direction mirror i shows when the object is turned by 180
+    # degrees about z, (m,)
     twin: Ints
 
     def __len__(self) -> int:
@@ -120,15 +109,10 @@ class PrototypeLayout:
 
 @dataclass(frozen=True)
 class BallChoices:
-    """The balls of any number of groups, chosen once for each number.
+    """The balls of any number of groups, chosen once for each number."""
 
-    Attributes:
-        spec: the design; its number of balls does not matter.
-        array: camera a's mirrors.
-    """
-
-    spec: Spec
-    array: MirrorArray
+    spec: Spec  # the design; its number of balls does not matter
+    array: MirrorArray  # camera a's mirrors
     _chosen: dict[int, tuple[MirrorGroups, Balls, BallFit]] = field(
         default_factory=dict, init=False, repr=False
     )

@@ -32,25 +32,17 @@ ROUNDING = 1e-12  # of a difference of two azimuths, radians
 
 @dataclass(frozen=True)
 class PlacementProblem:
-    """Limits of the azimuths of k balls, radians.
+    """Limits of the azimuths of k balls, radians."""
 
-    Attributes:
-        min_separation: minimum difference of two balls' azimuths, (k, k); zero where any will do.
-        served_low: minimum azimuth at which the ball replaces a mirror, (k,).
-        served_high: maximum azimuth at which the ball replaces a mirror, (k,).
-        min_azimuth: azimuth the ball must never go below, (k,).
-        max_azimuth: azimuth it must never go above, (k,).
-        seat_half_angle: from a ball's centre to the edge of its seat, seen from the axis, (k,).
-        max_swing: maximum angle that the base may turn through.
-    """
-
+    # minimum difference of two balls' azimuths, (k, k); zero where any will do
     min_separation: Floats
-    served_low: Floats
-    served_high: Floats
-    min_azimuth: Floats
-    max_azimuth: Floats
+    served_low: Floats  # minimum azimuth at which the ball replaces a mirror, (k,)
+    served_high: Floats  # maximum azimuth at which the ball replaces a mirror, (k,)
+    min_azimuth: Floats  # azimuth the ball must never go below, (k,)
+    max_azimuth: Floats  # azimuth it must never go above, (k,)
+    # from a ball's centre to the edge of its seat, seen from the axis, (k,)
     seat_half_angle: Floats
-    max_swing: float
+    max_swing: float  # maximum angle that the base may turn through
 
     def __len__(self) -> int:
         """Number of balls."""
@@ -90,18 +82,12 @@ class PlacementProblem:
 
 @dataclass(frozen=True)
 class Placement:
-    """Azimuths of the balls on the base at base angle zero, and what they need, radians.
+    """Azimuths of the balls on the base at base angle zero, and what they need, radians."""
 
-    Attributes:
-        azimuth: (k,).
-        swing: angle that the base turns through, half of it to either side.
-        swing_bound: lower bound of the swing of any azimuths, as far as the search showed.
-        outermost: largest azimuth, to either side of zero, that the edge of a seat ever reaches.
-    """
-
-    azimuth: Floats
-    swing: float
-    swing_bound: float
+    azimuth: Floats  # (k,)
+    swing: float  # angle that the base turns through, half of it to either side
+    swing_bound: float  # lower bound of the swing of any azimuths, as far as the search showed
+    # largest azimuth, to either side of zero, that the edge of a seat ever reaches
     outermost: float
 
 

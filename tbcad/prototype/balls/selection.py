@@ -30,24 +30,15 @@ class Balls:
 
     A cap is a printed or turned part: a ball of body_radius, for the same seat, with a front of
     the larger reflecting radius. The front ends where the two spheres meet.
-
-    Attributes:
-        poses: apices and normals; the apex is on the ellipsoid whatever the radius.
-        radius: of the reflecting sphere, mm, (k,).
-        stock: place in the catalogue, CAP for a cap, (k,).
-        catalogue: balls that could be chosen.
-        outline: of the part in use, mm, (k, s, 3).
-        body_radius: of the sphere that contains the whole part and touches the seat, mm, (k,).
-        body_depth: of that sphere's centre behind the apex along the normal, mm, (k,).
     """
 
-    poses: BallPoses
-    radius: Floats
-    stock: Ints
-    catalogue: Catalogue
-    outline: Floats
-    body_radius: Floats
-    body_depth: Floats
+    poses: BallPoses  # apices and normals; the apex is on the ellipsoid whatever the radius
+    radius: Floats  # of the reflecting sphere, mm, (k,)
+    stock: Ints  # place in the catalogue, CAP for a cap, (k,)
+    catalogue: Catalogue  # balls that could be chosen
+    outline: Floats  # of the part in use, mm, (k, s, 3)
+    body_radius: Floats  # of the sphere that contains the whole part and touches the seat, mm, (k,)
+    body_depth: Floats  # of that sphere's centre behind the apex along the normal, mm, (k,)
 
     def __len__(self) -> int:
         """Number of balls."""
@@ -89,21 +80,13 @@ class Balls:
 
 @dataclass(frozen=True)
 class BallCandidates:
-    """Groups of camera a's mirrors, and what balls show in their places.
+    """Groups of camera a's mirrors, and what balls show in their places."""
 
-    Attributes:
-        array: camera a's mirrors.
-        groups: of them.
-        windows: their cells as the camera sees them.
-        target: coverage diameter that counts, mm.
-        margin: by which what is required is larger, mm.
-    """
-
-    array: MirrorArray
-    groups: MirrorGroups
-    windows: Windows
-    target: float
-    margin: float
+    array: MirrorArray  # camera a's mirrors
+    groups: MirrorGroups  # of them
+    windows: Windows  # their cells as the camera sees them
+    target: float  # coverage diameter that counts, mm
+    margin: float  # by which what is required is larger, mm
 
     @property
     def required(self) -> float:

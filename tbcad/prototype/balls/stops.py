@@ -24,17 +24,11 @@ MIN_SINE = 1e-12  # of a polar angle, against division by zero
 
 @dataclass(frozen=True)
 class StopRequests:
-    """Base angles at which each of m mirrors may be served, relative to its ball's azimuth.
+    """Base angles at which each of m mirrors may be served, relative to its ball's azimuth."""
 
-    Attributes:
-        ball: that replaces the mirror, (m,).
-        azimuth: of the mirror, radians, (m,).
-        tolerance: maximum difference of the ball's azimuth from the mirror's, radians, (m,).
-    """
-
-    ball: Ints
-    azimuth: Floats
-    tolerance: Floats
+    ball: Ints  # that replaces the mirror, (m,)
+    azimuth: Floats  # of the mirror, radians, (m,)
+    tolerance: Floats  # maximum difference of the ball's azimuth from the mirror's, radians, (m,)
 
     def low(self, k: int) -> Floats:
         """Minimum azimuth (k,) that each of k balls must reach, tolerance used."""
@@ -56,21 +50,13 @@ class StopRequests:
 
 @dataclass(frozen=True)
 class StopPlan:
-    """Stops of the base in ascending order, s stops and m mirrors.
+    """Stops of the base in ascending order, s stops and m mirrors."""
 
-    Attributes:
-        angle: base angle at each stop, radians, (s,).
-        stop: at which each mirror is served, (m,).
-        azimuth_error: azimuth of the ball less that of the mirror, radians, (m,).
-        polar_error: polar angle of the ball less that of the mirror, radians, (m,).
-        error: angle between the ball's direction and the mirror's, radians, (m,).
-    """
-
-    angle: Floats
-    stop: Ints
-    azimuth_error: Floats
-    polar_error: Floats
-    error: Floats
+    angle: Floats  # base angle at each stop, radians, (s,)
+    stop: Ints  # at which each mirror is served, (m,)
+    azimuth_error: Floats  # azimuth of the ball less that of the mirror, radians, (m,)
+    polar_error: Floats  # polar angle of the ball less that of the mirror, radians, (m,)
+    error: Floats  # angle between the ball's direction and the mirror's, radians, (m,)
 
     def __len__(self) -> int:
         """Number of stops."""

@@ -48,16 +48,11 @@ UP = np.eye(3)[2]
 
 @dataclass(frozen=True)
 class SeatPose:
-    """A seat on the bed.
+    """A seat on the bed."""
 
-    Attributes:
-        axes: rows of the seat's own frame along the bed's x, y and z; the axis leans toward y,
-            (3, 3).
-        pad_azimuth: of its first pad about its axis, radians.
-    """
-
+    # rows of the seat's own frame along the bed's x, y and z; the axis leans toward y, (3, 3)
     axes: Floats
-    pad_azimuth: float
+    pad_azimuth: float  # of its first pad about its axis, radians
 
     @property
     def lean(self) -> float:

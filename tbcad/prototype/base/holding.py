@@ -109,17 +109,11 @@ def pull_on_plate(gap: float, magnet: float, height: float) -> float:
 
 @dataclass(frozen=True)
 class Motion:
-    """How the base moves, and what caps weigh.
+    """How the base moves, and what caps weigh."""
 
-    Attributes:
-        speed: radians/s.
-        acceleration: radians/s^2.
-        cap_density: g/cm^3.
-    """
-
-    speed: float
-    acceleration: float
-    cap_density: float
+    speed: float  # radians/s
+    acceleration: float  # radians/s^2
+    cap_density: float  # g/cm^3
 
 
 AT_DEFAULT_SPEED = Motion(np.radians(15.0), np.radians(50.0), 1.27)

@@ -28,19 +28,13 @@ SET_SCREW_AZIMUTHS = np.radians([135.0, 225.0])
 
 @dataclass(frozen=True)
 class HolePattern:
-    """Holes of a purchased part, on a circle about the axis.
+    """Holes of a purchased part, on a circle about the axis."""
 
-    Attributes:
-        circle: diameter, mm.
-        hole: diameter of the holes; zero: inserts of the spec.
-        head: diameter and depth of the counterbore on the side of the object, mm; zero: none.
-        boss: whether the hub has a boss with a shaft bore that is locked.
-    """
-
-    circle: float
-    hole: float
+    circle: float  # diameter, mm
+    hole: float  # diameter of the holes; zero: inserts of the spec
+    # diameter and depth of the counterbore on the side of the object, mm; zero: none
     head: tuple[float, float]
-    boss: bool
+    boss: bool  # whether the hub has a boss with a shaft bore that is locked
 
 
 PATTERNS: dict[Drive, HolePattern] = {
@@ -55,37 +49,21 @@ PATTERNS: dict[Drive, HolePattern] = {
 
 @dataclass(frozen=True)
 class Hub:
-    """The hub about the axis; z along the axis, toward the camera, mm.
+    """The hub about the axis; z along the axis, toward the camera, mm."""
 
-    Attributes:
-        front: z of the disc's face toward the object.
-        back: z of the disc's other face.
-        face: z of the outer face, where the drive is bolted on.
-        disc: radius of the disc.
-        boss: radius of the boss between back and face; zero: none.
-        bore: radius of the shaft's through bore.
-        holes: places (h, 2) of the drive's holes across the axis, x toward azimuth zero.
-        hole: diameter of the holes.
-        depth: depth of the holes from the outer face.
-        head: diameter and depth of their counterbores from the front; zero: none.
-        lock: how the shaft is held; None without a boss.
-        lock_z: z of the lock's screws.
-        key_radius: distance of the key's hole from the axis.
-    """
-
-    front: float
-    back: float
-    face: float
-    disc: float
-    boss: float
-    bore: float
-    holes: Floats
-    hole: float
-    depth: float
-    head: tuple[float, float]
-    lock: str | None
-    lock_z: float
-    key_radius: float
+    front: float  # z of the disc's face toward the object
+    back: float  # z of the disc's other face
+    face: float  # z of the outer face, where the drive is bolted on
+    disc: float  # radius of the disc
+    boss: float  # radius of the boss between back and face; zero: none
+    bore: float  # radius of the shaft's through bore
+    holes: Floats  # places (h, 2) of the drive's holes across the axis, x toward azimuth zero
+    hole: float  # diameter of the holes
+    depth: float  # depth of the holes from the outer face
+    head: tuple[float, float]  # diameter and depth of their counterbores from the front; zero: none
+    lock: str | None  # how the shaft is held; None without a boss
+    lock_z: float  # z of the lock's screws
+    key_radius: float  # distance of the key's hole from the axis
 
     @property
     def socket(self) -> float:

@@ -52,23 +52,14 @@ class CutPlane:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint on a plane.
+    """A joint on a plane."""
 
-    Attributes:
-        plane: between both sides.
-        region: that the joint is in, (h, 4).
-        dowels: places on the plane, mm, (d, 3); pressed in below it.
-        screws: places on the plane, mm, (s, 3).
-        heads: the side of each screw's head, 1 above the plane, -1 below, (s,).
-        labels: places on the plane of the numbers below and above, mm, (2, 3).
-    """
-
-    plane: CutPlane
-    region: Floats
-    dowels: Floats
-    screws: Floats
-    heads: NDArray[np.int64]
-    labels: Floats
+    plane: CutPlane  # between both sides
+    region: Floats  # that the joint is in, (h, 4)
+    dowels: Floats  # places on the plane, mm, (d, 3); pressed in below it
+    screws: Floats  # places on the plane, mm, (s, 3)
+    heads: NDArray[np.int64]  # the side of each screw's head, 1 above the plane, -1 below, (s,)
+    labels: Floats  # places on the plane of the numbers below and above, mm, (2, 3)
 
 
 Cut = tuple[CutPlane, Floats]

@@ -58,31 +58,18 @@ ROUNDING_MM = 1e-9
 
 @dataclass(frozen=True)
 class BaseLayout:
-    """Dimensions of the carrier, in the ellipsoid's frame unless said otherwise.
+    """Dimensions of the carrier, in the ellipsoid's frame unless said otherwise."""
 
-    Attributes:
-        spec: of the base.
-        frame: rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3).
-        light: what the carrier stays out of.
-        inner: the wall's inner line from the hub toward the camera, (z, r) in mm, (p, 2).
-        sector: minimum and maximum azimuth of the wall, radians.
-        ribs: azimuths of the meridian ribs, the first and the last at the edges, radians.
-        outline: outer line of the ribs, (z, r), mm, (q, 2).
-        rings: cross-sections of the ring ribs, (z, r), mm, each (4, 2).
-        hub: disc, boss and holes.
-        seats: one for each ball, in the frame of the shell.
-    """
-
-    spec: BaseSpec
-    frame: Floats
-    light: LightSpheroid
-    inner: Floats
-    sector: tuple[float, float]
-    ribs: Floats
-    outline: Floats
-    rings: tuple[Floats, ...]
-    hub: Hub
-    seats: Seats
+    spec: BaseSpec  # of the base
+    frame: Floats  # rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3)
+    light: LightSpheroid  # what the carrier stays out of
+    inner: Floats  # the wall's inner line from the hub toward the camera, (z, r) in mm, (p, 2)
+    sector: tuple[float, float]  # minimum and maximum azimuth of the wall, radians
+    ribs: Floats  # azimuths of the meridian ribs, the first and the last at the edges, radians
+    outline: Floats  # outer line of the ribs, (z, r), mm, (q, 2)
+    rings: tuple[Floats, ...]  # cross-sections of the ring ribs, (z, r), mm, each (4, 2)
+    hub: Hub  # disc, boss and holes
+    seats: Seats  # one for each ball, in the frame of the shell
 
     @property
     def outer(self) -> Floats:

@@ -30,17 +30,11 @@ def pad_normals(tilt: float, azimuth: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Pockets:
-    """Pockets behind k balls.
+    """Pockets behind k balls."""
 
-    Attributes:
-        magnet: diameter of the magnet, zero: glue, mm, (k,).
-        height: of the magnet, zero: glue, mm, (k,).
-        radius: of the pocket, or of the well, mm, (k,).
-    """
-
-    magnet: Floats
-    height: Floats
-    radius: Floats
+    magnet: Floats  # diameter of the magnet, zero: glue, mm, (k,)
+    height: Floats  # of the magnet, zero: glue, mm, (k,)
+    radius: Floats  # of the pocket, or of the well, mm, (k,)
 
 
 def glue_wells(prototype: PrototypeLayout, needed: Floats, room: Floats) -> Pockets:

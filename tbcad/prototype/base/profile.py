@@ -25,14 +25,10 @@ class LightSpheroid:
     The sum of distances to two points is convex. So if it is at most the level on the two spheres
     of a round cone, it is so in the whole cone: a spheroid with the same foci as the mirrors'
     ellipsoid contains all light.
-
-    Attributes:
-        pinhole: distance along the axis, mm.
-        level: maximum of the sum, mm.
     """
 
-    pinhole: float
-    level: float
+    pinhole: float  # distance along the axis, mm
+    level: float  # maximum of the sum, mm
 
     def excess(self, points: Floats) -> Floats:
         """By how much the sum of distances of points (..., 2 or 3) exceeds the level, mm, (...).

@@ -38,44 +38,26 @@ SLANT_AZIMUTHS = np.radians(np.arange(0, 360, 30))
 
 @dataclass(frozen=True)
 class Seats:
-    """Seats of k balls, in the frame of the shell with the base at angle zero.
+    """Seats of k balls, in the frame of the shell with the base at angle zero."""
 
-    Attributes:
-        centre: of the bodies, mm, (k, 3).
-        radius: of the bodies, mm, (k,).
-        axes: of each seat, (k, 3, 3): rows along the meridian toward the camera, along the circle
-            against the azimuth, and the seat's axis, away from the light.
-        cup: radius of the cup, mm, (k,).
-        pad: radius of the pads, mm, (k,).
-        tilt: angle of the pads' normals to the seat's axis, radians.
-        pad_azimuth: of the first pad about the seat's axis from the first row, radians, (k,).
-        front: length at which the boss begins, mm, (k,).
-        back: length at which it ends, mm, (k,).
-        boss: radius of the boss, mm, (k,).
-        magnet: diameter of the magnet, zero: glue, mm, (k,).
-        magnet_height: of the magnet, zero: glue, mm, (k,).
-        pocket: radius of its pocket, or of the well, mm, (k,).
-        bottom: length at which the pocket ends, mm, (k,).
-        insertion: from the centre to where the ball is free when it is taken out, mm, (k, 3).
-        pad_offset: by how much pads are printed off their places, away from the balls, mm.
-    """
-
-    centre: Floats
-    radius: Floats
+    centre: Floats  # of the bodies, mm, (k, 3)
+    radius: Floats  # of the bodies, mm, (k,)
+    # of each seat, (k, 3, 3): rows along the meridian toward the camera, along the circle against
+    # the azimuth, and the seat's axis, away from the light
     axes: Floats
-    cup: Floats
-    pad: Floats
-    tilt: float
-    pad_azimuth: Floats
-    front: Floats
-    back: Floats
-    boss: Floats
-    magnet: Floats
-    magnet_height: Floats
-    pocket: Floats
-    bottom: Floats
-    insertion: Floats
-    pad_offset: float
+    cup: Floats  # radius of the cup, mm, (k,)
+    pad: Floats  # radius of the pads, mm, (k,)
+    tilt: float  # angle of the pads' normals to the seat's axis, radians
+    pad_azimuth: Floats  # of the first pad about the seat's axis from the first row, radians, (k,)
+    front: Floats  # length at which the boss begins, mm, (k,)
+    back: Floats  # length at which it ends, mm, (k,)
+    boss: Floats  # radius of the boss, mm, (k,)
+    magnet: Floats  # diameter of the magnet, zero: glue, mm, (k,)
+    magnet_height: Floats  # of the magnet, zero: glue, mm, (k,)
+    pocket: Floats  # radius of its pocket, or of the well, mm, (k,)
+    bottom: Floats  # length at which the pocket ends, mm, (k,)
+    insertion: Floats  # from the centre to where the ball is free when it is taken out, mm, (k, 3)
+    pad_offset: float  # by how much pads are printed off their places, away from the balls, mm
 
     def __len__(self) -> int:
         """Number of seats."""

@@ -40,15 +40,10 @@ WHOLE: Floats = np.zeros((0, 4))  # the region that nothing cuts
 
 @dataclass(frozen=True)
 class BaseSplit:
-    """Pieces and joints of the base.
+    """Pieces and joints of the base."""
 
-    Attributes:
-        pieces: regions (h, 4); the piece with the hub first.
-        joints: one for each cut; none: the base stays whole.
-    """
-
-    pieces: tuple[Floats, ...]
-    joints: tuple[Joint, ...]
+    pieces: tuple[Floats, ...]  # regions (h, 4); the piece with the hub first
+    joints: tuple[Joint, ...]  # one for each cut; none: the base stays whole
 
     def piece_of(self, point: Floats) -> int:
         """Number, from 0, of the piece that a point (3,) is in."""

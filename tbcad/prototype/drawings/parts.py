@@ -58,17 +58,11 @@ CUT_MM = 1.0  # tolerance of what is sawn, to either side: feet clamp anywhere a
 
 @dataclass(frozen=True)
 class Listed:
-    """What all sheets take from the parts list.
+    """What all sheets take from the parts list."""
 
-    Attributes:
-        design: name of it.
-        items: number of each part.
-        quantities: of each part.
-    """
-
-    design: str
-    items: Mapping[str, int]
-    quantities: Mapping[str, int]
+    design: str  # name of it
+    items: Mapping[str, int]  # number of each part
+    quantities: Mapping[str, int]  # of each part
 
     def block(self, title: str, part: PurchasedPart, view: str) -> TitleBlock:
         """The title block of a part's drawing."""

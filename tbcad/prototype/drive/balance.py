@@ -19,15 +19,10 @@ ROUNDING = 1e-9  # of first moments, as a share of the sum of their magnitudes
 
 @dataclass(frozen=True)
 class PointMasses:
-    """Masses on the base, n of them.
+    """Masses on the base, n of them."""
 
-    Attributes:
-        mass_g: grams, (n,).
-        centre: centres of gravity in the frame of the shell at base angle zero, mm, (n, 3).
-    """
-
-    mass_g: Floats
-    centre: Floats
+    mass_g: Floats  # grams, (n,)
+    centre: Floats  # centres of gravity in the frame of the shell at base angle zero, mm, (n, 3)
 
     def __len__(self) -> int:
         """Number of masses."""
@@ -36,19 +31,12 @@ class PointMasses:
 
 @dataclass(frozen=True)
 class BaseBalance:
-    """Sums over all masses on the base.
+    """Sums over all masses on the base."""
 
-    Attributes:
-        frame: rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3).
-        mass_g: grams.
-        first_moment: along the rows of the frame at base angle zero, g mm, (3,).
-        inertia: moment of inertia of the point masses about the axis, g mm^2.
-    """
-
-    frame: Floats
-    mass_g: float
-    first_moment: Floats
-    inertia: float
+    frame: Floats  # rows: axis w, azimuth zero, third, in the frame of the shell, (3, 3)
+    mass_g: float  # grams
+    first_moment: Floats  # along the rows of the frame at base angle zero, g mm, (3,)
+    inertia: float  # moment of inertia of the point masses about the axis, g mm^2
 
     @property
     def centre(self) -> Floats:

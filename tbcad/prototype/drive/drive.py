@@ -26,25 +26,15 @@ STEPS_PER_PERIOD = 4  # full steps in a period of a stepper's torque
 
 @dataclass(frozen=True)
 class Drive:
-    """A motor and the parts between it and the base; a stage contains its motor and its gear.
+    """A motor and the parts between it and the base; a stage contains its motor and its gear."""
 
-    Attributes:
-        name: kind of drive that the hub of the base has holes for.
-        motor: stepper, or stage.
-        pinion: on the motor; None without a belt.
-        wheel: on the base.
-        belt: between the two.
-        coupling: on the motor's shaft; None unless direct.
-        efficiency: of the gear.
-    """
-
-    name: str
-    motor: PurchasedPart
-    pinion: PurchasedPart | None
-    wheel: PurchasedPart | None
-    belt: PurchasedPart | None
-    coupling: PurchasedPart | None
-    efficiency: float
+    name: str  # kind of drive that the hub of the base has holes for
+    motor: PurchasedPart  # stepper, or stage
+    pinion: PurchasedPart | None  # on the motor; None without a belt
+    wheel: PurchasedPart | None  # on the base
+    belt: PurchasedPart | None  # between the two
+    coupling: PurchasedPart | None  # on the motor's shaft; None unless direct
+    efficiency: float  # of the gear
 
     @property
     def parts(self) -> tuple[PurchasedPart, ...]:

@@ -33,17 +33,11 @@ LIFE_EXPONENT = 3  # of a ball bearing's load (ISO 281)
 
 @dataclass(frozen=True)
 class BaseTorques:
-    """Torques on the base, N mm.
+    """Torques on the base, N mm."""
 
-    Attributes:
-        gravity: the largest over the stops and between them.
-        peak: with acceleration.
-        required: the peak times the safety factor.
-    """
-
-    gravity: float
-    peak: float
-    required: float
+    gravity: float  # the largest over the stops and between them
+    peak: float  # with acceleration
+    required: float  # the peak times the safety factor
 
 
 def base_torques(

@@ -28,32 +28,20 @@ ABOVE_DEG = 1.0  # of the upper soft limit above the highest angle
 
 @dataclass(frozen=True)
 class StopSequence:
-    """The stops of the base in one run; there are two runs, one for each turn of the object.
+    """The stops of the base in one run; there are two runs, one for each turn of the object."""
 
-    Attributes:
-        start: base angle below all stops, degrees.
-        angle: of the stops, degrees, ascending, (s,).
-        mirrors: shown at each stop, (s,).
-    """
-
-    start: float
-    angle: Floats
-    mirrors: NDArray[np.int64]
+    start: float  # base angle below all stops, degrees
+    angle: Floats  # of the stops, degrees, ascending, (s,)
+    mirrors: NDArray[np.int64]  # shown at each stop, (s,)
 
 
 @dataclass(frozen=True)
 class HomeAngles:
-    """Base angles of homing, degrees.
+    """Base angles of homing, degrees."""
 
-    Attributes:
-        switch: at which the switch trips.
-        homed: after the pull-off, without the trim.
-        travel: from the switch to the upper soft limit and the pull-off beyond it.
-    """
-
-    switch: float
-    homed: float
-    travel: float
+    switch: float  # at which the switch trips
+    homed: float  # after the pull-off, without the trim
+    travel: float  # from the switch to the upper soft limit and the pull-off beyond it
 
 
 def stop_sequence(prototype: PrototypeLayout, motion: MotionSpec) -> StopSequence:

@@ -17,19 +17,12 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class SeriesResistor:
-    """A resistor in series with an LED.
+    """A resistor in series with an LED."""
 
-    Attributes:
-        part: to buy; its name has value and rating.
-        ohm: value.
-        current_ma: that the LED gets, mA.
-        dissipation_w: of the resistor while the LED is on, W.
-    """
-
-    part: PurchasedPart
-    ohm: float
-    current_ma: float
-    dissipation_w: float
+    part: PurchasedPart  # to buy; its name has value and rating
+    ohm: float  # value
+    current_ma: float  # that the LED gets, mA
+    dissipation_w: float  # of the resistor while the LED is on, W
 
 
 def e24_at_least(ohm: float) -> float:

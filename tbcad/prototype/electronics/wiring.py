@@ -83,31 +83,18 @@ SUPPLY: Row = {
 
 @dataclass(frozen=True)
 class Wiring:
-    """The electronics of a stage.
+    """The electronics of a stage."""
 
-    Attributes:
-        lights: that the controller switches.
-        leds: number of LEDs.
-        led: the purchased part.
-        supply_v: of lamp and LEDs.
-        resistor: in series with each LED; None without LEDs.
-        connector: of the LEDs' cable; None without LEDs.
-        wire: of the LEDs; None without LEDs.
-        lengths: of each LED's cable to the controller, mm.
-        trigger: whether a relay releases the camera.
-        axis: of the controller.
-    """
-
-    lights: tuple[Light, ...]
-    leds: int
-    led: PurchasedPart
-    supply_v: float
-    resistor: SeriesResistor | None
-    connector: PurchasedPart | None
-    wire: PurchasedPart | None
-    lengths: tuple[float, ...]
-    trigger: bool
-    axis: str
+    lights: tuple[Light, ...]  # that the controller switches
+    leds: int  # number of LEDs
+    led: PurchasedPart  # the purchased part
+    supply_v: float  # of lamp and LEDs
+    resistor: SeriesResistor | None  # in series with each LED; None without LEDs
+    connector: PurchasedPart | None  # of the LEDs' cable; None without LEDs
+    wire: PurchasedPart | None  # of the LEDs; None without LEDs
+    lengths: tuple[float, ...]  # of each LED's cable to the controller, mm
+    trigger: bool  # whether a relay releases the camera
+    axis: str  # of the controller
 
     @property
     def parts(self) -> Parts:

@@ -43,21 +43,13 @@ def standard_in(what: str) -> str:
 
 @dataclass(frozen=True)
 class PrintedItem:
-    """A part to be printed.
+    """A part to be printed."""
 
-    Attributes:
-        name: of the part and of its files.
-        what: it is for.
-        volume: mm^3.
-        estimate: of its print.
-        material: of it.
-    """
-
-    name: str
-    what: str
-    volume: float
-    estimate: PrintEstimate
-    material: str = PRINT_MATERIAL
+    name: str  # of the part and of its files
+    what: str  # it is for
+    volume: float  # mm^3
+    estimate: PrintEstimate  # of its print
+    material: str = PRINT_MATERIAL  # of it
 
 
 def bom_rows(

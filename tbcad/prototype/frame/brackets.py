@@ -20,19 +20,13 @@ OVERLAP_MM = 2.0  # by which added bodies overlap, so that no faces coincide
 
 @dataclass(frozen=True)
 class Bracket:
-    """A printed part that is screwed on.
+    """A printed part that is screwed on."""
 
-    Attributes:
-        component: the part itself.
-        holes: tapped holes that it needs in the base plate, (x, y) along the frame's axes, (h, 2).
-        foot: corners of its foot on the plate, the same, (f, 2).
-        fasteners: of it, but for those in the base plate.
-    """
-
-    component: Component
+    component: Component  # the part itself
+    # tapped holes that it needs in the base plate, (x, y) along the frame's axes, (h, 2)
     holes: Floats
-    foot: Floats
-    fasteners: tuple[Fastener, ...] = ()
+    foot: Floats  # corners of its foot on the plate, the same, (f, 2)
+    fasteners: tuple[Fastener, ...] = ()  # of it, but for those in the base plate
 
 
 def frame_axes(axis: Floats) -> Floats:

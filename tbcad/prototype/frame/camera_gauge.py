@@ -49,60 +49,38 @@ WHAT = "gauge for the camera's place, on the hub while the camera is aligned"
 
 @dataclass(frozen=True)
 class GaugeSizes:
-    """Where the marks are.
+    """Where the marks are."""
 
-    Attributes:
-        hub: of the hub's face that the gauge lies on, along the axis, mm.
-        near: of the near marks, mm.
-        far: of the far marks, mm.
-        near_half: from the axis to a near mark, mm.
-        far_half: from the axis to a far mark, mm.
-    """
-
-    hub: float
-    near: float
-    far: float
-    near_half: float
-    far_half: float
+    hub: float  # of the hub's face that the gauge lies on, along the axis, mm
+    near: float  # of the near marks, mm
+    far: float  # of the far marks, mm
+    near_half: float  # from the axis to a near mark, mm
+    far_half: float  # from the axis to a far mark, mm
 
 
 @dataclass(frozen=True)
 class Sight:
-    """How the pinhole sees the marks.
+    """How the pinhole sees the marks."""
 
-    Attributes:
-        near: distance of the near marks along the base's axis, mm.
-        far: of the far marks.
-        tangent: of the angle between axis and lines of sight.
-        to_axis: cosine of the angle between the optical axis and the base's.
-        to_zero: part of the optical axis along azimuth zero.
-    """
-
-    near: float
-    far: float
-    tangent: float
-    to_axis: float
-    to_zero: float
+    near: float  # distance of the near marks along the base's axis, mm
+    far: float  # of the far marks
+    tangent: float  # of the angle between axis and lines of sight
+    to_axis: float  # cosine of the angle between the optical axis and the base's
+    to_zero: float  # part of the optical axis along azimuth zero
 
 
 @dataclass(frozen=True)
 class CameraGauge:
-    """The gauge, and what it tells.
+    """The gauge, and what it tells."""
 
-    Attributes:
-        component: the part, on the hub at base angle zero.
-        sizes: where its marks are.
-        marks: near and far mark of the side at positive azimuths, then of the other, at base angle
-            zero, mm, (2, 2, 3).
-        angles: of the base at which photographs are taken, degrees.
-        errors: of the pinhole's place, standard deviation each: along the base's axis, across the
-            frame's plane, in it out from the axis, mm.
-    """
-
-    component: Component
-    sizes: GaugeSizes
+    component: Component  # the part, on the hub at base angle zero
+    sizes: GaugeSizes  # where its marks are
+    # near and far mark of the side at positive azimuths, then of the other, at base angle zero, mm,
+    # (2, 2, 3)
     marks: Floats
-    angles: tuple[float, float, float]
+    angles: tuple[float, float, float]  # of the base at which photographs are taken, degrees
+    # of the pinhole's place, standard deviation each: along the base's axis, across the frame's
+    # plane, in it out from the axis, mm
     errors: dict[str, float]
 
 

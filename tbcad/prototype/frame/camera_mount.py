@@ -76,21 +76,13 @@ AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
 
 @dataclass(frozen=True)
 class CameraMount:
-    """The parts that hold the camera.
+    """The parts that hold the camera."""
 
-    Attributes:
-        bracket: on the base plate.
-        plate: for the camera, on three screws.
-        fence: on the plate, below the camera.
-        fasteners: of them, without the screws in the base plate.
-        travel: how far the camera moves to either side.
-    """
-
-    bracket: Bracket
-    plate: Component
-    fence: Component
-    fasteners: tuple[Fastener, ...]
-    travel: CameraTravel
+    bracket: Bracket  # on the base plate
+    plate: Component  # for the camera, on three screws
+    fence: Component  # on the plate, below the camera
+    fasteners: tuple[Fastener, ...]  # of them, without the screws in the base plate
+    travel: CameraTravel  # how far the camera moves to either side
 
 
 @dataclass(frozen=True)

@@ -72,27 +72,16 @@ WINDOW_PLAY_MM, WINDOW_BEYOND_MM = 1.0, 20.0  # round a motor on the axis, and b
 
 @dataclass(frozen=True)
 class BearingHead:
-    """The head of the frame.
+    """The head of the frame."""
 
-    Attributes:
-        component: the printed part.
-        plate: across the axis.
-        purchased: what is in it: bearings, shaft, collar, wheels, motor.
-        fasteners: that hold it and the motor, and the inserts in its side.
-        rear: coordinate of the tube's end along w, from the origin, mm.
-        shaft: in the bearings, if any.
-        face: level coordinate of the flange's face on the uprights, mm.
-        top: height of the flange's upper end, mm.
-    """
-
-    component: Component
-    plate: HeadPlate
-    purchased: tuple[Component, ...]
-    fasteners: tuple[Fastener, ...]
-    rear: float
-    shaft: PurchasedPart | None
-    face: float
-    top: float
+    component: Component  # the printed part
+    plate: HeadPlate  # across the axis
+    purchased: tuple[Component, ...]  # what is in it: bearings, shaft, collar, wheels, motor
+    fasteners: tuple[Fastener, ...]  # that hold it and the motor, and the inserts in its side
+    rear: float  # coordinate of the tube's end along w, from the origin, mm
+    shaft: PurchasedPart | None  # in the bearings, if any
+    face: float  # level coordinate of the flange's face on the uprights, mm
+    top: float  # height of the flange's upper end, mm
 
 
 def bearing_head(

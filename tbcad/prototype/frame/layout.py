@@ -45,43 +45,24 @@ HEAD_PARTS = ("bearing_front", "bearing_rear", "collar", "shaft")
 
 @dataclass(frozen=True)
 class FrameLayout:
-    """The frame, in the frame of the shell.
+    """The frame, in the frame of the shell."""
 
-    Attributes:
-        axes: of the frame, as rows: level under the axis w, across it, up, (3, 3).
-        head: bearings and motor.
-        homing: zero disc, and switch with its bracket.
-        mount: of the camera; None without one.
-        lamps: that light the object, None without any.
-        printed: brackets to print.
-        purchased: simple bodies of purchased parts, for the assembly.
-        holes: tapped M5 holes of the base plate, (x, y) along the frame's axes, mm, (h, 2).
-        holds: bracket that each hole holds.
-        corner: the plate's, from where its holes are measured, (x, y) as the holes, mm, (2,).
-        plate: part of the base plate.
-        upright: part that the uprights are cut from.
-        length: of the uprights, mm.
-        fasteners: of the frame, without those that hold the drive to the hub.
-        light: smallest distance of each to the light in use, mm.
-        swept: smallest distance of each to what the base sweeps, mm.
-    """
-
-    axes: Floats
-    head: BearingHead
-    homing: HomingLayout
-    mount: CameraMount | None
-    lamps: LampLayout | None
-    printed: tuple[Component, ...]
-    purchased: tuple[Component, ...]
-    holes: Floats
-    holds: tuple[str, ...]
-    corner: Floats
-    plate: PurchasedPart
-    upright: PurchasedPart
-    length: float
-    fasteners: tuple[Fastener, ...]
-    light: dict[str, float]
-    swept: dict[str, float]
+    axes: Floats  # of the frame, as rows: level under the axis w, across it, up, (3, 3)
+    head: BearingHead  # bearings and motor
+    homing: HomingLayout  # zero disc, and switch with its bracket
+    mount: CameraMount | None  # of the camera; None without one
+    lamps: LampLayout | None  # that light the object, None without any
+    printed: tuple[Component, ...]  # brackets to print
+    purchased: tuple[Component, ...]  # simple bodies of purchased parts, for the assembly
+    holes: Floats  # tapped M5 holes of the base plate, (x, y) along the frame's axes, mm, (h, 2)
+    holds: tuple[str, ...]  # bracket that each hole holds
+    corner: Floats  # the plate's, from where its holes are measured, (x, y) as the holes, mm, (2,)
+    plate: PurchasedPart  # part of the base plate
+    upright: PurchasedPart  # part that the uprights are cut from
+    length: float  # of the uprights, mm
+    fasteners: tuple[Fastener, ...]  # of the frame, without those that hold the drive to the hub
+    light: dict[str, float]  # smallest distance of each to the light in use, mm
+    swept: dict[str, float]  # smallest distance of each to what the base sweeps, mm
 
     @property
     def floor(self) -> float:

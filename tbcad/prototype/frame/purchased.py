@@ -32,19 +32,12 @@ TNUT, WASHER = "TNUT-M5-6", "WASHER-5"
 
 @dataclass(frozen=True)
 class HeadPlate:
-    """The head's plate, mm.
+    """The head's plate, mm."""
 
-    Attributes:
-        front: of its face toward the hub, along the axis.
-        low: of its lower edge, out from the axis.
-        high: of its upper edge.
-        half_width: of the plate.
-    """
-
-    front: float
-    low: float
-    high: float
-    half_width: float
+    front: float  # of its face toward the hub, along the axis
+    low: float  # of its lower edge, out from the axis
+    high: float  # of its upper edge
+    half_width: float  # of the plate
 
     @property
     def back(self) -> float:

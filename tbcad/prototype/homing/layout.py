@@ -68,25 +68,15 @@ PLUS_MM = rectangle((11.0, 40.2), (16.0, 41.2)), rectangle((13.0, 38.2), (14.0, 
 
 @dataclass(frozen=True)
 class HomingLayout:
-    """Zero disc, bracket and switch.
+    """Zero disc, bracket and switch."""
 
-    Attributes:
-        angles: of homing.
-        disc: the printed part that turns with the base.
-        bracket: the printed part on the head's plate.
-        switch: body of the switch, drawn pressed.
-        fasteners: of bracket and switch.
-        pin: name of the rod that fixes angle zero.
-        error_deg: largest error of angle zero from the play of rod and key.
-    """
-
-    angles: HomeAngles
-    disc: Component
-    bracket: Component
-    switch: Component
-    fasteners: tuple[Fastener, ...]
-    pin: str
-    error_deg: float
+    angles: HomeAngles  # of homing
+    disc: Component  # the printed part that turns with the base
+    bracket: Component  # the printed part on the head's plate
+    switch: Component  # body of the switch, drawn pressed
+    fasteners: tuple[Fastener, ...]  # of bracket and switch
+    pin: str  # name of the rod that fixes angle zero
+    error_deg: float  # largest error of angle zero from the play of rod and key
 
 
 def homing_layout(

@@ -26,33 +26,20 @@ MARCHES, NEAR_MM = 48, 0.5  # steps along a line of light, and how near to the b
 
 @dataclass(frozen=True)
 class LampLayout:
-    """The lamps, in the frame of the shell.
+    """The lamps, in the frame of the shell."""
 
-    Attributes:
-        strip: that they are made of, from the lists.
-        strips: number of strips on each, side by side.
-        length: of a strip, mm.
-        level: whether strips lie level, along y; else they are upright.
-        places: middles of the shining faces, mm, (l, 3).
-        inward: unit directions that they shine in, (l, 3).
-        stands: on the base plate, to print.
-        holders: on the uprights, to print.
-        screws: heights (z) of the holders' screws on each upright, the upper first, mm.
-        fasteners: that hold the holders.
-        bodies: of the strips of each lamp.
-    """
-
-    strip: PurchasedPart
-    strips: int
-    length: float
-    level: bool
-    places: Floats
-    inward: Floats
-    stands: tuple[Bracket, ...]
-    holders: tuple[Component, ...]
+    strip: PurchasedPart  # that they are made of, from the lists
+    strips: int  # number of strips on each, side by side
+    length: float  # of a strip, mm
+    level: bool  # whether strips lie level, along y; else they are upright
+    places: Floats  # middles of the shining faces, mm, (l, 3)
+    inward: Floats  # unit directions that they shine in, (l, 3)
+    stands: tuple[Bracket, ...]  # on the base plate, to print
+    holders: tuple[Component, ...]  # on the uprights, to print
+    # heights (z) of the holders' screws on each upright, the upper first, mm
     screws: tuple[float, ...]
-    fasteners: tuple[Fastener, ...]
-    bodies: tuple[Component, ...]
+    fasteners: tuple[Fastener, ...]  # that hold the holders
+    bodies: tuple[Component, ...]  # of the strips of each lamp
 
     @property
     def width(self) -> float:

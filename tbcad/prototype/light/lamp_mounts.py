@@ -33,19 +33,12 @@ LEVEL, ACROSS, UP = np.eye(3)
 
 @dataclass(frozen=True)
 class LampMounts:
-    """Builds what holds a lamp.
+    """Builds what holds a lamp."""
 
-    Attributes:
-        frame: section of the frame.
-        strip: part.
-        face: x of the uprights' front, mm.
-        sides: of a shining face, along y and along z, mm.
-    """
-
-    frame: FrameSpec
-    strip: PurchasedPart
-    face: float
-    sides: tuple[float, float]
+    frame: FrameSpec  # section of the frame
+    strip: PurchasedPart  # part
+    face: float  # x of the uprights' front, mm
+    sides: tuple[float, float]  # of a shining face, along y and along z, mm
 
     @property
     def half(self) -> float:

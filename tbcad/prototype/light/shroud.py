@@ -33,19 +33,12 @@ Ranges: TypeAlias = tuple[tuple[float, float], tuple[float, float], tuple[float,
 
 @dataclass(frozen=True)
 class Panel:
-    """One piece of card: a rectangle with flaps.
+    """One piece of card: a rectangle with flaps."""
 
-    Attributes:
-        component: in its place, without flaps.
-        size: width and height as drawn, mm.
-        flaps: edges that have one: "left", "right", "top".
-        notched: whether cables go out through its lower edge.
-    """
-
-    component: Component
-    size: tuple[float, float]
-    flaps: tuple[str, ...] = ()
-    notched: bool = False
+    component: Component  # in its place, without flaps
+    size: tuple[float, float]  # width and height as drawn, mm
+    flaps: tuple[str, ...] = ()  # edges that have one: "left", "right", "top"
+    notched: bool = False  # whether cables go out through its lower edge
 
     @property
     def name(self) -> str:

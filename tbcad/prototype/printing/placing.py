@@ -80,23 +80,14 @@ def opening_up(normals: Floats) -> Floats | None:
 
 @dataclass(frozen=True)
 class PlacedSolid:
-    """A solid in its place, and its pose on the printer's bed.
+    """A solid in its place, and its pose on the printer's bed."""
 
-    Attributes:
-        name: of the part.
-        shape: one closed solid in the frame of the shell, the base at angle zero.
-        mesh: of the shape, as it is exported.
-        properties: volume, area and centroid of the shape.
-        axes: what x, y and z become on the printer's bed, as rows, (3, 3).
-        origin: place of the origin on the bed, mm, (3,).
-    """
-
-    name: str
-    shape: TopoDS_Solid
-    mesh: Mesh
-    properties: SolidProperties
-    axes: Floats
-    origin: Floats
+    name: str  # of the part
+    shape: TopoDS_Solid  # one closed solid in the frame of the shell, the base at angle zero
+    mesh: Mesh  # of the shape, as it is exported
+    properties: SolidProperties  # volume, area and centroid of the shape
+    axes: Floats  # what x, y and z become on the printer's bed, as rows, (3, 3)
+    origin: Floats  # place of the origin on the bed, mm, (3,)
 
     def __getstate__(self) -> dict[str, Any]:
         """The kernel's shapes are no data to Python until they are written as bytes."""
@@ -186,19 +177,12 @@ def _overhang(mesh: Mesh, orientation: Floats) -> float:
 
 @dataclass(frozen=True)
 class PrintedPart:
-    """One printed part.
+    """One printed part."""
 
-    Attributes:
-        solid: in its place, and how it is laid on the bed.
-        role: what it belongs to.
-        what: it is for.
-        ball: of a cap, the number of its seat, from 0; -1 for all others.
-    """
-
-    solid: PlacedSolid
-    role: Role
-    what: str
-    ball: int = -1
+    solid: PlacedSolid  # in its place, and how it is laid on the bed
+    role: Role  # what it belongs to
+    what: str  # it is for
+    ball: int = -1  # of a cap, the number of its seat, from 0; -1 for all others
 
     @property
     def name(self) -> str:

@@ -51,25 +51,15 @@ SAME_SIZE_MM = 1e-6  # sizes are equal up to rounding
 
 @dataclass(frozen=True)
 class PurchasedPart:
-    """A purchased part.
+    """A purchased part."""
 
-    Attributes:
-        kind: its list, a key of SIZES.
-        name: unique in all lists.
-        what: description with standard.
-        material: of it.
-        mass_g: grams.
-        sizes: numbers in the order of SIZES, units in their names.
-        source: where they come from.
-    """
-
-    kind: str
-    name: str
-    what: str
-    material: str
-    mass_g: float
-    sizes: tuple[float, ...]
-    source: str
+    kind: str  # its list, a key of SIZES
+    name: str  # unique in all lists
+    what: str  # description with standard
+    material: str  # of it
+    mass_g: float  # grams
+    sizes: tuple[float, ...]  # numbers in the order of SIZES, units in their names
+    source: str  # where they come from
 
     def __getitem__(self, size: str) -> float:
         """One of the sizes, by its name in SIZES."""

@@ -22,40 +22,24 @@ WEIGHED_DIGITS = 2  # a price by mass is an estimate whatever the list says
 
 @dataclass(frozen=True)
 class Price:
-    """What one piece costs.
+    """What one piece costs."""
 
-    Attributes:
-        amount: in the currency.
-        currency: by ISO 4217.
-        date: year and month, or day, at which it held.
-        source: where it comes from.
-    """
-
-    amount: float
-    currency: str
-    date: str
-    source: str
+    amount: float  # in the currency
+    currency: str  # by ISO 4217
+    date: str  # year and month, or day, at which it held
+    source: str  # where it comes from
 
 
 @dataclass(frozen=True)
 class PriceRule:
-    """A line of a list.
+    """A line of a list."""
 
-    Attributes:
-        pattern: name of a part, `*` for any characters.
-        each: price of a piece without what follows from its mass.
-        per_kg: price of a kilogram.
-        currency: of both.
-        date: at which they held.
-        source: where they come from.
-    """
-
-    pattern: str
-    each: float
-    per_kg: float
-    currency: str
-    date: str
-    source: str
+    pattern: str  # name of a part, `*` for any characters
+    each: float  # price of a piece without what follows from its mass
+    per_kg: float  # price of a kilogram
+    currency: str  # of both
+    date: str  # at which they held
+    source: str  # where they come from
 
     def price(self, mass_g: float) -> Price:
         """Of a piece of a mass (g); by mass it is rounded to two digits."""

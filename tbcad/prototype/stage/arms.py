@@ -20,27 +20,16 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Arm:
-    """The arm of one LED.
+    """The arm of one LED."""
 
-    Attributes:
-        axes: rows: out from the axis, across, up, (3, 3).
-        inner: r of its upright inner face; the LED is half the width farther out.
-        outer: r of its outer side at the pocket.
-        floor: z of the pocket's floor.
-        turn: z below which the object's room ends and the arm turns outward.
-        root: (r, z) where its upper face leaves the crown's plate.
-        low: z of the plate's lower face at its rim.
-        sphere: radius of the sphere that it stays in.
-    """
-
-    axes: Floats
-    inner: float
-    outer: float
-    floor: float
-    turn: float
-    root: tuple[float, float]
-    low: float
-    sphere: float
+    axes: Floats  # rows: out from the axis, across, up, (3, 3)
+    inner: float  # r of its upright inner face; the LED is half the width farther out
+    outer: float  # r of its outer side at the pocket
+    floor: float  # z of the pocket's floor
+    turn: float  # z below which the object's room ends and the arm turns outward
+    root: tuple[float, float]  # (r, z) where its upper face leaves the crown's plate
+    low: float  # z of the plate's lower face at its rim
+    sphere: float  # radius of the sphere that it stays in
 
     @property
     def half_width(self) -> float:

@@ -18,17 +18,11 @@ STEP_MM = 1e-3  # of the centres, for derivatives
 
 @dataclass(frozen=True)
 class CalibrationEstimate:
-    """Standard deviations of spheres' centres from one photograph of the LEDs, radii known.
+    """Standard deviations of spheres' centres from one photograph of the LEDs, radii known."""
 
-    Attributes:
-        seen: LEDs that each mirror sees past an object in its room, (m,).
-        worst: of each centre in its least certain direction, mm, (m,).
-        across: in the directions across the line of sight, root mean square, mm, (m,).
-    """
-
-    seen: Ints
-    worst: Floats
-    across: Floats
+    seen: Ints  # LEDs that each mirror sees past an object in its room, (m,)
+    worst: Floats  # of each centre in its least certain direction, mm, (m,)
+    across: Floats  # in the directions across the line of sight, root mean square, mm, (m,)
 
     def record(self) -> CentreEstimate:
         """Figures for prototype.json."""

@@ -47,25 +47,15 @@ LEVEL = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class CrownSizes:
-    """Sizes of the crown, mm.
+    """Sizes of the crown, mm."""
 
-    Attributes:
-        plate: z of its upper face.
-        rim: radius of its rim.
-        neck: radius where it leaves the capture sphere.
-        wire: radius of its bore for the wires.
-        post: radius of the post.
-        wall: thickness of the post's wall.
-        joint: z of the post's upper end.
-    """
-
-    plate: float
-    rim: float
-    neck: float
-    wire: float
-    post: float
-    wall: float
-    joint: float
+    plate: float  # z of its upper face
+    rim: float  # radius of its rim
+    neck: float  # radius where it leaves the capture sphere
+    wire: float  # radius of its bore for the wires
+    post: float  # radius of the post
+    wall: float  # thickness of the post's wall
+    joint: float  # z of the post's upper end
 
     @property
     def plug(self) -> float:

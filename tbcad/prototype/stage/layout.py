@@ -52,25 +52,15 @@ BEYOND_POST_MM = 0.5  # that the set screw may stand out of the post
 
 @dataclass(frozen=True)
 class StageLayout:
-    """The object stage; the axis of the post is z through the origin.
+    """The object stage; the axis of the post is z through the origin."""
 
-    Attributes:
-        sizes: of crown and post.
-        foot: z of the post's lower end, mm.
-        led: of the pockets, from the lists.
-        leds: centres of the domes, mm, (l, 3).
-        components: disc, crown and post, to be printed.
-        light: smallest distance of all to the light outside the capture sphere, mm.
-        swept: smallest distance to what the base sweeps, mm.
-    """
-
-    sizes: CrownSizes
-    foot: float
-    led: PurchasedPart
-    leds: Floats
-    components: tuple[Component, ...]
-    light: float
-    swept: float
+    sizes: CrownSizes  # of crown and post
+    foot: float  # z of the post's lower end, mm
+    led: PurchasedPart  # of the pockets, from the lists
+    leds: Floats  # centres of the domes, mm, (l, 3)
+    components: tuple[Component, ...]  # disc, crown and post, to be printed
+    light: float  # smallest distance of all to the light outside the capture sphere, mm
+    swept: float  # smallest distance to what the base sweeps, mm
 
 
 def stage_layout(

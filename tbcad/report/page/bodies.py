@@ -37,25 +37,15 @@ SHELL_COLOUR = (0.80, 0.80, 0.80, 1.0)
 
 
 class Body(NamedTuple):
-    """A body of the 3D view.
+    """A body of the 3D view."""
 
-    Attributes:
-        name: as in the files.
-        group: key of the group that is switched on and off.
-        vertices: mm, (v, 3).
-        triangles: counter-clockwise from outside, (t, 3).
-        colour: red, green, blue and opacity, 0 to 1.
-        apart: by how much it is moved when everything is taken apart, mm, (3,).
-        turns: whether it turns with the base.
-    """
-
-    name: str
-    group: str
-    vertices: Floats
-    triangles: Ints
-    colour: tuple[float, ...]
-    apart: Floats
-    turns: bool = False
+    name: str  # as in the files
+    group: str  # key of the group that is switched on and off
+    vertices: Floats  # mm, (v, 3)
+    triangles: Ints  # counter-clockwise from outside, (t, 3)
+    colour: tuple[float, ...]  # red, green, blue and opacity, 0 to 1
+    apart: Floats  # by how much it is moved when everything is taken apart, mm, (3,)
+    turns: bool = False  # whether it turns with the base
 
 
 def packed_body(body: Body, arrays: PackedArrays) -> Record:

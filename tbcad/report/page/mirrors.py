@@ -16,25 +16,15 @@ UM_PER_MM = 1000.0
 
 
 class Quantity(NamedTuple):
-    """A figure of every mirror.
+    """A figure of every mirror."""
 
-    Attributes:
-        key: short name.
-        label: what it is.
-        unit: of the values.
-        digits: after the point.
-        values: (m,); NaN is unknown.
-        on_map: whether the map can show it.
-        added: whether both halves of a mirror on the seam add up.
-    """
-
-    key: str
-    label: str
-    unit: str
-    digits: int
-    values: Floats
-    on_map: bool = True
-    added: bool = False
+    key: str  # short name
+    label: str  # what it is
+    unit: str  # of the values
+    digits: int  # after the point
+    values: Floats  # (m,); NaN is unknown
+    on_map: bool = True  # whether the map can show it
+    added: bool = False  # whether both halves of a mirror on the seam add up
 
 
 def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) -> dict[str, Any]:

@@ -48,21 +48,14 @@ MIRROR_ARRAYS = ("u", "apex", "normal", "curvature", "boxes")
 
 @dataclass(frozen=True)
 class CameraFrame:
-    """One camera's share of a light field; its arrays may lie in a file and are read by slices.
+    """One camera's share of a light field; its arrays may lie in a file and are read by slices."""
 
-    Attributes:
-        camera: its pinhole, axes and sensor.
-        u: directions of the virtual cameras, (m, 3).
-        mirrors: surfaces, (m,).
-        boxes: columns x0, x1 and rows y0, y1, ends excluded, that hold each mirror, (m, 4).
-        planes: arrays `colour`, `mirror`, `origin`, `direction` as above.
-    """
-
-    camera: Camera
-    u: Floats
-    mirrors: Surfaces
+    camera: Camera  # its pinhole, axes and sensor
+    u: Floats  # directions of the virtual cameras, (m, 3)
+    mirrors: Surfaces  # surfaces, (m,)
+    # columns x0, x1 and rows y0, y1, ends excluded, that hold each mirror, (m, 4)
     boxes: NDArray[np.int64]
-    planes: Mapping[str, Any]
+    planes: Mapping[str, Any]  # arrays `colour`, `mirror`, `origin`, `direction` as above
 
     def read(self, rows: slice, columns: slice = slice(None)) -> dict[str, NDArray[Any]]:
         """All arrays of a part of the picture."""

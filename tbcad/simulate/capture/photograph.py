@@ -25,17 +25,11 @@ CENTRE: Shift = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class RowBand:
-    """Rows of a photograph.
+    """Rows of a photograph."""
 
-    Attributes:
-        rows: which, from the top.
-        rays: through the pixels' centres; none where the object itself is in front.
-        colour: red, green, blue, (h, w, 3).
-    """
-
-    rows: range
-    rays: TracedRays
-    colour: Bytes
+    rows: range  # which, from the top
+    rays: TracedRays  # through the pixels' centres; none where the object itself is in front
+    colour: Bytes  # red, green, blue, (h, w, 3)
 
 
 CameraPhotographs = list[tuple[Reflector, Callable[[], Iterable[RowBand]]]]

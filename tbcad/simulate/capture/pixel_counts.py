@@ -33,22 +33,15 @@ class Sensor:
 
 @dataclass(frozen=True)
 class PixelCounts:
-    """Pixels of one camera's picture, over its m mirrors.
+    """Pixels of one camera's picture, over its m mirrors."""
 
-    Attributes:
-        on: pixels whose ray meets the mirror, (m,).
-        seen: those whose ray then meets the capture sphere, (m,).
-        disc: those that also lie in the largest cone about the apex, as the pinhole sees it, that
-            fits in the flat mirror (theta_0, Fig. 3 of the paper), (m,).
-        fill: how far the mirrors fill the frame; beyond 1 some lie outside it.
-        rays: number of rays that were traced.
-    """
-
-    on: Floats
-    seen: Floats
+    on: Floats  # pixels whose ray meets the mirror, (m,)
+    seen: Floats  # those whose ray then meets the capture sphere, (m,)
+    # those that also lie in the largest cone about the apex, as the pinhole sees it, that fits in
+    # the flat mirror (theta_0, Fig. 3 of the paper), (m,).
     disc: Floats
-    fill: float
-    rays: int
+    fill: float  # how far the mirrors fill the frame; beyond 1 some lie outside it
+    rays: int  # number of rays that were traced
 
 
 def parse_sensor(text: str) -> Sensor:

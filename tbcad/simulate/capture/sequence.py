@@ -38,15 +38,10 @@ RAYS_PER_CHUNK = 1 << 16
 
 @dataclass(frozen=True)
 class SequenceWriter:
-    """A sequence that is being written.
+    """A sequence that is being written."""
 
-    Attributes:
-        pixel: of each camera, numbers of the rays that are kept, (r,).
-        colour: of each camera, the frames so far, (t, r, 3).
-    """
-
-    pixel: Mapping[str, Ints]
-    colour: Mapping[str, h5py.Dataset]
+    pixel: Mapping[str, Ints]  # of each camera, numbers of the rays that are kept, (r,)
+    colour: Mapping[str, h5py.Dataset]  # of each camera, the frames so far, (t, r, 3)
 
     def append(self, colours: Mapping[str, Bytes]) -> None:
         """Add a frame: of each camera the colours of the rays that are kept, (r, 3)."""

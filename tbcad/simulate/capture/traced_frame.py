@@ -23,15 +23,10 @@ PartTracer = Callable[[range, range, Shift], TracedRays]
 
 @dataclass(frozen=True)
 class TracedFrame(CameraFrame):
-    """A frame without arrays: its pixels are those of a photograph with one ray a pixel.
+    """A frame without arrays: its pixels are those of a photograph with one ray a pixel."""
 
-    Attributes:
-        trace: gives the rays of rows and columns after the mirrors.
-        scene: the object.
-    """
-
-    trace: PartTracer
-    scene: Scene
+    trace: PartTracer  # gives the rays of rows and columns after the mirrors
+    scene: Scene  # the object
 
     def read(self, rows: slice, columns: slice = slice(None)) -> dict[str, NDArray[Any]]:
         """All arrays of a part of the picture, traced anew."""

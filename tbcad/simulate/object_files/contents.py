@@ -28,25 +28,18 @@ LIKELY_UNITS_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 
 @dataclass(frozen=True)
 class ObjectPart:
-    """Triangles with colours of one kind.
+    """Triangles with colours of one kind."""
 
-    Attributes:
-        points: corners, in the unit and the axes of the file, (v, 3).
-        faces: corners of the facets, (f, 3).
-        normals: at the corners, as the file has them, (v, 3); None where it has none.
-        colours: at each facet's corners, 0 to 1 as shown (sRGB), (f, 3, 3); None: it has none.
-        uv: where each facet's corners lie on `picture`, 0 to 1 from its lower left, (f, 3, 2).
-        picture: (h, w, 3).
-        source: what the colours are, for the user; "" where there are none.
-    """
-
-    points: Floats
-    faces: Ints
+    points: Floats  # corners, in the unit and the axes of the file, (v, 3)
+    faces: Ints  # corners of the facets, (f, 3)
+    # at the corners, as the file has them, (v, 3); None where it has none
     normals: Floats | None = None
+    # at each facet's corners, 0 to 1 as shown (sRGB), (f, 3, 3); None: it has none
     colours: Floats | None = None
+    # where each facet's corners lie on `picture`, 0 to 1 from its lower left, (f, 3, 2)
     uv: Floats | None = None
-    picture: Bytes | None = None
-    source: str = ""
+    picture: Bytes | None = None  # (h, w, 3)
+    source: str = ""  # what the colours are, for the user; "" where there are none
 
     def moved(self, matrix: Floats) -> "ObjectPart":
         """The part moved by a matrix (4, 4); normals follow its inverse."""
@@ -64,19 +57,12 @@ class ObjectPart:
 
 
 class ObjectFile(NamedTuple):
-    """A file as it is read.
+    """A file as it is read."""
 
-    Attributes:
-        parts: its triangles.
-        notes: what it names that was not found, not understood or left out.
-        unit: key of UNITS_MM; None where the file does not say.
-        up: the axis that points up; None where the file does not say.
-    """
-
-    parts: Sequence[ObjectPart]
-    notes: Sequence[str] = ()
-    unit: str | None = None
-    up: Up | None = None
+    parts: Sequence[ObjectPart]  # its triangles
+    notes: Sequence[str] = ()  # what it names that was not found, not understood or left out
+    unit: str | None = None  # key of UNITS_MM; None where the file does not say
+    up: Up | None = None  # the axis that points up; None where the file does not say
 
 
 def shown_shares(values: NDArray[Any]) -> Floats:

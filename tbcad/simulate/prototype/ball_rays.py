@@ -32,19 +32,12 @@ WallTable: TypeAlias = tuple[Ints, Floats]
 
 @dataclass(frozen=True)
 class BallHits:
-    """What n rays from the camera meet.
+    """What n rays from the camera meet."""
 
-    Attributes:
-        ball: number of the ball that reflects each, from 1; 0 where none does, (n,).
-        origin: points on the balls, mm, (n, 3); zero where there is none.
-        direction: unit vectors after the ball, (n, 3); zero where there is none.
-        distance: of the ball, mm, (n,); infinite where there is none.
-    """
-
-    ball: Ints
-    origin: Floats
-    direction: Floats
-    distance: Floats
+    ball: Ints  # number of the ball that reflects each, from 1; 0 where none does, (n,)
+    origin: Floats  # points on the balls, mm, (n, 3); zero where there is none
+    direction: Floats  # unit vectors after the ball, (n, 3); zero where there is none
+    distance: Floats  # of the ball, mm, (n,); infinite where there is none
 
 
 def trace_balls(run: PrototypeRun, direction: Floats, stop: Ints) -> BallHits:

@@ -21,21 +21,13 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class RectangularLamps:
-    """Equal rectangular lamps, upright or level, with Lambertian faces.
+    """Equal rectangular lamps, upright or level, with Lambertian faces."""
 
-    Attributes:
-        places: middles of the faces, mm, (l, 3).
-        inward: unit directions that they face, level, (l, 3).
-        width: of a face, across, mm.
-        length: of a face, upward, mm.
-        lumen: light of each.
-    """
-
-    places: Floats
-    inward: Floats
-    width: float
-    length: float
-    lumen: float
+    places: Floats  # middles of the faces, mm, (l, 3)
+    inward: Floats  # unit directions that they face, level, (l, 3)
+    width: float  # of a face, across, mm
+    length: float  # of a face, upward, mm
+    lumen: float  # light of each
 
     def tiles(self) -> tuple[Floats, Floats]:
         """Middles (t, 3) of the tiles of all faces, and the directions that they face, (t, 3)."""

@@ -63,26 +63,17 @@ Called with the mirror that each ray belongs to, from 1, 0 for none, (n,); its u
 
 @dataclass(frozen=True)
 class MergePlan:
-    """A run ready to be merged; each array has what is on no mirror first, then the mirrors.
+    """A run ready to be merged; each array has what is on no mirror first, then the mirrors."""
 
-    Attributes:
-        run: the run.
-        in_front: where the object hides what is behind.
-        trace_shell: traces rows of the shell's picture.
-        boxes: columns x0, x1 and rows y0, y1, ends excluded, of the shell's picture that hold the
-            object seen directly, or a mirror's cell, (1 + m, 4).
-        rotation: of directions, (1 + m, 3, 3).
-        stop: whose photograph is used, (1 + m,).
-        ball: in place of the mirror, from 1, (1 + m,).
-    """
-
-    run: PrototypeRun
-    in_front: InFront
-    trace_shell: Tracer
+    run: PrototypeRun  # the run
+    in_front: InFront  # where the object hides what is behind
+    trace_shell: Tracer  # traces rows of the shell's picture
+    # columns x0, x1 and rows y0, y1, ends excluded, of the shell's picture that hold the object
+    # seen directly, or a mirror's cell, (1 + m, 4)
     boxes: Ints
-    rotation: Floats
-    stop: Ints
-    ball: Ints
+    rotation: Floats  # of directions, (1 + m, 3, 3)
+    stop: Ints  # whose photograph is used, (1 + m,)
+    ball: Ints  # in place of the mirror, from 1, (1 + m,)
 
 
 def merge_plan(
@@ -250,17 +241,11 @@ def _resampled_colours(picture: Bytes, rows: range, shown: Bools) -> Bytes:
 
 @dataclass(frozen=True)
 class SimulatedPhotographs:
-    """What the photographs of a run's stops show of a scene.
+    """What the photographs of a run's stops show of a scene."""
 
-    Attributes:
-        run: the run.
-        scene: the object.
-        samples: a pixel is the mean of these rays.
-    """
-
-    run: PrototypeRun
-    scene: Scene
-    samples: Samples = 1
+    run: PrototypeRun  # the run
+    scene: Scene  # the object
+    samples: Samples = 1  # a pixel is the mean of these rays
 
     def colours(self, stop: int, places: Floats) -> Bytes:
         """Colours (n, 3) of a stop's photograph at columns and rows (n, 2)."""

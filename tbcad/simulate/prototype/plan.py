@@ -28,32 +28,20 @@ class Plan:
 
     The first row of `ball` and `stop` is for camera a's mirrors, the second for camera b's: they
     are photographed in a second run by the same camera, with the object turned by 180 degrees.
-
-    Attributes:
-        frame: rows: the axis that the base turns about, azimuth zero, and the third, (3, 3).
-        apex: of the balls, mm, (k, 3).
-        normal: inward unit normals there, (k, 3).
-        radius: of the reflecting spheres, mm, (k,).
-        body_centre: of the spheres in the seats, mm, (k, 3); a ball's own, if no cap.
-        body_radius: mm, (k,).
-        moved: whether a mirror's window moves along with its ball.
-        angle: of the base at each stop, radians, (s,).
-        ball: that stands in, from 0, (2, m).
-        stop: at which it does, from 0, (2, m).
-        parted: whether balls are ended by walls, so that a pixel of one never shows another: those
-            of a shell with mirrors on pedestals.
     """
 
-    frame: Floats
-    apex: Floats
-    normal: Floats
-    radius: Floats
-    body_centre: Floats
-    body_radius: Floats
-    moved: bool
-    angle: Floats
-    ball: Ints
-    stop: Ints
+    frame: Floats  # rows: the axis that the base turns about, azimuth zero, and the third, (3, 3)
+    apex: Floats  # of the balls, mm, (k, 3)
+    normal: Floats  # inward unit normals there, (k, 3)
+    radius: Floats  # of the reflecting spheres, mm, (k,)
+    body_centre: Floats  # of the spheres in the seats, mm, (k, 3); a ball's own, if no cap
+    body_radius: Floats  # mm, (k,)
+    moved: bool  # whether a mirror's window moves along with its ball
+    angle: Floats  # of the base at each stop, radians, (s,)
+    ball: Ints  # that stands in, from 0, (2, m)
+    stop: Ints  # at which it does, from 0, (2, m)
+    # whether balls are ended by walls, so that a pixel of one never shows another: those of a shell
+    # with mirrors on pedestals
     parted: bool = False
 
     def __len__(self) -> int:

@@ -26,27 +26,20 @@ class PrototypeRun:
     """A run of s stops, whose balls replace the m mirrors of one of the shell's cameras.
 
     All in the frame of the object.
-
-    Attributes:
-        reflector: the shell's camera and mirrors, whose picture is composed.
-        camera: that takes the photographs.
-        balls: at each stop: centre and radius of the reflecting sphere, centre and radius of the
-            sphere in the seat, mm, (s, k, 8).
-        stop: whose photograph shows the ball in place of each mirror, (m,).
-        ball: in place of each mirror, (m,).
-        ball_surfaces: the reflecting surface of that ball at that stop, (m,).
-        window_rotation: matrices that rotate directions (3,) @ matrix of the shell's picture into
-            the photograph's, (m, 3, 3).
-        parted: whether a pixel of one mirror never shows another's ball: mirrors on pedestals.
     """
 
-    reflector: Reflector
-    camera: LensCamera
+    reflector: Reflector  # the shell's camera and mirrors, whose picture is composed
+    camera: LensCamera  # that takes the photographs
+    # at each stop: centre and radius of the reflecting sphere, centre and radius of the sphere in
+    # the seat, mm, (s, k, 8)
     balls: Floats
-    stop: Ints
-    ball: Ints
-    ball_surfaces: Surfaces
+    stop: Ints  # whose photograph shows the ball in place of each mirror, (m,)
+    ball: Ints  # in place of each mirror, (m,)
+    ball_surfaces: Surfaces  # the reflecting surface of that ball at that stop, (m,)
+    # matrices that rotate directions (3,) @ matrix of the shell's picture into the photograph's,
+    # (m, 3, 3)
     window_rotation: Floats
+    # whether a pixel of one mirror never shows another's ball: mirrors on pedestals
     parted: bool = False
 
     def __len__(self) -> int:

@@ -27,20 +27,14 @@ ROUNDING = 1e-9
 
 
 class ExportedDesign(Record):
-    """What the simulation needs of an export.
-
-    Attributes:
-        folder: where it lies.
-        spec: the design that was asked for.
-        capture_mm: diameter of the capture sphere.
-        reflectors: camera a and camera b with the mirrors that were recorded.
-    """
+    """What the simulation needs of an export."""
 
     model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True)
 
-    folder: Path
-    spec: Spec
-    capture_mm: float
+    folder: Path  # where it lies
+    spec: Spec  # the design that was asked for
+    capture_mm: float  # diameter of the capture sphere
+    # camera a and camera b with the mirrors that were recorded
     reflectors: tuple[Reflector, Reflector]
 
 

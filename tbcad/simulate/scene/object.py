@@ -30,36 +30,25 @@ class Reading:
 
 @dataclass(frozen=True)
 class SceneObject:
-    """A triangle mesh with a colour at each corner of each facet, or pictures on it.
+    """A triangle mesh with a colour at each corner of each facet, or pictures on it."""
 
-    Attributes:
-        name: what it is, for records.
-        points: corners, mm, (v, 3), z up, in the frame of the design.
-        faces: corners of the facets, (f, 3).
-        normals: unit normals at the corners, for shading, on either side, (v, 3).
-        albedo: red, green, blue at each facet's corners, 0 to 1, (f, 3, 3).
-        uv: where each facet's corners lie on its picture, 0 to 1 from its lower left, (f, 3, 2).
-        texture: pictures below each other, (h, w, 3), which albedo multiplies; None where `albedo`
-            says it all.
-        tiles: first row, height and width of each facet's picture in `texture`, (f, 3); height 0
-            where it has none.
-        patterned: whether the built-in pattern is painted over it.
-        light: on each corner, 0 to 1, on the side of the normal and behind it, (v, 2); None for the
-            built-in light.
-        reading: how its file was taken; None without a file.
-    """
-
-    name: str
-    points: Floats
-    faces: Ints
-    normals: Floats
-    albedo: Floats
+    name: str  # what it is, for records
+    points: Floats  # corners, mm, (v, 3), z up, in the frame of the design
+    faces: Ints  # corners of the facets, (f, 3)
+    normals: Floats  # unit normals at the corners, for shading, on either side, (v, 3)
+    albedo: Floats  # red, green, blue at each facet's corners, 0 to 1, (f, 3, 3)
+    # where each facet's corners lie on its picture, 0 to 1 from its lower left, (f, 3, 2)
     uv: Floats | None = None
+    # pictures below each other, (h, w, 3), which albedo multiplies; None where `albedo` says it all
     texture: Bytes | None = None
+    # first row, height and width of each facet's picture in `texture`, (f, 3); height 0 where it
+    # has none
     tiles: Ints | None = None
-    patterned: bool = False
+    patterned: bool = False  # whether the built-in pattern is painted over it
+    # on each corner, 0 to 1, on the side of the normal and behind it, (v, 2); None for the built-in
+    # light
     light: Floats | None = None
-    reading: Reading | None = None
+    reading: Reading | None = None  # how its file was taken; None without a file
 
     @property
     def radius(self) -> float:

@@ -47,20 +47,15 @@ PATTERN, PLAIN = "the built-in pattern", "plain grey"
 
 @dataclass(frozen=True)
 class ObjectOptions:
-    """How an object's file is taken.
+    """How an object's file is taken."""
 
-    Attributes:
-        fit: move and scale it so that it just fits the capture sphere.
-        paint: its own colours, or the built-in pattern where the file has none; the pattern in any
-            case; or plain grey.
-        up: the file's axis that points up; None: as the file or its format says, else z.
-        unit: of the file; None: as the file or its format says, else mm.
-    """
-
-    fit: bool = False
+    fit: bool = False  # move and scale it so that it just fits the capture sphere
+    # its own colours, or the built-in pattern where the file has none; the pattern in any case; or
+    # plain grey
     paint: Paint = "own"
+    # the file's axis that points up; None: as the file or its format says, else z
     up: Up | None = None
-    unit: Unit | None = None
+    unit: Unit | None = None  # of the file; None: as the file or its format says, else mm
 
     def __post_init__(self) -> None:
         """Refuse what is none of these.

@@ -14,31 +14,21 @@ ABOVE_FACET_MM = 1e-3
 
 @dataclass(frozen=True)
 class PointLights:
-    """Lamps that are small and shine alike in all directions.
+    """Lamps that are small and shine alike in all directions."""
 
-    Attributes:
-        place: mm, (l, 3).
-        colour: light that falls on a surface at the origin that faces the lamp, red, green and
-            blue, (l, 3); a matt white one that gets 1 is shown as 255.
-    """
-
-    place: Floats
+    place: Floats  # mm, (l, 3)
+    # light that falls on a surface at the origin that faces the lamp, red, green and blue, (l, 3);
+    # a matt white one that gets 1 is shown as 255
     colour: Floats
 
 
 @dataclass(frozen=True)
 class Spots:
-    """Points of a surface.
+    """Points of a surface."""
 
-    Attributes:
-        place: mm, (k, 3).
-        normal: unit normals for shading, (k, 3).
-        facet_normal: unit normals of the facets, on the same side, (k, 3).
-    """
-
-    place: Floats
-    normal: Floats
-    facet_normal: Floats
+    place: Floats  # mm, (k, 3)
+    normal: Floats  # unit normals for shading, (k, 3)
+    facet_normal: Floats  # unit normals of the facets, on the same side, (k, 3)
 
     def part(self, some: slice) -> "Spots":
         """Some of them."""

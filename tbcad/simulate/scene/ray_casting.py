@@ -27,36 +27,24 @@ RAYS_PER_CHUNK = 1 << 15
 
 @dataclass(frozen=True)
 class Scene:
-    """An object ready for ray casting from several threads.
+    """An object ready for ray casting from several threads."""
 
-    Attributes:
-        subject: the object.
-        embree: its facets, committed; queries release the interpreter's lock.
-        shade: light at each corner, 0 to 1, on the side of its normal and behind it, (v, 2).
-        radius: of the sphere about the origin that holds it, mm.
-        gloss: share of the lamps' light in highlights, which move with the viewpoint; 0: matt.
-        lamps: in place of all that light, with cast shadows; None: as `shade` says.
-    """
-
-    subject: SceneObject
-    embree: Any
-    shade: Floats
-    radius: float
+    subject: SceneObject  # the object
+    embree: Any  # its facets, committed; queries release the interpreter's lock
+    shade: Floats  # light at each corner, 0 to 1, on the side of its normal and behind it, (v, 2)
+    radius: float  # of the sphere about the origin that holds it, mm
+    # share of the lamps' light in highlights, which move with the viewpoint; 0: matt
     gloss: float = 0.0
+    # in place of all that light, with cast shadows; None: as `shade` says
     lamps: PointLights | None = None
 
 
 @dataclass(frozen=True)
 class RayHits:
-    """What n rays see.
+    """What n rays see."""
 
-    Attributes:
-        colour: red, green, blue, 0 to 255, (n, 3), float32; the background where nothing is.
-        depth: mm along the ray, infinite where nothing is, (n,).
-    """
-
-    colour: Colours
-    depth: Floats
+    colour: Colours  # red, green, blue, 0 to 255, (n, 3), float32; the background where nothing is
+    depth: Floats  # mm along the ray, infinite where nothing is, (n,)
 
 
 def embree_scene(points: NDArray[Any], faces: NDArray[Any] | None = None) -> Any:
@@ -102,21 +90,13 @@ def built_in_shade(normals: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class SurfaceHits:
-    """Where rays meet the object first.
+    """Where rays meet the object first."""
 
-    Attributes:
-        rows: numbers of the rays that do, ascending, (k,).
-        depth: mm along them, (k,).
-        facet: (k,).
-        weight: barycentric, of the facet's corners, (k, 3).
-        direction: unit vectors of the rays: light is that of the side that they meet, (k, 3).
-    """
-
-    rows: Ints
-    depth: Floats
-    facet: Ints
-    weight: Floats
-    direction: Floats
+    rows: Ints  # numbers of the rays that do, ascending, (k,)
+    depth: Floats  # mm along them, (k,)
+    facet: Ints  # (k,)
+    weight: Floats  # barycentric, of the facet's corners, (k, 3)
+    direction: Floats  # unit vectors of the rays: light is that of the side that they meet, (k, 3)
 
     def albedo(self, subject: SceneObject) -> Floats:
         """Colours (k, 3), 0 to 1."""

@@ -23,18 +23,13 @@ ROUNDING_MM = 1e-9
 
 @dataclass(frozen=True)
 class TracedRays:
-    """Rays after the mirrors, of a band of h rows and w columns.
+    """Rays after the mirrors, of a band of h rows and w columns."""
 
-    Attributes:
-        mirror: number of the mirror, from 1 in the order of the ids; 0 where there is none
-            of this camera's, (h, w).
-        origin: points on the mirrors, mm, (h, w, 3); zero where there is none.
-        direction: unit vectors after the mirror, (h, w, 3); zero where there is none.
-    """
-
+    # number of the mirror, from 1 in the order of the ids; 0 where there is none of this camera's,
+    # (h, w)
     mirror: MirrorNumbers
-    origin: Floats
-    direction: Floats
+    origin: Floats  # points on the mirrors, mm, (h, w, 3); zero where there is none
+    direction: Floats  # unit vectors after the mirror, (h, w, 3); zero where there is none
 
     def meeting(self, radius: float) -> Bools:
         """Which rays meet the sphere of a radius (mm) about the origin, (h, w)."""

@@ -19,19 +19,12 @@ ARC_SAMPLES = np.linspace(0, 1, 9)
 
 @dataclass(frozen=True)
 class Reflector:
-    """One camera and its m mirrors, in the order of their ids.
+    """One camera and its m mirrors, in the order of their ids."""
 
-    Attributes:
-        camera_id: "a" or "b".
-        camera: its pinhole, axes and sensor.
-        u: directions of the virtual cameras, (m, 3).
-        cells: of the reflecting surfaces.
-    """
-
-    camera_id: str
-    camera: Camera
-    u: Floats
-    cells: Cells
+    camera_id: str  # "a" or "b"
+    camera: Camera  # its pinhole, axes and sensor
+    u: Floats  # directions of the virtual cameras, (m, 3)
+    cells: Cells  # of the reflecting surfaces
 
     def __len__(self) -> int:
         return len(self.u)
@@ -96,13 +89,9 @@ class Reflector:
 
 @dataclass(frozen=True)
 class SubstitutedReflector(Reflector):
-    """A camera with other surfaces in place of its mirrors.
+    """A camera with other surfaces in place of its mirrors."""
 
-    Attributes:
-        surfaces: in place of the mirrors, (m,).
-    """
-
-    surfaces: Surfaces
+    surfaces: Surfaces  # in place of the mirrors, (m,)
 
     @property
     def mirrors(self) -> Surfaces:

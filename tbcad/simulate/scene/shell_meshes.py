@@ -35,17 +35,13 @@ MIN_FACET_COSINE = 0.9
 
 @dataclass(frozen=True)
 class ShellMeshes:
-    """Both shells' facets.
+    """Both shells' facets."""
 
-    Attributes:
-        mirror: number of the mirror that each facet is of, from 1; less than 0 for those of
-            camera b; 0 for none, (f,).
-        embree: the facets, committed.
-        surfaces: of camera a's and of camera b's mirrors, recovered from the facets, coat on.
-    """
-
+    # number of the mirror that each facet is of, from 1; less than 0 for those of camera b; 0 for
+    # none, (f,)
     mirror: MirrorNumbers
-    embree: Any
+    embree: Any  # the facets, committed
+    # of camera a's and of camera b's mirrors, recovered from the facets, coat on
     surfaces: tuple[Surfaces, Surfaces]
 
 

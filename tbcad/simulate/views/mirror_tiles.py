@@ -20,43 +20,27 @@ class MirrorTile:
     """A rectangle of h x w pixels that holds a mirror's, row by row; n = h w.
 
     The pixels on its border are not of the mirror, so that each of the mirror's has 8 neighbours.
-
-    Attributes:
-        shape: h and w.
-        valid: whether a pixel is of this mirror, (n,).
-        colour: (n, 3).
-        origin: of the rays, mm, (n, 3).
-        direction: of the rays, (n, 3).
-        pinhole: point that the rays come nearest to, the virtual camera's, mm, (3,).
-        spread: largest distance of a ray from that point, mm.
-        middle: number of the mirror's pixel nearest to the middle of the rectangle.
     """
 
-    shape: tuple[int, int]
-    valid: Bools
-    colour: Bytes
-    origin: NDArray[np.float32]
-    direction: NDArray[np.float32]
-    pinhole: Floats
-    spread: float
-    middle: int
+    shape: tuple[int, int]  # h and w
+    valid: Bools  # whether a pixel is of this mirror, (n,)
+    colour: Bytes  # (n, 3)
+    origin: NDArray[np.float32]  # of the rays, mm, (n, 3)
+    direction: NDArray[np.float32]  # of the rays, (n, 3)
+    pinhole: Floats  # point that the rays come nearest to, the virtual camera's, mm, (3,)
+    spread: float  # largest distance of a ray from that point, mm
+    middle: int  # number of the mirror's pixel nearest to the middle of the rectangle
 
 
 @dataclass
 class MirrorTiles:
-    """The tiles of all mirrors of a light field, each read once.
+    """The tiles of all mirrors of a light field, each read once."""
 
-    Attributes:
-        source: the light field; its file must stay open.
-        u: directions of the virtual cameras of all frames, one after the other, (m, 3).
-        apex: of their mirrors, mm, (m, 3).
-        width: no ray of a mirror passes its apex by more, mm, (m,).
-    """
-
-    source: LightField
+    source: LightField  # the light field; its file must stay open
+    # directions of the virtual cameras of all frames, one after the other, (m, 3)
     u: Floats = field(init=False)
-    apex: Floats = field(init=False)
-    width: Floats = field(init=False)
+    apex: Floats = field(init=False)  # of their mirrors, mm, (m, 3)
+    width: Floats = field(init=False)  # no ray of a mirror passes its apex by more, mm, (m,)
     _read: dict[int, MirrorTile | None] = field(init=False, default_factory=dict)
     _mirrors: list[tuple[CameraFrame, int]] = field(init=False)
 

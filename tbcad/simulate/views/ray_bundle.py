@@ -29,15 +29,10 @@ TILES_PER_CHUNK = 16
 
 @dataclass(frozen=True)
 class TwoPlane:
-    """The parametrisation for one direction.
+    """The parametrisation for one direction."""
 
-    Attributes:
-        axes: rows: two unit vectors across, and the direction of the view, (3, 3).
-        scale: s, mm.
-    """
-
-    axes: Floats
-    scale: float
+    axes: Floats  # rows: two unit vectors across, and the direction of the view, (3, 3)
+    scale: float  # s, mm
 
     def coordinates(
         self,
@@ -112,25 +107,18 @@ def _coordinates(
 
 @dataclass(frozen=True)
 class RayBundle:
-    """The rays of k mirrors, n in all.
+    """The rays of k mirrors, n in all."""
 
-    Attributes:
-        two_plane: the parametrisation of the rays.
-        limit: how far a ray may be from a target ray that it is used for, mm.
-        points: two-plane coordinates, (n, 4); NaN at pixels of another mirror or too oblique.
-        tiles: first pixel, height and width of each tile, and a pixel in its middle that has a
-            ray, -1 if none has, (k, 4). Pixels on the border of a tile have no ray.
-        pinholes: of the virtual cameras: across, across, depth over s, and how far from there
-            the rays pass at that depth, mm, (k, 4).
-        colour: (n, 3).
-    """
-
-    two_plane: TwoPlane
-    limit: float
-    points: Floats
+    two_plane: TwoPlane  # the parametrisation of the rays
+    limit: float  # how far a ray may be from a target ray that it is used for, mm
+    points: Floats  # two-plane coordinates, (n, 4); NaN at pixels of another mirror or too oblique
+    # first pixel, height and width of each tile, and a pixel in its middle that has a ray, -1 if
+    # none has, (k, 4). Pixels on the border of a tile have no ray.
     tiles: Ints
+    # of the virtual cameras: across, across, depth over s, and how far from there the rays pass at
+    # that depth, mm, (k, 4)
     pinholes: Floats
-    colour: Bytes
+    colour: Bytes  # (n, 3)
 
 
 def ray_bundle(two_plane: TwoPlane, tiles: list[MirrorTile], limit: float) -> RayBundle:

@@ -35,14 +35,10 @@ WIDE_LENS = 1.0
 
 @dataclass(frozen=True)
 class ThinLens:
-    """A lens.
+    """A lens."""
 
-    Attributes:
-        aperture_mm: its diameter.
-        plane_mm: the plane that it makes sharp, across its axis, from the origin toward the lens.
-    """
-
-    aperture_mm: float
+    aperture_mm: float  # its diameter
+    # the plane that it makes sharp, across its axis, from the origin toward the lens
     plane_mm: float
 
     def check(self, view: Camera, capture_mm: float) -> None:

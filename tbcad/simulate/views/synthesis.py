@@ -39,15 +39,10 @@ DepthFunction = Callable[[Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class SynthesisedView:
-    """A picture made from a light field.
+    """A picture made from a light field."""
 
-    Attributes:
-        colour: (h, w, 3), 0 to 255, float32; zero where nothing was captured.
-        seen: whether a captured ray was near, or the ray misses the capture sphere, (h, w).
-    """
-
-    colour: Colours
-    seen: Bools
+    colour: Colours  # (h, w, 3), 0 to 255, float32; zero where nothing was captured
+    seen: Bools  # whether a captured ray was near, or the ray misses the capture sphere, (h, w)
 
     @property
     def image(self) -> NDArray[np.uint8]:

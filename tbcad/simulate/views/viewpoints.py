@@ -33,15 +33,11 @@ QUALITY = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "object_share")
 class ImageQuality:
     """A picture against the truth.
 
-    Attributes:
-        psnr_db: peak signal to noise ratio; infinite for equal pictures.
-        ssim: structural similarity, 1 for equal pictures.
-
     Both are NaN where the pictures show nothing but one and the same colour, black for instance.
     """
 
-    psnr_db: float
-    ssim: float
+    psnr_db: float  # peak signal to noise ratio; infinite for equal pictures
+    ssim: float  # structural similarity, 1 for equal pictures
 
     def words(self, other: str) -> str:
         """The figures in a line, against a picture of that name."""
@@ -108,14 +104,10 @@ def equivalent_blur_px(truth: Bytes, picture: Bytes) -> float:
 
 @dataclass(frozen=True)
 class OwnMethod:
-    """How views are made, by a room above this one.
+    """How views are made, by a room above this one."""
 
-    Attributes:
-        name: of the method.
-        views: of a light field: what makes the picture (h, w, 3) of a camera.
-    """
-
-    name: str
+    name: str  # of the method
+    # of a light field: what makes the picture (h, w, 3) of a camera
     views: Callable[[LightField], Callable[[Camera], Bytes]]
 
     def __str__(self) -> str:
@@ -127,17 +119,11 @@ StudyMethod = Method | OwnMethod
 
 @dataclass(frozen=True)
 class Viewpoints:
-    """Viewpoints at some elevations, evenly around the object at each.
+    """Viewpoints at some elevations, evenly around the object at each."""
 
-    Attributes:
-        elevation_deg: of each viewpoint, (v,).
-        azimuth_deg: of each viewpoint, (v,).
-        distance_mm: of all of them from the origin.
-    """
-
-    elevation_deg: Floats
-    azimuth_deg: Floats
-    distance_mm: float
+    elevation_deg: Floats  # of each viewpoint, (v,)
+    azimuth_deg: Floats  # of each viewpoint, (v,)
+    distance_mm: float  # of all of them from the origin
 
     def cameras(self, capture_mm: float, size: tuple[int, int] = (640, 480)) -> list[Camera]:
         """The cameras, of these columns and rows, each filled by the capture sphere."""

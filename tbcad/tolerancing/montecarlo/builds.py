@@ -47,14 +47,10 @@ class CameraCoverage:
 
 @dataclass(frozen=True)
 class CoverageResult(CameraCoverage):
-    """Coverage and pointing errors.
+    """Coverage and pointing errors."""
 
-    Attributes:
-        offset: distance at the object between the ray of each mirror's centre pixel and the
-            designed ray, a's mirrors, then b's, mm, (s, 2 m); not finite where the ray misses its
-            mirror.
-    """
-
+    # distance at the object between the ray of each mirror's centre pixel and the designed ray, a's
+    # mirrors, then b's, mm, (s, 2 m); not finite where the ray misses its mirror
     offset: Floats
 
     @property
@@ -69,44 +65,29 @@ class CoverageResult(CameraCoverage):
 
 @dataclass(frozen=True)
 class ShellResult(CoverageResult):
-    """Coverage and pointing errors in s builds of the shell.
+    """Coverage and pointing errors in s builds of the shell."""
 
-    Attributes:
-        pixels: sizes of the pictures, (s, v).
-        angle: pointing errors of an uncalibrated build, radians, (s, 2 m).
-    """
-
-    pixels: Floats
-    angle: Floats
+    pixels: Floats  # sizes of the pictures, (s, v)
+    angle: Floats  # pointing errors of an uncalibrated build, radians, (s, 2 m)
 
 
 @dataclass(frozen=True)
 class YieldEstimate:
-    """Share of builds whose every virtual camera covers enough.
-
-    Attributes:
-        low: lower end of the confidence interval of the true share.
-        high: upper end.
-    """
+    """Share of builds whose every virtual camera covers enough."""
 
     share: float
-    low: float
-    high: float
+    low: float  # lower end of the confidence interval of the true share
+    high: float  # upper end
 
 
 @dataclass(frozen=True)
 class ShellCase:
-    """Builds of the shell to be simulated; it can be sent to another process.
+    """Builds of the shell to be simulated; it can be sent to another process."""
 
-    Attributes:
-        edge_models: both halves as designed.
-        warp: what the process's warp does to both halves.
-    """
-
-    edge_models: EdgeModels
+    edge_models: EdgeModels  # both halves as designed
     errors: Errors
     seed: int
-    warp: WarpMaps | None = field(init=False)
+    warp: WarpMaps | None = field(init=False)  # what the process's warp does to both halves
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "warp", warp_maps_of(self.edge_models, self.errors))
@@ -135,13 +116,9 @@ class MonteCarloCase(ShellCase):
 
 @dataclass(frozen=True)
 class CoverageCase(ShellCase):
-    """The same builds as MonteCarloCase's, but only what their virtual cameras cover.
+    """The same builds as MonteCarloCase's, but only what their virtual cameras cover."""
 
-    Attributes:
-        worst_only: only the minimum of each build is exact, the others are not below it; in less
-            time.
-    """
-
+    # only the minimum of each build is exact, the others are not below it; in less time
     worst_only: bool = False
 
     def __call__(self, builds: range) -> CameraCoverage:

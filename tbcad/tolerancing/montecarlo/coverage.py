@@ -25,19 +25,15 @@ from tbcad.types import Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class MirrorCoverage:
-    """Coverage of m mirrors of one half in s builds.
+    """Coverage of m mirrors of one half in s builds."""
 
-    Attributes:
-        diameter: twice the minimum distance from the object's centre of all rays camera -> edge of
-            the cell -> reflected (DESIGN.md section 2), mm; inf where there is no edge, (s, m).
-        crossings: how often the image of the cell's outline crosses a half line from the object's
-            centre: an odd number where it surrounds the centre, (s, m).
-        pixels: size of the cell's picture, (s, m).
-    """
-
+    # twice the minimum distance from the object's centre of all rays camera -> edge of the cell ->
+    # reflected (DESIGN.md section 2), mm; inf where there is no edge, (s, m)
     diameter: Floats
+    # how often the image of the cell's outline crosses a half line from the object's centre: an odd
+    # number where it surrounds the centre, (s, m)
     crossings: Ints
-    pixels: Floats
+    pixels: Floats  # size of the cell's picture, (s, m)
 
 
 def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False) -> MirrorCoverage:

@@ -18,36 +18,21 @@ class ShellDraws:
     """Errors of one camera's half of the shell in s builds, in the order of the builds.
 
     A point x of the designed shell is moved to R(shell_tilt) (scale * x) + shell_shift.
-
-    Attributes:
-        centre: of the spheres, mm, (s, m, 3).
-        radius: by which the spheres are too large, coating included, mm, (s, m).
-        scale: size over the designed size along each axis, (s, 3).
-        shell_shift: mm, (s, 3).
-        shell_tilt: rotation vectors about the object's centre, radians, (s, 3).
-        camera_shift: of the pinhole, mm, (s, 3).
-        camera_tilt: rotation vectors about the pinhole, radians, (s, 3).
-        focal: focal length over the designed one, (s,).
-        facets: coverage lost on facets, mm, (s,).
-        foot: of the foot plane at each mirror, along its normal, mm, (s, m).
-        wall: of each wall of a pedestal, along its normal into the mirror's cell, mm, (s, w).
-        form: factors of the mirrors' form errors (tolerancing.montecarlo.form), mm, (s, m, t).
-        valley: radius of the fillets in the valleys between mirrors, mm, (s,).
     """
 
-    centre: Floats
-    radius: Floats
-    scale: Floats
-    shell_shift: Floats
-    shell_tilt: Floats
-    camera_shift: Floats
-    camera_tilt: Floats
-    focal: Floats
-    facets: Floats
-    foot: Floats
-    wall: Floats
-    form: Floats
-    valley: Floats
+    centre: Floats  # of the spheres, mm, (s, m, 3)
+    radius: Floats  # by which the spheres are too large, coating included, mm, (s, m)
+    scale: Floats  # size over the designed size along each axis, (s, 3)
+    shell_shift: Floats  # mm, (s, 3)
+    shell_tilt: Floats  # rotation vectors about the object's centre, radians, (s, 3)
+    camera_shift: Floats  # of the pinhole, mm, (s, 3)
+    camera_tilt: Floats  # rotation vectors about the pinhole, radians, (s, 3)
+    focal: Floats  # focal length over the designed one, (s,)
+    facets: Floats  # coverage lost on facets, mm, (s,)
+    foot: Floats  # of the foot plane at each mirror, along its normal, mm, (s, m)
+    wall: Floats  # of each wall of a pedestal, along its normal into the mirror's cell, mm, (s, w)
+    form: Floats  # factors of the mirrors' form errors (tolerancing.montecarlo.form), mm, (s, m, t)
+    valley: Floats  # radius of the fillets in the valleys between mirrors, mm, (s,)
 
     def __len__(self) -> int:
         return len(self.focal)

@@ -37,24 +37,17 @@ APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6
 
 @dataclass(frozen=True, eq=False)  # compared by identity, so that what follows can be kept
 class EdgeModel:
-    """One camera's half as designed: m mirrors and two planes.
-
-    Attributes:
-        table: apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7).
-        pairs: which of them may share an edge.
-        halved: mirrors that the seam halves, (m,).
-        screen: two axes and the normal of a plane through the object for each mirror, (m, 3, 3);
-            the normal is the direction u.
-        cell_radius: distance of each mirror's farthest corner from its apex, mm, (m,).
-        walls: that end mirrors on pedestals, w of them; none where neighbouring spheres meet.
-    """
+    """One camera's half as designed: m mirrors and two planes."""
 
     view: Camera
-    table: Floats
-    pairs: NeighbourPairs
-    halved: Bools
+    table: Floats  # apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7)
+    pairs: NeighbourPairs  # which of them may share an edge
+    halved: Bools  # mirrors that the seam halves, (m,)
+    # two axes and the normal of a plane through the object for each mirror, (m, 3, 3); the normal
+    # is the direction u
     screen: Floats
-    cell_radius: Floats
+    cell_radius: Floats  # distance of each mirror's farthest corner from its apex, mm, (m,)
+    # that end mirrors on pedestals, w of them; none where neighbouring spheres meet
     walls: GrooveWalls
 
     def __len__(self) -> int:

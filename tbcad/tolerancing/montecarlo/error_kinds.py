@@ -14,19 +14,13 @@ Distribution = Literal["normal", "uniform"]
 
 @dataclass(frozen=True)
 class Error:
-    """One kind of error.
+    """One kind of error."""
 
-    Attributes:
-        spread: standard deviation if normal, half width if uniform; in mm, radians or as a share.
-        mean: error common to all builds, in the same unit.
-        distribution: of the error about its mean.
-        length: over which places of one part share the error, mm; 0: each has its own.
-    """
-
+    # standard deviation if normal, half width if uniform; in mm, radians or as a share
     spread: float = 0.0
-    mean: float = 0.0
-    distribution: Distribution = "normal"
-    length: float = 0.0
+    mean: float = 0.0  # error common to all builds, in the same unit
+    distribution: Distribution = "normal"  # of the error about its mean
+    length: float = 0.0  # over which places of one part share the error, mm; 0: each has its own
 
     @property
     def sigma(self) -> float:
@@ -49,13 +43,6 @@ class Errors:
     """Errors of a manufacturing process, one kind a field, in mm, radians and shares (1 = 100 %).
 
     They are what the keys of tolerancing.process.process.Process say, with these of their own:
-
-    Attributes:
-        ball_radius: of each ball's radius, by its grade.
-        coating: by which a shell's coating is thicker than the design allows for.
-        warp: of length 0 an error of each mirror's centre.
-        cutter_radius: of the fillets that a cutter leaves in the valleys between mirrors.
-        ridge_rounding: of the fillets there that a mandrel's ridges leave.
     """
 
     sphere_centre: Error = NO_ERROR
@@ -67,20 +54,21 @@ class Errors:
     camera_shift: Error = NO_ERROR
     camera_tilt: Error = NO_ERROR
     camera_focal: Error = NO_ERROR
-    coating: Error = NO_ERROR
+    coating: Error = NO_ERROR  # by which a shell's coating is thicker than the design allows for
     facets: Error = NO_ERROR
     rotation_angle: Error = NO_ERROR
     axis_runout: Error = NO_ERROR
     axis_tilt: Error = NO_ERROR
-    ball_radius: Error = NO_ERROR
+    ball_radius: Error = NO_ERROR  # of each ball's radius, by its grade
     seat: Error = NO_ERROR
     cap_tilt: Error = NO_ERROR
     wind_up: Error = NO_ERROR
-    warp: Error = NO_ERROR
+    warp: Error = NO_ERROR  # of length 0 an error of each mirror's centre
     waviness: Error = NO_ERROR
     groove_wall: Error = NO_ERROR
+    # of the fillets that a cutter leaves in the valleys between mirrors
     cutter_radius: Error = NO_ERROR
-    ridge_rounding: Error = NO_ERROR
+    ridge_rounding: Error = NO_ERROR  # of the fillets there that a mandrel's ridges leave
 
     @property
     def whole_radius(self) -> Error:

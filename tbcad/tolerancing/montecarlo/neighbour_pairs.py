@@ -23,21 +23,14 @@ PairArrays: TypeAlias = tuple[Ints, Ints, Ints, Floats]
 
 @dataclass(frozen=True)
 class NeighbourPairs:
-    """Pairs of faces that may share an edge, e of them, and the faces that may cut it short.
+    """Pairs of faces that may share an edge, e of them, and the faces that may cut it short."""
 
-    Attributes:
-        pair: a mirror and another mirror or a plane, (e, 2).
-        offset: where the faces of each pair begin in `face`, (e + 1,).
-        face: mirrors and planes, in the order of their distance from both of the pair.
-        reach: maximum distance of the edge's points from its middle, mm, (e,).
-        footed: mirrors whose pairs have a foot plane of their own, (r,): faces m + 2 onwards.
-            The walls of pedestals come after them.
-    """
-
-    pair: Ints
-    offset: Ints
-    face: Ints
-    reach: Floats
+    pair: Ints  # a mirror and another mirror or a plane, (e, 2)
+    offset: Ints  # where the faces of each pair begin in `face`, (e + 1,)
+    face: Ints  # mirrors and planes, in the order of their distance from both of the pair
+    reach: Floats  # maximum distance of the edge's points from its middle, mm, (e,)
+    # mirrors whose pairs have a foot plane of their own, (r,): faces m + 2 onwards. The walls of
+    # pedestals come after them.
     footed: Ints
 
     @property

@@ -24,19 +24,14 @@ OVERSHOOT, SMALLEST_STEP, LARGEST_STEP = 1.2, 1.5, 10.0
 
 @dataclass(frozen=True)
 class SingleErrorEffect:
-    """Effect of one kind of error when there is no other.
+    """Effect of one kind of error when there is no other."""
 
-    Attributes:
-        kind: its name, as in Errors.
-        loss: coverage of the worst virtual camera lost against the design, mm, mean of the builds.
-        loss_at_yield: the same in the worst build of those that are to be good, mm.
-        tolerable_factor: factor on the process's error up to which the yield is reached when there
-            is no other error; infinite where it does not matter.
-    """
-
-    kind: str
+    kind: str  # its name, as in Errors
+    # coverage of the worst virtual camera lost against the design, mm, mean of the builds
     loss: float
-    loss_at_yield: float
+    loss_at_yield: float  # the same in the worst build of those that are to be good, mm
+    # factor on the process's error up to which the yield is reached when there is no other error;
+    # infinite where it does not matter
     tolerable_factor: float
 
 

@@ -36,32 +36,20 @@ VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
 
 @dataclass(frozen=True)
 class ReferenceViews:
-    """Views to compare with the truth.
+    """Views to compare with the truth."""
 
-    Attributes:
-        capture_mm: diameter of the capture sphere.
-        views: viewpoints, v of them.
-        truths: pictures of a real camera there, (h, w, 3) each.
-    """
-
-    capture_mm: float
-    views: list[Camera]
-    truths: list[Bytes]
+    capture_mm: float  # diameter of the capture sphere
+    views: list[Camera]  # viewpoints, v of them
+    truths: list[Bytes]  # pictures of a real camera there, (h, w, 3) each
 
 
 @dataclass(frozen=True)
 class Sharpness:
-    """SSIM of views against the truth, over s builds and v viewpoints.
+    """SSIM of views against the truth, over s builds and v viewpoints."""
 
-    Attributes:
-        designed: of the shell as designed, (v,).
-        uncalibrated: with the designed rays, (s, v).
-        calibrated: with rays known but for the residual of the calibration, (s, v).
-    """
-
-    designed: Floats
-    uncalibrated: Floats
-    calibrated: Floats
+    designed: Floats  # of the shell as designed, (v,)
+    uncalibrated: Floats  # with the designed rays, (s, v)
+    calibrated: Floats  # with rays known but for the residual of the calibration, (s, v)
 
 
 def sharpness(

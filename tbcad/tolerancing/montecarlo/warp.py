@@ -29,17 +29,11 @@ RING_SHARE = 0.8
 
 @dataclass(frozen=True)
 class SmoothField:
-    """A field of unit variance, as a function of K standard normal numbers.
+    """A field of unit variance, as a function of K standard normal numbers."""
 
-    Attributes:
-        points: X, mm, (K, 3).
-        length: correlation length L, mm.
-        factor: F, lower triangular, (K, K).
-    """
-
-    points: Floats
-    length: float
-    factor: Floats
+    points: Floats  # X, mm, (K, 3)
+    length: float  # correlation length L, mm
+    factor: Floats  # F, lower triangular, (K, K)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -87,26 +81,17 @@ def pivots(points: Floats, length: float) -> Ints:
 
 @dataclass(frozen=True)
 class WarpMap:
-    """What K random numbers for each axis do to the m mirrors of one half.
+    """What K random numbers for each axis do to the m mirrors of one half."""
 
-    Attributes:
-        basis: of the field at q points of each mirror, the apex first, (K, m q).
-        fit: centre and radius of the sphere, and astigmatism, from the points' displacements along
-            their normals, (m, 6, q).
-        normal: there, (m, q, 3).
-        foot_basis: of the field where each mirror is nearest to the foot plane, (m, K).
-        foot_normal: unit normal of the foot plane, (3,).
-        wall_basis: of the field in the middle of the edge at each wall of a pedestal, (K, w).
-        wall_normal: unit normals of the walls, (w, 3).
-    """
-
-    basis: Floats
+    basis: Floats  # of the field at q points of each mirror, the apex first, (K, m q)
+    # centre and radius of the sphere, and astigmatism, from the points' displacements along their
+    # normals, (m, 6, q)
     fit: Floats
-    normal: Floats
-    foot_basis: Floats
-    foot_normal: Floats
-    wall_basis: Floats
-    wall_normal: Floats
+    normal: Floats  # there, (m, q, 3)
+    foot_basis: Floats  # of the field where each mirror is nearest to the foot plane, (m, K)
+    foot_normal: Floats  # unit normal of the foot plane, (3,)
+    wall_basis: Floats  # of the field in the middle of the edge at each wall of a pedestal, (K, w)
+    wall_normal: Floats  # unit normals of the walls, (w, 3)
 
     @property
     def modes(self) -> int:
@@ -136,17 +121,11 @@ WarpMaps: TypeAlias = tuple[WarpMap, WarpMap]
 
 @dataclass(frozen=True)
 class ShellShape:
-    """One half as designed.
+    """One half as designed."""
 
-    Attributes:
-        table: apex, normal, curvature of the m mirrors, the seam and the foot, (m + 2, 7).
-        cell_radius: distance of each mirror's farthest corner from its apex, mm, (m,).
-        walls: of pedestals.
-    """
-
-    table: Floats
-    cell_radius: Floats
-    walls: GrooveWalls
+    table: Floats  # apex, normal, curvature of the m mirrors, the seam and the foot, (m + 2, 7)
+    cell_radius: Floats  # distance of each mirror's farthest corner from its apex, mm, (m,)
+    walls: GrooveWalls  # of pedestals
 
 
 @compiled_loop

@@ -24,30 +24,20 @@ class PrototypeDraws:
 
     The base goes through its stops twice, for camera a's mirrors and for camera b's. A point x of
     the designed base is moved to R(tilt) R(axis, stop's angle + angle) x + runout.
-
-    Attributes:
-        radius: by which balls are too large, mm, (s, k).
-        seat: of the balls' centres on the base, mm, (s, k, 3).
-        cap_tilt: of caps about two axes across their own, radians, (s, k, 2).
-        angle: of the base at each stop of each run, with its turn under gravity, radians,
-            (s, 2, t).
-        runout: of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2).
-        tilt: of the axis about azimuth zero and across it, both through the object's centre,
-            radians, (s, 2).
-        camera_shift: of the pinhole, mm, (s, 3).
-        camera_tilt: rotation vectors about the pinhole, radians, (s, 3).
-        focal: focal length over the designed one, (s,).
     """
 
-    radius: Floats
-    seat: Floats
-    cap_tilt: Floats
+    radius: Floats  # by which balls are too large, mm, (s, k)
+    seat: Floats  # of the balls' centres on the base, mm, (s, k, 3)
+    cap_tilt: Floats  # of caps about two axes across their own, radians, (s, k, 2)
+    # of the base at each stop of each run, with its turn under gravity, radians, (s, 2, t)
     angle: Floats
-    runout: Floats
+    runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
+    # of the axis about azimuth zero and across it, both through the object's centre, radians, (s,
+    # 2)
     tilt: Floats
-    camera_shift: Floats
-    camera_tilt: Floats
-    focal: Floats
+    camera_shift: Floats  # of the pinhole, mm, (s, 3)
+    camera_tilt: Floats  # rotation vectors about the pinhole, radians, (s, 3)
+    focal: Floats  # focal length over the designed one, (s,)
 
     def __len__(self) -> int:
         return len(self.focal)

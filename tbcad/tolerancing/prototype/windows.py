@@ -39,48 +39,30 @@ HALVES = (0, 1)
 
 @dataclass(frozen=True)
 class RunWindows:
-    """The windows of one run's m mirrors, as camera directions: right, down, forward.
+    """The windows of one run's m mirrors, as camera directions: right, down, forward."""
 
-    Attributes:
-        ball: number of the ball in each window, (m,).
-        stop: number of its stop, (m,).
-        side: unit directions along the sides of all windows, mirror after mirror,
-            (e, SIDE_SAMPLES, 3).
-        coarse: see tbcad.tolerancing.prototype.rays.coarse_directions.
-        first: number of each mirror's first side, (m + 1,).
-        middle: unit directions of the mirrors' apices, (m, 3).
-        outward: directions from there to the outline, away from the seam where it halves, (m, 3).
-        halved: mirrors that the seam halves, (m,).
-    """
-
-    ball: Ints
-    stop: Ints
+    ball: Ints  # number of the ball in each window, (m,)
+    stop: Ints  # number of its stop, (m,)
+    # unit directions along the sides of all windows, mirror after mirror, (e, SIDE_SAMPLES, 3)
     side: Floats
-    coarse: Floats
-    first: Ints
-    middle: Floats
+    coarse: Floats  # see tbcad.tolerancing.prototype.rays.coarse_directions
+    first: Ints  # number of each mirror's first side, (m + 1,)
+    middle: Floats  # unit directions of the mirrors' apices, (m, 3)
+    # directions from there to the outline, away from the seam where it halves, (m, 3)
     outward: Floats
-    halved: Bools
+    halved: Bools  # mirrors that the seam halves, (m,)
 
 
 @dataclass(frozen=True)
 class PrototypeWindows:
-    """The prototype as designed, as the fast model needs it.
+    """The prototype as designed, as the fast model needs it."""
 
-    Attributes:
-        pinhole: mm, (3,).
-        axes: the camera's right, down and forward, (3, 3).
-        runs: for camera a's mirrors and for camera b's.
-        virtual: number of each mirror's virtual camera, a's mirrors, then b's, (2 m,).
-        wind_up: turn of the base under gravity at each of t stops, radians, (t,).
-    """
-
-    pinhole: Floats
-    axes: Floats
+    pinhole: Floats  # mm, (3,)
+    axes: Floats  # the camera's right, down and forward, (3, 3)
     plan: Plan
-    runs: tuple[RunWindows, RunWindows]
-    virtual: Ints
-    wind_up: Floats
+    runs: tuple[RunWindows, RunWindows]  # for camera a's mirrors and for camera b's
+    virtual: Ints  # number of each mirror's virtual camera, a's mirrors, then b's, (2 m,)
+    wind_up: Floats  # turn of the base under gravity at each of t stops, radians, (t,)
 
     @property
     def is_cap(self) -> Bools:
@@ -126,19 +108,12 @@ def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
 
 @dataclass(frozen=True)
 class PrototypeResult:
-    """Coverage and pointing errors of s prototypes: see CoverageResult.
+    """Coverage and pointing errors of s prototypes: see CoverageResult."""
 
-    Attributes:
-        coverage: with designed windows, mm, (s, v).
-        offset: likewise, mm, (s, 2 m).
-        calibrated_coverage: with windows where the balls are, mm, (s, v).
-        calibrated_offset: likewise, mm, (s, 2 m).
-    """
-
-    coverage: Floats
-    offset: Floats
-    calibrated_coverage: Floats
-    calibrated_offset: Floats
+    coverage: Floats  # with designed windows, mm, (s, v)
+    offset: Floats  # likewise, mm, (s, 2 m)
+    calibrated_coverage: Floats  # with windows where the balls are, mm, (s, v)
+    calibrated_offset: Floats  # likewise, mm, (s, 2 m)
 
     @property
     def uncalibrated(self) -> CoverageResult:
@@ -168,22 +143,15 @@ class PrototypeCase:
 
 @dataclass(frozen=True)
 class RunPose:
-    """Actual camera and balls of one run of one build, in the prototype's frame.
+    """Actual camera and balls of one run of one build, in the prototype's frame."""
 
-    Attributes:
-        pinhole: mm, (3,).
-        lens: matrices that turn directions in the designed camera, as rows, into those of the
-            window's pixels, (m, 3, 3).
-        centre: of the ball in each window, mm, (m, 3).
-        radius: of each, mm, (m,).
-        highlight: unit directions in which they show the object's centre, (m, 3).
-    """
-
-    pinhole: Floats
+    pinhole: Floats  # mm, (3,)
+    # matrices that turn directions in the designed camera, as rows, into those of the window's
+    # pixels, (m, 3, 3)
     lens: Floats
-    centre: Floats
-    radius: Floats
-    highlight: Floats
+    centre: Floats  # of the ball in each window, mm, (m, 3)
+    radius: Floats  # of each, mm, (m,)
+    highlight: Floats  # unit directions in which they show the object's centre, (m, 3)
 
 
 def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: int) -> RunPose:

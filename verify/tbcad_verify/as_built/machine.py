@@ -25,25 +25,15 @@ Five = Annotated[list[float], Field(min_length=5, max_length=5)]
 
 
 class RealCamera(Strict):
-    """A camera with a lens that distorts as OpenCV's model says.
+    """A camera with a lens that distorts as OpenCV's model says."""
 
-    Attributes:
-        pinhole: (3,) mm.
-        axes: (3, 3) rows: across the columns, down the rows, forward.
-        focal: pixels, along rows and columns.
-        principal: column and row of the optical axis.
-        distortion: k1, k2, p1, p2, k3.
-        width: columns.
-        height: rows.
-    """
-
-    pinhole: Vector = Field(alias="pinhole_mm")
-    axes: Matrix
-    focal: Pair = Field(alias="focal_px")
-    principal: Pair = Field(alias="principal_px")
-    distortion: Five
-    width: int = Field(alias="width_px", ge=1, le=MAX_SIDE_PX)
-    height: int = Field(alias="height_px", ge=1, le=MAX_SIDE_PX)
+    pinhole: Vector = Field(alias="pinhole_mm")  # (3,) mm
+    axes: Matrix  # (3, 3) rows: across the columns, down the rows, forward
+    focal: Pair = Field(alias="focal_px")  # pixels, along rows and columns
+    principal: Pair = Field(alias="principal_px")  # column and row of the optical axis
+    distortion: Five  # k1, k2, p1, p2, k3
+    width: int = Field(alias="width_px", ge=1, le=MAX_SIDE_PX)  # columns
+    height: int = Field(alias="height_px", ge=1, le=MAX_SIDE_PX)  # rows
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -88,24 +78,17 @@ class MachineFrame(Strict):
 
 
 class AsBuilt(Strict):
-    """The whole machine.
+    """The whole machine."""
 
-    Attributes:
-        camera: that takes the photographs.
-        axis: (3,) unit, that the base rotates about.
-        axis_point: (3,) mm, of the axis.
-        frames: positions in which it was measured.
-        angle_deg: of the base in each.
-        shift: of the base in each, mm; None for nowhere.
-        balls: reflecting spheres.
-    """
-
-    camera: RealCamera
-    axis: Vector
-    axis_point: Vector = Field(alias="axis_point_mm")
+    camera: RealCamera  # that takes the photographs
+    axis: Vector  # (3,) unit, that the base rotates about
+    axis_point: Vector = Field(alias="axis_point_mm")  # (3,) mm, of the axis
+    # positions in which it was measured
     frames: list[MachineFrame] = Field(min_length=1, max_length=MOST)
-    angle_deg: list[float] = Field(max_length=MOST)
+    angle_deg: list[float] = Field(max_length=MOST)  # of the base in each
+    # of the base in each, mm; None for nowhere
     shift: list[Vector] | None = Field(None, alias="shift_mm", max_length=MOST)
+    # reflecting spheres
     balls: list[MeasuredBall] = Field(alias="spheres", min_length=1, max_length=MOST)
 
     @model_validator(mode="after")

@@ -28,50 +28,29 @@ NOTE = (
 
 @dataclass(frozen=True)
 class BallRow:
-    """One ball.
+    """One ball."""
 
-    Attributes:
-        number: from 1.
-        mirrors: for which it substitutes, of both runs.
-        short: of them that show too little.
-        coverage_mm: minimum of them; None where no stop is calibrated.
-        off_um: of its centre from where the base should have it.
-        shim_um: thickness on each of its pads.
-        radius_um: measured less recorded.
-        shimmed_mm: minimum coverage with all shims.
-    """
-
-    number: int
-    mirrors: int
-    short: int
-    coverage_mm: float | None
-    off_um: float
-    shim_um: tuple[float, ...]
-    radius_um: float
-    shimmed_mm: float | None
+    number: int  # from 1
+    mirrors: int  # for which it substitutes, of both runs
+    short: int  # of them that show too little
+    coverage_mm: float | None  # minimum of them; None where no stop is calibrated
+    off_um: float  # of its centre from where the base should have it
+    shim_um: tuple[float, ...]  # thickness on each of its pads
+    radius_um: float  # measured less recorded
+    shimmed_mm: float | None  # minimum coverage with all shims
 
 
 @dataclass(frozen=True)
 class AsBuiltReport:
-    """The verification of one calibrated prototype.
+    """The verification of one calibrated prototype."""
 
-    Attributes:
-        target_mm: diameter that every mirror must show.
-        checks: in order.
-        coverage_mm: of each mirror, NaN where its stop is not calibrated.
-        balls: each with its shims.
-        turn_deg: by which zero of the base's angle is off.
-        tilt_deg: of the base beside that.
-        shift_mm: of the base.
-    """
-
-    target_mm: float
-    checks: tuple[Check, ...]
-    coverage_mm: Mapping[str, float]
-    balls: tuple[BallRow, ...]
-    turn_deg: float
-    tilt_deg: float
-    shift_mm: float
+    target_mm: float  # diameter that every mirror must show
+    checks: tuple[Check, ...]  # in order
+    coverage_mm: Mapping[str, float]  # of each mirror, NaN where its stop is not calibrated
+    balls: tuple[BallRow, ...]  # each with its shims
+    turn_deg: float  # by which zero of the base's angle is off
+    tilt_deg: float  # of the base beside that
+    shift_mm: float  # of the base
 
     @property
     def passed(self) -> bool:

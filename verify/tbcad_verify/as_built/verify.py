@@ -84,24 +84,16 @@ def verify_as_built(
 
 @dataclass(frozen=True)
 class SeatErrors:
-    """K seats, and the base as a whole.
+    """K seats, and the base as a whole."""
 
-    Attributes:
-        off: (3, K) from where the base should have the centres to where they are, mm, in the frame
-            of the designed base.
-        shim: (3, K) thickness to put on each pad, mm; negative: to take away.
-        placed: (3, K) where centres are once this is done, mm, with the base at angle zero.
-        turn: of the whole base about its axis, radians, by which zero is off.
-        tilt: of the whole base beside that, radians.
-        shift: of the whole base, mm.
-    """
-
+    # (3, K) from where the base should have the centres to where they are, mm, in the frame of the
+    # designed base
     off: Floats
-    shim: Floats
-    placed: Floats
-    turn: float
-    tilt: float
-    shift: float
+    shim: Floats  # (3, K) thickness to put on each pad, mm; negative: to take away
+    placed: Floats  # (3, K) where centres are once this is done, mm, with the base at angle zero
+    turn: float  # of the whole base about its axis, radians, by which zero is off
+    tilt: float  # of the whole base beside that, radians
+    shift: float  # of the whole base, mm
 
 
 def seat_errors(context: PrototypeContext, machine: AsBuilt) -> SeatErrors:

@@ -31,49 +31,30 @@ HALF_TURN = np.array([[-1.0], [-1.0], [1.0]])
 
 @dataclass(frozen=True)
 class Half:
-    """The m mirrors of one camera of the shell, in the frame of the prototype.
+    """The m mirrors of one camera of the shell, in the frame of the prototype."""
 
-    Attributes:
-        ids: of the mirrors.
-        shell: their spheres, turned into those of the prototype's camera where need be.
-        ball: (m,) that substitutes for each, from 0.
-        frame: (m,) of the machine, in which it does; -1 where that stop was not measured.
-        designed: (3, m) apices of the balls there, by the plan.
-    """
-
-    ids: tuple[str, ...]
-    shell: MirrorSpheres
-    ball: Ints
-    frame: Ints
-    designed: Floats
+    ids: tuple[str, ...]  # of the mirrors
+    shell: MirrorSpheres  # their spheres, turned into those of the prototype's camera where need be
+    ball: Ints  # (m,) that substitutes for each, from 0
+    frame: Ints  # (m,) of the machine, in which it does; -1 where that stop was not measured
+    designed: Floats  # (3, m) apices of the balls there, by the plan
 
 
 @dataclass(frozen=True)
 class HalfViews:
-    """What m mirrors show.
+    """What m mirrors show."""
 
-    Attributes:
-        coverage: (m,) mm; NaN where the stop was not measured.
-        margin: (m,) least distance of the window from the picture's edge, pixels.
-        clearance: (m,) least distance of the way to the ball from the capture sphere, mm.
-    """
-
-    coverage: Floats
-    margin: Floats
-    clearance: Floats
+    coverage: Floats  # (m,) mm; NaN where the stop was not measured
+    margin: Floats  # (m,) least distance of the window from the picture's edge, pixels
+    clearance: Floats  # (m,) least distance of the way to the ball from the capture sphere, mm
 
 
 @dataclass(frozen=True)
 class RealTransfer:
-    """Takes directions of the shell's picture to rays after the real balls.
+    """Takes directions of the shell's picture to rays after the real balls."""
 
-    Attributes:
-        matrix: (3, 3, m) from the shell's picture to the real camera's sight.
-        mirrors: a ball for each mirror.
-    """
-
-    matrix: Floats
-    mirrors: PreparedSurfaces
+    matrix: Floats  # (3, 3, m) from the shell's picture to the real camera's sight
+    mirrors: PreparedSurfaces  # a ball for each mirror
 
     def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
         """Directions (3, N) of mirrors' cells as they meet the balls, and their reflections."""

@@ -25,29 +25,18 @@ RIDGE = 1e-10
 
 @dataclass(frozen=True)
 class SurfaceFits:
-    """What each of K segments is, measured on its vertices.
+    """What each of K segments is, measured on its vertices."""
 
-    Attributes:
-        surfaces: K best spheres or planes.
-        form: (K,) root mean square of the vertices' distances, mm.
-        chord: (K,) largest distance of a facet's middle from the surface, mm.
-        extent: (K,) distance of the farthest vertex from the segment's middle, mm.
-        middle: (3, K) mean of the facets' middles by area, mm.
-        normal: (3, K) mean normal by area, unit.
-        area: (K,) of the facets, mm^2.
-        count: (K,) vertices.
-        blur: (K,) how far float32 rounding of the vertices, taken as random, can have moved a
-            sphere's centre or changed its radius, six standard deviations, mm.
-    """
-
-    surfaces: Surfaces
-    form: Floats
-    chord: Floats
-    extent: Floats
-    middle: Floats
-    normal: Floats
-    area: Floats
-    count: NDArray[np.intp]
+    surfaces: Surfaces  # K best spheres or planes
+    form: Floats  # (K,) root mean square of the vertices' distances, mm
+    chord: Floats  # (K,) largest distance of a facet's middle from the surface, mm
+    extent: Floats  # (K,) distance of the farthest vertex from the segment's middle, mm
+    middle: Floats  # (3, K) mean of the facets' middles by area, mm
+    normal: Floats  # (3, K) mean normal by area, unit
+    area: Floats  # (K,) of the facets, mm^2
+    count: NDArray[np.intp]  # (K,) vertices
+    # (K,) how far float32 rounding of the vertices, taken as random, can have moved a sphere's
+    # centre or changed its radius, six standard deviations, mm
     blur: Floats
 
     @property
@@ -58,17 +47,11 @@ class SurfaceFits:
 
 @dataclass(frozen=True)
 class PatchVertices:
-    """Every vertex of every segment once, ordered by segment.
+    """Every vertex of every segment once, ordered by segment."""
 
-    Attributes:
-        segment: (P,) ascending.
-        vertex: (P,).
-        first: (K,) where each segment starts.
-    """
-
-    segment: NDArray[np.int64]
-    vertex: NDArray[np.int64]
-    first: NDArray[np.intp]
+    segment: NDArray[np.int64]  # (P,) ascending
+    vertex: NDArray[np.int64]  # (P,)
+    first: NDArray[np.intp]  # (K,) where each segment starts
 
 
 @dataclass(frozen=True)

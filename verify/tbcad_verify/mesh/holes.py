@@ -27,21 +27,13 @@ GAP_RAD = math.pi / 2 + 1e-3  # that may be missing of the full turn
 
 @dataclass(frozen=True)
 class RoundHoles:
-    """The H holes, in the order of their first facets.
+    """The H holes, in the order of their first facets."""
 
-    Attributes:
-        diameter: (H,) mm of the circle through the corners; facets bulge inside it.
-        middle: (3, H) mm, at half depth.
-        axis: (3, H) unit, of either sign.
-        depth: (H,) mm, of the cylinder.
-        wall: the facets of all their walls, ascending.
-    """
-
-    diameter: Floats
-    middle: Floats
-    axis: Floats
-    depth: Floats
-    wall: Ints
+    diameter: Floats  # (H,) mm of the circle through the corners; facets bulge inside it
+    middle: Floats  # (3, H) mm, at half depth
+    axis: Floats  # (3, H) unit, of either sign
+    depth: Floats  # (H,) mm, of the cylinder
+    wall: Ints  # the facets of all their walls, ascending
 
     @property
     def smallest(self) -> int | None:
@@ -59,17 +51,11 @@ class RoundHoles:
 
 @dataclass(frozen=True)
 class FacetPatches:
-    """N facets in G patches.
+    """N facets in G patches."""
 
-    Attributes:
-        facet: (N,) indices, ascending.
-        group: (N,) patch of each, 0 ... G - 1.
-        count: G.
-    """
-
-    facet: Ints
-    group: Groups
-    count: int
+    facet: Ints  # (N,) indices, ascending
+    group: Groups  # (N,) patch of each, 0 ... G - 1.
+    count: int  # G
 
 
 def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:

@@ -12,23 +12,15 @@ from tbcad_verify.mesh.vectors import norm
 
 @dataclass(frozen=True)
 class MassProperties:
-    """Volume, area, centroid and box, as plain numbers.
+    """Volume, area, centroid and box, as plain numbers."""
 
-    Attributes:
-        volume: signed, mm^3.
-        area: mm^2.
-        centroid: x, y, z of the volume's centroid, mm.
-        low: minimum x, y, z, mm.
-        high: maximum x, y, z, mm.
-        bend: largest growth of the area of an offset surface with its distance, mm^2 / mm: by
-            Steiner, the sum over edges of length times angle. None if it was not computed.
-    """
-
-    volume: float
-    area: float
-    centroid: list[float]
-    low: list[float]
-    high: list[float]
+    volume: float  # signed, mm^3
+    area: float  # mm^2
+    centroid: list[float]  # x, y, z of the volume's centroid, mm
+    low: list[float]  # minimum x, y, z, mm
+    high: list[float]  # maximum x, y, z, mm
+    # largest growth of the area of an offset surface with its distance, mm^2 / mm: by Steiner, the
+    # sum over edges of length times angle. None if it was not computed.
     bend: float | None = None
 
 

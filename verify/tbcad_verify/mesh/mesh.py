@@ -35,29 +35,17 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Topology:
-    """Faults of a mesh; a good one has zeros, one component and a positive volume.
+    """Faults of a mesh; a good one has zeros, one component and a positive volume."""
 
-    Attributes:
-        open_edges: edges that belong to one facet only.
-        crowded_edges: edges of more than two facets.
-        turned_edges: edges along which both facets run in the same direction.
-        degenerate: facets without area.
-        duplicate: facets on the same three vertices as a neighbour.
-        stored_normals: facets whose stored normal contradicts their corners' order.
-        components: connected pieces.
-        volume: signed, mm^3; negative when inside out.
-        status: manifold3d's; "NoError" is good.
-    """
-
-    open_edges: int
-    crowded_edges: int
-    turned_edges: int
-    degenerate: int
-    duplicate: int
-    stored_normals: int
-    components: int
-    volume: float
-    status: str
+    open_edges: int  # edges that belong to one facet only
+    crowded_edges: int  # edges of more than two facets
+    turned_edges: int  # edges along which both facets run in the same direction
+    degenerate: int  # facets without area
+    duplicate: int  # facets on the same three vertices as a neighbour
+    stored_normals: int  # facets whose stored normal contradicts their corners' order
+    components: int  # connected pieces
+    volume: float  # signed, mm^3; negative when inside out
+    status: str  # manifold3d's; "NoError" is good
 
 
 def mesh_from_facets(facets: Facets) -> Mesh:

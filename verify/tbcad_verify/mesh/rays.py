@@ -33,15 +33,10 @@ THREADS = max(1, min((os.cpu_count() or 1) // 2, 8))
 
 @dataclass(frozen=True)
 class RayScene:
-    """All parts' facets, ready to be hit.
+    """All parts' facets, ready to be hit."""
 
-    Attributes:
-        embree: the committed scene; queries release the interpreter's lock.
-        planes: (F, 4) unit outward normal and its product with a corner, mm.
-    """
-
-    embree: Any
-    planes: Floats
+    embree: Any  # the committed scene; queries release the interpreter's lock
+    planes: Floats  # (F, 4) unit outward normal and its product with a corner, mm
 
     def first(self, start: Floats32, d: Floats32) -> Ints:
         """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
@@ -54,12 +49,9 @@ class ImagePairScene(RayScene):
 
     Facets of the image have the numbers after the mesh's. They are met where the ray's own image
     meets the mesh. A ray passes the plane once: what it meets on the side where it starts is first.
-
-    Attributes:
-        side: 1 where the mesh has x >= 0, -1 where it has x <= 0.
     """
 
-    side: float
+    side: float  # 1 where the mesh has x >= 0, -1 where it has x <= 0
 
     @property
     def mesh(self) -> RayScene:

@@ -36,30 +36,19 @@ FOLD_RAD = 0.2
 
 @dataclass(frozen=True)
 class Edges:
-    """The edges between two facets, one a column.
+    """The edges between two facets, one a column."""
 
-    Attributes:
-        half: (E,) one of the two half-edges, the one with the smaller number.
-        angle: (E,) between the facets' normals, rad; positive where convex.
-        noise: (E,) the most by which rounding can have changed the angle, rad.
-    """
-
-    half: NDArray[np.intp]
-    angle: Floats
-    noise: Floats
+    half: NDArray[np.intp]  # (E,) one of the two half-edges, the one with the smaller number
+    angle: Floats  # (E,) between the facets' normals, rad; positive where convex
+    noise: Floats  # (E,) the most by which rounding can have changed the angle, rad
 
 
 @dataclass(frozen=True)
 class Segmentation:
-    """Smooth patches.
+    """Smooth patches."""
 
-    Attributes:
-        label: (F,) segment of each facet.
-        count: K.
-    """
-
-    label: NDArray[np.int32]
-    count: int
+    label: NDArray[np.int32]  # (F,) segment of each facet
+    count: int  # K
 
 
 def measure_edges(mesh: Mesh) -> Edges:

@@ -16,17 +16,11 @@ FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribu
 
 @dataclass(frozen=True)
 class Facets:
-    """The triangles of one STL, as written.
+    """The triangles of one STL, as written."""
 
-    Attributes:
-        name: the file.
-        normals: (F, 3) float32, as stored; zero where the writer left them out.
-        corners: (F, 3, 3) float32: facet, corner, axis; mm.
-    """
-
-    name: str
-    normals: NDArray[np.float32]
-    corners: NDArray[np.float32]
+    name: str  # the file
+    normals: NDArray[np.float32]  # (F, 3) float32, as stored; zero where the writer left them out
+    corners: NDArray[np.float32]  # (F, 3, 3) float32: facet, corner, axis; mm
 
 
 def read_facets(folder: Path, name: str) -> tuple[Facets, FileBytes]:

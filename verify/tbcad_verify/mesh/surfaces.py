@@ -20,17 +20,11 @@ from tbcad_verify.types import Floats
 
 @dataclass(frozen=True)
 class Surfaces:
-    """N surfaces.
+    """N surfaces."""
 
-    Attributes:
-        point: (3, N) mm, on the surface.
-        normal: (3, N) unit.
-        curvature: (N,) 1/mm.
-    """
-
-    point: Floats
-    normal: Floats
-    curvature: Floats
+    point: Floats  # (3, N) mm, on the surface
+    normal: Floats  # (3, N) unit
+    curvature: Floats  # (N,) 1/mm
 
     def take(self, index: NDArray[np.integer]) -> Surfaces:
         """The surfaces with these numbers, in this order."""
@@ -62,30 +56,20 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class ReflectedRays:
-    """Reflected rays: points on the mirrors, directions, and lengths before the mirror.
+    """Reflected rays: points on the mirrors, directions, and lengths before the mirror."""
 
-    Attributes:
-        point: (3, N) mm, where the ray meets the mirror; NaN where it misses.
-        toward: (3, N) direction after reflection, as long as the one before.
-        reach: (N,) how many lengths of the incoming direction lie before the point.
-    """
-
-    point: Floats
-    toward: Floats
-    reach: Floats
+    point: Floats  # (3, N) mm, where the ray meets the mirror; NaN where it misses
+    toward: Floats  # (3, N) direction after reflection, as long as the one before
+    reach: Floats  # (N,) how many lengths of the incoming direction lie before the point
 
 
 @dataclass(frozen=True)
 class PreparedSurfaces:
-    """Surfaces seen from one point: what is the same for all rays is computed once.
+    """Surfaces seen from one point: what is the same for all rays is computed once."""
 
-    Attributes:
-        origin: (3,) mm, where all rays start.
-        table: (K, 8) a row a surface: m (3), C, k, q (3); a ray meets the surface where
-            k/2 |d|^2 t^2 + d.m t + C = 0, and the normal at x is q + k x.
-    """
-
-    origin: Floats
+    origin: Floats  # (3,) mm, where all rays start
+    # (K, 8) a row a surface: m (3), C, k, q (3); a ray meets the surface where k/2 |d|^2 t^2 + d.m
+    # t + C = 0, and the normal at x is q + k x
     table: Floats
 
 

@@ -22,24 +22,16 @@ DIGITS = 9
 
 @dataclass(frozen=True)
 class PrintAssessment:
-    """Whether one machine can make one part.
+    """Whether one machine can make one part."""
 
-    Attributes:
-        part: name of the part's STL.
-        measures: of the part.
-        profile: of the machine.
-        placement: how it lies in the machine, and overhangs.
-        uncut_mm: only for milled parts: length of inner edges in which a round tool leaves more
-            than the tolerance.
-        problems: one sentence each; none: it can be made.
-    """
-
-    part: str
-    measures: PartMeasures
-    profile: Profile
-    placement: BedPlacement
+    part: str  # name of the part's STL
+    measures: PartMeasures  # of the part
+    profile: Profile  # of the machine
+    placement: BedPlacement  # how it lies in the machine, and overhangs
+    # only for milled parts: length of inner edges in which a round tool leaves more than the
+    # tolerance
     uncut_mm: float | None
-    problems: tuple[str, ...]
+    problems: tuple[str, ...]  # one sentence each; none: it can be made
 
     @property
     def mass_g(self) -> float:

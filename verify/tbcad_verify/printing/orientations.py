@@ -23,32 +23,20 @@ AXES = np.vstack([-np.eye(3)[::-1], np.eye(3)[::-1]]).T  # -z first: as the file
 
 @dataclass(frozen=True)
 class HullView:
-    """A hull with one of its directions down, whatever the machine.
+    """A hull with one of its directions down, whatever the machine."""
 
-    Attributes:
-        level: (3, 3) rotation from the file's axes to some with z up.
-        seen: from above.
-        height: mm.
-    """
-
-    level: Floats
-    seen: Silhouette
-    height: float
+    level: Floats  # (3, 3) rotation from the file's axes to some with z up
+    seen: Silhouette  # from above
+    height: float  # mm
 
 
 @dataclass(frozen=True)
 class PartHull:
-    """The convex hull of a part.
+    """The convex hull of a part."""
 
-    Attributes:
-        points: (3, V) its corners, mm.
-        down: (3, D) unit directions which can point down: large faces, then the axes.
-        tilted: (3, T) others, tried when nothing else fits.
-    """
-
-    points: Floats
-    down: Floats
-    tilted: Floats
+    points: Floats  # (3, V) its corners, mm
+    down: Floats  # (3, D) unit directions which can point down: large faces, then the axes
+    tilted: Floats  # (3, T) others, tried when nothing else fits
 
     @cached_property
     def standing(self) -> list[HullView]:

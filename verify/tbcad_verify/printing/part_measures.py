@@ -19,42 +19,25 @@ from tbcad_verify.types import Floats
 
 @dataclass(frozen=True)
 class InnerEdges:
-    """Inner edges, where the air between two faces fills less than a half turn.
+    """Inner edges, where the air between two faces fills less than a half turn."""
 
-    Attributes:
-        bend: (E,) rad between the faces' normals.
-        length: (E,) mm.
-    """
-
-    bend: Floats
-    length: Floats
+    bend: Floats  # (E,) rad between the faces' normals
+    length: Floats  # (E,) mm
 
 
 @dataclass(frozen=True)
 class PartMeasures:
-    """One part.
+    """One part."""
 
-    Attributes:
-        mesh: its triangles.
-        status: of manifold3d; "NoError" is good.
-        mass: volume, area, centroid, box.
-        solids: connected surfaces that enclose material; more than one means loose shells.
-        cavities: connected surfaces that enclose a void: turned inside out.
-        walls: thickness.
-        holes: round ones.
-        inner_edges: between concave faces.
-        hull: convex hull, and the orientations to try.
-    """
-
-    mesh: Mesh
-    status: str
-    mass: MassProperties
-    solids: int
-    cavities: int
-    walls: WallThickness
-    holes: RoundHoles
-    inner_edges: InnerEdges
-    hull: PartHull
+    mesh: Mesh  # its triangles
+    status: str  # of manifold3d; "NoError" is good
+    mass: MassProperties  # volume, area, centroid, box
+    solids: int  # connected surfaces that enclose material; more than one means loose shells
+    cavities: int  # connected surfaces that enclose a void: turned inside out
+    walls: WallThickness  # thickness
+    holes: RoundHoles  # round ones
+    inner_edges: InnerEdges  # between concave faces
+    hull: PartHull  # convex hull, and the orientations to try
 
     @property
     def triangles(self) -> int:

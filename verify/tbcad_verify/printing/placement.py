@@ -26,19 +26,12 @@ UNCERTAINTY_RAD = 1e-3
 
 @dataclass(frozen=True)
 class Pose:
-    """One orientation.
+    """One orientation."""
 
-    Attributes:
-        rotation: (3, 3) from the file's axes to the machine's: x right, y back, z up.
-        size: (3,) of the part then, mm.
-        turn: about the machine's z, the last part of the rotation, rad.
-        excess: by how much it is too large for the bed, mm; negative where there is room.
-    """
-
-    rotation: Floats
-    size: Floats
-    turn: float
-    excess: float
+    rotation: Floats  # (3, 3) from the file's axes to the machine's: x right, y back, z up
+    size: Floats  # (3,) of the part then, mm
+    turn: float  # about the machine's z, the last part of the rotation, rad
+    excess: float  # by how much it is too large for the bed, mm; negative where there is room
 
     @property
     def fits(self) -> bool:
@@ -53,15 +46,10 @@ class Pose:
 
 @dataclass(frozen=True)
 class BedPlacement:
-    """The best orientation.
+    """The best orientation."""
 
-    Attributes:
-        pose: the orientation.
-        overhang: area that needs support, mm^2; None for processes without support.
-    """
-
-    pose: Pose
-    overhang: float | None
+    pose: Pose  # the orientation
+    overhang: float | None  # area that needs support, mm^2; None for processes without support
 
 
 def place(measures: PartMeasures, profile: Profile) -> BedPlacement:

@@ -12,17 +12,12 @@ from tbcad_verify.types import Floats
 
 @dataclass(frozen=True)
 class Silhouette:
-    """A part seen from above.
+    """A part seen from above."""
 
-    Attributes:
-        rim: (2, N) corners of the convex hull, mm.
-        turns: (K,) rotations that bring an edge of the rim to lie along x or y, rad, ascending.
-        sides: (2, K) extents along x and y after each, mm.
-    """
-
-    rim: Floats
+    rim: Floats  # (2, N) corners of the convex hull, mm
+    # (K,) rotations that bring an edge of the rim to lie along x or y, rad, ascending
     turns: Floats
-    sides: Floats
+    sides: Floats  # (2, K) extents along x and y after each, mm
 
 
 def silhouette(points: Floats) -> Silhouette:

@@ -35,36 +35,22 @@ LIFT_ULP = 8  # of float32, by which rays start below the surface
 
 @dataclass(frozen=True)
 class WallThickness:
-    """Thickness at S samples.
+    """Thickness at S samples."""
 
-    Attributes:
-        thickness: (S,) mm; infinite where no opposite side faces the ray.
-        share: (S,) mm^2 of surface that a sample represents; 0 in grooves.
-        minimum: mm; infinite if there is no wall at all.
-        where: (3,) middle of the thinnest wall, mm.
-    """
-
-    thickness: Floats
-    share: Floats
-    minimum: float
-    where: Floats
+    thickness: Floats  # (S,) mm; infinite where no opposite side faces the ray
+    share: Floats  # (S,) mm^2 of surface that a sample represents; 0 in grooves
+    minimum: float  # mm; infinite if there is no wall at all
+    where: Floats  # (3,) middle of the thinnest wall, mm
 
 
 @dataclass(frozen=True)
 class ThicknessRays:
-    """Start points and directions of S rays.
+    """Start points and directions of S rays."""
 
-    Attributes:
-        start: (3, S) on the surface, mm.
-        inward: (3, S) unit.
-        share: (S,) mm^2.
-        min_cosine: between the ray and the outward normal that it meets.
-    """
-
-    start: Floats
-    inward: Floats
-    share: Floats
-    min_cosine: float
+    start: Floats  # (3, S) on the surface, mm
+    inward: Floats  # (3, S) unit
+    share: Floats  # (S,) mm^2
+    min_cosine: float  # between the ray and the outward normal that it meets
 
 
 def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:

@@ -18,40 +18,25 @@ Command = tuple[str, ...]  # a program's absolute path and first arguments; empt
 
 @dataclass(frozen=True)
 class ExpectedPart:
-    """One part, and what the programs should find in its files.
+    """One part, and what the programs should find in its files."""
 
-    Attributes:
-        name: of the part.
-        files: "step", "stl", "3mf" -> file name inside the export; missing ones are skipped.
-        spheres: number of spherical faces of the solid; None: any number.
-        volume: of the mesh, mm^3; NaN when it is unknown.
-        volume_error: maximum difference of another file's volume from it, mm^3.
-    """
-
-    name: str
+    name: str  # of the part
+    # "step", "stl", "3mf" -> file name inside the export; missing ones are skipped
     files: Mapping[str, str]
-    spheres: int | None
-    volume: float
-    volume_error: float
+    spheres: int | None  # number of spherical faces of the solid; None: any number
+    volume: float  # of the mesh, mm^3; NaN when it is unknown
+    volume_error: float  # maximum difference of another file's volume from it, mm^3
 
 
 @dataclass(frozen=True)
 class Sandbox:
-    """A private folder with a copy of one file, for one run of one program.
+    """A private folder with a copy of one file, for one run of one program."""
 
-    Attributes:
-        command: how the program's command line starts.
-        folder: absolute.
-        copy: in the folder. Its name is ours, so that it is never taken for an option.
-        file: name of the original inside the export.
-        limits: of the run.
-    """
-
-    command: Command
-    folder: Path
-    copy: Path
-    file: str
-    limits: Limits
+    command: Command  # how the program's command line starts
+    folder: Path  # absolute
+    copy: Path  # in the folder. Its name is ours, so that it is never taken for an option.
+    file: str  # name of the original inside the export
+    limits: Limits  # of the run
 
     def run(self, *arguments: str | Path) -> Outcome:
         """Run the program with these further arguments."""
@@ -60,22 +45,14 @@ class Sandbox:
 
 @dataclass(frozen=True)
 class ProgramQuery:
-    """One program and one kind of file.
+    """One program and one kind of file."""
 
-    Attributes:
-        program: its name.
-        kind: which of a part's files it is given.
-        install: the command that installs it.
-        questions: name -> unit of the checks it answers, in order.
-        find: returns how to start it.
-        ask: runs it and makes the checks of these names; raises Unknown without an answer.
-    """
-
-    program: str
-    kind: str
-    install: str
-    questions: Mapping[str, str]
-    find: Callable[[], Command]
+    program: str  # its name
+    kind: str  # which of a part's files it is given
+    install: str  # the command that installs it
+    questions: Mapping[str, str]  # name -> unit of the checks it answers, in order
+    find: Callable[[], Command]  # returns how to start it
+    # runs it and makes the checks of these names; raises Unknown without an answer
     ask: Callable[[Sandbox, ExpectedPart, list[CheckName]], Sequence[Check]]
 
     def names(self, part: ExpectedPart) -> list[CheckName]:

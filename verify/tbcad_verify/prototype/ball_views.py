@@ -57,42 +57,26 @@ TURNS = 0.25  # by which turns about the origin may differ from one
 
 @dataclass(frozen=True)
 class BallViews:
-    """The view of each of m mirrors.
+    """The view of each of m mirrors."""
 
-    Attributes:
-        coverage: (m,) mm; 0 where the ball does not show the object's middle in the window.
-        hidden: (m,) directions just inside the cell in which another mirror of the shell is seen.
-        rays: (m,) that were traced: pixels, and rings out to the rim of the capture sphere.
-        blocked: (m,) of them that something stops, or that miss the ball.
-        blockers: what stops them, each once.
-        pixels: (m,) whose ray meets the capture sphere after the ball.
-        pixels_shell: (m,) after the mirror.
-    """
-
-    coverage: Floats
+    coverage: Floats  # (m,) mm; 0 where the ball does not show the object's middle in the window
+    # (m,) directions just inside the cell in which another mirror of the shell is seen
     hidden: Ints
-    rays: Ints
-    blocked: Ints
-    blockers: tuple[str, ...]
-    pixels: Floats
-    pixels_shell: Floats
+    rays: Ints  # (m,) that were traced: pixels, and rings out to the rim of the capture sphere
+    blocked: Ints  # (m,) of them that something stops, or that miss the ball
+    blockers: tuple[str, ...]  # what stops them, each once
+    pixels: Floats  # (m,) whose ray meets the capture sphere after the ball
+    pixels_shell: Floats  # (m,) after the mirror
 
 
 @dataclass(frozen=True)
 class PixelRays:
-    """Rays of sampled pixels that meet the capture sphere after their ball.
+    """Rays of sampled pixels that meet the capture sphere after their ball."""
 
-    Attributes:
-        direction: (3, N) in the shell's picture.
-        mirror: (N,) whose cell they are in.
-        weight: (N,) pixels of the prototype's picture that each represents.
-        shell: (m,) pixels of the shell's picture that see the capture sphere in each mirror.
-    """
-
-    direction: Floats
-    mirror: Ints
-    weight: Floats
-    shell: Floats
+    direction: Floats  # (3, N) in the shell's picture
+    mirror: Ints  # (N,) whose cell they are in
+    weight: Floats  # (N,) pixels of the prototype's picture that each represents
+    shell: Floats  # (m,) pixels of the shell's picture that see the capture sphere in each mirror
 
 
 def ball_views(measured: MeasuredPrototype, pixel: PixelRays) -> BallViews:

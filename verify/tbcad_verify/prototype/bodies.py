@@ -24,17 +24,11 @@ LIFT_MM = 1e-3
 
 @dataclass(frozen=True)
 class BodyScene:
-    """Bodies that rays meet.
+    """Bodies that rays meet."""
 
-    Attributes:
-        embree: the committed scene; None without any body.
-        owner: (F,) number of each facet's body.
-        names: of the bodies.
-    """
-
-    embree: object
-    owner: Ints
-    names: tuple[str, ...]
+    embree: object  # the committed scene; None without any body
+    owner: Ints  # (F,) number of each facet's body
+    names: tuple[str, ...]  # of the bodies
 
     def first(self, origin: Floats, along: Floats) -> tuple[Ints, Floats]:
         """Number of the body that rays (N, 3) meet first, -1 for none, and its distance, mm."""
@@ -52,15 +46,10 @@ class BodyScene:
 
 @dataclass(frozen=True)
 class AssembledBodies:
-    """The bodies of an assembly.
+    """The bodies of an assembly."""
 
-    Attributes:
-        context: the record.
-        drawn: their shapes, by name.
-    """
-
-    context: PrototypeContext
-    drawn: Mapping[str, Shape]
+    context: PrototypeContext  # the record
+    drawn: Mapping[str, Shape]  # their shapes, by name
     _scenes: dict[tuple[str, ...], BodyScene] = field(default_factory=dict, init=False, repr=False)
 
     def scene(self, names: tuple[str, ...]) -> BodyScene:
@@ -89,17 +78,11 @@ def turning(context: PrototypeContext, names: Iterable[str]) -> set[str]:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Bodies that turn with the base, and bodies that do not.
+    """Bodies that turn with the base, and bodies that do not."""
 
-    Attributes:
-        assembly: all bodies.
-        moving: names of those that turn.
-        fixed: names of the others.
-    """
-
-    assembly: AssembledBodies
-    moving: tuple[str, ...]
-    fixed: tuple[str, ...]
+    assembly: AssembledBodies  # all bodies
+    moving: tuple[str, ...]  # names of those that turn
+    fixed: tuple[str, ...]  # names of the others
 
     @property
     def context(self) -> PrototypeContext:

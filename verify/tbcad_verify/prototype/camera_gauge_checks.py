@@ -217,15 +217,10 @@ def _room_faults(
 
 @dataclass(frozen=True)
 class _Sight:
-    """A pair of marks at a base angle, seen from a place near the pinhole.
+    """A pair of marks at a base angle, seen from a place near the pinhole."""
 
-    Attributes:
-        marks: near and far one, (2, 3) mm.
-        axis: of the base, (3,).
-    """
-
-    marks: Floats
-    axis: Floats
+    marks: Floats  # near and far one, (2, 3) mm
+    axis: Floats  # of the base, (3,)
 
     def gap(self, at: Floats, shift: Floats) -> Floats:
         """(2,) angle from far to near mark away from the axis, and about it, rad."""

@@ -28,19 +28,12 @@ CHECKS = {"cap fronts": "um", "cap bodies": "um", "cap form": "um"}
 
 @dataclass(frozen=True)
 class FittedSphere:
-    """A sphere through vertices.
+    """A sphere through vertices."""
 
-    Attributes:
-        centre: (3,) mm.
-        radius: mm.
-        form: distance from it that most vertices keep, mm.
-        blur: how far float32 can have moved the centre, six standard deviations, mm.
-    """
-
-    centre: Floats
-    radius: float
-    form: float
-    blur: float
+    centre: Floats  # (3,) mm
+    radius: float  # mm
+    form: float  # distance from it that most vertices keep, mm
+    blur: float  # how far float32 can have moved the centre, six standard deviations, mm
 
 
 @dataclass(frozen=True)

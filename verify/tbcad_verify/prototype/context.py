@@ -18,15 +18,10 @@ from tbcad_verify.types import Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class PrototypeContext:
-    """One export with a prototype.
+    """One export with a prototype."""
 
-    Attributes:
-        export: the whole record.
-        prototype: the record of the prototype.
-    """
-
-    export: Export
-    prototype: Prototype
+    export: Export  # the whole record
+    prototype: Prototype  # the record of the prototype
 
     @property
     def camera(self) -> Camera:

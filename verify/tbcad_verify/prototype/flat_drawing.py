@@ -24,15 +24,10 @@ Entity = dict[int, list[str]]
 
 @dataclass(frozen=True)
 class FlatDrawing:
-    """What a DXF says is to be cut.
+    """What a DXF says is to be cut."""
 
-    Attributes:
-        circles: (N, 3) x, y and radius, mm.
-        corners: (M, 2) of the outlines.
-    """
-
-    circles: Floats
-    corners: Floats
+    circles: Floats  # (N, 3) x, y and radius, mm
+    corners: Floats  # (M, 2) of the outlines
 
 
 def read_dxf(text: str) -> FlatDrawing:

@@ -47,19 +47,12 @@ WORDS = {"dark": 0.0, "lit": LAMP, "out": 1.0}
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a program.
+    """One line of a program."""
 
-    Attributes:
-        number: from 1.
-        code: first word of the command, such as "G1"; empty for a comment alone.
-        values: of the other words, by their letter.
-        says: what the comment tells, by name.
-    """
-
-    number: int
-    code: str = ""
-    values: dict[str, float] = field(default_factory=dict)
-    says: dict[str, float] = field(default_factory=dict)
+    number: int  # from 1
+    code: str = ""  # first word of the command, such as "G1"; empty for a comment alone
+    values: dict[str, float] = field(default_factory=dict)  # of the other words, by their letter
+    says: dict[str, float] = field(default_factory=dict)  # what the comment tells, by name
 
 
 def parse_program(text: str) -> tuple[list[Line], list[str]]:

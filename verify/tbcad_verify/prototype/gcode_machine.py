@@ -20,88 +20,55 @@ from tbcad_verify.types import Floats
 
 @dataclass
 class Photograph:
-    """A photograph, and the state of the machine when it is taken.
+    """A photograph, and the state of the machine when it is taken."""
 
-    Attributes:
-        angle: of the base, degrees.
-        settled: time at rest before it, s.
-        released: time for which the camera's release is on, s; infinite where a person takes it.
-        waited: time at rest after it, s; infinite where a person takes it.
-        rising: whether the base came there from below.
-        turned: how often the object was turned before it.
-        stop: number of its stop in the comments, from 1; 0 without.
-        lights: digital outputs that are on.
-        lit: time since one of them was switched, s.
-        phase: light that the pause tells: 0 none, -1 the lamp, else the LED's number; NaN without.
-    """
-
-    angle: float
-    settled: float
+    angle: float  # of the base, degrees
+    settled: float  # time at rest before it, s
+    # time for which the camera's release is on, s; infinite where a person takes it
     released: float
-    waited: float
-    rising: bool
-    turned: int
-    stop: int
-    lights: frozenset[int]
-    lit: float
+    waited: float  # time at rest after it, s; infinite where a person takes it
+    rising: bool  # whether the base came there from below
+    turned: int  # how often the object was turned before it
+    stop: int  # number of its stop in the comments, from 1; 0 without
+    lights: frozenset[int]  # digital outputs that are on
+    lit: float  # time since one of them was switched, s
+    # light that the pause tells: 0 none, -1 the lamp, else the LED's number; NaN without
     phase: float = math.nan
 
 
 @dataclass
 class Machine:
-    """The controller's state, and the record of what it did.
+    """The controller's state, and the record of what it did."""
 
-    Attributes:
-        switch: base angle at which homing finds the switch, and
-        homed: at which it ends, degrees; NaN: there is no switch.
-        modes_set: millimetres, absolute, units a minute, first coordinate system.
-        axis: letter of the axis; empty before it is used.
-        angle: of the base, degrees; NaN before a person has put it to a known one.
-        offset: of the base's angle from the program's coordinate, degrees; NaN before it is set.
-        feed: degrees a minute; 0 before it is set.
-        now: time that the base has rested, s; motions take none.
-        moved: time of the last motion, and
-        switched: of the last switching of an output, s.
-        release: time at which the camera's release was last turned on, s; NaN while it is off.
-        closed: time at which it was last turned off, s.
-        ended_motion: whether the controller has waited for the end of the last motion.
-        lights: digital outputs that are on.
-        rising: whether the last motion, if any, was upward.
-        ended: the program has ended.
-        stop: number of the last stop in the comments.
-        moves: base angles driven to, degrees.
-        photographs: in order.
-        homes: how often the base was homed; each adds the switch's angle and its end to `moves`.
-        pauses: what a person does at each but photographs: "base", "pin" or "turn".
-        bases: angle to which a person puts the base, degrees.
-        feeds: every speed that is set.
-        faults: what no program may do, a few words each.
-    """
-
-    switch: float = math.nan
-    homed: float = math.nan
-    modes_set: bool = False
-    axis: str = ""
-    angle: float = math.nan
+    switch: float = math.nan  # base angle at which homing finds the switch, and
+    homed: float = math.nan  # at which it ends, degrees; NaN: there is no switch
+    modes_set: bool = False  # millimetres, absolute, units a minute, first coordinate system
+    axis: str = ""  # letter of the axis; empty before it is used
+    angle: float = math.nan  # of the base, degrees; NaN before a person has put it to a known one
+    # of the base's angle from the program's coordinate, degrees; NaN before it is set
     offset: float = math.nan
-    feed: float = 0.0
-    now: float = 0.0
-    moved: float = 0.0
-    switched: float = -math.inf
+    feed: float = 0.0  # degrees a minute; 0 before it is set
+    now: float = 0.0  # time that the base has rested, s; motions take none
+    moved: float = 0.0  # time of the last motion, and
+    switched: float = -math.inf  # of the last switching of an output, s
+    # time at which the camera's release was last turned on, s; NaN while it is off
     release: float = math.nan
-    closed: float = 0.0
-    ended_motion: bool = True
-    lights: set[int] = field(default_factory=set)
-    rising: bool = False
-    ended: bool = False
-    stop: int = 0
-    moves: list[float] = field(default_factory=list)
+    closed: float = 0.0  # time at which it was last turned off, s
+    ended_motion: bool = True  # whether the controller has waited for the end of the last motion
+    lights: set[int] = field(default_factory=set)  # digital outputs that are on
+    rising: bool = False  # whether the last motion, if any, was upward
+    ended: bool = False  # the program has ended
+    stop: int = 0  # number of the last stop in the comments
+    moves: list[float] = field(default_factory=list)  # base angles driven to, degrees
+    # how often the base was homed; each adds the switch's angle and its end to `moves`
     homes: int = 0
-    photographs: list[Photograph] = field(default_factory=list)
+    photographs: list[Photograph] = field(default_factory=list)  # in order
+    # what a person does at each but photographs: "base", "pin" or "turn"
     pauses: list[str] = field(default_factory=list)
+    # angle to which a person puts the base, degrees
     bases: list[float] = field(default_factory=list)
-    feeds: list[float] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
+    feeds: list[float] = field(default_factory=list)  # every speed that is set
+    faults: list[str] = field(default_factory=list)  # what no program may do, a few words each
 
     @property
     def angles(self) -> Floats:

@@ -53,21 +53,13 @@ FRAME = "plate"
 
 @dataclass(frozen=True)
 class Key:
-    """A key on a screw.
+    """A key on a screw."""
 
-    Attributes:
-        start: (3,) middle of the screw's outer face, mm.
-        out: (3,) unit, from it along the key.
-        radius: of the key's corners, mm.
-        length: of its long arm, mm.
-        short: length of its short arm, mm.
-    """
-
-    start: Floats
-    out: Floats
-    radius: float
-    length: float
-    short: float
+    start: Floats  # (3,) middle of the screw's outer face, mm
+    out: Floats  # (3,) unit, from it along the key
+    radius: float  # of the key's corners, mm
+    length: float  # of its long arm, mm
+    short: float  # length of its short arm, mm
 
     @property
     def solid(self) -> Any:

@@ -61,29 +61,19 @@ CHECKS = {"klipper": "faults"}
 
 @dataclass
 class _State:
-    """What a Klipper host would do.
+    """What a Klipper host would do."""
 
-    Attributes:
-        angle: of the base, degrees; NaN before homing.
-        on: names of pins that are on.
-        taken: angle, lights and turns of the object before it, of each photograph.
-        speeds: of moves, degrees a second.
-        said: the last words before a pause; empty after it.
-        done: what was done on the way to homing: "told" to take the pin out, "enable", "search".
-        turns: of the object so far.
-        dwells: in order, ms.
-        faults: what no program may do.
-    """
-
-    angle: float = math.nan
-    on: set[str] = field(default_factory=set)
+    angle: float = math.nan  # of the base, degrees; NaN before homing
+    on: set[str] = field(default_factory=set)  # names of pins that are on
+    # angle, lights and turns of the object before it, of each photograph
     taken: list[tuple[float, frozenset[str], int]] = field(default_factory=list)
-    speeds: list[float] = field(default_factory=list)
-    said: str = ""
+    speeds: list[float] = field(default_factory=list)  # of moves, degrees a second
+    said: str = ""  # the last words before a pause; empty after it
+    # what was done on the way to homing: "told" to take the pin out, "enable", "search"
     done: set[str] = field(default_factory=set)
-    turns: int = 0
-    dwells: list[int] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
+    turns: int = 0  # of the object so far
+    dwells: list[int] = field(default_factory=list)  # in order, ms
+    faults: list[str] = field(default_factory=list)  # what no program may do
 
 
 def checks(

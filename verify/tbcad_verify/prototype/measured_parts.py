@@ -36,29 +36,17 @@ POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 @dataclass(frozen=True)
 class MeasuredPart:
-    """One part; what could not be measured is None.
+    """One part; what could not be measured is None."""
 
-    Attributes:
-        part: its record.
-        checks: of mesh and pose.
-        reason: why something is None.
-        mesh: as it lies on the bed.
-        placed: the same in the frame of the shell, the base at angle zero.
-        topology: of the mesh.
-        mass: of the mesh on the bed.
-        placed_mass: of the placed mesh.
-        edges: of the mesh.
-    """
-
-    part: PrintedPart
-    checks: list[Check]
-    reason: str = ""
-    mesh: Mesh | None = None
-    placed: Mesh | None = None
-    topology: Topology | None = None
-    mass: MassProperties | None = None
-    placed_mass: MassProperties | None = None
-    edges: Edges | None = None
+    part: PrintedPart  # its record
+    checks: list[Check]  # of mesh and pose
+    reason: str = ""  # why something is None
+    mesh: Mesh | None = None  # as it lies on the bed
+    placed: Mesh | None = None  # the same in the frame of the shell, the base at angle zero
+    topology: Topology | None = None  # of the mesh
+    mass: MassProperties | None = None  # of the mesh on the bed
+    placed_mass: MassProperties | None = None  # of the placed mesh
+    edges: Edges | None = None  # of the mesh
 
     @property
     def placed_mesh(self) -> Mesh:

@@ -27,42 +27,25 @@ from tbcad_verify.types import Floats, Ints
 
 @dataclass(frozen=True)
 class Obstacles:
-    """Bodies that may obstruct the light.
+    """Bodies that may obstruct the light."""
 
-    Attributes:
-        scene: all of them; None without any.
-        owner: (F + 1,) number of each facet's body; -1 at the end, for no facet.
-        names: of the bodies.
-    """
-
-    scene: RayScene | None
-    owner: Ints
-    names: tuple[str, ...]
+    scene: RayScene | None  # all of them; None without any
+    owner: Ints  # (F + 1,) number of each facet's body; -1 at the end, for no facet
+    names: tuple[str, ...]  # of the bodies
 
 
 @dataclass(frozen=True)
 class MeasuredPrototype:
-    """The prototype with its base at angle zero.
+    """The prototype with its base at angle zero."""
 
-    Attributes:
-        context: the record.
-        centre: (3, K) of the reflecting spheres, mm.
-        radius: (K,) of them, mm.
-        body: (3, K) centres of the spheres that lie on the pads, mm.
-        body_radius: (K,) mm.
-        mirrors: the reflecting spheres, for rays from the pinhole.
-        rotating: base, caps, and what is fastened to them.
-        fixed: all else.
-    """
-
-    context: PrototypeContext
-    centre: Floats
-    radius: Floats
-    body: Floats
-    body_radius: Floats
-    mirrors: PreparedSurfaces
-    rotating: Obstacles
-    fixed: Obstacles
+    context: PrototypeContext  # the record
+    centre: Floats  # (3, K) of the reflecting spheres, mm
+    radius: Floats  # (K,) of them, mm
+    body: Floats  # (3, K) centres of the spheres that lie on the pads, mm
+    body_radius: Floats  # (K,) mm
+    mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
+    rotating: Obstacles  # base, caps, and what is fastened to them
+    fixed: Obstacles  # all else
 
 
 def measure_prototype(

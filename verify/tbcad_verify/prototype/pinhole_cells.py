@@ -30,25 +30,15 @@ TILE = 16  # columns and rows of sampled pixels that follow each other: few mirr
 
 @dataclass(frozen=True)
 class MirrorSpheres:
-    """The reflecting spheres of m mirrors, coats included.
+    """The reflecting spheres of m mirrors, coats included."""
 
-    Attributes:
-        pinhole: (3,) mm.
-        apex: (3, m) mm.
-        centre: (3, m) mm.
-        radius: (m,) mm.
-        side: 1 where the camera's mirrors have x >= 0, else -1.
-        foot: height below which there is no mirror, mm.
-        halved: (m,) mirrors whose other half is the other camera's.
-    """
-
-    pinhole: Floats
-    apex: Floats
-    centre: Floats
-    radius: Floats
-    side: float
-    foot: float
-    halved: Bools
+    pinhole: Floats  # (3,) mm
+    apex: Floats  # (3, m) mm
+    centre: Floats  # (3, m) mm
+    radius: Floats  # (m,) mm
+    side: float  # 1 where the camera's mirrors have x >= 0, else -1
+    foot: float  # height below which there is no mirror, mm
+    halved: Bools  # (m,) mirrors whose other half is the other camera's
 
 
 @dataclass(frozen=True)

@@ -26,22 +26,15 @@ class Reflecting(Protocol):
 
 @dataclass(frozen=True)
 class RayTransfer:
-    """What takes directions of the shell's picture to rays on the balls, for m mirrors.
+    """What takes directions of the shell's picture to rays on the balls, for m mirrors."""
 
-    Attributes:
-        measured: balls and obstacles.
-        merged: (3, 3, m) rotates directions of a mirror's cell in the shell's picture to where
-            the merged picture has them on the mirror's ball.
-        on_base: (3, 3, m) the same, to the frame of the base at the mirror's stop.
-        ball: (m,) that substitutes for the mirror.
-        base: m rotations of the base.
-    """
-
-    measured: MeasuredPrototype
+    measured: MeasuredPrototype  # balls and obstacles
+    # (3, 3, m) rotates directions of a mirror's cell in the shell's picture to where the merged
+    # picture has them on the mirror's ball
     merged: Floats
-    on_base: Floats
-    ball: Ints
-    base: Rotation
+    on_base: Floats  # (3, 3, m) the same, to the frame of the base at the mirror's stop
+    ball: Ints  # (m,) that substitutes for the mirror
+    base: Rotation  # m rotations of the base
 
     def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
         """Directions (3, N) of mirrors' cells in the base's frame, and their reflections."""

@@ -49,19 +49,13 @@ Boxes = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class MeasuredSeat:
-    """Where the pads put one ball.
+    """Where the pads put one ball."""
 
-    Attributes:
-        centre: (3,) mm; NaN where no three pads were found.
-        margin: minimum distance of a contact from the edge of its pad less the required one, mm.
-        clear: minimum distance of the ball from all of the base but its pads, mm.
-        reason: why the centre is not known; empty where it is.
-    """
-
-    centre: Floats
+    centre: Floats  # (3,) mm; NaN where no three pads were found
+    # minimum distance of a contact from the edge of its pad less the required one, mm
     margin: float
-    clear: float
-    reason: str = ""
+    clear: float  # minimum distance of the ball from all of the base but its pads, mm
+    reason: str = ""  # why the centre is not known; empty where it is
 
 
 @dataclass(frozen=True)

@@ -53,15 +53,10 @@ NamedSolids = list[tuple[str, Any]]  # name and manifold3d solid
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points all over a surface, as they lie about the axis.
+    """Points all over a surface, as they lie about the axis."""
 
-    Attributes:
-        profile: (P, 2) position along the axis and distance from it, mm.
-        grain: longest edge between them, mm.
-    """
-
-    profile: Floats
-    grain: float
+    profile: Floats  # (P, 2) position along the axis and distance from it, mm
+    grain: float  # longest edge between them, mm
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -83,17 +78,11 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class AxialSolid:
-    """A solid, and how it lies about the axis.
+    """A solid, and how it lies about the axis."""
 
-    Attributes:
-        name: of the part.
-        solid: at angle zero, as manifold3d has it.
-        frame: (3, 3) unit vectors along the axis and across it, as rows.
-    """
-
-    name: str
-    solid: Any
-    frame: Floats
+    name: str  # of the part
+    solid: Any  # at angle zero, as manifold3d has it
+    frame: Floats  # (3, 3) unit vectors along the axis and across it, as rows
 
     @cached_property
     def facet_boxes(self) -> Floats:
@@ -134,25 +123,15 @@ class AxialSolid:
 
 @dataclass(frozen=True)
 class PairSweep:
-    """The sweep of one rotating part past one fixed part.
+    """The sweep of one rotating part past one fixed part."""
 
-    Attributes:
-        names: of both.
-        volume: maximum that they share, mm^3.
-        gap: minimum distance, mm; at most `SEARCH_MM`.
-        at: base angle of the worse of both, rad.
-        samples: number of angles.
-        blind: by how much a step exceeded what the distance allows, at most, rad; 0: never.
-        rough: whether the gap is only known to be no less.
-    """
-
-    names: tuple[str, str]
-    volume: float
-    gap: float
-    at: float
-    samples: int
-    blind: float
-    rough: bool = False
+    names: tuple[str, str]  # of both
+    volume: float  # maximum that they share, mm^3
+    gap: float  # minimum distance, mm; at most `SEARCH_MM`
+    at: float  # base angle of the worse of both, rad
+    samples: int  # number of angles
+    blind: float  # by how much a step exceeded what the distance allows, at most, rad; 0: never
+    rough: bool = False  # whether the gap is only known to be no less
 
     @property
     def pair(self) -> str:

@@ -59,25 +59,15 @@ SQUARE = 1e-6  # by which axes of a camera may be off unit length or a right ang
 
 
 class Camera(Strict):
-    """A pinhole with square pixels, looking along `forward`; rows run along `right`.
+    """A pinhole with square pixels, looking along `forward`; rows run along `right`."""
 
-    Attributes:
-        id: one letter.
-        pinhole: (3,) mm.
-        forward: (3,) unit, the optical axis.
-        right: (3,) unit, across the columns.
-        width: columns.
-        height: rows.
-        hfov_deg: full view angle across the columns.
-    """
-
-    id: Name
-    pinhole: Vector = Field(alias="pinhole_mm")
-    forward: Vector
-    right: Vector
-    width: int = Field(alias="width_px", ge=1, le=MAX_SIDE_PX)
-    height: int = Field(alias="height_px", ge=1, le=MAX_SIDE_PX)
-    hfov_deg: float = Field(ge=1e-3, le=179)
+    id: Name  # one letter
+    pinhole: Vector = Field(alias="pinhole_mm")  # (3,) mm
+    forward: Vector  # (3,) unit, the optical axis
+    right: Vector  # (3,) unit, across the columns
+    width: int = Field(alias="width_px", ge=1, le=MAX_SIDE_PX)  # columns
+    height: int = Field(alias="height_px", ge=1, le=MAX_SIDE_PX)  # rows
+    hfov_deg: float = Field(ge=1e-3, le=179)  # full view angle across the columns
 
     @model_validator(mode="after")
     def _traceable(self) -> Self:
@@ -113,14 +103,10 @@ class Part(PartFiles):
 
 
 class Mandrel(Part):
-    """The negative of one camera's shell, and how the shell comes off.
+    """The negative of one camera's shell, and how the shell comes off."""
 
-    Attributes:
-        pull: (3,) unit, along which the shell is drawn.
-        draft_deg: least angle between pull and surface; below 0 it catches.
-    """
-
-    pull: Vector
+    pull: Vector  # (3,) unit, along which the shell is drawn
+    # least angle between pull and surface; below 0 it catches
     draft_deg: float = Field(ge=-90, le=90)
 
     @field_validator("pull", mode="after")
@@ -180,35 +166,22 @@ class Manifest(Strict):
 
 @dataclass(frozen=True)
 class Export:
-    """A folder's record.
+    """A folder's record."""
 
-    Attributes:
-        folder: resolved path.
-        spec: the resolved design.
-        target_mm: diameter that every virtual camera must see.
-        coating_mm: thickness of the reflecting coat over the meshed surface.
-        foot_z_mm: height of the foot plane.
-        cameras: by id.
-        parts: in the record's order.
-        mirrors: from mirrors.csv.
-        manifest: file name -> (size, sha256), as it should be.
-        digests: file name -> (size, sha256), of the bytes that all this was parsed from.
-        prototype: the machine with balls; None where only the shell was built.
-        mandrels: negatives of the shells, in the record's order.
-    """
-
-    folder: Path
-    spec: Spec
-    target_mm: float
-    coating_mm: float
-    foot_z_mm: float
-    cameras: Mapping[str, Camera]
-    parts: tuple[Part, ...]
-    mirrors: Mirrors
-    manifest: Mapping[str, tuple[int, str]]
+    folder: Path  # resolved path
+    spec: Spec  # the resolved design
+    target_mm: float  # diameter that every virtual camera must see
+    coating_mm: float  # thickness of the reflecting coat over the meshed surface
+    foot_z_mm: float  # height of the foot plane
+    cameras: Mapping[str, Camera]  # by id
+    parts: tuple[Part, ...]  # in the record's order
+    mirrors: Mirrors  # from mirrors.csv
+    manifest: Mapping[str, tuple[int, str]]  # file name -> (size, sha256), as it should be
+    # file name -> (size, sha256), of the bytes that all this was parsed from
     digests: Mapping[str, tuple[int, str]]
+    # the machine with balls; None where only the shell was built
     prototype: Prototype | None = None
-    mandrels: tuple[Mandrel, ...] = ()
+    mandrels: tuple[Mandrel, ...] = ()  # negatives of the shells, in the record's order
 
     @property
     def printed(self) -> tuple[PrintedPart, ...]:

@@ -23,17 +23,11 @@ AGAIN = "write the export again with `tbcad build`"
 
 @dataclass(frozen=True)
 class FileBytes:
-    """One file as it was when it was read: what is hashed is what is parsed.
+    """One file as it was when it was read: what is hashed is what is parsed."""
 
-    Attributes:
-        name: path inside the export, with forward slashes.
-        data: the bytes, shape (size,), uint8.
-        sha256: hex digest of exactly these bytes.
-    """
-
-    name: str
-    data: NDArray[np.uint8]
-    sha256: str
+    name: str  # path inside the export, with forward slashes
+    data: NDArray[np.uint8]  # the bytes, shape (size,), uint8
+    sha256: str  # hex digest of exactly these bytes
 
     @property
     def digest(self) -> tuple[int, str]:

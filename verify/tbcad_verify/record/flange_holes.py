@@ -24,51 +24,31 @@ SAMPLES = 20_001  # points on a section
 
 @dataclass(frozen=True)
 class Hole:
-    """A round hole.
+    """A round hole."""
 
-    Attributes:
-        point: (3,) mm, on the axis at half depth.
-        axis: (3,) unit; its sign has no meaning.
-        radius: mm.
-        depth: mm.
-    """
-
-    point: Floats
-    axis: Floats
-    radius: float
-    depth: float
+    point: Floats  # (3,) mm, on the axis at half depth
+    axis: Floats  # (3,) unit; its sign has no meaning
+    radius: float  # mm
+    depth: float  # mm
 
 
 @dataclass(frozen=True)
 class Flange:
-    """A flange with the H holes that it should have.
+    """A flange with the H holes that it should have."""
 
-    Attributes:
-        name: "seam" or "foot".
-        axis: of the holes, X or Z.
-        thickness: mm.
-        middle: (H, 3) mm, of each hole at half depth.
-        diameter: (H,) mm.
-    """
-
-    name: str
-    axis: int
-    thickness: float
-    middle: Floats
-    diameter: Floats
+    name: str  # "seam" or "foot"
+    axis: int  # of the holes, X or Z
+    thickness: float  # mm
+    middle: Floats  # (H, 3) mm, of each hole at half depth
+    diameter: Floats  # (H,) mm
 
 
 @dataclass(frozen=True)
 class HoleLimits:
-    """By how much holes may be off.
+    """By how much holes may be off."""
 
-    Attributes:
-        size: of diameter and depth, mm.
-        place: mm.
-    """
-
-    size: float
-    place: float
+    size: float  # of diameter and depth, mm
+    place: float  # mm
 
 
 def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flange]:

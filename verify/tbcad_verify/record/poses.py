@@ -28,16 +28,11 @@ WELL_FORMED = re.compile(r"[a-z][0-9]{4,}")
 
 @dataclass(frozen=True)
 class VirtualCameras:
-    """Virtual cameras: one a mirror, but one for the two halves of a mirror on the seam.
+    """Virtual cameras: one a mirror, but one for the two halves of a mirror on the seam."""
 
-    Attributes:
-        index: (M,) virtual camera of each mirror.
-        count: V.
-        halved: (M,) true for mirrors that have their other half on the other side of the seam.
-    """
-
-    index: NDArray[np.intp]
-    count: int
+    index: NDArray[np.intp]  # (M,) virtual camera of each mirror
+    count: int  # V
+    # (M,) true for mirrors that have their other half on the other side of the seam
     halved: NDArray[np.bool_]
 
 

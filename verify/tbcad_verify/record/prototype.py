@@ -54,63 +54,37 @@ OPTIONAL = (PLATE_HOLES, KLIPPER, KLIPPER_CONFIG)
 
 
 class Prototype(Strict):
-    """The whole record.
+    """The whole record."""
 
-    Attributes:
-        camera: id of the camera that it serves.
-        target_mm: coverage diameter that is required.
-        picture: whether pictures are moved along with their balls when they are merged.
-        frame: of the base.
-        swing: smallest and largest base angle driven, degrees.
-        seats: one for each ball.
-        parts: printed.
-        leds: of the stage.
-        camera_place: how the camera is put in its place; None without one.
-        home: angles of homing.
-        bought: purchased parts other than balls and fasteners.
-        fasteners: in their places.
-        assembly_steps: in their order.
-        lamps: that light the object; None without any.
-        shroud: round the rig; None without.
-        drawings: of what is cut or drilled.
-        assembly: files of the whole.
-        balls: K of them.
-        plan: every picture.
-        stops: of the base.
-        plate_holes: of the base plate; None without the file.
-        program: text of the controller's program.
-        settings: text of the controller's settings.
-        klipper: text of the program for Klipper, and
-        klipper_config: of its configuration; None without the file.
-        digests: file name -> (size, sha256), of what was parsed.
-    """
-
-    camera: Name
-    target_mm: float = Field(ge=1e-3, le=1e6)
+    camera: Name  # id of the camera that it serves
+    target_mm: float = Field(ge=1e-3, le=1e6)  # coverage diameter that is required
+    # whether pictures are moved along with their balls when they are merged
     picture: Literal["moved", "fixed"]
-    frame: Frame
+    frame: Frame  # of the base
+    # smallest and largest base angle driven, degrees
     swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
-    seats: list[Seat] = Field(max_length=MOST)
-    parts: list[PrintedPart] = Field(min_length=1, max_length=MOST)
-    leds: list[Led] = Field(max_length=MOST)
-    camera_place: CameraPlace | None = None
-    home: Home
+    seats: list[Seat] = Field(max_length=MOST)  # one for each ball
+    parts: list[PrintedPart] = Field(min_length=1, max_length=MOST)  # printed
+    leds: list[Led] = Field(max_length=MOST)  # of the stage
+    camera_place: CameraPlace | None = None  # how the camera is put in its place; None without one
+    home: Home  # angles of homing
+    # purchased parts other than balls and fasteners
     bought: list[PurchasedBody] = Field(max_length=MOST)
-    fasteners: list[PlacedFastener] = Field(max_length=MOST)
-    assembly_steps: list[AssemblyStep] = Field(max_length=MOST)
-    lamps: Lamps | None
-    shroud: Shroud | None
-    drawings: list[Drawing] = Field(max_length=MOST)
-    assembly: Assembly = Assembly()
-    balls: Balls
-    plan: Plan
-    stops: Stops
-    plate_holes: PlateHoles | None
-    program: str
-    settings: str
-    klipper: str | None
-    klipper_config: str | None
-    digests: Mapping[str, tuple[int, str]]
+    fasteners: list[PlacedFastener] = Field(max_length=MOST)  # in their places
+    assembly_steps: list[AssemblyStep] = Field(max_length=MOST)  # in their order
+    lamps: Lamps | None  # that light the object; None without any
+    shroud: Shroud | None  # round the rig; None without
+    drawings: list[Drawing] = Field(max_length=MOST)  # of what is cut or drilled
+    assembly: Assembly = Assembly()  # files of the whole
+    balls: Balls  # K of them
+    plan: Plan  # every picture
+    stops: Stops  # of the base
+    plate_holes: PlateHoles | None  # of the base plate; None without the file
+    program: str  # text of the controller's program
+    settings: str  # text of the controller's settings
+    klipper: str | None  # text of the program for Klipper, and
+    klipper_config: str | None  # of its configuration; None without the file
+    digests: Mapping[str, tuple[int, str]]  # file name -> (size, sha256), of what was parsed
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

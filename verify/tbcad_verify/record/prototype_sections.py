@@ -37,41 +37,26 @@ class Frame(Strict):
 
 
 class Seat(Strict):
-    """The seat of a ball as recorded: where to begin looking for its pads.
+    """The seat of a ball as recorded: where to begin looking for its pads."""
 
-    Attributes:
-        ball: its number, from 1.
-        axis: (3,) unit, away from the light.
-        normals: (3, 3) unit, of each pad, toward the ball's centre.
-        contacts: (3, 3) mm, the pads' middles.
-        pad: diameter of the pads, mm.
-    """
-
-    ball: int
-    axis: Vector
-    normals: Matrix
-    contacts: Matrix = Field(alias="contacts_mm")
-    pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)
+    ball: int  # its number, from 1
+    axis: Vector  # (3,) unit, away from the light
+    normals: Matrix  # (3, 3) unit, of each pad, toward the ball's centre
+    contacts: Matrix = Field(alias="contacts_mm")  # (3, 3) mm, the pads' middles
+    pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)  # diameter of the pads, mm
 
 
 class PrintedPart(PartFiles):
     """One part to be printed; y = x @ axes + origin lays it on the bed.
 
     The meshes are on the bed, the STEP file has the solid in its place.
-
-    Attributes:
-        role: what it is.
-        finish: of its surface; None: any.
-        number: of a cap, its ball's, from 1.
-        axes: (3, 3).
-        origin: (3,) mm.
     """
 
-    role: Literal["base", "cap", "stage", "frame", "tool"]
-    finish: str | None = Field(max_length=WIDEST)
-    number: int | None = Field(alias="ball")
-    axes: Matrix
-    origin: Vector = Field(alias="origin_mm")
+    role: Literal["base", "cap", "stage", "frame", "tool"]  # what it is
+    finish: str | None = Field(max_length=WIDEST)  # of its surface; None: any
+    number: int | None = Field(alias="ball")  # of a cap, its ball's, from 1
+    axes: Matrix  # (3, 3)
+    origin: Vector = Field(alias="origin_mm")  # (3,) mm
 
     @property
     def ball(self) -> int:
@@ -88,19 +73,12 @@ class Led(Strict):
 
 
 class PurchasedBody(Strict):
-    """A purchased part, whose shape only the assembly has.
+    """A purchased part, whose shape only the assembly has."""
 
-    Attributes:
-        name: of its body in the assembly.
-        part: name in the parts list; None for what the user has.
-        turns: whether with the base.
-        finish: of its surface; None: as it is bought.
-    """
-
-    name: Name
-    part: str | None
-    turns: bool
-    finish: str | None = Field(max_length=WIDEST)
+    name: Name  # of its body in the assembly
+    part: str | None  # name in the parts list; None for what the user has
+    turns: bool  # whether with the base
+    finish: str | None = Field(max_length=WIDEST)  # of its surface; None: as it is bought
 
 
 class Lamp(Strict):
@@ -112,23 +90,15 @@ class Lamp(Strict):
 
 
 class Lamps(Strict):
-    """What lights the object.
+    """What lights the object."""
 
-    Attributes:
-        strip: name of the LED strip in the parts list.
-        strips: side by side on each lamp.
-        length: of the strips, mm.
-        width: of all strips of a lamp side by side, mm.
-        level: whether they lie level, else they are upright.
-        places: of all lamps.
-    """
-
-    strip: str = Field(max_length=WIDEST)
-    strips: int = Field(ge=1, le=MOST)
-    length: float = Field(alias="length_mm", gt=0, le=LARGEST)
+    strip: str = Field(max_length=WIDEST)  # name of the LED strip in the parts list
+    strips: int = Field(ge=1, le=MOST)  # side by side on each lamp
+    length: float = Field(alias="length_mm", gt=0, le=LARGEST)  # of the strips, mm
+    # of all strips of a lamp side by side, mm
     width: float = Field(alias="width_mm", gt=0, le=LARGEST)
-    level: bool
-    places: list[Lamp] = Field(min_length=1, max_length=MOST)
+    level: bool  # whether they lie level, else they are upright
+    places: list[Lamp] = Field(min_length=1, max_length=MOST)  # of all lamps
 
 
 class Panel(Strict):
@@ -149,38 +119,25 @@ class Shroud(Strict):
 
 
 class PlacedFastener(Strict):
-    """A screw, washer, nut, insert, dowel, magnet or LED in its place.
+    """A screw, washer, nut, insert, dowel, magnet or LED in its place."""
 
-    Attributes:
-        name: of its body in the assembly.
-        part: name in the parts list.
-        position: (3,) mm, the point of its axis from which its body goes along; of screws and
-            washers on the face that they press on.
-        along: (3,) unit.
-        through: bodies that it goes through and into, in this order.
-        turns: whether with the base.
-        finish: of its surface; None: as it is bought.
-    """
-
-    name: Name
-    part: str = Field(max_length=WIDEST)
+    name: Name  # of its body in the assembly
+    part: str = Field(max_length=WIDEST)  # name in the parts list
+    # (3,) mm, the point of its axis from which its body goes along; of screws and washers on the
+    # face that they press on
     position: Vector = Field(alias="position_mm")
-    along: Vector
+    along: Vector  # (3,) unit
+    # bodies that it goes through and into, in this order
     through: list[Name] = Field(min_length=1, max_length=9)
-    turns: bool
-    finish: str | None = Field(max_length=WIDEST)
+    turns: bool  # whether with the base
+    finish: str | None = Field(max_length=WIDEST)  # of its surface; None: as it is bought
 
 
 class AssemblyStep(Strict):
-    """A step of assembly.
+    """A step of assembly."""
 
-    Attributes:
-        key: its name.
-        mounts: names of the bodies and fasteners that it mounts.
-    """
-
-    key: Name
-    mounts: list[Name] = Field(max_length=MOST)
+    key: Name  # its name
+    mounts: list[Name] = Field(max_length=MOST)  # names of the bodies and fasteners that it mounts
 
 
 class Drawing(Strict):
@@ -207,17 +164,12 @@ class MarkPicture(Strict):
 
 
 class CameraPlace(Strict):
-    """How the camera is put in its place.
+    """How the camera is put in its place."""
 
-    Attributes:
-        gauge: name of its part.
-        marks: near and far mark of either side, at base angle zero, (2, 2, 3) mm.
-        pictures: of the marks.
-    """
-
-    gauge: Name
+    gauge: Name  # name of its part
+    # near and far mark of either side, at base angle zero, (2, 2, 3) mm
     marks: list[list[Vector]] = Field(alias="marks_mm")
-    pictures: list[MarkPicture] = Field(min_length=1, max_length=99)
+    pictures: list[MarkPicture] = Field(min_length=1, max_length=99)  # of the marks
 
     @field_validator("marks")
     @classmethod

@@ -12,32 +12,21 @@ NOT_SIMULATED = f"As made: {COMMAND} simulates builds with manufacturing errors"
 
 @dataclass(frozen=True)
 class ProcessYield:
-    """Simulated builds by one manufacturing process.
+    """Simulated builds by one manufacturing process."""
 
-    Attributes:
-        process: its name.
-        share: of the builds whose every virtual camera sees the whole object.
-        coverage_mm: median of the builds' minimum coverage.
-    """
-
-    process: str
-    share: float
-    coverage_mm: float
+    process: str  # its name
+    share: float  # of the builds whose every virtual camera sees the whole object
+    coverage_mm: float  # median of the builds' minimum coverage
 
 
 @dataclass(frozen=True)
 class AsMade:
-    """Simulated builds of one design, without any new search for its margin.
+    """Simulated builds of one design, without any new search for its margin."""
 
-    Attributes:
-        builds: number of simulated builds by each process.
-        processes: the largest coverage first; empty if they could not be simulated.
-        reason: why not.
-    """
-
-    builds: int = 0
+    builds: int = 0  # number of simulated builds by each process
+    # the largest coverage first; empty if they could not be simulated
     processes: tuple[ProcessYield, ...] = ()
-    reason: str = ""
+    reason: str = ""  # why not
 
 
 def as_made_lines(as_made: AsMade | None) -> list[str]:

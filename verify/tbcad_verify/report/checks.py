@@ -19,27 +19,16 @@ MAX_NAMED = 5  # how many offenders a line names
 
 @dataclass(frozen=True)
 class Check:
-    """One figure and its limit.
+    """One figure and its limit."""
 
-    Attributes:
-        name: what was measured.
-        file: in which file of the export.
-        passed: None is "unknown", which is not a pass.
-        measured: the figure, or None.
-        limit: of the figure; None if it informs only.
-        unit: of both.
-        detail: what exceeds the limit, and by how much; or why it is unknown.
-        bound: whether the figure may be at most, at least or exactly the limit.
-    """
-
-    name: str
-    file: str
-    passed: bool | None
-    measured: float | None
-    limit: float | None
-    unit: str
-    detail: str = ""
-    bound: str = AT_MOST
+    name: str  # what was measured
+    file: str  # in which file of the export
+    passed: bool | None  # None is "unknown", which is not a pass
+    measured: float | None  # the figure, or None
+    limit: float | None  # of the figure; None if it informs only
+    unit: str  # of both
+    detail: str = ""  # what exceeds the limit, and by how much; or why it is unknown
+    bound: str = AT_MOST  # whether the figure may be at most, at least or exactly the limit
 
 
 def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:

@@ -13,17 +13,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A figure that a summary shows.
+    """A figure that a summary shows."""
 
-    Attributes:
-        check: name of the check that measures it.
-        label: what it is, in a summary; at most LABEL_WIDTH columns.
-        unit: in a summary; None: the check's.
-    """
-
-    check: str
-    label: str
-    unit: str | None = None
+    check: str  # name of the check that measures it
+    label: str  # what it is, in a summary; at most LABEL_WIDTH columns
+    unit: str | None = None  # in a summary; None: the check's
 
 
 LABEL_WIDTH = 17  # columns

@@ -19,21 +19,13 @@ EXPORT, AS_BUILT = "check", "as_built"  # tables of checks.toml
 
 @dataclass(frozen=True)
 class Method:
-    """How some checks are made.
+    """How some checks are made."""
 
-    Attributes:
-        title: of the row in the table of verify/README.md.
-        names: of the checks in verify.json, or what they begin with before a blank.
-        method: what is compared, and how.
-        tolerance: of the figure, or where it comes from.
-        remedies: what to do about each check that fails.
-    """
-
-    title: str
-    names: tuple[str, ...]
-    method: str
-    tolerance: str
-    remedies: tuple[str, ...]
+    title: str  # of the row in the table of verify/README.md
+    names: tuple[str, ...]  # of the checks in verify.json, or what they begin with before a blank
+    method: str  # what is compared, and how
+    tolerance: str  # of the figure, or where it comes from
+    remedies: tuple[str, ...]  # what to do about each check that fails
 
 
 @cache

@@ -23,34 +23,22 @@ POLL_S = 0.02
 
 @dataclass(frozen=True)
 class Limits:
-    """What a child may use.
+    """What a child may use."""
 
-    Attributes:
-        seconds: time from its start.
-        output: bytes printed.
-        stop: once this is set, children are killed and none is started.
-    """
-
-    seconds: float = 300.0
-    output: int = 1_000_000
+    seconds: float = 300.0  # time from its start
+    output: int = 1_000_000  # bytes printed
+    # once this is set, children are killed and none is started
     stop: threading.Event = field(default_factory=threading.Event)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a child ended.
+    """How a child ended."""
 
-    Attributes:
-        code: exit status; None if it was stopped, crashed or never started.
-        text: what it printed to stdout and stderr, up to the limit.
-        seconds: how long it ran.
-        reason: why there is no exit status; empty if there is one.
-    """
-
-    code: int | None
-    text: str
-    seconds: float
-    reason: str = ""
+    code: int | None  # exit status; None if it was stopped, crashed or never started
+    text: str  # what it printed to stdout and stderr, up to the limit
+    seconds: float  # how long it ran
+    reason: str = ""  # why there is no exit status; empty if there is one
 
 
 def run(command: Sequence[str], folder: Path, limits: Limits) -> Outcome:

@@ -24,22 +24,16 @@ PER_MIRROR = (
 
 @dataclass
 class Results:
-    """What one stage measured, or several.
+    """What one stage measured, or several."""
 
-    Attributes:
-        stages: titles of the stages begun.
-        checks: in the order they were made.
-        mirrors: figures of every recorded mirror, (M,) each: columns of `PER_MIRROR`.
-        masses: mass properties of each part's mesh, by the part's name.
-        printing: a row for each part on each printer.
-        prototype: what is known of each ball and stop; None if there is no prototype.
-    """
-
-    stages: list[str] = field(default_factory=list)
-    checks: list[Check] = field(default_factory=list)
+    stages: list[str] = field(default_factory=list)  # titles of the stages begun
+    checks: list[Check] = field(default_factory=list)  # in the order they were made
+    # figures of every recorded mirror, (M,) each: columns of `PER_MIRROR`
     mirrors: dict[str, Floats] = field(default_factory=dict)
+    # mass properties of each part's mesh, by the part's name
     masses: dict[str, MassProperties] = field(default_factory=dict)
-    printing: list[Row] = field(default_factory=list)
+    printing: list[Row] = field(default_factory=list)  # a row for each part on each printer
+    # what is known of each ball and stop; None if there is no prototype
     prototype: Row | None = None
 
 

@@ -52,23 +52,18 @@ Steps = tuple[Files, Comparisons, Mandrels, list[Check]]
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """What else to verify, and how.
+    """What else to verify, and how."""
 
-    Attributes:
-        write: write verify.json into the folder.
-        apart: read the meshes in another process, so that a crash there becomes "unknown".
-        seconds: time limit of one stage, file or program.
-        printers: profiles, by name or path, that every part must suit. Without any, the built-in
-            ones are tried, and what they find informs only.
-        clients: also ask the programs that users open the files with, where they are installed.
-        strict: fail also where a file was changed that only people read, such as a list of parts.
-    """
-
-    write: bool = True
+    write: bool = True  # write verify.json into the folder
+    # read the meshes in another process, so that a crash there becomes "unknown"
     apart: bool = True
-    seconds: float = STAGE_LIMIT_S
+    seconds: float = STAGE_LIMIT_S  # time limit of one stage, file or program
+    # profiles, by name or path, that every part must suit. Without any, the built-in ones are
+    # tried, and what they find informs only.
     printers: tuple[str, ...] = ()
+    # also ask the programs that users open the files with, where they are installed
     clients: bool = False
+    # fail also where a file was changed that only people read, such as a list of parts
     strict: bool = False
 
 

@@ -47,23 +47,17 @@ CHECKS = {
 
 @dataclass(frozen=True)
 class Coverage:
-    """What each virtual camera sees.
+    """What each virtual camera sees."""
 
-    Attributes:
-        facet: (V,) diameter by facets, mm; 0 where the outline's image does not surround the
-            object's middle, NaN where a mirror is missing.
-        fitted: (V,) the same by fitted surfaces.
-        gap: (V,) widest stretch that neither half of a mirror on the seam sees by fitted surfaces,
-            mm; NaN where a half is missing.
-        hidden: (M,) points of each mirror that the pinhole does not see.
-        blockers: what hides them.
-    """
-
+    # (V,) diameter by facets, mm; 0 where the outline's image does not surround the object's
+    # middle, NaN where a mirror is missing
     facet: Floats
-    fitted: Floats
+    fitted: Floats  # (V,) the same by fitted surfaces
+    # (V,) widest stretch that neither half of a mirror on the seam sees by fitted surfaces, mm; NaN
+    # where a half is missing
     gap: Floats
-    hidden: Floats
-    blockers: tuple[str, ...]
+    hidden: Floats  # (M,) points of each mirror that the pinhole does not see
+    blockers: tuple[str, ...]  # what hides them
 
 
 def measure(setup: OpticalSetup) -> Coverage:

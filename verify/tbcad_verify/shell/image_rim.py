@@ -19,19 +19,12 @@ CLOSE_MM = 1e-4
 
 @dataclass(frozen=True)
 class RimRays:
-    """Camera rays that, off their mirror, graze the capture sphere: AZIMUTHS for each mirror.
+    """Camera rays that, off their mirror, graze the capture sphere: AZIMUTHS for each mirror."""
 
-    Attributes:
-        mirror: (N,) recorded mirror.
-        direction: (3, N) from the pinhole.
-        lines: reflected.
-        error: (N,) mm by which they fail to graze; NaN where no ray off the mirror would.
-    """
-
-    mirror: NDArray[np.intp]
-    direction: Floats
-    lines: ReflectedRays
-    error: Floats
+    mirror: NDArray[np.intp]  # (N,) recorded mirror
+    direction: Floats  # (3, N) from the pinhole
+    lines: ReflectedRays  # reflected
+    error: Floats  # (N,) mm by which they fail to graze; NaN where no ray off the mirror would
 
 
 def rim_rays(

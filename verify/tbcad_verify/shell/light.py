@@ -36,53 +36,35 @@ SAMPLED = 7  # a prime: no column of pixels is left out
 
 @dataclass(frozen=True)
 class SensorScene:
-    """What light meets, for one camera.
+    """What light meets, for one camera."""
 
-    Attributes:
-        scene: all parts.
-        own: as much of it as tells which of this camera's mirrors rays from the pinhole meet first.
-        camera: the real camera.
-        owner: (F + 1,) mirror of each facet that belongs to this camera's mirrors, else -1; the
-            last entry stands for a ray that hits nothing.
-        other: (F + 1,) true for facets of any mirror.
-        seen: the mirrors' reflecting surfaces from the pinhole, one a recorded mirror.
-        mirrors: M, how many are recorded.
-        radius_mm: of the capture sphere.
-        coating_mm: the coat that the mesh does not show.
-    """
-
-    scene: RayScene
+    scene: RayScene  # all parts
+    # as much of it as tells which of this camera's mirrors rays from the pinhole meet first
     own: RayScene
-    camera: Camera
+    camera: Camera  # the real camera
+    # (F + 1,) mirror of each facet that belongs to this camera's mirrors, else -1; the last entry
+    # stands for a ray that hits nothing
     owner: NDArray[np.int32]
-    other: NDArray[np.bool_]
+    other: NDArray[np.bool_]  # (F + 1,) true for facets of any mirror
+    # the mirrors' reflecting surfaces from the pinhole, one a recorded mirror
     seen: PreparedSurfaces
-    mirrors: int
-    radius_mm: float
-    coating_mm: float
+    mirrors: int  # M, how many are recorded
+    radius_mm: float  # of the capture sphere
+    coating_mm: float  # the coat that the mesh does not show
 
 
 @dataclass(frozen=True)
 class PixelTally:
-    """Counts over pixels: sums of integers and minima, which do not depend on the order.
+    """Counts over pixels: sums of integers and minima, which do not depend on the order."""
 
-    Attributes:
-        pixels: (M,) per mirror, whose reflected ray meets the capture sphere unhindered.
-        blocked: (M,) per mirror, whose reflected ray is stopped before the capture sphere.
-        blockers: (B,) facets that stop them, each once.
-        on_mirrors: pixels that see any part of this camera's mirrors.
-        twice: of those, how many rays meet another mirror after the first.
-        nearest: (M,) minimum distance of useful camera-to-mirror rays from the origin, mm.
-        spread: (P,) distance at the object between the rays off facets and off fitted
-            surfaces, for one useful pixel in `SAMPLED`, mm.
-    """
-
-    pixels: Ints
-    blocked: Ints
-    blockers: Ints
-    on_mirrors: int
-    twice: int
-    nearest: Floats
+    pixels: Ints  # (M,) per mirror, whose reflected ray meets the capture sphere unhindered
+    blocked: Ints  # (M,) per mirror, whose reflected ray is stopped before the capture sphere
+    blockers: Ints  # (B,) facets that stop them, each once
+    on_mirrors: int  # pixels that see any part of this camera's mirrors
+    twice: int  # of those, how many rays meet another mirror after the first
+    nearest: Floats  # (M,) minimum distance of useful camera-to-mirror rays from the origin, mm
+    # (P,) distance at the object between the rays off facets and off fitted surfaces, for one
+    # useful pixel in `SAMPLED`, mm
     spread: NDArray[np.float32]
 
 

@@ -63,16 +63,11 @@ CHECKS = {
 
 @dataclass(frozen=True)
 class _Shared:
-    """Which of the negative's facets are the shell's, turned.
+    """Which of the negative's facets are the shell's, turned."""
 
-    Attributes:
-        own: (F,) mirror of each of the negative's facets; -1 for another facet of the shell's, -2
-            for none.
-        missing: (M,) number of facets of each mirror that the negative has not.
-    """
-
+    # (F,) mirror of each of the negative's facets; -1 for another facet of the shell's, -2 for none
     own: NDArray[np.intp]
-    missing: Ints
+    missing: Ints  # (M,) number of facets of each mirror that the negative has not
 
 
 def mandrel_results(

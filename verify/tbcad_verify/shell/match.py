@@ -18,23 +18,14 @@ from tbcad_verify.types import Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class Match:
-    """Recorded mirrors (M, in the record's order) against recovered patches.
+    """Recorded mirrors (M, in the record's order) against recovered patches."""
 
-    Attributes:
-        segment: (M,) the patch of each mirror; -1 where it is missing.
-        extra: patches that are mirrors but match none of the record.
-        centre_error: (M,) mm; NaN where missing. For planes: see `compare`.
-        radius_error: (M,) mm; NaN where missing, 0 for planes.
-        blur: (M,) how well float32 lets either be known, mm; 0 for planes.
-        surface_error: (M,) largest distance of a patch's vertex from the recorded surface, mm.
-    """
-
-    segment: Ints
-    extra: Ints
-    centre_error: Floats
-    radius_error: Floats
-    blur: Floats
-    surface_error: Floats
+    segment: Ints  # (M,) the patch of each mirror; -1 where it is missing
+    extra: Ints  # patches that are mirrors but match none of the record
+    centre_error: Floats  # (M,) mm; NaN where missing. For planes: see `compare`.
+    radius_error: Floats  # (M,) mm; NaN where missing, 0 for planes
+    blur: Floats  # (M,) how well float32 lets either be known, mm; 0 for planes
+    surface_error: Floats  # (M,) largest distance of a patch's vertex from the recorded surface, mm
 
 
 def match(

@@ -28,30 +28,18 @@ from tbcad_verify.shell.recover import Recovery, recover
 
 @dataclass(frozen=True)
 class ShellPart:
-    """One part of a shell as measured; None where that failed.
+    """One part of a shell as measured; None where that failed."""
 
-    Attributes:
-        part: its record.
-        mesh: its triangles, joined.
-        edges: of the mesh.
-        topology: what is wrong with the mesh.
-        mass: volume, area, centroid and box.
-        recovery: its patches and mirrors.
-        no_topology: why the topology is None.
-        no_recovery: why the recovery is None.
-        reason: why something is None.
-        image_of: the part of which this is the mirror image; None where it was measured by itself.
-    """
-
-    part: Part
-    mesh: Mesh | None
-    edges: Edges | None
-    topology: Topology | None
-    mass: MassProperties | None
-    recovery: Recovery | None
-    no_topology: str
-    no_recovery: str
-    reason: str
+    part: Part  # its record
+    mesh: Mesh | None  # its triangles, joined
+    edges: Edges | None  # of the mesh
+    topology: Topology | None  # what is wrong with the mesh
+    mass: MassProperties | None  # volume, area, centroid and box
+    recovery: Recovery | None  # its patches and mirrors
+    no_topology: str  # why the topology is None
+    no_recovery: str  # why the recovery is None
+    reason: str  # why something is None
+    # the part of which this is the mirror image; None where it was measured by itself
     image_of: Part | None = None
 
     @property

@@ -44,32 +44,20 @@ CHECKS = {"mesh wall": "mm", "mesh holes": "faults"}
 
 @dataclass(frozen=True)
 class Valleys:
-    """Corners of one part's mesh where mirrors meet, or the walls of their pedestals.
+    """Corners of one part's mesh where mirrors meet, or the walls of their pedestals."""
 
-    Attributes:
-        point: (3, V) mm; of grooves between mirrors, their bottoms.
-        inner: (V,) whether only mirrors meet there, and no joining face.
-    """
-
-    point: Floats
-    inner: Bools
+    point: Floats  # (3, V) mm; of grooves between mirrors, their bottoms
+    inner: Bools  # (V,) whether only mirrors meet there, and no joining face
 
 
 @dataclass(frozen=True)
 class MeshCasing:
-    """Where a half's mirrors end and its back begins.
+    """Where a half's mirrors end and its back begins."""
 
-    Attributes:
-        semi_axes: of the camera's ellipsoid along its axis and across it, (2,) mm.
-        deepest: by how much the ellipsoid must grow to hold all valleys, mm.
-        beyond: by how much to be the back, mm: half of its corners are within.
-        nearest: the same, where the back is nearest.
-    """
-
-    semi_axes: Floats
-    deepest: float
-    beyond: float
-    nearest: float
+    semi_axes: Floats  # of the camera's ellipsoid along its axis and across it, (2,) mm
+    deepest: float  # by how much the ellipsoid must grow to hold all valleys, mm
+    beyond: float  # by how much to be the back, mm: half of its corners are within
+    nearest: float  # the same, where the back is nearest
 
     def walls(self) -> tuple[float, float]:
         """Material behind the deepest valley where the back is nearest, and otherwise, mm."""

@@ -24,30 +24,19 @@ ASIDE_MM = 0.01
 
 @dataclass(frozen=True)
 class OpticalSetup:
-    """Everything that the optical checks need.
+    """Everything that the optical checks need."""
 
-    Attributes:
-        export: requirements and poses.
-        mesh: all parts.
-        recovery: all parts' patches, K.
-        part: (K,) number of each patch's part.
-        match: recorded mirrors against patches.
-        virtual: recorded mirrors as virtual cameras.
-        scene: for rays.
-        mirrors: (M,) reflecting surfaces as recovered, coat included; those of missing ones
-            must not be used.
-        symmetric: whether camera b, its mesh and the matches of its mirrors are camera a's,
-            reflected in the plane x = 0.
-    """
-
-    export: Export
-    mesh: Mesh
-    recovery: Recovery
-    part: NDArray[np.intp]
-    match: Match
-    virtual: VirtualCameras
-    scene: RayScene
+    export: Export  # requirements and poses
+    mesh: Mesh  # all parts
+    recovery: Recovery  # all parts' patches, K
+    part: NDArray[np.intp]  # (K,) number of each patch's part
+    match: Match  # recorded mirrors against patches
+    virtual: VirtualCameras  # recorded mirrors as virtual cameras
+    scene: RayScene  # for rays
+    # (M,) reflecting surfaces as recovered, coat included; those of missing ones must not be used
     mirrors: Surfaces
+    # whether camera b, its mesh and the matches of its mirrors are camera a's, reflected in the
+    # plane x = 0
     symmetric: bool = False
 
     @property

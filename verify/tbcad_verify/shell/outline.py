@@ -34,23 +34,14 @@ NEWTON = 5
 
 @dataclass(frozen=True)
 class Outline:
-    """The outlines of all mirrors of one camera, cut into N samples, edge by edge.
+    """The outlines of all mirrors of one camera, cut into N samples, edge by edge."""
 
-    Attributes:
-        mirror: (N,) recorded mirror.
-        facet: (N,) the facet inside the mirror, at its edge.
-        on_mesh: (3, N) mm, on the mesh edge.
-        inside: (3, N) mm, a little inside the facet.
-        point: (3, N) mm, where the edge is on the reflecting surface, above the coat.
-        seam: (N,) true on the cut of a halved mirror along x = 0.
-    """
-
-    mirror: Ints
-    facet: Ints
-    on_mesh: Floats
-    inside: Floats
-    point: Floats
-    seam: NDArray[np.bool_]
+    mirror: Ints  # (N,) recorded mirror
+    facet: Ints  # (N,) the facet inside the mirror, at its edge
+    on_mesh: Floats  # (3, N) mm, on the mesh edge
+    inside: Floats  # (3, N) mm, a little inside the facet
+    point: Floats  # (3, N) mm, where the edge is on the reflecting surface, above the coat
+    seam: NDArray[np.bool_]  # (N,) true on the cut of a halved mirror along x = 0
 
 
 def trace_outline(

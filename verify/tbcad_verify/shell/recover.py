@@ -35,19 +35,12 @@ GRAZING = 0.05
 
 @dataclass(frozen=True)
 class Recovery:
-    """The patches of one or more meshes.
+    """The patches of one or more meshes."""
 
-    Attributes:
-        segments: patch of every facet.
-        fits: surface of every patch.
-        mirror: (K,) true for those that are mirrors.
-        folds: edges at which the mesh is folded onto itself.
-    """
-
-    segments: Segmentation
-    fits: SurfaceFits
-    mirror: Bools
-    folds: int
+    segments: Segmentation  # patch of every facet
+    fits: SurfaceFits  # surface of every patch
+    mirror: Bools  # (K,) true for those that are mirrors
+    folds: int  # edges at which the mesh is folded onto itself
 
 
 def recover(

@@ -24,21 +24,13 @@ HOLE_MM = 1e-6  # of radii and places along an axis
 
 @dataclass(frozen=True)
 class Casing:
-    """Back and holes of one shell.
+    """Back and holes of one shell."""
 
-    Attributes:
-        semi_axes: of the back along the axis and across it, mm.
-        centre: (3,) of the back, mm.
-        axis: (3,) unit, of the back.
-        valleys: (V, 3) corners of the mirrors and of the walls below them, mm.
-        holes: round, by diameter, from the spec.
-    """
-
-    semi_axes: tuple[float, float]
-    centre: Floats
-    axis: Floats
-    valleys: Floats
-    holes: tuple[Hole, ...]
+    semi_axes: tuple[float, float]  # of the back along the axis and across it, mm
+    centre: Floats  # (3,) of the back, mm
+    axis: Floats  # (3,) unit, of the back
+    valleys: Floats  # (V, 3) corners of the mirrors and of the walls below them, mm
+    holes: tuple[Hole, ...]  # round, by diameter, from the spec
 
 
 def read_casing(table: StepTable, mirrors: frozenset[str]) -> Casing:

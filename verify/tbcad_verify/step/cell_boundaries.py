@@ -29,37 +29,25 @@ MOST_NUMBERS = 1_000_000  # in one array of intermediate results
 
 @dataclass(frozen=True)
 class CellBoundaries:
-    """The cells of M mirrors, as arcs on their maps.
+    """The cells of M mirrors, as arcs on their maps."""
 
-    Attributes:
-        maps: of the mirrors.
-        arcs: in ascending order of mirror; `circle` is the number of the other surface: mirrors,
-            walls, then the horizon.
-        spread: extent of all surfaces, mm.
-    """
-
-    maps: SurfaceMaps
+    maps: SurfaceMaps  # of the mirrors
+    # in ascending order of mirror; `circle` is the number of the other surface: mirrors, walls,
+    # then the horizon
     arcs: MapArcs
-    spread: float
+    spread: float  # extent of all surfaces, mm
 
 
 @dataclass(frozen=True)
 class MapBatch:
-    """Some mirrors' maps (M) with all surfaces that may cut them (T, and the horizon last).
+    """Some mirrors' maps (M) with all surfaces that may cut them (T, and the horizon last)."""
 
-    Attributes:
-        index: (M,) the mirrors' numbers.
-        maps: of the mirrors.
-        circles: (M, T + 1).
-        near: (M, T + 1) mm, the order in which circles are taken; walls and horizon come first.
-        spread: mm.
-    """
-
-    index: Ints
-    maps: SurfaceMaps
-    circles: MapCircles
+    index: Ints  # (M,) the mirrors' numbers
+    maps: SurfaceMaps  # of the mirrors
+    circles: MapCircles  # (M, T + 1)
+    # (M, T + 1) mm, the order in which circles are taken; walls and horizon come first
     near: Floats
-    spread: float
+    spread: float  # mm
 
 
 def cell_boundaries(mirrors: Surfaces, walls: Surfaces) -> CellBoundaries:

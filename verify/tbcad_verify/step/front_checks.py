@@ -41,31 +41,18 @@ ENDS_MM = 1e-6  # ten times the precision to which the kernel joins corners and 
 
 @dataclass(frozen=True, kw_only=True)
 class FrontComparison(PartComparison):
-    """The mirrors of a STEP file and all that they are compared with.
+    """The mirrors of a STEP file and all that they are compared with."""
 
-    Attributes:
-        mirrors: the camera's m mirrors, as recorded.
-        foreign: ids of all other mirrors.
-        coating_mm: that is not part of the solid.
-        face: (m,) each mirror's face; -1 where no face, or more than one, has its name.
-        front: the file's faces as seen from the light.
-        cells: (m,) in closed form.
-        grooves: between pedestals, in the file.
-        part: its record.
-        export: the record.
-        camera: that the part is for.
-    """
-
-    mirrors: Mirrors
-    foreign: frozenset[str]
-    coating_mm: float
-    face: Ints
-    front: StepFaces
-    cells: ClosedFormCells
-    grooves: Grooves | None
-    part: Part
-    export: Export
-    camera: Camera
+    mirrors: Mirrors  # the camera's m mirrors, as recorded
+    foreign: frozenset[str]  # ids of all other mirrors
+    coating_mm: float  # that is not part of the solid
+    face: Ints  # (m,) each mirror's face; -1 where no face, or more than one, has its name
+    front: StepFaces  # the file's faces as seen from the light
+    cells: ClosedFormCells  # (m,) in closed form
+    grooves: Grooves | None  # between pedestals, in the file
+    part: Part  # its record
+    export: Export  # the record
+    camera: Camera  # that the part is for
 
 
 AnyPart = TypeVar("AnyPart", bound=Part)

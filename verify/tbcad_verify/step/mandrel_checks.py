@@ -43,13 +43,9 @@ PLANES = ("seam", "foot")
 
 @dataclass(frozen=True, kw_only=True)
 class MandrelComparison(FrontComparison):
-    """A negative's STEP file and all that it is compared with.
+    """A negative's STEP file and all that it is compared with."""
 
-    Attributes:
-        holes: blind ones.
-    """
-
-    holes: tuple[Hole, ...]
+    holes: tuple[Hole, ...]  # blind ones
 
 
 def mandrel_comparisons(

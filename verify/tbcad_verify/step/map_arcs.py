@@ -24,24 +24,16 @@ class MapArcs:
 
     A circle is followed from its point nearest the apex; an arc that passes the farthest point is
     two arcs.
-
-    Attributes:
-        mirror: (N,) number of the map.
-        circle: (N,) column of the circle.
-        near: (2, N) mm, the circle's nearest point.
-        inward: (2, N) unit, there, toward the uncovered side.
-        bend: (N,) 1/mm, the circle's signed curvature; 0 for lines.
-        t: (2, N) both ends, mm: twice the tangent of half the angle from `near`, over the bend.
-        s: (2, N) both ends, mm of arc length from `near`.
     """
 
-    mirror: Ints
-    circle: Ints
-    near: Floats
-    inward: Floats
-    bend: Floats
+    mirror: Ints  # (N,) number of the map
+    circle: Ints  # (N,) column of the circle
+    near: Floats  # (2, N) mm, the circle's nearest point
+    inward: Floats  # (2, N) unit, there, toward the uncovered side
+    bend: Floats  # (N,) 1/mm, the circle's signed curvature; 0 for lines
+    # (2, N) both ends, mm: twice the tangent of half the angle from `near`, over the bend
     t: Floats
-    s: Floats
+    s: Floats  # (2, N) both ends, mm of arc length from `near`
 
     def take(self, index: NDArray[np.generic]) -> MapArcs:
         """The arcs with these numbers, or for which a mask holds."""

@@ -18,21 +18,15 @@ CLAIMS = {"volume", "area", "centroid"}
 
 @dataclass(frozen=True)
 class PartComparison:
-    """One part's STEP file and the mesh that it is compared with.
+    """One part's STEP file and the mesh that it is compared with."""
 
-    Attributes:
-        name: of the part.
-        file: as read.
-        mesh_mass: of the mesh, in the same place; None where it could not be measured.
-        mesh_error: maximum distance of the mesh from the exact surface, mm.
-        claim: maximum error of the file's own claims, as a share: faces between edges that have no
-            closed form are only integrated to about a millionth.
-    """
-
-    name: str
-    file: StepFile
+    name: str  # of the part
+    file: StepFile  # as read
+    # of the mesh, in the same place; None where it could not be measured
     mesh_mass: MassProperties | None
-    mesh_error: float
+    mesh_error: float  # maximum distance of the mesh from the exact surface, mm
+    # maximum error of the file's own claims, as a share: faces between edges that have no closed
+    # form are only integrated to about a millionth
     claim: float = CLAIM_SHARE
 
     @property

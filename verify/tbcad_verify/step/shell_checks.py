@@ -52,15 +52,10 @@ AREAS = ("cell areas", "mirrors.csv", "of the area")
 
 @dataclass(frozen=True, kw_only=True)
 class ShellComparison(FrontComparison):
-    """A shell's STEP file and all that it is compared with.
+    """A shell's STEP file and all that it is compared with."""
 
-    Attributes:
-        casing: back and holes.
-        wall: thickness behind the deepest valley, mm.
-    """
-
-    casing: Casing
-    wall: float | Unknown
+    casing: Casing  # back and holes
+    wall: float | Unknown  # thickness behind the deepest valley, mm
 
 
 def shell_comparisons(

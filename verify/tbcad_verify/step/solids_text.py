@@ -24,36 +24,23 @@ ROUND = {"CYLINDRICAL_SURFACE": "cylinder", "SPHERICAL_SURFACE": "sphere"}
 
 @dataclass(frozen=True)
 class RoundFace:
-    """A cylinder's or sphere's face.
+    """A cylinder's or sphere's face."""
 
-    Attributes:
-        kind: "cylinder" or "sphere".
-        point: (3,) mm, on the axis or the centre.
-        axis: (3,) unit.
-        radius: mm.
-        hollow: whether the material is outside.
-        span: first and last place of its corners along the axis, from `point`, mm.
-    """
-
-    kind: str
-    point: Floats
-    axis: Floats
-    radius: float
-    hollow: bool
+    kind: str  # "cylinder" or "sphere"
+    point: Floats  # (3,) mm, on the axis or the centre
+    axis: Floats  # (3,) unit
+    radius: float  # mm
+    hollow: bool  # whether the material is outside
+    # first and last place of its corners along the axis, from `point`, mm
     span: tuple[float, float]
 
 
 @dataclass(frozen=True)
 class TextSolid:
-    """One solid.
+    """One solid."""
 
-    Attributes:
-        corners: (V, 3) mm, sorted.
-        faces: the round ones.
-    """
-
-    corners: Floats
-    faces: tuple[RoundFace, ...]
+    corners: Floats  # (V, 3) mm, sorted
+    faces: tuple[RoundFace, ...]  # the round ones
 
 
 def read_solids(text: str) -> dict[str, TextSolid]:

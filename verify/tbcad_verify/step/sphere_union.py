@@ -31,18 +31,13 @@ SAME_CORNER = 1e-11  # of the spread
 
 @dataclass(frozen=True)
 class ClosedFormCells:
-    """One cell a mirror, M of them, in the order given.
+    """One cell a mirror, M of them, in the order given."""
 
-    Attributes:
-        area: (M,) mm^2; 0 where the mirror is covered completely, NaN where its cell does not end
-            before the horizon (for planes: before infinity).
-        first: (M, 3) mm^3, the integral of x.
-        volume: (M,) mm^3, the integral of x.n / 3, with the unit normal n out of the solid.
-    """
-
+    # (M,) mm^2; 0 where the mirror is covered completely, NaN where its cell does not end before
+    # the horizon (for planes: before infinity)
     area: Floats
-    first: Floats
-    volume: Floats
+    first: Floats  # (M, 3) mm^3, the integral of x
+    volume: Floats  # (M,) mm^3, the integral of x.n / 3, with the unit normal n out of the solid
 
 
 def closed_form_cells(

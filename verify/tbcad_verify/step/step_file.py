@@ -45,55 +45,36 @@ Found = TypeVar("Found")
 class StepFaces:
     """The F faces of a STEP file: surfaces from the text, measures from the kernel.
 
-    Attributes:
-        names: as the text has them.
-        kind: (F,) "sphere", "plane" or "other".
-        point: (F, 3) centre of a sphere, a point of a plane, mm.
-        radius: (F,) of spheres, mm.
-        normal: (F, 3) of planes, out of the solid.
-        outward: (F,) true where a sphere is convex seen from outside the solid, and a plane faces
-            the direction that the kernel gives, in the text too: kernels repair reversed faces,
-            other readers may not.
-        inward: (F,) true where a sphere is concave seen from outside the solid, in kernel and text.
-        area: (F,) mm^2.
-        middle: (F, 3) of the area, mm.
-
     Figures that do not exist are NaN: so are measures where the kernel has no face on the text's
     surface.
     """
 
-    names: tuple[str, ...]
-    kind: NDArray[np.str_]
-    point: Floats
-    radius: Floats
-    normal: Floats
+    names: tuple[str, ...]  # as the text has them
+    kind: NDArray[np.str_]  # (F,) "sphere", "plane" or "other"
+    point: Floats  # (F, 3) centre of a sphere, a point of a plane, mm
+    radius: Floats  # (F,) of spheres, mm
+    normal: Floats  # (F, 3) of planes, out of the solid
+    # (F,) true where a sphere is convex seen from outside the solid, and a plane faces the
+    # direction that the kernel gives, in the text too: kernels repair reversed faces, other readers
+    # may not
     outward: NDArray[np.bool_]
+    # (F,) true where a sphere is concave seen from outside the solid, in kernel and text
     inward: NDArray[np.bool_]
-    area: Floats
-    middle: Floats
+    area: Floats  # (F,) mm^2
+    middle: Floats  # (F, 3) of the area, mm
 
 
 @dataclass(frozen=True)
 class StepFile:
-    """One STEP file.
+    """One STEP file."""
 
-    Attributes:
-        solids: names of the solids in the text.
-        counts: the kernel's solids, shells and open edges.
-        valid: the kernel's check of the shape.
-        gap: tolerance to which the kernel had to widen corners and edges until they met, mm.
-        mass: of the whole, by the kernel.
-        properties: volume, area and centroid, as far as the file claims them.
-        faces: all of them.
-    """
-
-    solids: tuple[str, ...]
-    counts: dict[str, int]
-    valid: bool
-    gap: float
-    mass: MassProperties
-    properties: dict[str, Any]
-    faces: StepFaces
+    solids: tuple[str, ...]  # names of the solids in the text
+    counts: dict[str, int]  # the kernel's solids, shells and open edges
+    valid: bool  # the kernel's check of the shape
+    gap: float  # tolerance to which the kernel had to widen corners and edges until they met, mm
+    mass: MassProperties  # of the whole, by the kernel
+    properties: dict[str, Any]  # volume, area and centroid, as far as the file claims them
+    faces: StepFaces  # all of them
 
 
 def load(folder: Path, name: str) -> FileBytes:

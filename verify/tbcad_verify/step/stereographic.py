@@ -30,19 +30,12 @@ FAR = 1e4
 
 @dataclass(frozen=True)
 class SurfaceMaps:
-    """Maps of M surfaces.
+    """Maps of M surfaces."""
 
-    Attributes:
-        surfaces: M of them; the apex is the map's origin.
-        right: (3, M) unit, the map's first axis.
-        up: (3, M) unit, its second; right, up and normal are right-handed.
-        reach: (M,) radius of the map, mm: to the horizon of the front side.
-    """
-
-    surfaces: Surfaces
-    right: Floats
-    up: Floats
-    reach: Floats
+    surfaces: Surfaces  # M of them; the apex is the map's origin
+    right: Floats  # (3, M) unit, the map's first axis
+    up: Floats  # (3, M) unit, its second; right, up and normal are right-handed
+    reach: Floats  # (M,) radius of the map, mm: to the horizon of the front side
 
     def take(self, index: Ints) -> SurfaceMaps:
         """The maps with these numbers."""
@@ -51,21 +44,13 @@ class SurfaceMaps:
 
 @dataclass(frozen=True)
 class MapCircles:
-    """Circles on the maps, K on each of M, scaled so that |beta|^2 - 4 alpha gamma = 1.
+    """Circles on the maps, K on each of M, scaled so that |beta|^2 - 4 alpha gamma = 1."""
 
-    Attributes:
-        alpha: (M, K) 1/mm; twice this is the circle's curvature.
-        beta: (2, M, K).
-        gamma: (M, K) mm.
-        real: (M, K) false where the other surface does not cut the mirror.
-        covers: (M, K) true where it covers the whole mirror.
-    """
-
-    alpha: Floats
-    beta: Floats
-    gamma: Floats
-    real: NDArray[np.bool_]
-    covers: NDArray[np.bool_]
+    alpha: Floats  # (M, K) 1/mm; twice this is the circle's curvature
+    beta: Floats  # (2, M, K)
+    gamma: Floats  # (M, K) mm
+    real: NDArray[np.bool_]  # (M, K) false where the other surface does not cut the mirror
+    covers: NDArray[np.bool_]  # (M, K) true where it covers the whole mirror
 
     def take(self, column: Ints) -> MapCircles:
         """Some of each map's circles: (M, K') numbers of columns."""

@@ -31,17 +31,11 @@ CLOSE_MM = 1e-5
 
 @dataclass(frozen=True)
 class AreaMoments:
-    """Moments of a surface.
+    """Moments of a surface."""
 
-    Attributes:
-        area: mm^2.
-        middle: (3,) mm.
-        second: (3, 3) about the middle, mm^4.
-    """
-
-    area: float
-    middle: Floats
-    second: Floats
+    area: float  # mm^2
+    middle: Floats  # (3,) mm
+    second: Floats  # (3, 3) about the middle, mm^4
 
 
 def measure_face(face: TopoDS_Face, origin: Floats, gap: float = 0.0) -> tuple[Row, Floats]:
