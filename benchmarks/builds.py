@@ -11,7 +11,7 @@ from pathlib import Path
 
 from timing import Figure, Row, at_most
 
-COMMAND = "from tbcad.cli import main; main()"  # what the installed program does
+COMMAND = "from tbcad.app.cli import main; main()"  # what the installed program does
 ENDS = {0: "done", 1: "done, the verification fails"}
 REFUSED = 2
 INSTALLED = {"PYTHONSAFEPATH": "1"}

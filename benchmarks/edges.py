@@ -7,12 +7,12 @@ from pathlib import Path
 
 from timing import Figure, Row, at_most, measured, spent_in_turns
 
-from tbcad.cad.brep import Solid
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.cad.kernel.brep import Solid
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.shell.files import camera_solid, shell_envelope, write_shell_solids
 from tbcad.shell.mesh import shell_mesh
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import load_spec
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
 from tbcad.tolerancing.process.process import load_process, process_errors

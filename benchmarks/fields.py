@@ -19,23 +19,23 @@ import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tbcad.depth.depth_map import depth_views
-from tbcad.optics.camera import Camera
+from tbcad.core.optics.camera import Camera
+from tbcad.light.depth.depth_map import depth_views
+from tbcad.light.reconstruction.field import Field
+from tbcad.light.reconstruction.fitted import reconstruction
+from tbcad.light.reconstruction.picture import field_picture
+from tbcad.light.simulate.camera_photographs import camera_photographs
+from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.light.simulate.capture.photograph import to_bytes
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.object_from_file import ObjectOptions, Paint, load_or_built_in
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.synthesis import synthesise
+from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.options.captures import ReconstructOptions
-from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fitted import reconstruction
-from tbcad.reconstruction.picture import field_picture
-from tbcad.simulate.camera_photographs import camera_photographs
-from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
-from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.simulate.scene.object_from_file import ObjectOptions, Paint, load_or_built_in
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.views.ground_truth import pinhole_picture
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.viewpoints import image_quality
 from tbcad.types import Bytes
 
 CAPTURE_MM, DISTANCE_MM, SIZE = 60.0, 640.0, (640, 480)

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tbcad.optics.camera import Camera
-from tbcad.simulate.parallel import THREADS
-from tbcad.simulate.scene.object import GREY, SceneObject
-from tbcad.simulate.scene.ray_casting import LAMP_LIGHT, LAMPS, SKY_LIGHT
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.core.optics.camera import Camera
+from tbcad.light.simulate.parallel import THREADS
+from tbcad.light.simulate.scene.object import GREY, SceneObject
+from tbcad.light.simulate.scene.ray_casting import LAMP_LIGHT, LAMPS, SKY_LIGHT
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 PROGRAM = "povray"

@@ -9,20 +9,20 @@ import numpy as np
 from simulation import BOTH, PLACE, photographed
 from timing import Row, at_least, at_most, measured, spent_in_turns
 
-from tbcad.depth.depth_map import depth_views
-from tbcad.optics.camera import Camera
-from tbcad.reconstruction.field import Field
-from tbcad.reconstruction.fit import fit
-from tbcad.reconstruction.picture import field_picture
-from tbcad.reconstruction.rays import captured_rays
-from tbcad.reconstruction.start import Settings
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
+from tbcad.core.optics.camera import Camera
+from tbcad.light.depth.depth_map import depth_views
+from tbcad.light.reconstruction.field import Field
+from tbcad.light.reconstruction.fit import fit
+from tbcad.light.reconstruction.picture import field_picture
+from tbcad.light.reconstruction.rays import captured_rays
+from tbcad.light.reconstruction.start import Settings
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.synthesis import synthesise
 
 TURN = 12  # viewpoints around the object
 

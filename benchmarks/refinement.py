@@ -15,18 +15,18 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.geometry.vectors import perpendicular_axes, unit
-from tbcad.reconstruction.fit import fit
-from tbcad.reconstruction.picture import field_picture
-from tbcad.reconstruction.rays import CapturedRays, captured_rays, entries
-from tbcad.reconstruction.start import Level, Settings
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.photograph import to_bytes
-from tbcad.simulate.scene.object_from_file import load_or_built_in
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.views.ground_truth import pinhole_picture
-from tbcad.simulate.views.viewpoints import image_quality
+from tbcad.core.geometry.vectors import perpendicular_axes, unit
+from tbcad.light.reconstruction.fit import fit
+from tbcad.light.reconstruction.picture import field_picture
+from tbcad.light.reconstruction.rays import CapturedRays, captured_rays, entries
+from tbcad.light.reconstruction.start import Level, Settings
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.capture.photograph import to_bytes
+from tbcad.light.simulate.scene.object_from_file import load_or_built_in
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.types import Floats
 
 SETTINGS = Settings(levels=(Level(60, 2), Level(100, 3)))

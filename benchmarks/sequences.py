@@ -12,10 +12,10 @@ import numpy as np
 from circumstances import RESULTS, circumstances, show_and_write
 from timing import Figure, Row, at_least, at_most, measured
 
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.sequence import create_sequence, turns, write_turning
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.capture.sequence import create_sequence, turns, write_turning
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.types import Bytes
 
 FRAMES, WANTED, CORES = 8, 5, 2

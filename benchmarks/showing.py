@@ -21,11 +21,11 @@ from circumstances import RESULTS, circumstances, show_and_write
 from timing import Figure, Row, at_least, measured
 
 from tbcad import Views
-from tbcad.reconstruction.field import NAME, read_field
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.viewer.page import Query
-from tbcad.viewer.render import FieldRenderer, Renderer, ViewRenderer
-from tbcad.viewer.server import HOST, ViewServer
+from tbcad.light.reconstruction.field import NAME, read_field
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.viewer.page import Query
+from tbcad.light.viewer.render import FieldRenderer, Renderer, ViewRenderer
+from tbcad.light.viewer.server import HOST, ViewServer
 
 Method = Literal["nearest", "blend", "depth"]
 VIEWS = 90  # once around, in steps of 4 degrees

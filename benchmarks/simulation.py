@@ -13,22 +13,22 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from timing import Figure, Row, Spent, Work, at_least, at_most, measured, spent_in_turns
 
-from tbcad.optics.camera import Camera
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.image_files import write_images
-from tbcad.simulate.parallel import THREADS
-from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import GREY, SceneObject, built_in_object
-from tbcad.simulate.scene.object_from_file import load_object
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import Reflector
-from tbcad.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.ray_bundle import TwoPlane, two_plane_along
-from tbcad.simulate.views.refocus import ThinLens, lens_pinholes, refocus
-from tbcad.simulate.views.synthesis import synthesise
+from tbcad.core.optics.camera import Camera
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.capture.photograph import photograph
+from tbcad.light.simulate.image_files import write_images
+from tbcad.light.simulate.parallel import THREADS
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.scene.object import GREY, SceneObject, built_in_object
+from tbcad.light.simulate.scene.object_from_file import load_object
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
+from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus
+from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.types import Floats
 
 Cameras = Sequence[Reflector]

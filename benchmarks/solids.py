@@ -13,12 +13,12 @@ from OCP.gp import gp_Pnt
 from OCP.TopTools import TopTools_ListOfShape
 from timing import Figure, Row, at_most, in_turns, measured
 
-from tbcad.cad.brep import Solid
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
-from tbcad.optics.cells import cells_of
-from tbcad.optics.power_diagram import bounded_triangulation
+from tbcad.cad.kernel.brep import Solid
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
+from tbcad.core.optics.cells import cells_of
+from tbcad.core.optics.power_diagram import bounded_triangulation
+from tbcad.core.spec.load import load_spec
 from tbcad.shell.files import camera_solid, shell_envelope
-from tbcad.spec.load import load_spec
 
 SEGMENTS = 64
 FUSED = (8, 16)

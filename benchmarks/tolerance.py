@@ -17,16 +17,16 @@ from tbcad_verify.shell.optics import set_up
 from tbcad_verify.shell.recover import recover
 from timing import Figure, Row, at_least, at_most, in_turns, measured
 
-from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.mirrors.record import write_record
-from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.surfaces import Surfaces
+from tbcad.cad.formats.stl import write_stl
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.optics.cells import Cells, cells_of
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import load_spec
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw

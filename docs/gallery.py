@@ -17,14 +17,14 @@ import numpy as np
 from PIL import Image
 
 import tbcad
+from tbcad.core.spec.load import shipped_designs
+from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.light.simulate.capture.photograph import photograph
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.overview import Overview, overview
-from tbcad.simulate.capture.light_field import LightField, light_field_in_memory
-from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import shipped_designs
 
 DOCS = Path(__file__).parent
 RESULTS, PAGE, PICTURES = DOCS / "gallery.json", DOCS / "gallery.md", DOCS / "pictures"

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import tbcad
-from tbcad.mirrors.array import MirrorArray
+from tbcad.core.mirrors.array import MirrorArray
 
 OUT = Path(__file__).parent / "pictures" / "principle.svg"
 IN_PLANE = 1e-6  # of y of a mirror's direction

@@ -21,7 +21,7 @@ from tbcad.version import __version__
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
 
-    from tbcad.api import (
+    from tbcad.app.api import (
         Build,
         Views,
         analyse,
@@ -44,13 +44,13 @@ if TYPE_CHECKING:
         verify,
         view,
     )
+    from tbcad.app.whole_design import Design
+    from tbcad.core.mirrors.array import MirrorArray
+    from tbcad.core.spec.design import Spec
+    from tbcad.core.spec.load import load_spec
     from tbcad.errors import InputError
-    from tbcad.mirrors.array import MirrorArray
-    from tbcad.simulate.capture.light_field import LightField
-    from tbcad.spec.design import Spec
-    from tbcad.spec.load import load_spec
+    from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.tolerancing.analysis import Analysis
-    from tbcad.whole_design import Design
 
 __all__ = [
     "Analysis",
@@ -87,13 +87,13 @@ __all__ = [
 
 _MODULES = {
     "Analysis": "tbcad.tolerancing.analysis",
-    "Design": "tbcad.whole_design",
+    "Design": "tbcad.app.whole_design",
     "InputError": "tbcad.errors",
-    "LightField": "tbcad.simulate.capture.light_field",
-    "MirrorArray": "tbcad.mirrors.array",
+    "LightField": "tbcad.light.simulate.capture.light_field",
+    "MirrorArray": "tbcad.core.mirrors.array",
     "Report": "tbcad_verify.report.report",
-    "Spec": "tbcad.spec.design",
-    "load_spec": "tbcad.spec.load",
+    "Spec": "tbcad.core.spec.design",
+    "load_spec": "tbcad.core.spec.load",
 }
 
 
@@ -101,7 +101,7 @@ def __getattr__(name: str) -> object:
     """Load a public name when it is first used (PEP 562)."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_MODULES.get(name, "tbcad.api")), name)
+    value = getattr(import_module(_MODULES.get(name, "tbcad.app.api")), name)
     globals()[name] = value
     return value
 

@@ -1,6 +1,6 @@
 """`python -m tbcad`: the command `tbcad`."""
 
-from tbcad.cli import main
+from tbcad.app.cli import main
 
 if __name__ == "__main__":
     main()

@@ -5,7 +5,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.progress import Progress
+from tbcad.common.progress import Progress
 
 __all__ = ["Bools", "Bytes", "Colours", "Floats", "Ints", "Progress"]
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from tbcad.cli import run
-from tbcad.mirrors.record import write_record
-from tbcad.reconstruction import fitted
-from tbcad.reconstruction.choice import Trial
-from tbcad.reconstruction.rays import CapturedRays
-from tbcad.reconstruction.start import Settings
+from tbcad.app.cli import run
+from tbcad.core.mirrors.record import write_record
+from tbcad.light.reconstruction import fitted
+from tbcad.light.reconstruction.choice import Trial
+from tbcad.light.reconstruction.rays import CapturedRays
+from tbcad.light.reconstruction.start import Settings
 from tbcad.types import Bools, Progress
 from tests.mirror_arrays import mirror_design
 

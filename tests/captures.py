@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.simulate.capture.files import read_object
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.capture.files import read_object
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 
 
 @pytest.fixture(scope="session")

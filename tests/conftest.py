@@ -12,14 +12,14 @@ from hypothesis import HealthCheck, settings
 # threads of the linear algebra would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from tbcad.cli import run
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.mirrors.record import write_record
+from tbcad.app.cli import run
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.mirrors.record import write_record
+from tbcad.light.simulate.prototype.plan import Plan, read_plan
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.files import shell_envelope
-from tbcad.simulate.prototype.plan import Plan, read_plan
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
 from tests.mirror_arrays import mirror_design
 from tests.prototype_exports import write_export, write_wind_up
 

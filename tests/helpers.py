@@ -23,9 +23,9 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from tbcad.cad.brep import Solid
-from tbcad.cad.meshing import meshed
-from tbcad.cad.solids import faces
+from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.meshing import meshed
+from tbcad.cad.kernel.solids import faces
 
 
 def bounds(shape: TopoDS_Shape) -> np.ndarray:

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from tbcad.geometry.rotations import rotated
-from tbcad.geometry.vectors import unit
-from tbcad.machine.designed import designed_prototype
-from tbcad.machine.machine import Machine
+from tbcad.core.geometry.rotations import rotated
+from tbcad.core.geometry.vectors import unit
+from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.records.exposure import Frame
-from tbcad.simulate.prototype.plan import Plan
-from tbcad.simulate.scene.exported import ExportedDesign
+from tbcad.rig.machine.designed import designed_prototype
+from tbcad.rig.machine.machine import Machine
 
 # Standard deviations, about those of tbcad/tolerancing/process/fdm.toml.
 SEAT_MM, RADIUS_MM, CAMERA_MM, RUNOUT_MM = 0.15, 0.005, 0.14, 0.05

@@ -2,9 +2,9 @@
 
 from functools import lru_cache
 
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.spec.design import Spec
-from tbcad.spec.load import load_spec
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.load import load_spec
 
 
 @lru_cache(maxsize=16)

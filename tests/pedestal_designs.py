@@ -1,8 +1,8 @@
 """Designs whose mirrors stand on pedestals, for tests."""
 
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.optics.pedestals.cells import PedestalCells, pedestal_cells
-from tbcad.optics.pedestals.plan import pedestal_plan
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.optics.pedestals.cells import PedestalCells, pedestal_cells
+from tbcad.core.optics.pedestals.plan import pedestal_plan
 from tests.mirror_arrays import mirror_design
 
 GROOVE = 0.1

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.formats.csv_table import write_table
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.mirrors.record import write_record
+from tbcad.cad.formats.csv_table import write_table
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.record import write_record
+from tbcad.light.simulate.prototype.plan import Plan
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files import tables
 from tbcad.records.tables import StopRow
-from tbcad.simulate.prototype.plan import Plan
 from tests.prototype_records import write_prototype
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.reconstruction.grid import Grid
-from tbcad.reconstruction.rays import CapturedRays
+from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.types import Bools, Floats
 
 RADIUS = 10.0  # of the capture sphere, mm

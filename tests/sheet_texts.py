@@ -5,9 +5,9 @@ from itertools import combinations
 
 import numpy as np
 
-from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
-from tbcad.formats.entities import Text, simple
-from tbcad.formats.pdf import text_width
+from tbcad.cad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
+from tbcad.cad.formats.entities import Text, simple
+from tbcad.cad.formats.pdf import text_width
 
 
 def texts(sheet: Sheet) -> list[Text]:

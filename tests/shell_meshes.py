@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.mirrors.record import write_record
+from tbcad.cad.formats.stl import write_stl
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.record import write_record
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.shell.files import camera_a_mesh
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
 
 
 def export_with_meshes(folder: Path, made: MirrorDesign) -> ExportedDesign:

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.calibration.estimate.parameters import Prior
-from tbcad.calibration.priors import prototype_prior
-from tbcad.machine.built import is_cap, random_build
-from tbcad.machine.designed import designed_prototype
-from tbcad.machine.machine import Machine
-from tbcad.simulate.prototype.plan import read_plan
-from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulated_run.led_light import Occluders
-from tbcad.simulated_run.photographs import ImagingChain, SimulatedRun, frames_of
+from tbcad.light.simulate.prototype.plan import read_plan
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.calibration.priors import prototype_prior
+from tbcad.rig.machine.built import is_cap, random_build
+from tbcad.rig.machine.designed import designed_prototype
+from tbcad.rig.machine.machine import Machine
+from tbcad.rig.simulated_run.led_light import Occluders
+from tbcad.rig.simulated_run.photographs import ImagingChain, SimulatedRun, frames_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.types import Floats

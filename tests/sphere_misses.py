@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm
-from tbcad.optics.reflection import reflected_rays
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.optics.reflection import reflected_rays
 from tbcad.types import Floats
 
 

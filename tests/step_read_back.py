@@ -1,6 +1,6 @@
 """A solid as a reader of its STEP file gets it: whole, valid, and without gaps.
 
-The oracle of `tbcad.cad.checks.without_slack`, which needs no file.
+The oracle of `tbcad.cad.kernel.checks.without_slack`, which needs no file.
 """
 
 import tempfile
@@ -12,10 +12,10 @@ from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.brep import InvalidSolidError, Solid
-from tbcad.cad.checks import MAX_GAP_MM
-from tbcad.cad.measures import SolidProperties, volume
-from tbcad.formats.step import write_step
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.kernel.brep import InvalidSolidError, Solid
+from tbcad.cad.kernel.checks import MAX_GAP_MM
+from tbcad.cad.kernel.measures import SolidProperties, volume
 
 VOLUME_ERROR = 1e-5  # as a share of the volume; the kernel integrates to some 2e-6
 MAXIMUM = 1  # of the tolerances in a shape

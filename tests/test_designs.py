@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import dotted_fields, section_of
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.capture.pixel_counts import virtual_cameras
 from tbcad.optimizing.candidate import figures_of, size_of
 from tbcad.optimizing.views import mean_ssim
-from tbcad.simulate.capture.pixel_counts import virtual_cameras
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import dotted_fields, section_of
-from tbcad.spec.load import load_spec
 from tests.mirror_arrays import designed
 
 DESIGNS = Path(__file__).parents[1] / "designs"

@@ -16,10 +16,10 @@ import typer
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-import tbcad.cli  # noqa: F401 - adds all commands
-from tbcad.camera.catalogue import CAMERA_COLUMNS, LENS_COLUMNS
-from tbcad.cli import run
-from tests.cli.commands import commands
+import tbcad.app.cli  # noqa: F401 - adds all commands
+from tbcad.app.cli import run
+from tbcad.core.camera.catalogue import CAMERA_COLUMNS, LENS_COLUMNS
+from tests.app.cli.commands import commands
 
 ROOT = Path(__file__).parents[1]
 CHANGELOG = "CHANGELOG.md"  # shows commands as they once were
@@ -192,7 +192,7 @@ PICTURES = ["--width", "96", "--height", "72"]
 NOT_RUN = ("--scheduler", "--clients", "--port", "boards/", "captures/real", "simulate-run")
 NOT_RUN += ("runs/first", "calibration/", "calibration", "captures/first")
 NOT_RUN += ("calibration-shell/",)
-NOT_RUN += ("show",)  # goes on until it is stopped: tests/viewer
+NOT_RUN += ("show",)  # goes on until it is stopped: tests/light/viewer
 OF_THEIR_OWN = ("docs/tour.md",)  # documents whose commands have a test of their own
 SAMPLE = ROOT / "docs" / "sample"
 

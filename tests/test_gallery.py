@@ -8,8 +8,8 @@ from types import ModuleType
 import pytest
 
 import tbcad
+from tbcad.core.spec.load import shipped_designs
 from tbcad.output.overview import overview
-from tbcad.spec.load import shipped_designs
 
 DOCS = Path(__file__).parents[1] / "docs"
 

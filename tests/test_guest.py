@@ -91,7 +91,7 @@ def test_two_builds_at_once_write_what_a_command_writes(tmp_path: Path) -> None:
     run_script(tmp_path, "shell,prototype", 2)
     written = digests(tmp_path / "0")
     assert digests(tmp_path / "1") == written
-    main = "import sys; from tbcad.cli import main; sys.exit(main())"
+    main = "import sys; from tbcad.app.cli import main; sys.exit(main())"
     command = [sys.executable, "-c", main, "build", "--n", "6", "--parts", "shell,prototype"]
     subprocess.run([*command, "--out", str(tmp_path / "command"), "--quiet"], check=True)
     assert digests(tmp_path / "command") == written

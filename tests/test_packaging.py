@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.spec.load import shipped_designs
+from tbcad.core.spec.load import shipped_designs
 from tbcad.version import __version__
 
 ROOT = Path(__file__).parents[1]
@@ -48,7 +48,7 @@ def test_has_designs_data_and_types(wheel: zipfile.ZipFile) -> None:
     assert {
         "tbcad/py.typed",
         "tbcad_verify/py.typed",
-        "tbcad/reference/terms.toml",
+        "tbcad/app/reference/terms.toml",
         "tbcad_verify/report/checks.toml",
         "tbcad/tolerancing/process/fdm.toml",
         "tbcad/prototype/balls/catalogues/metric.csv",
@@ -74,4 +74,4 @@ def test_metadata_is_complete(wheel: zipfile.ZipFile) -> None:
     assert len(found.get_all("Classifier")) > 5
     assert {"cadquery", "cluster", "machine"} <= set(found.get_all("Provides-Extra"))
     (scripts,) = (name for name in wheel.namelist() if name.endswith("/entry_points.txt"))
-    assert "tbcad = tbcad.cli:main" in wheel.read(scripts).decode()
+    assert "tbcad = tbcad.app.cli:main" in wheel.read(scripts).decode()

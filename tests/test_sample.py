@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tbcad_verify.run.verify import verify
 
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import COLUMNS, design_record, mirror_rows
-from tbcad.spec.load import load_spec
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.record import COLUMNS, design_record, mirror_rows
+from tbcad.core.spec.load import load_spec
 from tests.exported_files import read_csv
 
 ROOT = Path(__file__).parents[1]

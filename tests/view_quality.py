@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from tbcad.simulate.scene.ray_casting import Scene
-from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.views.ground_truth import pinhole_picture
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.viewpoints import image_quality
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.synthesis import synthesise
+from tbcad.light.simulate.views.viewpoints import image_quality
 
 THREE_SIDES_DEG = ((10.0, 25.0), (130.0, 40.0), (250.0, 55.0))
 DISTANCE_MM, CAPTURE_MM = 640.0, 60.0

@@ -14,8 +14,9 @@ from pydantic.json_schema import PydanticInvalidForJsonSchema
 from tbcad_verify.record.prototype_tables import PlateHoles
 
 import tbcad
-from tbcad.cli.app import app
-from tbcad.cli.help_texts import HEADINGS
+from tbcad.app.cli.app import app
+from tbcad.app.cli.help_texts import HEADINGS
+from tbcad.app.reference.template import design_template
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files import bom_csv
 from tbcad.records.calibration import CalibrationRecord
@@ -27,7 +28,6 @@ from tbcad.records.manifest import Manifest
 from tbcad.records.prototype import Prototype
 from tbcad.records.run import RunRecord
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow
-from tbcad.reference.template import design_template
 
 ROOT = Path(__file__).parents[2]
 RECORDS: dict[str, type[Document]] = {

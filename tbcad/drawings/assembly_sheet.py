@@ -11,8 +11,7 @@ import numpy as np
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from tbcad.cad.projection import Segment
-from tbcad.drafting.sheet import (
+from tbcad.cad.drafting.sheet import (
     A3,
     BESIDE_MM,
     Sheet,
@@ -23,9 +22,10 @@ from tbcad.drafting.sheet import (
     sheet_frame,
     table,
 )
-from tbcad.drafting.views import as_entities
+from tbcad.cad.drafting.views import as_entities
+from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
+from tbcad.cad.kernel.projection import Segment
 from tbcad.drawings.export import DrawnExport
-from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.report.callouts import EDGE, RADIUS, Callout, place_callouts
 from tbcad.types import Bools, Floats, Ints

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.cad.features import distance
-from tbcad.cad.projection import Shape
-from tbcad.drafting.sheet import TABLE_ROW_MM, table
+from tbcad.cad.drafting.sheet import TABLE_ROW_MM, table
+from tbcad.cad.formats.entities import Entity, Point
+from tbcad.cad.kernel.features import distance
+from tbcad.cad.kernel.projection import Shape
 from tbcad.drawings.holes import DrawnHole, is_coaxial, mm
-from tbcad.formats.entities import Entity, Point
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.cad.features import HOLE_DEG, SLOT_DEG, RoundFace
-from tbcad.drafting.sheet import is_legible
-from tbcad.drafting.views import ABOVE, FRONT, LEFT
+from tbcad.cad.drafting.sheet import is_legible
+from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT
+from tbcad.cad.kernel.features import HOLE_DEG, SLOT_DEG, RoundFace
 from tbcad.types import Floats
 
 VIEWS = {"A": FRONT, "B": ABOVE, "C": LEFT}  # by the letter of their holes

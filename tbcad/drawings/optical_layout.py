@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from tbcad.drafting.dimensions import across, diameter, labels
-from tbcad.drafting.sheet import (
+from tbcad.cad.drafting.dimensions import across, diameter, labels
+from tbcad.cad.drafting.sheet import (
     A3,
     Sheet,
     TitleBlock,
@@ -19,13 +19,13 @@ from tbcad.drafting.sheet import (
     sheet_frame,
     table,
 )
-from tbcad.drafting.views import straight
+from tbcad.cad.drafting.views import straight
+from tbcad.cad.formats.checked_files import columns
+from tbcad.cad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
+from tbcad.core.spec.sizes import OpticsSpec
 from tbcad.drawings.export import DrawnExport
-from tbcad.formats.checked_files import columns
-from tbcad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
 from tbcad.records.design import DesignRecord
 from tbcad.records.tables import MirrorRow
-from tbcad.spec.sizes import OpticsSpec
 from tbcad.types import Floats
 
 NAME = "optical_layout"

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.cad.features import RoundFace, bounds, cylinders, plane_levels
-from tbcad.cad.projection import Shape, project
-from tbcad.drafting.dimensions import (
+from tbcad.cad.drafting.dimensions import (
     across,
     centre_cross,
     labels,
@@ -15,7 +13,7 @@ from tbcad.drafting.dimensions import (
     ruler_upward,
     upward,
 )
-from tbcad.drafting.sheet import (
+from tbcad.cad.drafting.sheet import (
     A3,
     A4,
     BESIDE_MM,
@@ -26,7 +24,11 @@ from tbcad.drafting.sheet import (
     notes_beside_title,
     sheet_frame,
 )
-from tbcad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
+from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
+from tbcad.cad.formats.entities import Circle, Entity, Layer, Point, Text
+from tbcad.cad.formats.pdf import text_width
+from tbcad.cad.kernel.features import RoundFace, bounds, cylinders, plane_levels
+from tbcad.cad.kernel.projection import Shape, project
 from tbcad.drawings.fits import Mate, SheetTable, drawn, fits_table, in_columns
 from tbcad.drawings.holes import (
     HEAD,
@@ -38,8 +40,6 @@ from tbcad.drawings.holes import (
     numbered_holes,
     table_rows,
 )
-from tbcad.formats.entities import Circle, Entity, Layer, Point, Text
-from tbcad.formats.pdf import text_width
 from tbcad.types import Floats
 
 BEFORE_MM, BEHIND_MM = 30.0, 16.0  # room for levels left and below; for lengths above and right

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.features import RoundFace, bounds, cylinders
-from tbcad.cad.projection import Shape
-from tbcad.cad.solids import moved
-from tbcad.drafting.sheet import Sheet, TitleBlock
+from tbcad.cad.drafting.sheet import Sheet, TitleBlock
+from tbcad.cad.formats.step import read_named_solid
+from tbcad.cad.kernel.features import RoundFace, bounds, cylinders
+from tbcad.cad.kernel.projection import Shape
+from tbcad.cad.kernel.solids import moved
 from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.fits import ListedSeat, Mate, purchased_mate, reamed_to, seats_table
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
-from tbcad.formats.step import read_named_solid
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.records.prototype import PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.projection import Curve, section
-from tbcad.drafting.dimensions import across, upward
-from tbcad.drafting.sheet import (
+from tbcad.cad.drafting.dimensions import across, upward
+from tbcad.cad.drafting.sheet import (
     A3,
     Sheet,
     TitleBlock,
@@ -18,11 +17,12 @@ from tbcad.drafting.sheet import (
     placed,
     sheet_frame,
 )
-from tbcad.drafting.views import FRONT, as_entities, straight
+from tbcad.cad.drafting.views import FRONT, as_entities, straight
+from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point
+from tbcad.cad.formats.step import read_named_solid
+from tbcad.cad.kernel.projection import Curve, section
 from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.holes import mm
-from tbcad.formats.entities import Circle, Entity, Layer, Line, Point
-from tbcad.formats.step import read_named_solid
 from tbcad.records.design import MandrelRecord
 from tbcad.types import Floats
 

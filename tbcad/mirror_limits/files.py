@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.cad.brep import Solid
-from tbcad.cad.solids import cylinder_radius
+from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.step import read_named_solid
+from tbcad.cad.formats.step_tolerances import FaceTolerances, write_tolerances
+from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.solids import cylinder_radius
+from tbcad.core.mirrors.array import mirror_ids
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
-from tbcad.formats.csv_table import Row, write_table
-from tbcad.formats.step import read_named_solid
-from tbcad.formats.step_tolerances import FaceTolerances, write_tolerances
+from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.mirror_limits.limits import MirrorLimits
 from tbcad.mirror_limits.read_back import check_read_back
 from tbcad.mirror_limits.sensitivity import MM_PER_UM, Sensitivities
-from tbcad.mirrors.array import mirror_ids
-from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.optics.power_diagram import PLANES
-from tbcad.optics.surfaces import Surfaces
 from tbcad.shell.files import wall_names
-from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-inspection/1"

@@ -6,8 +6,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from tbcad.formats.step import StepError
-from tbcad.formats.step_tolerances import FaceTolerances, ReadTolerance, read_tolerances
+from tbcad.cad.formats.step import StepError
+from tbcad.cad.formats.step_tolerances import FaceTolerances, ReadTolerance, read_tolerances
 from tbcad.types import Floats
 
 Key = TypeVar("Key", str, int, frozenset[str])

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.vectors import unit
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.core.geometry.vectors import unit
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.coverage import coverage, virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import CURVATURE, EdgeModel, EdgeModels, edge_models

@@ -9,13 +9,13 @@ from typing import TypeAlias
 import numpy as np
 from pydantic import ValidationError
 
+from tbcad.cad.formats.checked_files import parse_json
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.spec.design import FIT, Spec, spec_with
+from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import parse_json
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels
 from tbcad.optimizing.views import ViewsBy, mean_ssim
-from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels
-from tbcad.spec.design import FIT, Spec, spec_with
-from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
 STEP_MM = 0.5  # of lengths: finer changes no figure that counts

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.formats.toml import toml_text
+from tbcad.cad.formats.toml import toml_text
+from tbcad.common.results.plots import PlotPanel, Series, plot_file
+from tbcad.common.results.tables import Table, csv_text
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.load import spec_dict
 from tbcad.optimizing.candidate import DesignCandidate, Figures, placed
 from tbcad.optimizing.search import SearchResult
 from tbcad.options.designs import OptimizeOptions
-from tbcad.results.plots import PlotPanel, Series, plot_file
-from tbcad.results.tables import Table, csv_text
-from tbcad.spec.design import Spec
-from tbcad.spec.load import spec_dict
 from tbcad.types import Floats
 
 FIGURES = tuple(field.name for field in fields(Figures))

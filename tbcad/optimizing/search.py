@@ -10,7 +10,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
 
-from tbcad.atomic_files import replace_files
+from tbcad.common.atomic_files import replace_files
+from tbcad.common.schedule import run_units
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.load import spec_dict
 from tbcad.errors import InputError
 from tbcad.optimizing.candidate import (
     DesignCandidate,
@@ -25,9 +28,6 @@ from tbcad.optimizing.candidate import (
     store_bytes,
 )
 from tbcad.options.designs import Objective, OptimizeOptions
-from tbcad.schedule import run_units
-from tbcad.spec.design import Spec
-from tbcad.spec.load import spec_dict
 from tbcad.types import Floats
 
 POPULATION = 40  # places of a generation: eight for each variable

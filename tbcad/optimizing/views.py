@@ -11,14 +11,14 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.camera import Camera
-from tbcad.reconstruction.picture import BY_FIELD
-from tbcad.simulate.capture.traced_frame import traced_light_field
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.viewpoints import (
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.camera import Camera
+from tbcad.light.reconstruction.picture import BY_FIELD
+from tbcad.light.simulate.capture.traced_frame import traced_light_field
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.viewpoints import (
     ELEVATIONS_DEG,
     ground_truths,
     image_quality,

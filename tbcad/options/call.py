@@ -24,9 +24,9 @@ from typing import (
 
 from typer.models import ParameterInfo
 
+from tbcad.common.progress import Progress
+from tbcad.common.screen import Stages
 from tbcad.errors import InputError
-from tbcad.progress import Progress
-from tbcad.screen import Stages
 
 Keywords = ParamSpec("Keywords")
 Record = TypeVar("Record")
@@ -181,7 +181,7 @@ def _check(name: str, value: object, kind: Any, option: ParameterInfo | str) -> 
     from annotated_types import Ge, Le
     from pydantic import ValidationError
 
-    from tbcad.spec.errors import short_text
+    from tbcad.core.spec.errors import short_text
 
     low, high = getattr(option, "min", None), getattr(option, "max", None)
     try:
@@ -198,7 +198,7 @@ def _check(name: str, value: object, kind: Any, option: ParameterInfo | str) -> 
 
 
 def _allowed(kind: Any, limits: Sequence[object]) -> str:
-    from tbcad.spec.errors import allowed_text
+    from tbcad.core.spec.errors import allowed_text
 
     kinds = [one for one in get_args(kind) if one is not NoneType]
     if get_origin(kind) is Sequence:

@@ -124,7 +124,7 @@ def _cameras(folder: Path) -> list[Path]:
 
 def _is_of_shell(folder: Path) -> bool:
     """Whether a calibration's record says that it is of one camera of a shell."""
-    from tbcad.formats.checked_files import parse_json
+    from tbcad.cad.formats.checked_files import parse_json
 
     file = folder / CALIBRATION_FILE
     try:

@@ -12,7 +12,7 @@ from tbcad.options.call import Call
 from tbcad.options.shared import AnyPath, ForceFile, PlotFormatOption, Scheduler
 
 if TYPE_CHECKING:
-    from tbcad.spec.design import Spec
+    from tbcad.core.spec.design import Spec
 
     AnyDesign = Spec | Path | str
 else:

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 
 import typer
 
+from tbcad.common.screen import Stages
 from tbcad.errors import InputError
 from tbcad.options.call import Call
 from tbcad.options.lists import ExposureLeds, ExposureLit, seconds
 from tbcad.options.shared import AnyPath, Exports
-from tbcad.screen import Stages
 
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16
@@ -110,7 +110,7 @@ class RunOptions(Call):
         "Called with what a person must do, such as turn the object; says whether it is done.",
     ] = None
     show: Annotated[
-        Show | None, "Shows stages with their expected seconds, as tbcad.screen.stages does."
+        Show | None, "Shows stages with their expected seconds, as tbcad.common.screen.stages does."
     ] = None
 
     def size(self) -> tuple[int, int] | None:

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.background import Submit, at_once
-from tbcad.cad.brep import InvalidSolidError
-from tbcad.camera.sheet import write_camera_sheet
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.mirrors.record import write_record
+from tbcad.cad.kernel.brep import InvalidSolidError
+from tbcad.common.background import Submit, at_once
+from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
 from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
 from tbcad.shell.mandrel import Mandrel
 from tbcad.shell.mandrel_files import design_mandrel, mandrel_record, write_mandrels
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from tbcad.atomic_files import write_errors_as_input_errors
+from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
 from tbcad.output.content import refuse_other_content
 from tbcad.output.foreign_files import foreign_files, is_always_kept, keep_files

@@ -5,8 +5,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
+from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.spec.design import Spec
 
 Source: TypeAlias = str | PathLike[str] | None
 """A file or folder that a command reads; None, and what is not there, are left out."""

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, volume
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.core.geometry.primitives import Component, volume
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.design import MeshSpec, Spec
+from tbcad.core.spec.errors import SpecError
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.files.bom_csv import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.shell.files import camera_a_mesh
 from tbcad.shell.mandrel_files import design_mandrel
-from tbcad.spec.design import MeshSpec, Spec
-from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
 # Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a

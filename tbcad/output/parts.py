@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.prototype.suitable import check_suitable
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
 
 SHELL, PROTOTYPE = "shell", "prototype"
 PARTS = (SHELL, PROTOTYPE)

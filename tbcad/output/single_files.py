@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from tbcad.atomic_files import refuse_existing, write_errors_as_input_errors
+from tbcad.common.atomic_files import refuse_existing, write_errors_as_input_errors
 from tbcad.errors import InputError
 from tbcad.output.content import kind_of, refuse_inside, words
 from tbcad.output.manifest import MANIFEST, VERDICT, read_manifest

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.section import AUTO
+from tbcad.core.spec.sizes import led_places
 from tbcad.prototype.balls.layout import (
     BallChoices,
     PrototypeLayout,
@@ -38,10 +42,6 @@ from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
 from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_fasteners, stage_layout
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
-from tbcad.spec.section import AUTO
-from tbcad.spec.sizes import led_places
 
 if TYPE_CHECKING:
     from tbcad.prototype.printing.placing import PrintedPart

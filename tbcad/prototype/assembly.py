@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tbcad.cad.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
-from tbcad.cad.solids import pyramid, sphere
-from tbcad.geometry.vectors import norm
+from tbcad.cad.kernel.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
+from tbcad.cad.kernel.solids import pyramid, sphere
+from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.printing.placing import Role, component_solid

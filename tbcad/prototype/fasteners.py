@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     Component,
     Primitive,
     box,
@@ -21,8 +21,8 @@ from tbcad.geometry.primitives import (
     rectangle,
     revolved_along,
 )
-from tbcad.geometry.rotations import unit_circle
-from tbcad.geometry.vectors import perpendicular_axes
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 

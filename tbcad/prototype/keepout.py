@@ -10,11 +10,11 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from tbcad.geometry.primitives import Primitive, enclosing_triangles, rectangle
-from tbcad.geometry.rotations import even_angles, unit_circle
-from tbcad.geometry.round_cones import RoundCones
-from tbcad.geometry.vectors import norm
-from tbcad.optics.ball_light import light_hulls
+from tbcad.core.geometry.primitives import Primitive, enclosing_triangles, rectangle
+from tbcad.core.geometry.rotations import even_angles, unit_circle
+from tbcad.core.geometry.round_cones import RoundCones
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.ball_light import light_hulls
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout
 from tbcad.prototype.base.profile import offset, shortened

@@ -9,10 +9,10 @@ from math import cos, inf, pi, sin, sqrt
 
 import numpy as np
 
-from tbcad.compiled import compiled_loop
-from tbcad.geometry.loop_vectors import Vector
-from tbcad.geometry.round_cones import RoundCones
-from tbcad.geometry.vectors import norm
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.loop_vectors import Vector
+from tbcad.core.geometry.round_cones import RoundCones
+from tbcad.core.geometry.vectors import norm
 from tbcad.types import Floats
 
 # Columns of a cone: centre and radius where it starts, unit vector and length from there to its

@@ -9,10 +9,12 @@ import numpy as np
 from OCP.Standard import Standard_Failure
 from OCP.StdFail import StdFail_NotDone
 
-from tbcad.background import Submit, at_once
-from tbcad.cad.brep import InvalidSolidError
-from tbcad.camera.requirements import camera_requirements
-from tbcad.geometry.primitives import Component
+from tbcad.cad.kernel.brep import InvalidSolidError
+from tbcad.common.background import Submit, at_once
+from tbcad.core.camera.requirements import camera_requirements
+from tbcad.core.geometry.primitives import Component
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.arrangement import (
     PrototypeModel,
     balance_and_drive,
@@ -29,8 +31,6 @@ from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.printing.placing import PlacedSolid, PrintedPart, Role, placed_components
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
 from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.

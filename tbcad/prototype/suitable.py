@@ -1,7 +1,7 @@
 """Designs that a prototype can be made of."""
 
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
 
 
 def check_suitable(spec: Spec) -> None:

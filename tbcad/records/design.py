@@ -4,9 +4,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from tbcad.formats.checked_files import Finite, Vector
+from tbcad.cad.formats.checked_files import Finite, Vector
+from tbcad.core.spec.design import Spec
 from tbcad.records.document import Document, RecordSection
-from tbcad.spec.design import Spec
 
 NAME = "design.json"
 MISSING = "name a folder that tbcad build wrote"

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from tbcad.formats.checked_files import read_json
+from tbcad.cad.formats.checked_files import read_json
 
 
 class RecordSection(BaseModel):

@@ -18,8 +18,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from tbcad.cad.formats.checked_files import Finite
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import Finite
 from tbcad.records.document import Document, RecordSection
 
 PHOTOGRAPHS = "photographs"

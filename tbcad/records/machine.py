@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tbcad.formats.checked_files import Finite, Vector
+from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.records.document import Document, RecordSection
 from tbcad.records.exposure import Frame
 

@@ -4,7 +4,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from tbcad.formats.checked_files import Finite, Vector
+from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.records.document import Document, RecordSection
 from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
 from tbcad.records.prototype_light import LampsRecord, ShroudRecord

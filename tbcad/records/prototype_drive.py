@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tbcad.formats.checked_files import Finite
+from tbcad.cad.formats.checked_files import Finite
 from tbcad.records.document import RecordSection
 from tbcad.records.exposure import PhaseName
 

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from tbcad.formats.checked_files import Finite, Vector
+from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.records.document import RecordSection
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field
 
-from tbcad.formats.checked_files import Finite, Record, read_csv
+from tbcad.cad.formats.checked_files import Finite, Record, read_csv
 from tbcad.records.design import MISSING
 from tbcad.records.prototype import Prototype
 

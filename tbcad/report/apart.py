@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tbcad.geometry.vectors import unit
+from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.records.prototype import FastenerRecord
 from tbcad.types import Floats

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from tbcad.atomic_files import replace_files, write_errors_as_input_errors
+from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.output.single_files import check_file
 from tbcad.prototype.assembly_steps.machine import RESISTORS, Machine
 from tbcad.prototype.assembly_steps.steps import Step

@@ -12,7 +12,7 @@ import pyvista
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
-from tbcad.geometry.vectors import unit
+from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
 from tbcad.report.apart import offsets

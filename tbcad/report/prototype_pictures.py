@@ -12,9 +12,9 @@ import numpy as np
 import pyvista
 import trimesh
 
+from tbcad.common.srgb import shown_colour
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow
-from tbcad.srgb import shown_colour
 from tbcad.types import Floats
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
-from tbcad.formats.checked_files import columns
-from tbcad.geometry.vectors import dot, unit
+from tbcad.cad.formats.checked_files import columns
+from tbcad.core.geometry.vectors import dot, unit
 from tbcad.records.design import NAME, DesignRecord
 from tbcad.records.tables import MirrorRow
 from tbcad.types import Bools, Floats, Ints

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from tbcad.geometry.conics import EllipseArc
-from tbcad.optics.cells import Cells
+from tbcad.core.geometry.conics import EllipseArc
+from tbcad.core.optics.cells import Cells
 from tbcad.shell.envelope import Envelope
 from tbcad.types import Bools, Ints
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.optics.cells import Cells
+from tbcad.core.optics.cells import Cells
 from tbcad.types import Bools, Floats, Ints
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.conics import EllipseArc, Spheroid, enclosing_offset, wall_offset
-from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.optics.cells import Cells
-from tbcad.spec.design import FlangeSpec, ShellSpec
-from tbcad.spec.errors import SpecError
+from tbcad.core.geometry.conics import EllipseArc, Spheroid, enclosing_offset, wall_offset
+from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.optics.cells import Cells
+from tbcad.core.spec.design import FlangeSpec, ShellSpec
+from tbcad.core.spec.errors import SpecError
 from tbcad.types import Floats
 
 X, _, Z = np.eye(3)

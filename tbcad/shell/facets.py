@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
-from tbcad.optics.cells import Cells
-from tbcad.optics.surfaces import Surfaces
+from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
 from tbcad.shell.cell_outlines import CellOutlines, cell_outlines
 from tbcad.shell.segments import segment_counts, strip_points, strip_widths
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints
 
 # The search is in a plane, so what it finds on a sphere is looked for again from there.

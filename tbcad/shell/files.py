@@ -3,26 +3,26 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tbcad.cad.brep import Maker, Solid
-from tbcad.cad.measures import (
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.formats.step_mirror import mirrored_step
+from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.threemf import write_3mf
+from tbcad.cad.kernel.brep import Maker, Solid
+from tbcad.cad.kernel.measures import (
     FaceIntegrals,
     SolidProperties,
     face_integrals,
     mean_corner,
     properties,
 )
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import faces, one_solid
-from tbcad.formats.step import write_step
-from tbcad.formats.step_mirror import mirrored_step
-from tbcad.formats.stl import write_stl
-from tbcad.formats.threemf import write_3mf
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.mirrors.record import shell_record
-from tbcad.optics.cell_moments import cell_moments
-from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.optics.pedestals.walls import wall_moments
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.solids import faces, one_solid
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.mirrors.record import shell_record
+from tbcad.core.optics.cell_moments import cell_moments
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.pedestals.walls import wall_moments
 from tbcad.shell.envelope import Envelope, closing_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.shell.solid import casing_faces, front_edges

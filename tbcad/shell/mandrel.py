@@ -11,17 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from tbcad.geometry.conics import Spheroid
-from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.geometry.rotations import even_angles, unit_circle
-from tbcad.geometry.vectors import perpendicular_axes, unit
-from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.optics.power_diagram import PLANES
-from tbcad.optics.surfaces import Surfaces
+from tbcad.core.geometry.conics import Spheroid
+from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.rotations import even_angles, unit_circle
+from tbcad.core.geometry.vectors import perpendicular_axes, unit
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.spec.design import FlangeSpec, ShellSpec
+from tbcad.core.spec.errors import SpecError
 from tbcad.shell.envelope import Holes, arc_around, arc_over_top, flange_holes
-from tbcad.spec.design import FlangeSpec, ShellSpec
-from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
 # Points on each arc: between two of them a normal turns by so little that draft changes by less

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 from OCP.TopoDS import TopoDS_Face
 
-from tbcad.cad.brep import Maker, Ring, Solid, hole_faces
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.solids import one_solid, reversed_faces
-from tbcad.formats.step import write_step
-from tbcad.geometry.vectors import FLIP_X
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.mirrors.record import mandrel_files
-from tbcad.optics.cells import Cells
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.kernel.brep import Maker, Ring, Solid, hole_faces
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.solids import one_solid, reversed_faces
+from tbcad.core.geometry.vectors import FLIP_X
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.mirrors.record import mandrel_files
+from tbcad.core.optics.cells import Cells
+from tbcad.core.spec.design import Spec
 from tbcad.records.design import MandrelRecord
 from tbcad.shell.casing_edges import boundary_chain, chain_ends
 from tbcad.shell.envelope import Holes
@@ -21,7 +22,6 @@ from tbcad.shell.files import shell_properties, wall_names, write_half_mesh
 from tbcad.shell.mandrel import Mandrel, mandrel_of
 from tbcad.shell.mesh import FROM_X, FROM_Z, MeshBuilder, front_facets
 from tbcad.shell.solid import FrontEdges, front_edges, reversed_ring
-from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
 X, Y, Z = np.eye(3)

@@ -3,17 +3,17 @@
 import manifold3d
 import numpy as np
 
-from tbcad.cad.mesh import Mesh
-from tbcad.geometry.conics import EllipseArc, Spheroid
-from tbcad.geometry.rotations import even_angles, unit_circle
-from tbcad.geometry.vectors import dot
-from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals.cells import PedestalCells
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.core.geometry.conics import EllipseArc, Spheroid
+from tbcad.core.geometry.rotations import even_angles, unit_circle
+from tbcad.core.geometry.vectors import dot
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.spec.design import Spec
 from tbcad.shell.casing_edges import ARC_ENDS, boundary_chain, casing_lines, outline
 from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
 from tbcad.shell.envelope import Envelope, Holes
 from tbcad.shell.facets import Facets, mirror_facets
-from tbcad.spec.design import Spec
 from tbcad.types import Floats, Ints
 
 MIN_HOLE_SEGMENTS = 24

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import mirror_margins
-from tbcad.optics.cells import Cells
-from tbcad.optics.reflection import miss_distances
-from tbcad.optics.windows import limiting_sides, minima_by_mirror
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.mirrors.array import mirror_margins
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.reflection import miss_distances
+from tbcad.core.optics.windows import limiting_sides, minima_by_mirror
+from tbcad.core.spec.design import Spec
 from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
-from tbcad.spec.design import Spec
 from tbcad.types import Bools, Floats, Ints
 
 # A corner's inner point is at most this many strip widths away, where arcs meet at a sharp angle.

@@ -9,12 +9,12 @@ from itertools import chain, pairwise
 import numpy as np
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex
 
-from tbcad.cad.brep import Maker, Ring, Side, hole_faces
-from tbcad.geometry.conics import EllipseArc
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.optics.cells import Arcs, Cells
-from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.optics.power_diagram import PLANES
+from tbcad.cad.kernel.brep import Maker, Ring, Side, hole_faces
+from tbcad.core.geometry.conics import EllipseArc
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.cells import Arcs, Cells
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.power_diagram import PLANES
 from tbcad.shell.casing_edges import (
     ARC_ENDS,
     boundary_chain,

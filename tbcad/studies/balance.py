@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Record, Table
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.camera import Camera
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Record, Table
-from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
-from tbcad.simulate.capture.traced_frame import traced_light_field
-from tbcad.simulate.scene.object import patterned_ball
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.viewpoints import (
+from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
+from tbcad.light.simulate.capture.traced_frame import traced_light_field
+from tbcad.light.simulate.scene.object import patterned_ball
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.viewpoints import (
     StudyMethod,
     ground_truths,
     image_quality_map,
@@ -27,7 +28,6 @@ from tbcad.simulate.views.viewpoints import (
     viewpoints_over_hemisphere,
     views_by,
 )
-from tbcad.spec.design import Spec
 from tbcad.studies.paper import with_lens_of_table_i
 from tbcad.studies.sweep import MAX_N, try_design
 from tbcad.types import Bools, Bytes, Progress

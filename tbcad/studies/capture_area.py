@@ -4,11 +4,11 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Cell, Record, Table
-from tbcad.simulate.capture.pixel_counts import virtual_cameras
-from tbcad.spec.design import Spec
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.capture.pixel_counts import virtual_cameras
 from tbcad.studies.paper import claims
 from tbcad.studies.sweep import DesignAttempt, for_each_n, try_design
 from tbcad.types import Progress

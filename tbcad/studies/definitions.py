@@ -4,12 +4,17 @@ from functools import cache
 
 import numpy as np
 
-from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.mirrors.array import MirrorArray, numbered_directions
-from tbcad.results.tables import Record, Table
-from tbcad.schedule import run_units
-from tbcad.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels, virtual_cameras
-from tbcad.spec.design import Spec
+from tbcad.common.results.tables import Record, Table
+from tbcad.common.schedule import run_units
+from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.mirrors.array import MirrorArray, numbered_directions
+from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.capture.pixel_counts import (
+    PixelCounts,
+    Sensor,
+    count_pixels,
+    virtual_cameras,
+)
 from tbcad.studies.paper import (
     NUMBER,
     RESOLUTION,

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.camera.lens import (
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Record, Table
+from tbcad.core.camera.lens import (
     DepthRange,
     Lens,
     aperture_stop,
@@ -12,12 +15,9 @@ from tbcad.camera.lens import (
     focal_length,
     lens_for,
 )
-from tbcad.camera.requirements import FANS, PLACES, VirtualImages, virtual_images
+from tbcad.core.camera.requirements import FANS, PLACES, VirtualImages, virtual_images
+from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Record, Table
-from tbcad.spec.design import Spec
 from tbcad.studies.paper import claimed, claims, with_lens_of_table_i
 from tbcad.studies.sweep import try_design
 from tbcad.types import Floats, Progress

@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorArray, design
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Record, Table
-from tbcad.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels
-from tbcad.spec.design import Spec, spec_with
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Record, Table
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.mirrors.array import MirrorArray, design
+from tbcad.core.spec.design import Spec, spec_with
+from tbcad.light.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels
 from tbcad.studies.paper import with_lens_of_table_i
 from tbcad.types import Floats, Progress
 

@@ -4,29 +4,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Record, Table
+from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
-from tbcad.optics.camera import Camera
-from tbcad.options.captures import Geometry
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Record, Table
-from tbcad.simulate.camera_photographs import photographed
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
-from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.rays import Shift
-from tbcad.simulate.views.ground_truth import disc_points, lens_picture, pixel_points
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.refocus import ThinLens, refocus
-from tbcad.simulate.views.viewpoints import (
+from tbcad.light.simulate.camera_photographs import photographed
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.rays import Shift
+from tbcad.light.simulate.views.ground_truth import disc_points, lens_picture, pixel_points
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import ThinLens, refocus
+from tbcad.light.simulate.views.viewpoints import (
     Viewpoints,
     ground_truths,
     object_masks,
     picture_quality,
     view_quality,
 )
+from tbcad.options.captures import Geometry
 from tbcad.studies.paper import claimed
 from tbcad.types import Bytes, Floats, Progress
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from tbcad.mirrors.array import UNSTRETCHED
-from tbcad.spec.design import FIT, Spec
+from tbcad.core.mirrors.array import UNSTRETCHED
+from tbcad.core.spec.design import FIT, Spec
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,21 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import ttest_rel
 
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Table
+from tbcad.light.simulate.camera_photographs import photographed
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.viewpoints import (
+    StudyMethod,
+    Viewpoints,
+    ground_truths,
+    view_quality,
+)
 from tbcad.options.captures import Geometry
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Table
-from tbcad.simulate.camera_photographs import photographed
-from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.viewpoints import StudyMethod, Viewpoints, ground_truths, view_quality
 from tbcad.types import Floats, Progress
 
 LEVEL = 0.95

@@ -5,18 +5,18 @@ from functools import partial
 
 import numpy as np
 
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Record, Table
+from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Record, Table
-from tbcad.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.pixel_counts import (
     PixelCounts,
     Sensor,
     allowed,
     count_pixels,
     virtual_cameras,
 )
-from tbcad.spec.design import Spec
 from tbcad.studies.definitions import DISC, IN_FRAME, definitions
 from tbcad.studies.paper import (
     HEADINGS,

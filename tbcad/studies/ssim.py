@@ -10,27 +10,27 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import linregress
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.results.plots import PlotPanel, Series
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Cell, Record, Table
-from tbcad.simulate.capture.light_field import NAME, LightField
-from tbcad.simulate.capture.light_field_writer import create_light_field, write_camera
-from tbcad.simulate.capture.photograph import photograph
-from tbcad.simulate.capture.pixel_counts import Sensor
-from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.viewpoints import (
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.capture.light_field import NAME, LightField
+from tbcad.light.simulate.capture.light_field_writer import create_light_field, write_camera
+from tbcad.light.simulate.capture.photograph import photograph
+from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import reflectors
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.viewpoints import (
     QUALITY,
     StudyMethod,
     Viewpoints,
     ground_truths,
     view_quality,
 )
-from tbcad.spec.design import Spec
 from tbcad.studies.paper import balanced_sensors, claims, with_lens_of_table_i
 from tbcad.studies.sweep import megapixels, try_design
 from tbcad.types import Bytes, Progress

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
+from tbcad.common.results.tables import Table
+from tbcad.common.schedule import run_units
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.spec.design import Spec, spec_with
+from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.results.tables import Table
-from tbcad.schedule import run_units
-from tbcad.spec.design import Spec, spec_with
-from tbcad.spec.errors import SpecError
 from tbcad.types import Floats, Progress
 
 Result = TypeVar("Result")

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
-from tbcad import schedule
+from tbcad.common import schedule
 from tbcad.errors import InputError
+from tbcad.light.simulate.prototype.plan import read_plan
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.options.tolerances import ToleranceOptions
-from tbcad.simulate.prototype.plan import read_plan
-from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.object import SceneObject
-from tbcad.simulate.scene.ray_casting import prepared_scene
-from tbcad.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,

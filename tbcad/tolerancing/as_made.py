@@ -4,7 +4,7 @@ import numpy as np
 from tbcad_verify.report.as_made import AsMade, ProcessYield
 
 from tbcad.errors import InputError
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, estimate_yield, simulate
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.mirrors.array import DIRECTION_DIGITS
-from tbcad.spec.design import MAX_MARGIN, Spec, spec_with
-from tbcad.spec.errors import SpecError
+from tbcad.core.mirrors.array import DIRECTION_DIGITS
+from tbcad.core.spec.design import MAX_MARGIN, Spec, spec_with
+from tbcad.core.spec.errors import SpecError
 from tbcad.tolerancing.margin import STEP_MM, SolvedDesigns, solved_designs, with_margin
 from tbcad.tolerancing.montecarlo.builds import coverage_at_yield
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers

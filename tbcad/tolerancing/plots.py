@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.results.plots import PlotPanel, Series
+from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad import schedule
+from tbcad.common import schedule
+from tbcad.core.spec.design import EdgeKind, Spec, spec_with
+from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.options.tolerances import check_yield
-from tbcad.spec.design import EdgeKind, Spec, spec_with
-from tbcad.spec.errors import SpecError
 from tbcad.tolerancing.margin import (
     STEP_MM,
     SeeingPixels,

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.results.study import Figure, Study
-from tbcad.results.tables import Record, Table
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.results.tables import Record, Table
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.measures import (
+from tbcad.cad.kernel.measures import (
     SolidProperties,
     face_integrals,
     mean_corner,
@@ -11,8 +11,8 @@ from tbcad.cad.measures import (
     properties,
     volume,
 )
-from tbcad.cad.solids import cylinder, faces, moved, polygon, prism, sphere
-from tbcad.geometry.primitives import rectangle
+from tbcad.cad.kernel.solids import cylinder, faces, moved, polygon, prism, sphere
+from tbcad.core.geometry.primitives import rectangle
 
 START, UP = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 1.0])
 

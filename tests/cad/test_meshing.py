@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.measures import volume
-from tbcad.cad.meshing import (
+from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.meshing import (
     SIDES,
     as_manifold,
     meshed,
@@ -14,8 +14,8 @@ from tbcad.cad.meshing import (
     volume_by_meshes,
     without_degenerate,
 )
-from tbcad.cad.solids import cut, cylinder, fused, sphere
-from tbcad.geometry.primitives import (
+from tbcad.cad.kernel.solids import cut, cylinder, fused, sphere
+from tbcad.core.geometry.primitives import (
     Cylinder,
     Primitive,
     Prism,
@@ -24,10 +24,10 @@ from tbcad.geometry.primitives import (
     rectangle,
     revolved_along,
 )
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     volume as closed_volume,
 )
-from tbcad.geometry.vectors import norm, unit
+from tbcad.core.geometry.vectors import norm, unit
 
 START, TILTED = np.array([1.0, -2.0, 3.0]), unit(np.array([0.3, -0.5, 0.8]))
 TRIANGLE = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0]])

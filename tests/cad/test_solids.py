@@ -5,9 +5,9 @@ import pytest
 from OCP.BRep import BRep_Builder
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
-from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.measures import mean_corner, volume
-from tbcad.cad.solids import (
+from tbcad.cad.kernel.brep import InvalidSolidError
+from tbcad.cad.kernel.measures import mean_corner, volume
+from tbcad.cad.kernel.solids import (
     common,
     cut,
     cylinder,
@@ -28,7 +28,7 @@ from tbcad.cad.solids import (
     vertices,
     without_cavities,
 )
-from tbcad.geometry.primitives import rectangle
+from tbcad.core.geometry.primitives import rectangle
 
 BASE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 ORIGIN, UP, AWAY = np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([20.0, 0.0, 0.0])

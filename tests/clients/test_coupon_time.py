@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 import tbcad
-from tbcad.mirrors.array import design
+from tbcad.core.mirrors.array import design
 from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.base.coupon import coupon_plates
 from tbcad.prototype.base.coupon_seat import expected_downs, worst_pose

@@ -1,17 +1,17 @@
 """The opacity of a field, rendered by Mitsuba as an absorbing medium before white light.
 
 Its media do not emit, so it says nothing about colours: those are compared with sums in double
-precision (tests/reconstruction/test_marching.py).
+precision (tests/light/reconstruction/test_marching.py).
 """
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from tbcad.reconstruction.field import Field, density_of
-from tbcad.reconstruction.grid import Grid
-from tbcad.reconstruction.picture import field_picture
-from tbcad.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.reconstruction.field import Field, density_of
+from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.picture import field_picture
+from tbcad.light.simulate.scene.viewpoint import camera_around_object
 from tests.ray_fields import RADIUS
 
 pytestmark = pytest.mark.clients

@@ -6,7 +6,7 @@ import pytest
 from tbcad_verify.programs import check_with_programs, is_skipped
 from tbcad_verify.report.checks import Check
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tests.clients.test_programs import PROGRAMS, wanted
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]

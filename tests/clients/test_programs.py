@@ -21,7 +21,7 @@ from tbcad_verify.programs.program_query import on_path, sandbox
 from tbcad_verify.report.checks import Check
 from tbcad_verify.run.child import Limits
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tests.exported_files import read_csv
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tests.clients.browser import Browser
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.cli import run
-from tbcad.viewer.page import Query
-from tbcad.viewer.server import ViewServer
+from tbcad.app.cli import run
+from tbcad.light.viewer.page import Query
+from tbcad.light.viewer.server import ViewServer
 from tests.clients.browser import Browser
 from tests.clients.viewer_page import (
     PICTURE_APERTURE_MM,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 

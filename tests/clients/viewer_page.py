@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tbcad.simulate.capture.light_field import LightField
-from tbcad.viewer.page import Query
-from tbcad.viewer.render import Renderer
-from tbcad.viewer.server import ViewServer
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.viewer.page import Query
+from tbcad.light.viewer.render import Renderer
+from tbcad.light.viewer.server import ViewServer
 from tests.clients.browser import Browser
 
 PIXELS = """(() => {

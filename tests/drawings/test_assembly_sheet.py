@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.cad.projection import Segment
-from tbcad.drafting.views import FRONT
+from tbcad.cad.drafting.views import FRONT
+from tbcad.cad.formats.entities import Circle, Text
+from tbcad.cad.kernel.projection import Segment
 from tbcad.drawings.assembly_sheet import EYES, AssemblyJob, draw_assembly, line_picture
-from tbcad.formats.entities import Circle, Text
 
 BOX, POST = (40.0, 20.0, 10.0), (5.0, 5.0, 30.0)
 

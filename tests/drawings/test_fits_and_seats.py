@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.brep import Solid
-from tbcad.cad.features import RoundFace, distance
-from tbcad.cad.solids import cut, cylinder, faces, one_solid, polygon, prism
+from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.features import RoundFace, distance
+from tbcad.cad.kernel.solids import cut, cylinder, faces, one_solid, polygon, prism
+from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.fits import (
     ListedSeat,
@@ -22,8 +25,6 @@ from tbcad.drawings.fits import (
 )
 from tbcad.drawings.holes import DrawnHole, numbered_holes, table_rows
 from tbcad.drawings.printed_parts import draw_part, part_job
-from tbcad.formats.csv_table import Row, write_table
-from tbcad.formats.step import write_step
 from tbcad.output.manifest import read_manifest, write_manifest
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.files.bom_csv import COLUMNS
@@ -31,7 +32,6 @@ from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import DesignRecord
 from tbcad.records.prototype import CapRecord, Prototype
 from tbcad.records.tables import BallRow
-from tbcad.spec.load import load_spec
 from tbcad.types import Floats
 from tests.prototype_records import printed_part, prototype_document
 from tests.sheet_texts import check_texts, texts

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.brep import Solid
-from tbcad.cad.features import bounds, cylinders, plane_levels
-from tbcad.cad.projection import Round, Segment, project, section
-from tbcad.cad.solids import cut, cylinder, faces, one_solid, polygon, prism
-from tbcad.drafting.sheet import BORDER_MM, TITLE_MM, Sheet, TitleBlock
-from tbcad.drafting.views import ABOVE, FRONT
+from tbcad.cad.drafting.sheet import BORDER_MM, TITLE_MM, Sheet, TitleBlock
+from tbcad.cad.drafting.views import ABOVE, FRONT
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.features import bounds, cylinders, plane_levels
+from tbcad.cad.kernel.projection import Round, Segment, project, section
+from tbcad.cad.kernel.solids import cut, cylinder, faces, one_solid, polygon, prism
 from tbcad.drawings.holes import numbered_holes
 from tbcad.drawings.part_sheet import PartText, part_sheets
 from tbcad.drawings.printed_parts import PartJob, draw_part
 from tbcad.drawings.write import Job, draw
-from tbcad.formats.step import write_step
 from tests.sheet_texts import check_texts, covered, texts
 
 SIZE = np.array([60.0, 40.0, 8.0])

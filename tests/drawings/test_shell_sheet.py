@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tbcad.drafting.sheet import rectangle
-from tbcad.drafting.views import straight
+from tbcad.cad.drafting.sheet import rectangle
+from tbcad.cad.drafting.views import straight
+from tbcad.cad.formats.entities import Layer, Polyline, Text
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import read_export
 from tbcad.drawings.shell_sheet import HATCH_MM, draw_shell, hatching, mandrel_job
 from tbcad.drawings.write import drawable
-from tbcad.formats.entities import Layer, Polyline, Text
-from tbcad.mirrors.array import design
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.spec.load import load_spec
 
 
 def closed(box: tuple[float, float, float, float]) -> Polyline:

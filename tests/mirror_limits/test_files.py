@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 
-from tbcad.api import inspect
-from tbcad.cli import run
-from tbcad.formats.step import StepError, read_named_solid
-from tbcad.formats.step_tolerances import read_tolerances
+from tbcad.app.api import inspect
+from tbcad.app.cli import run
+from tbcad.cad.formats.step import StepError, read_named_solid
+from tbcad.cad.formats.step_tolerances import read_tolerances
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.load import load_spec
 from tbcad.mirror_limits.read_back import check_read_back
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import write_record
 from tbcad.shell.files import shell_envelope, write_shell_solids
-from tbcad.spec.load import load_spec
 from tests.helpers import read_step, volume
 
 SMALL = ["n=4", "mirrors.coating_um=20"]
@@ -118,7 +118,7 @@ def test_radii_are_read_with_their_limits(written: Path) -> None:
 
 def test_a_file_that_lost_a_zone_is_found(written: Path, tmp_path: Path) -> None:
     """Read back against what should be there: one mirror more than the file has."""
-    from tbcad.formats.step_tolerances import FaceTolerances
+    from tbcad.cad.formats.step_tolerances import FaceTolerances
 
     rows = table(written)
     profile = {row["id"]: float(row["profile_mm"]) for row in rows} | {"a9999": 1.0}

@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.errors import InputError
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.mirror_limits.inspect import minimum_at_limits
 from tbcad.mirror_limits.limits import MirrorLimits, mirror_limits
 from tbcad.mirror_limits.sensitivity import (
@@ -18,9 +21,6 @@ from tbcad.mirror_limits.sensitivity import (
     tilt_axes,
     touching,
 )
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.simulate.scene.exported import ExportedDesign
-from tbcad.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.coverage import coverage
 from tbcad.tolerancing.montecarlo.edge_model import APEX, CURVATURE, edge_models, surface_tables
 from tbcad.types import Floats

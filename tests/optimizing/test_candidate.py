@@ -6,7 +6,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
 from tbcad.optimizing.candidate import (
     STEP_MM,
     bounds,
@@ -18,8 +20,6 @@ from tbcad.optimizing.candidate import (
     size_of,
     virtual_camera_pixels,
 )
-from tbcad.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
-from tbcad.spec.load import load_spec
 
 FEW_PIXELS = ("n=4", "width_px=416", "height_px=310")
 

@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.optimizing import search as search_module
 from tbcad.optimizing.candidate import STEP_MM, DesignCandidate, Figures, MachineLimits, Place
@@ -21,8 +23,6 @@ from tbcad.optimizing.search import (
     weightings,
 )
 from tbcad.options.designs import OptimizeOptions
-from tbcad.spec.design import Spec
-from tbcad.spec.load import load_spec
 
 SPEC = load_spec(None, ["n=4", "shell.wall_mm=4"])
 BEST = (123.0, -140.0, 111.5, 1.3, 1.15)

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import design
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.load import load_spec
+from tbcad.light.reconstruction import picture
+from tbcad.light.reconstruction.picture import BY_FIELD
+from tbcad.light.reconstruction.start import Level, Settings
+from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
 from tbcad.optimizing import views
 from tbcad.optimizing.candidate import MachineLimits, evaluate, place_of
 from tbcad.optimizing.views import mean_ssim
-from tbcad.reconstruction import picture
-from tbcad.reconstruction.picture import BY_FIELD
-from tbcad.reconstruction.start import Level, Settings
-from tbcad.simulate.capture.pixel_counts import Sensor
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
-from tbcad.spec.load import load_spec
 from tbcad.studies.ssim import ssim
 
 SPEC = load_spec(None, ["n=4", "width_px=208", "height_px=155"])

@@ -12,12 +12,12 @@ import pytest
 import typer
 
 import tbcad
-from tbcad.calibration.run import WrittenCalibration
 from tbcad.errors import InputError
 from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
-from tbcad.runs.photographs import Run
+from tbcad.rig.calibration.run import WrittenCalibration
+from tbcad.rig.runs.photographs import Run
 
 ONLY_WRITTEN = {
     *("json", "all_frames", "mesh", "prototype"),
@@ -125,7 +125,7 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
     ],
 )
 def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
-    from tests.cli.commands import leaves
+    from tests.app.cli.commands import leaves
 
     command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
     python = set(inspect.signature(getattr(tbcad, name)).parameters)

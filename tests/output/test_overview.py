@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign, design
 from tbcad.output.overview import Overview, overview
 from tbcad.output.parts import SHELL
 from tbcad.prototype.arrangement import arrangements
 from tbcad.prototype.model import build_prototype_model
 from tbcad.shell.files import camera_a_mesh
-from tbcad.spec.load import load_spec
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.single_files import check_file

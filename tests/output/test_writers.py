@@ -104,7 +104,7 @@ sys.path[:0] = [{root!r}]
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by what started the tests?
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from pathlib import Path
-from tbcad.cli import app, run
+from tbcad.app.cli import app, run
 from tbcad.output.folder import replacing
 
 @app.command()

@@ -2,7 +2,9 @@
 
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import load_drives
@@ -10,8 +12,6 @@ from tbcad.prototype.frame.layout import FrameLayout, frame_layout
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import PrototypeSpec
 
 # One of its balls is so near to the hub that a motor's pinion clears it by 2 mm only.
 SMALL = load_spec(

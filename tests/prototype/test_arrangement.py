@@ -2,15 +2,15 @@
 
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec, spec_dict
+from tbcad.core.spec.prototype import PAD_ANGLES_DEG, Hold
 from tbcad.prototype.arrangement import PrototypeModel, arrange, arrangements
 from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import ball_masses
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec, spec_dict
-from tbcad.spec.prototype import PAD_ANGLES_DEG, Hold
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.measures import volume as solid_volume
-from tbcad.geometry.primitives import enclosing_triangles, volume
+from tbcad.cad.kernel.measures import volume as solid_volume
+from tbcad.core.geometry.primitives import enclosing_triangles, volume
 from tbcad.prototype.fasteners import (
     PITCH_MM,
     PROFILES,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tbcad.geometry.round_cones import RoundCones
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.round_cones import RoundCones
+from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.keepout_distances import (
     azimuth_ranges,
     cone_table,

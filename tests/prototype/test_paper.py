@@ -9,7 +9,10 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import design
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
@@ -19,9 +22,6 @@ from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import PrototypeSpec
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)

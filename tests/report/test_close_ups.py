@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.mirrors.seam import seam_gaps
+from tbcad.core.mirrors.seam import seam_gaps
+from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.report import close_ups
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
 from tbcad.report.section import section_of
-from tbcad.simulate.scene.exported import ExportedDesign
 from tests.mirror_arrays import mirror_design
 from tests.shell_meshes import export_with_meshes
 

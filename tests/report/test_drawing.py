@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tests.exported_files import contents
 
 SAMPLE = Path(__file__).parents[2] / "docs" / "sample"

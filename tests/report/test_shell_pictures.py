@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import design
-from tbcad.mirrors.record import write_record
+from tbcad.core.mirrors.array import design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.load import load_spec
 from tbcad.report.shell_pictures import (
     ANGLE_DEG,
     FRAME_MARGIN,
@@ -18,7 +19,6 @@ from tbcad.report.shell_pictures import (
 )
 from tbcad.shell.facets import mirror_facets
 from tbcad.shell.files import camera_a_mesh
-from tbcad.spec.load import load_spec
 
 ROOT = Path(__file__).parents[2]
 AFTERNOON = ROOT / "designs" / "afternoon-print.toml"

@@ -6,8 +6,8 @@ import pytest
 import trimesh
 from OCP.BRepCheck import BRepCheck_Analyzer
 
-from tbcad.cad.measures import properties
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.cad.kernel.measures import properties
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
 from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, mandrel_solid
 from tests.helpers import volume

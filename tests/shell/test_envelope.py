@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorArray, design
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.mirrors.array import MirrorArray, design
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
 from tbcad.shell.envelope import Envelope, closing_envelope
 from tbcad.shell.files import shell_envelope
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
 
 
 def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_envelope: Envelope) -> None:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import norm
-from tbcad.optics.surfaces import Surfaces
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.spec.errors import SpecError
 from tbcad.shell.cell_outlines import CellOutlines
 from tbcad.shell.facets import middles
-from tbcad.spec.errors import SpecError
 
 RADIUS = 1000.0
 

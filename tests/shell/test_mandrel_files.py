@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec
 from tbcad.output.build import Export, write_export
 from tbcad.output.parts import SHELL
 from tbcad.shell.mandrel_files import design_mandrel
-from tbcad.spec.load import load_spec
 from tests.exported_files import contents
 
 KINDS = ("step", "stl", "3mf")

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.reflection import miss_distances
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.reflection import miss_distances
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.shell.files import camera_a_mesh, shell_envelope
 from tests.mirror_arrays import mirror_design

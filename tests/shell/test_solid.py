@@ -6,9 +6,9 @@ from OCP.TopAbs import TopAbs_EDGE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
-from tbcad.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec
 from tbcad.shell.files import camera_solid, shell_envelope
-from tbcad.spec.load import load_spec
 from tests.helpers import area
 from tests.pedestal_designs import pedestal_design
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tbcad.common.results.study import Study
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.results.study import Study
-from tbcad.simulate.scene.object import patterned_ball
-from tbcad.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
-from tbcad.simulate.views.viewpoints import viewpoints_over_hemisphere
-from tbcad.spec.load import load_spec
+from tbcad.light.simulate.scene.object import patterned_ball
+from tbcad.light.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
+from tbcad.light.simulate.views.viewpoints import viewpoints_over_hemisphere
 from tbcad.studies.balance import SUBDIVISIONS, balance, parse_subdivisions
 
 SMALL = load_spec(None, ["camera.width_px=416", "camera.height_px=310"])

@@ -7,22 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad import schedule
-from tbcad.cli import run
-from tbcad.errors import InputError
-from tbcad.mirrors import radii
-from tbcad.results.study import (
+from tbcad.app.cli import run
+from tbcad.common import schedule
+from tbcad.common.results.study import (
     SUMMARY_COLUMNS,
     Study,
     check_study_folder,
     study_files,
     write_study,
 )
-from tbcad.results.tables import Table, csv_text
-from tbcad.simulate import parallel
-from tbcad.simulate.capture.pixel_counts import Sensor
-from tbcad.spec.design import FIT
-from tbcad.spec.load import load_spec
+from tbcad.common.results.tables import Table, csv_text
+from tbcad.core.mirrors import radii
+from tbcad.core.spec.design import FIT
+from tbcad.core.spec.load import load_spec
+from tbcad.errors import InputError
+from tbcad.light.simulate import parallel
+from tbcad.light.simulate.capture.pixel_counts import Sensor
 from tbcad.studies.capture_area import capture_area
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import elevation

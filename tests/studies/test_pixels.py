@@ -5,17 +5,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.pixel_counts import (
     Sensor,
     count_pixels,
     parse_sensor,
     traced_pixels,
     virtual_cameras,
 )
-from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.studies.resolution import Ratio, balance, parse_ratio
 from tests.mirror_arrays import mirror_array
 

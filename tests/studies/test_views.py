@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_rel
 
+from tbcad.common.results.study import Study, study_files
+from tbcad.core.mirrors import radii
+from tbcad.core.mirrors.array import design
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.mirrors import radii
-from tbcad.mirrors.array import design
-from tbcad.optics.camera import Camera
-from tbcad.results.study import Study, study_files
-from tbcad.simulate.capture.pixel_counts import Sensor
-from tbcad.simulate.scene.exported import read_export
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.views.viewpoints import Viewpoints, viewpoints_around
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
+from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.views.viewpoints import Viewpoints, viewpoints_around
 from tbcad.studies.low_pass import BlurOptions, low_pass
 from tbcad.studies.paper import balanced_sensors
 from tbcad.studies.prototype_vs_shell import mean_difference_interval, prototype_vs_shell

@@ -2,8 +2,8 @@
 
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.simulate.scene.reflector import reflectors
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
 
 

@@ -17,15 +17,15 @@ from tbcad_verify.shell.optics import OpticalSetup, set_up
 from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
 from tbcad_verify.shell.recover import recover
 
-from tbcad.cad.mesh import Mesh
-from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.optics import windows
-from tbcad.optics.cells import Cells, cells_of
-from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.optics.power_diagram import PLANES
-from tbcad.optics.reflection import miss_distances, reflected_rays
-from tbcad.optics.surfaces import Surfaces
+from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.optics import windows
+from tbcad.core.optics.cells import Cells, cells_of
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.reflection import miss_distances, reflected_rays
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
@@ -57,7 +57,7 @@ def placed(cells: Cells, scale: float, middle: np.ndarray) -> Cells:
 
 
 def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray:
-    """Coverage of each mirror of build k by tbcad.optics.windows, mm; of even scale only."""
+    """Coverage of each mirror of build k by tbcad.core.optics.windows, mm; of even scale only."""
     scale = draws.scale[k, 0]
     assert np.all(draws.scale[k] == scale)
     back = Rotation.from_rotvec(draws.shell_tilt[k]).inv()
@@ -72,7 +72,7 @@ def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray
 
 
 def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What tbcad.optics.windows.limiting_sides does, with the halved mirrors known beforehand."""
+    """What tbcad.core.optics.windows.limiting_sides does, with the halved mirrors known beforehand."""
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]

@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.reflection import miss_distances
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.optics.reflection import miss_distances
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.warp import SmoothField
 

@@ -7,11 +7,11 @@ from math import ceil
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import design
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import MAX_MARGIN, Spec
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.design import MAX_MARGIN, Spec
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.margin import (
     STEP_MM,
     Margin,

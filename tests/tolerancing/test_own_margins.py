@@ -6,12 +6,12 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import design
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.design import Spec
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.margin import STEP_MM, solved_designs, with_margin
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models

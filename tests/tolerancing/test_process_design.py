@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cli import run
+from tbcad.app.cli import run
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.mirrors.array import design
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing import process_design as process_module
 from tbcad.tolerancing.margin import pixels_of_cameras
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import pytest
 
+from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.errors import InputError
-from tbcad.spec.load import load_spec, spec_dict
 from tbcad.tolerancing import process_design as process_module
 from tbcad.tolerancing.margin import SeeingPixels, seeing_pixels
 from tbcad.tolerancing.process.process import Process, load_process

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import norm, unit
-from tbcad.mirrors.array import design
-from tbcad.optics.reflection import reflect
-from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.spec.load import load_spec
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.mirrors.array import design
+from tbcad.core.optics.reflection import reflect
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model, edge_models

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tbcad.calibration.estimate.reflection import reflections
-from tbcad.geometry.vectors import norm, unit
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.rig.calibration.estimate.reflection import reflections
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 CENTRE = np.array([[140.0, 35.0, 60.0], [90.0, -70.0, 120.0]])

@@ -6,10 +6,10 @@ Where an exact figure differs from one measured first, the test states both.
 import numpy as np
 import pytest
 
-from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorArray, numbered_directions
-from tbcad.optics import flat
+from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.mirrors.array import MirrorArray, numbered_directions
+from tbcad.core.optics import flat
 from tbcad.studies.paper import claimed
 from tests.mirror_arrays import mirror_array
 
@@ -91,7 +91,7 @@ def test_equation_2_falls_short() -> None:
     """Exact coverage of eq. 2's radii: far from the 60 mm claimed.
 
     Measured before: 50.8 ... 64.3, median 53.6, 845 of 847 short. Exact here: 50.34 ... 66.22,
-    median 53.05, 845 short. tests/optics/test_trace.py confirms the lower figures by brute force;
+    median 53.05, 845 short. tests/core/optics/test_trace.py confirms the lower figures by brute force;
     the one per cent looks like the first measurement's sampling of the cells' edges. The largest
     is the mirror (1, 0, 0), whose coverage the foot plane's place decides.
     """

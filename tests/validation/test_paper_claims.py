@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.geometry.ellipsoid import Ellipsoid
-from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorArray, numbered_directions
-from tbcad.results.study import Study
-from tbcad.simulate.views.refocus import lens_pinholes
-from tbcad.spec.load import load_spec
+from tbcad.common.results.study import Study
+from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.mirrors.array import MirrorArray, numbered_directions
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.views.refocus import lens_pinholes
 from tbcad.studies.definitions import DISC, IN_FRAME, apices_in_frame, best_pitch, definitions
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import elevation

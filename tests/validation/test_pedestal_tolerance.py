@@ -9,11 +9,11 @@ import pytest
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.export import read_export as read_record
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.mirrors.record import write_record
-from tbcad.optics.reflection import miss_distances
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.optics.reflection import miss_distances
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.manifest import write_manifest
-from tbcad.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.as_made import as_made
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage

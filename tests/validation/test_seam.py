@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import unit
-from tbcad.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.spec.load import load_spec
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.spec.load import load_spec
 
 # Fixed-point steps of the point of reflection.
 STEPS = 60

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.export import read_export as read_record
 
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import write_record
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.manifest import write_manifest
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import load_spec
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models

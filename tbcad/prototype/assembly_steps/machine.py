@@ -5,14 +5,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from tbcad.cad.formats.csv_table import Row
+from tbcad.core.spec.csv_rows import read_rows
 from tbcad.errors import InputError
-from tbcad.formats.csv_table import Row
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files.bom_view import read_parts_list
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts
 from tbcad.records.prototype import NAME, FastenerRecord, Prototype
 from tbcad.records.tables import BallRow
-from tbcad.spec.csv_rows import read_rows
 
 WIRING = "wiring.csv"
 UNIT_PARTS = ("strips", "sheets")  # kinds that are counted by the metre or sheet, not by bodies

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.fasteners import core_radius
 from tbcad.prototype.purchased.parts import PurchasedPart

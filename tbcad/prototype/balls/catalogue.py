@@ -9,8 +9,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
-from tbcad.spec.errors import SpecError, short_text
+from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
+from tbcad.core.spec.errors import SpecError, short_text
 
 if TYPE_CHECKING:
     from tbcad.types import Floats

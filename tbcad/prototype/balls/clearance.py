@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.round_cones import RoundCones, contact_angle, spheres
-from tbcad.optics.ball_light import light_hulls
-from tbcad.optics.camera import Camera
+from tbcad.core.geometry.round_cones import RoundCones, contact_angle, spheres
+from tbcad.core.optics.ball_light import light_hulls
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.selection import Balls
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Floats
 
 # Added to each minimum angle, radians: far more than the solver's rounding and far less than

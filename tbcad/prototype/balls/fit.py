@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import ball_poses, pixel_counts, used_outlines
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.optics.ball_light import ball_poses, pixel_counts, used_outlines
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
@@ -17,8 +19,6 @@ from tbcad.prototype.balls.selection import (
     coverable,
 )
 from tbcad.records.prototype import Alternative
-from tbcad.spec.design import Spec
-from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Bools, Floats, Ints
 
 SELECTION_RULES = {

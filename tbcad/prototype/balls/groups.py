@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.cluster.vq import ClusterError, kmeans2
 
-from tbcad.spec.errors import SpecError
+from tbcad.core.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
 MAX_ITERATIONS = 200

@@ -6,9 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from tbcad.geometry.rotations import rotated_about_x
-from tbcad.geometry.vectors import FLIP_X
-from tbcad.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.geometry.rotations import rotated_about_x
+from tbcad.core.geometry.vectors import FLIP_X
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.prototype import MOST_BALLS
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
 from tbcad.prototype.balls.clearance import (
     allowed_azimuths,
@@ -33,8 +35,6 @@ from tbcad.prototype.balls.stops import (
 )
 from tbcad.prototype.suitable import check_suitable
 from tbcad.records.prototype import Alternative
-from tbcad.spec.design import Spec
-from tbcad.spec.prototype import MOST_BALLS
 from tbcad.types import Floats, Ints
 
 # Length of the post in semi-major axes: it reaches down beyond all balls.

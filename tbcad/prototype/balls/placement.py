@@ -14,7 +14,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from tbcad.spec.errors import SpecError
+from tbcad.core.spec.errors import SpecError
 from tbcad.types import Floats, Ints
 
 # Nodes of the search, not seconds, so that every computer finds the same.

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.rotations import rotated_about_x
-from tbcad.geometry.vectors import norm
-from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.ball_light import BallPoses, ball_poses, field_angles, used_outlines
-from tbcad.optics.windows import Windows, cell_windows
+from tbcad.core.geometry.rotations import rotated_about_x
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.optics.ball_light import BallPoses, ball_poses, field_angles, used_outlines
+from tbcad.core.optics.windows import Windows, cell_windows
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.catalogue import Catalogue
 from tbcad.prototype.balls.groups import MirrorGroups
-from tbcad.spec.prototype import PrototypeSpec
 from tbcad.types import Bools, Floats, Ints
 
 BISECTION_STEPS = 40

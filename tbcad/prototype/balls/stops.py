@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.placement import PlacementProblem
 from tbcad.types import Bools, Floats, Ints

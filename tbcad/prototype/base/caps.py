@@ -11,14 +11,14 @@ shared equally (root sum of squares) by radius, figure, tilt and seat.
 
 import numpy as np
 
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.design import Spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.records.prototype import CapRecord
-from tbcad.spec.design import Spec
 
 WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
 FRONT_MM = 2.0  # minimum material before the pocket

@@ -12,19 +12,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.checks import check_pads, closed_mesh
-from tbcad.cad.glyphs import ROWS, relief, text_width
-from tbcad.cad.measures import properties
-from tbcad.cad.solids import fused, moved, one_solid, polygon, prism
-from tbcad.geometry.primitives import rectangle
+from tbcad.cad.kernel.checks import check_pads, closed_mesh
+from tbcad.cad.kernel.glyphs import ROWS, relief, text_width
+from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.solids import fused, moved, one_solid, polygon, prism
+from tbcad.core.geometry.primitives import rectangle
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.coupon_seat import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 # Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.

@@ -12,8 +12,8 @@ import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import ConvexHull
 
-from tbcad.cad.brep import Maker
-from tbcad.cad.solids import (
+from tbcad.cad.kernel.brep import Maker
+from tbcad.cad.kernel.solids import (
     cut,
     cylinder,
     faces,
@@ -24,14 +24,14 @@ from tbcad.cad.solids import (
     reversed_faces,
     revolved_polygon,
 )
-from tbcad.geometry.rotations import unit_circle
-from tbcad.geometry.vectors import norm, unit
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import seat_room, with_posts
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.printing.placing import opening_up
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 UPRIGHT = 1e-9  # of an axis's level part: a seat without a lean

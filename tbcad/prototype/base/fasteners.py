@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.hub import (
     BELOW_HEAD_MM,
     KEY_DEPTH_MM,
@@ -25,8 +27,6 @@ from tbcad.prototype.purchased.parts import (
     choose_screw,
     of_kind,
 )
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 COUPLING_FLANGE_MM = 3.0  # thickness; no list gives it

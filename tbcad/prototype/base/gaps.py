@@ -6,7 +6,7 @@ as a knife. What remains between two gaps is left out too when it is short.
 
 import numpy as np
 
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import at_azimuths, meridian, outward
 from tbcad.prototype.base.seats import Seats

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import j1
 
-from tbcad.geometry.vectors import dot, norm
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.spec.design import Spec
 from tbcad.prototype.drive.balance import GRAVITY
-from tbcad.spec.design import Spec
 from tbcad.types import Floats
 
 MU_0 = 4e-7 * math.pi  # V s / (A m)

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.rotations import bolt_circle
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec, Drive
+from tbcad.core.geometry.rotations import bolt_circle
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec, Drive
 from tbcad.types import Floats
 
 WALL_MM = 3.0  # round holes that take a load

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.geometry.vectors import norm, perpendicular_axes, unit
+from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import distance_outside, half_plane, offset
 from tbcad.prototype.base.screws import joint_hardware

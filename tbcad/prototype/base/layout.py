@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.rotations import even_angles, unit_circle
-from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.ball_light import light_hulls
+from tbcad.core.geometry.rotations import even_angles, unit_circle
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.optics.ball_light import light_hulls
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
 from tbcad.prototype.base.hub import Hub, deepened, hub_layout
@@ -27,8 +29,6 @@ from tbcad.prototype.base.profile import (
     trimmed,
 )
 from tbcad.prototype.base.seats import Seats, seat_layout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 EDGE_MM = 2.0  # wall beyond the outermost bosses

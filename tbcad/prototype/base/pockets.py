@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.rotations import unit_circle
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.holding import MIN_RATIO, Motion, force_needed, glue_force, pull_on_ball
 from tbcad.prototype.drive.balance import ball_masses
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Bools, Floats
 
 PAD_AZIMUTHS = np.radians(np.arange(0, 120, 5))  # tried for the first pad

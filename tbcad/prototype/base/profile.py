@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.rotations import unit_circle
-from tbcad.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.types import Floats
 
 # Corners of the polygon round the ellipse of light: few, so that the wall has few cones.

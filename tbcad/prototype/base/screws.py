@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.purchased.parts import load_parts, of_kind
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec
 
 M3_MM = 3.0
 FLOOR_MM = 1.0  # below holes

@@ -18,11 +18,11 @@ from OCP.BRepBuilderAPI import (
 from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.brep import Maker, Ring, hole_faces
-from tbcad.cad.meshing import growth, primitive_mesh
-from tbcad.cad.solids import cylinder, faces, moved, on_sphere, revolved, wires
-from tbcad.geometry.primitives import Cylinder, Revolved
-from tbcad.geometry.vectors import perpendicular_axes
+from tbcad.cad.kernel.brep import Maker, Ring, hole_faces
+from tbcad.cad.kernel.meshing import growth, primitive_mesh
+from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, revolved, wires
+from tbcad.core.geometry.primitives import Cylinder, Revolved
+from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
 from tbcad.types import Floats

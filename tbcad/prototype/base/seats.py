@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.geometry.rotations import unit_circle
-from tbcad.geometry.vectors import dot, norm
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
 from tbcad.prototype.base.pockets import (
@@ -22,8 +24,6 @@ from tbcad.prototype.base.pockets import (
     pad_normals,
     worst_force_needed,
 )
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 LIP_MM = 0.5  # of the cup in front of the pads

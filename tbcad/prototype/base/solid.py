@@ -9,14 +9,24 @@ import numpy as np
 from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.checks import COARSE_MM, checked
-from tbcad.cad.glyphs import fitting_height, relief
-from tbcad.cad.measures import SolidProperties
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import as_manifold, moved_mesh, volume_by_meshes
-from tbcad.cad.solids import cut, cylinder, fused, polygon, polyhedron, prism, revolved_polygon
-from tbcad.geometry.rotations import unit_circle
+from tbcad.cad.kernel.brep import InvalidSolidError
+from tbcad.cad.kernel.checks import COARSE_MM, checked
+from tbcad.cad.kernel.glyphs import fitting_height, relief
+from tbcad.cad.kernel.measures import SolidProperties
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.meshing import as_manifold, moved_mesh, volume_by_meshes
+from tbcad.cad.kernel.solids import (
+    cut,
+    cylinder,
+    fused,
+    polygon,
+    polyhedron,
+    prism,
+    revolved_polygon,
+)
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base import seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.hub import (
@@ -38,8 +48,6 @@ from tbcad.prototype.base.split_solids import (
     number_solids,
 )
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -14,15 +14,15 @@ import numpy as np
 from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
-from tbcad.geometry.rotations import unit_circle
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.base.joints import Cut, CutPlane, Joint, in_region, plan_joint
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split_points import STEP_MM, base_points, bosses_and_hub
 from tbcad.prototype.printing.bed import min_bed, shortfall, size_text
-from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Bools, Floats, Ints
 
 CLEARANCE_MM = 1.0  # of a plane from any boss

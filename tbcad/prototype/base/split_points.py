@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from tbcad.geometry.rotations import even_angles
-from tbcad.geometry.vectors import norm, perpendicular_axes
+from tbcad.core.geometry.rotations import even_angles
+from tbcad.core.geometry.vectors import norm, perpendicular_axes
 from tbcad.prototype.base.joints import flange_top
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import at_azimuths

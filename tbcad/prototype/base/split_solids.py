@@ -6,13 +6,14 @@ All is built in the carrier's own frame: z the axis, x azimuth zero.
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.checks import checked
-from tbcad.cad.glyphs import fitting_height, relief
-from tbcad.cad.measures import SolidProperties
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import volume_by_cut_mesh
-from tbcad.cad.solids import common, cut, cylinder, polygon, prism, revolved_polygon
-from tbcad.geometry.vectors import perpendicular_axes, unit
+from tbcad.cad.kernel.checks import checked
+from tbcad.cad.kernel.glyphs import fitting_height, relief
+from tbcad.cad.kernel.measures import SolidProperties
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.meshing import volume_by_cut_mesh
+from tbcad.cad.kernel.solids import common, cut, cylinder, polygon, prism, revolved_polygon
+from tbcad.core.geometry.vectors import perpendicular_axes, unit
+from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import (
     ACCESS_MM,
@@ -24,7 +25,6 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Bools, Floats
 
 FAR_MM = 2000.0  # larger than any base

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tbcad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
-from tbcad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
+from tbcad.cad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
+from tbcad.cad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_edge, cap_pocket, cap_spigot, flat_depth
 from tbcad.prototype.base.layout import BaseLayout

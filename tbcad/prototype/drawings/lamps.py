@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from tbcad.drafting.dimensions import upward
-from tbcad.drafting.sheet import (
+from tbcad.cad.drafting.dimensions import upward
+from tbcad.cad.drafting.sheet import (
     A4,
     BESIDE_MM,
     Sheet,
@@ -13,7 +13,7 @@ from tbcad.drafting.sheet import (
     rectangle,
     sheet_frame,
 )
-from tbcad.formats.entities import Entity, Layer, Line
+from tbcad.cad.formats.entities import Entity, Layer, Line
 from tbcad.prototype.drawings.parts import Listed, fitted, outer
 from tbcad.prototype.frame.brackets import EXTRUSION_MM
 from tbcad.prototype.light.lamp import EDGE_MM, LampLayout

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.drafting.dimensions import (
+from tbcad.cad.drafting.dimensions import (
     across,
     arrow,
     centre_cross,
@@ -13,7 +13,7 @@ from tbcad.drafting.dimensions import (
     labels,
     upward,
 )
-from tbcad.drafting.sheet import (
+from tbcad.cad.drafting.sheet import (
     A3,
     A4,
     BESIDE_MM,
@@ -29,8 +29,8 @@ from tbcad.drafting.sheet import (
     sheet_frame,
     table,
 )
-from tbcad.formats.csv_table import Row
-from tbcad.formats.entities import Circle, Entity, Layer, Line, Point, Text
+from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive

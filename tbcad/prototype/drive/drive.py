@@ -7,9 +7,9 @@ from importlib.resources.abc import Traversable
 import numpy as np
 from scipy.optimize import brentq
 
+from tbcad.core.spec.csv_rows import Row, positive_number, read_rows
+from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, package_lists
-from tbcad.spec.csv_rows import Row, positive_number, read_rows
-from tbcad.spec.errors import SpecError, short_text
 from tbcad.types import Floats
 
 DRIVE_COLUMNS = ("drive", "motor", "pinion", "wheel", "belt", "coupling", "efficiency", "source")

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tbcad.core.spec.errors import SpecError, short_text
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
-from tbcad.spec.errors import SpecError, short_text
-from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
 
 MIN_MESH = 6  # teeth of a wheel in mesh that bear a belt's rating (SDP/SI, Technical Section, 13.3)

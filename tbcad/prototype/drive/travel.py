@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
 
 # Of the switch below the lowest angle of the program, so that its lever is free there.

@@ -8,9 +8,9 @@ Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
 
 from dataclasses import dataclass
 
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.records.prototype_drive import Phase
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import MotionSpec
 
 LAMP_OUTPUT, LAMP = 0, "lamp"
 MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most

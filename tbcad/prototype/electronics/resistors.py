@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
-from tbcad.spec.errors import SpecError
 
 # Two digits of each decade.
 E24 = (

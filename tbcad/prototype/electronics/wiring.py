@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.formats.csv_table import Row
-from tbcad.geometry.vectors import norm
+from tbcad.cad.formats.csv_table import Row
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.electronics.outputs import LAMP, Light, lights
 from tbcad.prototype.electronics.resistors import SeriesResistor, series_resistor
@@ -20,8 +22,6 @@ from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage import arms, crown
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import PrototypeSpec, StageSpec
 
 COLUMNS = (
     *("line", "signal", "part", "output", "on", "off", "connector", "pins", "supply_v"),

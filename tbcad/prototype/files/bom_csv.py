@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tbcad.formats.csv_table import Row
+from tbcad.cad.formats.csv_table import Row
+from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.prototype.purchased.prices import Price, Prices
-from tbcad.spec.errors import SpecError, short_text
 
 # A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
 STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")

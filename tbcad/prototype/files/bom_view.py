@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tbcad.cad.formats.csv_table import Row
+from tbcad.core.spec.csv_rows import read_rows
+from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.formats.csv_table import Row
 from tbcad.prototype.files.bom_csv import (
     BOUGHT,
     COLUMNS,
@@ -19,8 +21,6 @@ from tbcad.prototype.files.bom_csv import (
     totals,
 )
 from tbcad.prototype.purchased.prices import Prices
-from tbcad.spec.csv_rows import read_rows
-from tbcad.spec.errors import SpecError
 
 SHOWN = 6  # rows without --full
 WIDTH = 80  # columns of a terminal

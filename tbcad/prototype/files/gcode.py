@@ -16,12 +16,12 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import StopSequence, home_angles, stop_sequence
 from tbcad.prototype.electronics.outputs import LIT, phases
 from tbcad.records.prototype_drive import Phase
-from tbcad.spec.prototype import MotionSpec
 
 MAX_LINE_LENGTH = 79
 RUNS = 2  # one for each turn of the object

@@ -13,11 +13,11 @@ static_digital_output.py; Config_Reference.md, G-Codes.md.
 import re
 from collections.abc import Iterator
 
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.electronics.outputs import LAMP, LAMP_OUTPUT, Light
 from tbcad.prototype.files.settings import SEEK_DEG_MIN
-from tbcad.spec.prototype import MotionSpec
 
 PROGRAM, CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
 STEPPER = "MANUAL_STEPPER STEPPER=base"

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from tbcad.drafting.sheet import Sheet
-from tbcad.formats.csv_table import Row
-from tbcad.geometry.vectors import norm
+from tbcad.cad.drafting.sheet import Sheet
+from tbcad.cad.formats.csv_table import Row
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.base.held import holding
@@ -34,7 +35,6 @@ from tbcad.records import prototype as records
 from tbcad.records.prototype import MATT_BLACK, Prototype
 from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
 from tbcad.records.prototype_light import CardPanel, LampPlace, LampsRecord, ShroudRecord
-from tbcad.spec.prototype import MotionSpec
 
 STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
 PAD_UM = 10.0  # largest error of a ball's centre, found from its pads

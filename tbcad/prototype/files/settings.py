@@ -14,9 +14,9 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import PULL_OFF_DEG, HomeAngles
-from tbcad.spec.prototype import MotionSpec
 
 NAME = "grbl_settings.txt"
 AXES = "XYZA"  # a bit of a mask each, and the last digit of $100, $110, $120, $130

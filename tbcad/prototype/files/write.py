@@ -2,18 +2,19 @@
 
 from pathlib import Path
 
-from tbcad.background import Submit, at_once
-from tbcad.cad.assembly import mesh_groups
-from tbcad.cad.brep import Solid
-from tbcad.drafting.sheet import Sheet
-from tbcad.formats.csv_table import Row, write_table
-from tbcad.formats.dxf import write_dxf
-from tbcad.formats.glb import write_glb
-from tbcad.formats.step import write_step
-from tbcad.formats.step_assembly import write_assembly
-from tbcad.formats.stl import write_stl
-from tbcad.formats.threemf import write_3mf
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.cad.drafting.sheet import Sheet
+from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.dxf import write_dxf
+from tbcad.cad.formats.glb import write_glb
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.formats.step_assembly import write_assembly
+from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.threemf import write_3mf
+from tbcad.cad.kernel.assembly import mesh_groups
+from tbcad.cad.kernel.brep import Solid
+from tbcad.common.background import Submit, at_once
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.design import Spec
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
@@ -32,7 +33,6 @@ from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
 from tbcad.prototype.printing.placing import PrintedPart, part_mesh
 from tbcad.prototype.purchased.prices import Prices, load_prices
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.spec.design import Spec
 from tbcad.types import Progress
 
 

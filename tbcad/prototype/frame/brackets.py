@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Primitive, Prism, cylinder_between
+from tbcad.core.geometry.primitives import Component, Primitive, Prism, cylinder_between
 from tbcad.prototype.fasteners import Fastener
 from tbcad.types import Floats
 

@@ -14,11 +14,11 @@ from typing import Literal
 
 import numpy as np
 
-from tbcad.camera.requirements import CameraRequirements
-from tbcad.geometry.primitives import Component, Primitive, Prism, box
-from tbcad.geometry.rotations import even_angles, rotated_about_x, unit_circle
-from tbcad.geometry.vectors import norm
-from tbcad.optics.camera import Camera
+from tbcad.core.camera.requirements import CameraRequirements
+from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
+from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.camera import Camera
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.records.prototype import MarkPicture
 from tbcad.types import Floats

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     Component,
     Primitive,
     Prism,
@@ -23,8 +23,10 @@ from tbcad.geometry.primitives import (
     rectangle,
     slot,
 )
-from tbcad.geometry.vectors import unit
-from tbcad.optics.camera import Camera
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
@@ -36,8 +38,6 @@ from tbcad.prototype.frame.brackets import (
 )
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.records.prototype import CameraTravel
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats
 
 M5_MM, M5_HOLE_MM = 5.0, CLEARANCE_HOLE_MM[5.0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     Component,
     Cylinder,
     Primitive,
@@ -10,6 +10,7 @@ from tbcad.geometry.primitives import (
     cylinder_between,
     rectangle,
 )
+from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
@@ -25,7 +26,6 @@ from tbcad.prototype.frame.brackets import (
 from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 M5_HOLE_MM = CLEARANCE_HOLE_MM[5.0]

@@ -8,7 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Primitive, box, cylinder_between, rectangle, slot
+from tbcad.core.geometry.primitives import (
+    Component,
+    Primitive,
+    box,
+    cylinder_between,
+    rectangle,
+    slot,
+)
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
@@ -47,8 +56,6 @@ from tbcad.prototype.homing.sizes import (
     tab_radius,
 )
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 # Behind the head of a rotary stage's screw (M6, ISO 4762): room for it, and the length of its key.

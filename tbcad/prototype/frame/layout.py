@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Cylinder, Primitive, box
+from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, box
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
@@ -33,8 +35,6 @@ from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.lamps import lamp_layout
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.types import Floats
 
 SLOT_DEPTH_MM = 6.1  # of an extrusion of 20 mm; no list gives it

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Cylinder, box, cylinder_between
-from tbcad.geometry.rotations import bolt_circle
+from tbcad.core.geometry.primitives import Component, Cylinder, box, cylinder_between
+from tbcad.core.geometry.rotations import bolt_circle
+from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
@@ -14,7 +15,6 @@ from tbcad.prototype.drive.drive import Drive, pitch_diameter
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import OVERLAP_MM, THROUGH_MM, Bracket
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
-from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 PLATE_MM = 9.0  # so that M3x12 screws go 3 mm into a motor

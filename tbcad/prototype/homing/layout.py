@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     Component,
     Cylinder,
     Primitive,
@@ -18,7 +18,8 @@ from tbcad.geometry.primitives import (
     cylinder_between,
     rectangle,
 )
-from tbcad.geometry.rotations import unit_circle
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import HomeAngles
@@ -40,7 +41,6 @@ from tbcad.prototype.homing.sizes import (
     tab_radius,
 )
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
-from tbcad.spec.errors import SpecError
 from tbcad.types import Floats
 
 SWITCH = "SWITCH-SS-5GL2"

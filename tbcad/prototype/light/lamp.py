@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Primitive, Prism
-from tbcad.geometry.rotations import even_angles, unit_circle
-from tbcad.geometry.vectors import norm
-from tbcad.optics.camera import Camera
+from tbcad.core.geometry.primitives import Component, Primitive, Prism
+from tbcad.core.geometry.rotations import even_angles, unit_circle
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.brackets import THROUGH_MM, Bracket
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.purchased.parts import PurchasedPart
-from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats
 
 STRIP, SHORT_STRIP = "STRIP-COB-24V", "STRIP-240-24V"

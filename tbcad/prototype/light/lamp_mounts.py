@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Primitive, Prism, box
+from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
+from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.frame.brackets import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
@@ -14,7 +15,6 @@ from tbcad.prototype.frame.brackets import (
 )
 from tbcad.prototype.light.lamp import EDGE_MM
 from tbcad.prototype.purchased.parts import PurchasedPart
-from tbcad.spec.prototype import FrameSpec
 from tbcad.types import Floats
 
 HOLDER_MM = 8.0  # thickness behind the strips

@@ -13,16 +13,16 @@ from functools import cached_property
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component, Primitive, enclosing_triangles
-from tbcad.optics.camera import Camera
+from tbcad.core.geometry.primitives import Component, Primitive, enclosing_triangles
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import PrototypeSpec
+from tbcad.core.spec.section import AUTO
 from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout, hidden_by_base, in_view
 from tbcad.prototype.light.lamp_mounts import HOLDER_MM, OUT_MM, TAIL_MM, LampMounts
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import PrototypeSpec
-from tbcad.spec.section import AUTO
 from tbcad.types import Floats
 
 SIGNS = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])  # lamp 1 and its images

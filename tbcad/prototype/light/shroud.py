@@ -10,14 +10,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.formats.entities import Entity, Layer, Line, Polyline, Text
-from tbcad.geometry.primitives import Component, Primitive, box, enclosing_triangles
-from tbcad.geometry.rotations import even_angles, rotated, unit_circle
+from tbcad.cad.formats.entities import Entity, Layer, Line, Polyline, Text
+from tbcad.core.geometry.primitives import Component, Primitive, box, enclosing_triangles
+from tbcad.core.geometry.rotations import even_angles, rotated, unit_circle
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import LightSpec
+from tbcad.core.spec.section import AUTO
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import LightSpec
-from tbcad.spec.section import AUTO
 from tbcad.types import Floats
 
 FLAP_MM, FLAP_SLOPE_MM = 15.0, 5.0  # width of a flap, and by how much its ends slope inward

@@ -11,8 +11,8 @@ import numpy as np
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
-from tbcad.cad.mesh import Mesh
-from tbcad.geometry.vectors import norm
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.core.geometry.vectors import norm
 from tbcad.types import Bools, Floats
 
 LAYER_MM, INFILL = 0.2, 0.25

@@ -9,11 +9,11 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from tbcad.cad.checks import check_volume, closed_mesh
-from tbcad.cad.measures import SolidProperties, properties, volume
-from tbcad.cad.mesh import Mesh
-from tbcad.cad.meshing import primitive_mesh, volume_by_meshes, without_degenerate
-from tbcad.cad.solids import (
+from tbcad.cad.kernel.checks import check_volume, closed_mesh
+from tbcad.cad.kernel.measures import SolidProperties, properties, volume
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.meshing import primitive_mesh, volume_by_meshes, without_degenerate
+from tbcad.cad.kernel.solids import (
     cut,
     cylinder,
     from_bytes,
@@ -27,11 +27,11 @@ from tbcad.cad.solids import (
     solids,
     to_bytes,
 )
-from tbcad.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.printing.bed import fitting_orientation, min_bed, size_text
-from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 
 LEVEL = 1e-6  # of a normal's downward part

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
-from tbcad.spec.errors import SpecError
+from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
+from tbcad.core.spec.errors import SpecError
 
 COMMON_COLUMNS = ("part", "what", "material", "mass_g")
 SIZES: dict[str, tuple[str, ...]] = {

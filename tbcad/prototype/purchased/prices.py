@@ -7,9 +7,9 @@ from fnmatch import fnmatchcase
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
+from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.prototype.purchased.parts import package_lists
-from tbcad.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
-from tbcad.spec.errors import SpecError, short_text
 
 COLUMNS = ("part", "each", "per_kg", "currency", "date", "source")
 ESTIMATES = "estimates"  # tbcad's own list

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Prism, box
-from tbcad.geometry.vectors import norm, unit
+from tbcad.core.geometry.primitives import Prism, box
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.types import Floats
 
 ARC_CHORDS = 6  # along the sphere, of each part

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.vectors import unit
-from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.reflection import reflection_points
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
 from tbcad.records.prototype import CentreEstimate
-from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats, Ints
 
 NOISE_PX = 0.05  # standard deviation of a highlight's place in a photograph, each way

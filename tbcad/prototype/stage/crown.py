@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     Component,
     Cylinder,
     Primitive,
@@ -13,13 +13,13 @@ from tbcad.geometry.primitives import (
     box,
     cylinder_between,
 )
-from tbcad.geometry.rotations import unit_circle
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.prototype.stage.arms import UP, Arm, arm_axes
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats
 
 DISC_MM = 3.0  # thickness of the disc

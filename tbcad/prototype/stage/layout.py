@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.geometry.primitives import Component
-from tbcad.geometry.rotations import rotated_about_x
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.primitives import Component
+from tbcad.core.geometry.rotations import rotated_about_x
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.keepout import KeepOut, min_distance
@@ -33,8 +35,6 @@ from tbcad.prototype.stage.crown import (
     post_component,
 )
 from tbcad.prototype.stage.leds import check_leds
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import PrototypeSpec, StageSpec
 from tbcad.types import Floats
 
 MAX_NECK_MM = 6.0  # radius of the crown's neck where it leaves the sphere

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.purchased.parts import PurchasedPart
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import StageSpec
 from tbcad.types import Floats
 
 POCKET_PLAY_MM = 0.1  # to either side

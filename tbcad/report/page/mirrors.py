@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tbcad.formats.checked_files import columns
+from tbcad.cad.formats.checked_files import columns
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow
 from tbcad.report.page.packing import PackedArrays
 from tbcad.report.page.verdict import Verdict

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tbcad.cad.formats.images.pictures import decoded, visible_files
 from tbcad.errors import InputError
-from tbcad.formats.pictures import decoded, visible_files
 from tbcad.types import Bytes
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -70,7 +70,7 @@ def photographs(capture: Path, ids: list[str]) -> dict[str, Any]:
     Raises:
         InputError: the capture cannot be read, or is of another design.
     """
-    from tbcad.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.light_field import LightField
 
     record = {}
     with LightField.open(capture) as field:

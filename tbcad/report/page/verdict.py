@@ -9,7 +9,7 @@ from pydantic import Field
 from tbcad_verify.report.as_made import NOT_MODELLED, AsMade
 from tbcad_verify.report.key_figures import KEY_FIGURES
 
-from tbcad.formats.checked_files import Finite, Record, read_json
+from tbcad.cad.formats.checked_files import Finite, Record, read_json
 from tbcad.output.manifest import VERDICT
 
 STATES = {True: ("pass", "✔", "pass"), False: ("fail", "✘", "fail"), None: ("unknown", "?", "?")}

@@ -9,8 +9,10 @@ from typing import Any
 
 from tbcad_verify.report.as_made import AsMade
 
-from tbcad.atomic_files import replace_files
+from tbcad.common.atomic_files import replace_files
+from tbcad.common.web_page import web_page
 from tbcad.errors import InputError
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.output.manifest import (
     MANIFEST,
     REPORT,
@@ -34,8 +36,6 @@ from tbcad.report.page.verdict import (
     read_verdict,
     verdict_html,
 )
-from tbcad.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.web_page import web_page
 
 MAX_BYTES = 6_000_000
 RECORDS = ("design.json", "mirrors.csv")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from tbcad.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import chunks, in_threads
 from tbcad.tolerancing.montecarlo.coverage import coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, warp_maps_of

@@ -15,8 +15,8 @@ from math import inf
 
 import numpy as np
 
-from tbcad.compiled import compiled_loop
-from tbcad.geometry.loop_vectors import dot, minus, plus_scaled, vector
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.loop_vectors import dot, minus, plus_scaled, vector
 from tbcad.tolerancing.montecarlo.edge_samples import (
     DISTANCE,
     PLACES,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.optics.reflection import reflect, reflected_rays
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.reflection import reflect, reflected_rays
 from tbcad.tolerancing.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.edge_model import (
@@ -137,7 +137,7 @@ def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws, axes: list[Floats]) ->
 
 
 def _entry(table: Floats, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
-    """Points where rays enter surfaces (s, m, 7), and normals: see tbcad.simulate.scene.rays."""
+    """Points where rays enter surfaces (s, m, 7), and normals: see tbcad.light.simulate.scene.rays."""
     apex, normal, curvature = table[..., APEX], table[..., NORMAL], table[..., CURVATURE, None]
     offset = origin - apex
     c = dot(normal + curvature / 2 * offset, offset)

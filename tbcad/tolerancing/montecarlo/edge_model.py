@@ -7,12 +7,12 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tbcad.core.geometry.vectors import dot, perpendicular_axes, unit
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.pedestals.walls import GrooveWalls, groove_walls
+from tbcad.core.optics.power_diagram import PLANES
 from tbcad.errors import InputError
-from tbcad.geometry.vectors import dot, perpendicular_axes, unit
-from tbcad.optics.camera import Camera
-from tbcad.optics.pedestals.walls import GrooveWalls, groove_walls
-from tbcad.optics.power_diagram import PLANES
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.form import MONOMIALS, term_polynomials

@@ -6,8 +6,8 @@ become vector instructions of the processor. The points are those of both mirror
 
 from math import sqrt
 
-from tbcad.compiled import compiled_loop
-from tbcad.geometry.loop_vectors import Vector, cross, dot, minus, plus_scaled, vector
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.loop_vectors import Vector, cross, dot, minus, plus_scaled, vector
 from tbcad.tolerancing.montecarlo.visible_edges import (
     APEX,
     BEND,

@@ -1,6 +1,6 @@
 """Form errors of mirrors at samples of their edges: compiled.
 
-The surface of a mirror with waviness is where the value of its sphere (tbcad.optics.surfaces),
+The surface of a mirror with waviness is where the value of its sphere (tbcad.core.optics.surfaces),
 whose gradient is of unit length there, equals the height h of the waviness. An edge of two mirrors
 whose spheres have the unit normals g and g' at a point is thus displaced by a g + b g' with
 
@@ -11,8 +11,8 @@ to first order in the heights, and a mirror's normal is turned by its height's g
 
 from typing import TypeAlias
 
-from tbcad.compiled import compiled_loop
-from tbcad.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.tolerancing.montecarlo.edge_samples import (
     FIRST_HEIGHT,
     FIRST_NORMAL,

@@ -6,11 +6,11 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from tbcad.geometry.vectors import norm
-from tbcad.optics.cells import Cells
-from tbcad.optics.pedestals.cells import PedestalCells
-from tbcad.optics.power_diagram import PLANES
-from tbcad.optics.surfaces import Surfaces
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
 # Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the

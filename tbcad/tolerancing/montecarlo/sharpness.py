@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tbcad.mirrors.array import design
-from tbcad.optics.camera import Camera
-from tbcad.optics.pedestals.walls import GrooveWalls
-from tbcad.optics.surfaces import Surfaces
-from tbcad.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
-from tbcad.simulate.capture.photograph import BAND_ROWS, photograph
-from tbcad.simulate.parallel import chunks, in_threads
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import Reflector, SubstitutedReflector, reflectors
-from tbcad.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.simulate.views.synthesis import synthesise
-from tbcad.simulate.views.viewpoints import ground_truths, image_quality, viewpoints_around
-from tbcad.spec.design import Spec
+from tbcad.core.mirrors.array import design
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
+from tbcad.light.simulate.capture.photograph import BAND_ROWS, photograph
+from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import Reflector, SubstitutedReflector, reflectors
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.synthesis import synthesise
+from tbcad.light.simulate.views.viewpoints import ground_truths, image_quality, viewpoints_around
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 

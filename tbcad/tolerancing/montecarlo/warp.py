@@ -12,9 +12,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.compiled import compiled_loop
-from tbcad.geometry.vectors import dot, perpendicular_axes
-from tbcad.optics.pedestals.walls import GrooveWalls
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.vectors import dot, perpendicular_axes
+from tbcad.core.optics.pedestals.walls import GrooveWalls
 from tbcad.tolerancing.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
 from tbcad.types import Floats, Ints
 

@@ -14,8 +14,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from tbcad.prototype.balls.catalogue import load_grades
-from tbcad.spec.errors import (
+from tbcad.core.spec.errors import (
     SpecError,
     dotted_fields,
     section_of,
@@ -23,9 +22,10 @@ from tbcad.spec.errors import (
     unknown_key,
     validation_error,
 )
-from tbcad.spec.files import Table, read_toml, toml_value
-from tbcad.spec.prototype import GradeName
-from tbcad.spec.section import Section
+from tbcad.core.spec.files import Table, read_toml, toml_value
+from tbcad.core.spec.prototype import GradeName
+from tbcad.core.spec.section import Section
+from tbcad.prototype.balls.catalogue import load_grades
 from tbcad.tolerancing.montecarlo.error_kinds import Distribution, Error, Errors
 
 BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
-from tbcad.formats.checked_files import REBUILD
+from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.records.tables import StopRow
-from tbcad.simulate.prototype.plan import Plan
-from tbcad.simulate.scene.exported import ExportedDesign
 from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats

@@ -4,8 +4,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.compiled import compiled_loop
-from tbcad.geometry.loop_vectors import (
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.loop_vectors import (
     Vector,
     cross,
     divided,
@@ -237,7 +237,7 @@ def _miss(direction: Floats, lens: Floats, pinhole: Floats, centre: Floats, radi
 def _miss_along(ray: Vector, camera: Vector, ball: Vector, radius: float) -> float:
     """Distance squared from the origin of a ray after a ball; infinite where it misses the ball.
 
-    Infinite also where the ray goes away from the object, as in tbcad.optics.ball_light.
+    Infinite also where the ray goes away from the object, as in tbcad.core.optics.ball_light.
     """
     from_ball = minus(camera, ball)
     along = -dot(from_ball, ray)

@@ -1,7 +1,7 @@
 """Coverage of simulated prototypes: their balls within the windows that the software assumes.
 
 Every mirror has a window in the photograph of its stop, with a ball in it
-(tbcad.simulate.prototype.run). The windows keep their places in the picture, in pixels; base, balls
+(tbcad.light.simulate.prototype.run). The windows keep their places in the picture, in pixels; base, balls
 and camera are off. So a camera error turns all rays of a build alike, and the other errors move the
 balls under the windows. In a calibrated build the software moves the windows along.
 
@@ -14,13 +14,13 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.geometry.rotations import rotated
-from tbcad.geometry.vectors import dot, norm, perpendicular_axes, unit
-from tbcad.optics.reflection import reflected_rays
-from tbcad.optics.windows import cell_windows
-from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
-from tbcad.simulate.scene.reflector import Reflector
+from tbcad.core.geometry.rotations import rotated
+from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
+from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.optics.windows import cell_windows
+from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
+from tbcad.light.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.edge_model import ASYMMETRIC

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from tbcad.cli import run
+from tbcad.app.cli import run
+from tbcad.cad.formats.csv_table import write_table
 from tbcad.errors import InputError
-from tbcad.formats.csv_table import write_table
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
 from tbcad.prototype.electronics.wiring import COLUMNS as WIRING

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.catalogue import (
     COLUMNS,
     Catalogue,
@@ -10,7 +11,6 @@ from tbcad.prototype.balls.catalogue import (
     load_grades,
     steel_mass_g,
 )
-from tbcad.spec.errors import SpecError
 
 HEADER = ",".join(COLUMNS)
 ROW = "5 mm,5,ISO 3290-1,G10 G40,,mine"

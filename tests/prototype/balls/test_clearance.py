@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from tbcad.geometry.rotations import rotated_about_x
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorArray
-from tbcad.optics.reflection import reflected_rays
+from tbcad.core.geometry.rotations import rotated_about_x
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.catalogue import load_catalogue
 from tbcad.prototype.balls.clearance import (
     SOLVER_MARGIN,
@@ -15,7 +16,6 @@ from tbcad.prototype.balls.clearance import (
 )
 from tbcad.prototype.balls.groups import group_mirrors
 from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii
-from tbcad.spec.load import load_spec
 from tests.helpers import segment_distances
 
 LIMITS = load_spec(None).prototype

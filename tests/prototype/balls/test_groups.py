@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.mirrors.array import MirrorArray
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.groups import group_mirrors
-from tbcad.spec.errors import SpecError
 
 
 def test_one_group_is_the_mean(paper_array: MirrorArray) -> None:

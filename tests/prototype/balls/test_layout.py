@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tbcad.geometry.vectors import dot, norm, unit
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.mirrors.array import design as mirror_design
-from tbcad.optics.reflection import reflected_rays
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.array import design as mirror_design
+from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
 from tbcad.prototype.balls.layout import (
     MORE_BALLS,
@@ -24,8 +26,6 @@ from tbcad.prototype.balls.selection import (
 )
 from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
 from tbcad.prototype.files.tables import picture_rows
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
 from tests.helpers import segment_distances
 
 SPEC = load_spec(None)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.clearance import SOLVER_MARGIN
 from tbcad.prototype.balls.placement import (
     SLACK,
@@ -13,7 +14,6 @@ from tbcad.prototype.balls.placement import (
     greedy_placement,
     min_swing_placement,
 )
-from tbcad.spec.errors import SpecError
 
 
 def problem(

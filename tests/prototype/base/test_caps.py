@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.formats.entities import Text
+from tbcad.cad.formats.entities import Text
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.balls.selection import ball_candidates
@@ -14,8 +16,6 @@ from tbcad.prototype.base.caps import SHARES, cap_limits
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.records.prototype import CapRecord
-from tbcad.spec.design import Spec
-from tbcad.spec.load import load_spec
 
 CAPTURE_MM = 60.0
 

@@ -6,7 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_magnets, cap_pocket, cap_spigot
 from tbcad.prototype.base.fasteners import base_fasteners
@@ -15,9 +18,6 @@ from tbcad.prototype.base.split import UNCUT, BaseSplit, split_base
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec
 
 SPEC = BaseSpec()
 PARTS = load_parts()

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.gaps import MIN_PART_MM, STEP_MM, _runs, rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.spec.prototype import BaseSpec
 
 
 @pytest.fixture(scope="module")

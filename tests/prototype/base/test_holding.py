@@ -6,7 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.geometry.rotations import rotated
+from tbcad.core.geometry.rotations import rotated
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.held import holding
 from tbcad.prototype.base.holding import (
@@ -27,9 +30,6 @@ from tbcad.prototype.base.pockets import pad_normals
 from tbcad.prototype.drive.balance import GRAVITY
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.prototype import HeldBall
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import BaseSpec
 
 
 def dipole_moment(radius: float, height: float) -> float:

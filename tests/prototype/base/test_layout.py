@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import dot, norm
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.ball_light import light_hulls
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.ball_light import light_hulls
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.hub import hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -19,9 +22,6 @@ from tbcad.prototype.base.profile import (
     distance_outside,
 )
 from tbcad.prototype.base.seats import OFF_PATH_MM, insertion_clearance, seat_layout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import BaseSpec
 
 SPEC = BaseSpec()
 

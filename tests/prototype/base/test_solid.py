@@ -10,14 +10,18 @@ from matplotlib.path import Path as Outline
 from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_SphericalSurface
 
-from tbcad.cad.brep import InvalidSolidError
-from tbcad.cad.checks import check_pads, check_volume
-from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height, loops, relief
-from tbcad.cad.measures import plane_faces, properties, volume
-from tbcad.cad.meshing import volume_by_meshes
-from tbcad.cad.solids import cut, cylinder, faces, fused, one_solid
-from tbcad.geometry.vectors import dot, norm
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.cad.kernel.brep import InvalidSolidError
+from tbcad.cad.kernel.checks import check_pads, check_volume
+from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height, loops, relief
+from tbcad.cad.kernel.measures import plane_faces, properties, volume
+from tbcad.cad.kernel.meshing import volume_by_meshes
+from tbcad.cad.kernel.solids import cut, cylinder, faces, fused, one_solid
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import seat_solids
 from tbcad.prototype.base.cap_solids import cap_parts
@@ -48,10 +52,6 @@ from tbcad.prototype.base.solid import (
 from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec
 from tbcad.types import Floats
 from tests.helpers import as_trimesh, bounds, manifold
 

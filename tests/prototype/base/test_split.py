@@ -5,7 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.joints import flange_profile
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -14,9 +17,6 @@ from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.bed import min_bed, shortfall, usable_size
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec
 
 SPEC = BaseSpec()
 DOWN = [np.array([0.0, 0.0, -1.0])]

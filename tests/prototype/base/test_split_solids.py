@@ -8,13 +8,15 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 from OCP.BRepCheck import BRepCheck_Analyzer
 
-from tbcad.cad.brep import Solid
-from tbcad.cad.glyphs import ROWS, SIGNS, fitting_height
-from tbcad.cad.measures import plane_faces, volume
-from tbcad.cad.meshing import volume_by_meshes
-from tbcad.cad.solids import solids
-from tbcad.formats.step import write_step
-from tbcad.geometry.vectors import norm
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height
+from tbcad.cad.kernel.measures import plane_faces, volume
+from tbcad.cad.kernel.meshing import volume_by_meshes
+from tbcad.cad.kernel.solids import solids
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import LABEL_MM, Joint
@@ -23,8 +25,6 @@ from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.placing import PlacedSolid
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import BaseSpec
 from tests.helpers import as_trimesh, bounds, cylinders, manifold
 
 PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.measures import volume
-from tbcad.cad.solids import faces, polyhedron, revolved_polygon
-from tbcad.geometry.vectors import norm
+from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.solids import faces, polyhedron, revolved_polygon
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout, base_layout
 from tbcad.prototype.base.solid import facet_count, wall_facets, wall_section
-from tbcad.spec.prototype import BaseSpec
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from tbcad.drafting.dimensions import labels
-from tbcad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
-from tbcad.formats.entities import Circle, Dimension, Layer, Line, Polyline, Text, simple
+from tbcad.cad.drafting.dimensions import labels
+from tbcad.cad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
+from tbcad.cad.formats.entities import Circle, Dimension, Layer, Line, Polyline, Text, simple
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drawings.lamps import LAMP, lamp_sheet

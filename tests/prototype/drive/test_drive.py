@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.drive.drive import (
     DRIVE_COLUMNS,
     Drive,
@@ -19,7 +20,6 @@ from tbcad.prototype.drive.loads import HOLD_MARGIN, BaseTorques, DriveLoads, ch
 from tbcad.prototype.frame.head import GAP_MM
 from tbcad.prototype.frame.purchased import PLATE_MM
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
 
 PARTS = load_parts()
 DRIVES = load_drives(PARTS)

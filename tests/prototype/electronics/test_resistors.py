@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.electronics.resistors import E24, e24_at_least, series_resistor
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
 
 PARTS = load_parts()
 LED = PARTS["LED-3"]

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.electronics.wiring import Wiring, wiring_layout, wiring_rows
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import PrototypeSpec
 
 PARTS = load_parts()
 DRIVE = load_drives(PARTS)[0]

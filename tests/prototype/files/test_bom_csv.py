@@ -3,7 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.formats.csv_table import write_table
+from tbcad.cad.formats.csv_table import write_table
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import ball_masses, sum_masses
 from tbcad.prototype.drive.drive import Drive, load_drives
@@ -19,8 +21,6 @@ from tbcad.prototype.files.record import drive_record
 from tbcad.prototype.printing.estimate import PrintEstimate
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.purchased.prices import load_prices
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import MotionSpec
 from tests.exported_files import Rows, read_csv
 
 

@@ -9,7 +9,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from tbcad_verify.prototype.gcode_machine import run_program
 
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
@@ -17,9 +20,6 @@ from tbcad.prototype.drive.travel import free_base_angles, home_angles, stop_seq
 from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.files.gcode import DECIMALS, duration_minutes, gcode_program, write_program
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import MotionSpec
 
 LEDS, TRUNCATED = 4, 10.0**-DECIMALS
 MOTIONS = st.builds(

@@ -1,12 +1,12 @@
 """The program for Klipper is the same plan in Klipper's words."""
 
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.electronics.outputs import lights
 from tbcad.prototype.files.klipper import klipper_config, klipper_program
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.prototype import MotionSpec
 
 MOTION = MotionSpec(home_trim_deg=0.5)
 ANGLES = HomeAngles(-98.5, -96.5, 191.0)

@@ -2,12 +2,12 @@
 
 import pytest
 
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.files.settings import settings
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.prototype import MotionSpec
 
 ANGLES = HomeAngles(-98.5, -96.5, 191.0)
 

@@ -5,7 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tbcad.formats.csv_table import write_table
+from tbcad.cad.formats.csv_table import write_table
+from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import load_drives
@@ -19,7 +20,6 @@ from tbcad.prototype.files.tables import (
     stop_rows,
 )
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.load import load_spec
 from tests.exported_files import Rows, read_csv
 
 FRAME = np.array([[1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [0.0, -(2**0.5), 0.0]]) / 2**0.5

@@ -10,13 +10,13 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
+from tbcad.core.mirrors.array import design
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.mirrors.array import design
 from tbcad.output.build import write_export
 from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
 from tbcad.prototype.assembly_steps.machine import read_machine
 from tbcad.prototype.assembly_steps.steps import assembly_steps
-from tbcad.spec.load import load_spec
 from tests.exported_files import Rows, contents, read_csv
 from tests.helpers import area, read_mesh, read_step, volume
 

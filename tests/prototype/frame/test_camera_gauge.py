@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.camera.requirements import camera_requirements
-from tbcad.geometry.vectors import norm, unit
-from tbcad.optics.camera import Camera
+from tbcad.core.camera.requirements import camera_requirements
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.optics.camera import Camera
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge, marks_seen

@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tbcad.geometry.primitives import Component, Cylinder
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.primitives import Component, Cylinder
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
@@ -19,9 +22,6 @@ from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purcha
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import choose_part, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import PrototypeSpec
 from tests.prototype.conftest import SMALL
 
 PARTS = load_parts()

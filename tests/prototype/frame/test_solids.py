@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.measures import volume
-from tbcad.geometry.vectors import norm
+from tbcad.cad.kernel.measures import volume
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
@@ -16,8 +18,6 @@ from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
 from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.printer import PrinterSpec
 from tbcad.types import Floats
 from tests.helpers import as_trimesh, cylinders, manifold
 from tests.prototype.conftest import SMALL

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.geometry.primitives import Cylinder, Prism
-from tbcad.geometry.vectors import norm
+from tbcad.core.geometry.primitives import Cylinder, Prism
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import (
@@ -21,8 +23,6 @@ from tbcad.prototype.homing.layout import ROLLER_MM, homing_layout
 from tbcad.prototype.homing.sizes import PIN_HOLE_MM, tab_radius
 from tbcad.prototype.printing.placing import component_solid
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import MotionSpec
 from tbcad.types import Floats
 
 PARTS = load_parts()

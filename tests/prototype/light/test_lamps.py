@@ -7,6 +7,8 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.keepout import KeepOut
@@ -14,8 +16,6 @@ from tbcad.prototype.light import lamps as searched
 from tbcad.prototype.light.lamp import SHORT_STRIP, LampLayout, hidden_by_base
 from tbcad.prototype.light.lamps import SIGNS, lamp_layout
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import PrototypeSpec, StageSpec
 
 PARTS = load_parts()
 

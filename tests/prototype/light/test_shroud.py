@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from tbcad.formats.entities import Layer, Line, Polyline
-from tbcad.geometry.primitives import Component, box, volume
+from tbcad.cad.formats.entities import Layer, Line, Polyline
+from tbcad.core.geometry.primitives import Component, box, volume
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import LightSpec
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.light.shroud import FLAP_MM, NOTCH_MM, ShroudLayout, pattern, shroud_layout
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.prototype import LightSpec
 
 PARTS = load_parts()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.cad.mesh import Mesh
+from tbcad.cad.kernel.mesh import Mesh
 from tbcad.prototype.printing.estimate import (
     FLAT_MM,
     FLOWS,

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.measures import properties
-from tbcad.cad.solids import faces, fused, one_solid
-from tbcad.geometry.primitives import Slot, slot_parts, volume
-from tbcad.geometry.vectors import unit
+from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.solids import faces, fused, one_solid
+from tbcad.core.geometry.primitives import Slot, slot_parts, volume
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.printing.placing import NO_PADS, downward_pads, opening_up, primitive_solid
-from tbcad.spec.prototype import BaseSpec
 
 
 def cone(axis: np.ndarray, angle_deg: float, count: int = 12) -> np.ndarray:

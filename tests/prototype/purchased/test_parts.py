@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.purchased.parts import (
     COMMON_COLUMNS,
     SIZES,
@@ -10,7 +11,6 @@ from tbcad.prototype.purchased.parts import (
     of_kind,
     package_lists,
 )
-from tbcad.spec.errors import SpecError
 
 PARTS = load_parts()
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.purchased.prices import COLUMNS, load_prices
-from tbcad.spec.errors import SpecError
 
 HEADER = ",".join(COLUMNS)
 

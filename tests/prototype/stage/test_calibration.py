@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tbcad.optics.reflection import reflection_points
+from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.spec.load import load_spec
 from tbcad.prototype.stage.calibration import (
     NOISE_PX,
     calibration_estimate,
 )
 from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
-from tbcad.spec.load import load_spec
 from tests.mirror_arrays import mirror_array
 
 STAGE = load_spec(None).prototype.stage

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tbcad.geometry.primitives import (
+from tbcad.core.geometry.primitives import (
     SIDES,
     Cylinder,
     Prism,
@@ -17,8 +17,11 @@ from tbcad.geometry.primitives import (
     cylinder_between,
     enclosing_triangles,
 )
-from tbcad.geometry.rotations import even_angles, rotated_about_x, unit_circle
-from tbcad.geometry.vectors import norm, unit
+from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.keepout import (
@@ -32,9 +35,6 @@ from tbcad.prototype.keepout import (
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
 from tbcad.prototype.stage.leds import hidden_by_object, virtual_cameras, visible
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
 
 PARTS = load_parts()
 SIZED = load_spec(None).prototype

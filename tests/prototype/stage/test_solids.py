@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.geometry.vectors import norm, unit
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.printing.placing import PlacedSolid, placed_component
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout
-from tbcad.spec.errors import SpecError
-from tbcad.spec.load import load_spec
-from tbcad.spec.printer import PrinterSpec
-from tbcad.spec.prototype import StageSpec
 from tests.helpers import as_trimesh
 
 CAPTURE = 30.0

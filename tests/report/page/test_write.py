@@ -14,7 +14,7 @@ from PIL import Image
 from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.run.verify import verify
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.output.foreign_files import foreign_files
 from tbcad.output.manifest import fingerprint

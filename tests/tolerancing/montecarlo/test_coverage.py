@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.simulate.scene.rays import exact_tracer
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import load_spec
+from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.geometry.vectors import dot, perpendicular_axes
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.reflection import reflected_rays
+from tbcad.core.geometry.vectors import dot, perpendicular_axes
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.reflection import reflected_rays
 from tbcad.tolerancing.montecarlo.cell_edges import MISS_SQUARED
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.optics.camera import Camera
-from tbcad.optics.reflection import reflected_rays
-from tbcad.simulate.scene.object import built_in_object
-from tbcad.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.simulate.scene.rays import exact_tracer, reflect_pixels
-from tbcad.simulate.scene.reflector import Reflector, reflectors
-from tbcad.simulate.scene.viewpoint import camera_around_object
-from tbcad.simulate.views.viewpoints import ground_truths
-from tbcad.spec.load import load_spec
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.rays import exact_tracer, reflect_pixels
+from tbcad.light.simulate.scene.reflector import Reflector, reflectors
+from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.views.viewpoints import ground_truths
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.geometry.vectors import perpendicular_axes
+from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.warp import (
     MISSING_VARIANCE,

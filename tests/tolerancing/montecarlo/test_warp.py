@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import (

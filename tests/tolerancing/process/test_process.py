@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.spec.errors import SpecError, section_of
-from tbcad.spec.errors import dotted_fields as keys_of
+from tbcad.core.spec.errors import SpecError, section_of
+from tbcad.core.spec.errors import dotted_fields as keys_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.process.process import (
     BUILT_IN,

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tbcad.geometry.vectors import norm, perpendicular_axes, unit
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.optics.windows import cell_windows
+from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.windows import cell_windows
+from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
+from tbcad.light.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.simulate.prototype.run import PrototypeRun, prototype_runs
-from tbcad.simulate.scene.reflector import reflectors
-from tbcad.spec.load import load_spec
 from tbcad.tolerancing.montecarlo.builds import CoverageResult, simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes

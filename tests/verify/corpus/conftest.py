@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tests.verify.corpus.copies import digests
 from tests.verify.corpus.readings import remembered
 

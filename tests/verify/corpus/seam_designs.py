@@ -9,12 +9,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from tbcad.mirrors.array import MirrorDesign
-from tbcad.mirrors.array import design as mirrors_of
-from tbcad.mirrors.radii import RadiusProblem
-from tbcad.mirrors.seam import seam_gaps
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.array import design as mirrors_of
+from tbcad.core.mirrors.radii import RadiusProblem
+from tbcad.core.mirrors.seam import seam_gaps
+from tbcad.core.spec.design import Spec
 from tbcad.output.build import write_export
-from tbcad.spec.design import Spec
 from tests.verify.corpus.copies import load, put
 
 

@@ -12,13 +12,13 @@ from tbcad_verify.prototype import homing_checks, klipper_checks
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.export import read_export
 
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.electronics.outputs import lights
 from tbcad.prototype.files.klipper import klipper_config, klipper_program
 from tbcad.prototype.files.settings import settings, settings_lines
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.spec.prototype import MotionSpec
 
 DRIVE, MOTION = load_drives(load_parts())[0], MotionSpec()
 Faults = Callable[[PrototypeContext], Iterable[str]]

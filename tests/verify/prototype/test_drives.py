@@ -15,7 +15,7 @@ from tbcad_verify.prototype import drive_checks
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.drive_checks import EFFICIENCY, FULL_STEPS, MOTORS, WORM_RATIO, Gear
 
-from tbcad.cli import run
+from tbcad.app.cli import run
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.purchased.parts import load_parts
 

@@ -10,10 +10,10 @@ import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.radius_rule import rule_check
 
-from tbcad.mirrors.array import design
-from tbcad.mirrors.record import write_record
+from tbcad.core.mirrors.array import design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.load import load_spec
 from tbcad.output.manifest import write_manifest
-from tbcad.spec.load import load_spec
 
 
 def record(folder: Path, rule: str, *more: str) -> Export:

@@ -11,7 +11,7 @@ import tbcad_verify
 from pydantic import BaseModel
 from tbcad_verify.record.spec import Spec
 
-from tbcad.spec.design import Spec as DesignSpec
+from tbcad.core.spec.design import Spec as DesignSpec
 from tests.verify.corpus.mutation import refused
 from tests.verify.corpus.record_changes import JSON, design
 

@@ -6,11 +6,11 @@ import pytest
 from tbcad_verify.record.export import read_export
 from tbcad_verify.shell.needed_lens import image_depths, needed_lens
 
-from tbcad.camera.requirements import camera_requirements
-from tbcad.mirrors.array import design
-from tbcad.mirrors.record import write_record
+from tbcad.core.camera.requirements import camera_requirements
+from tbcad.core.mirrors.array import design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.load import load_spec
 from tbcad.output.manifest import write_manifest
-from tbcad.spec.load import load_spec
 
 
 @pytest.mark.parametrize(

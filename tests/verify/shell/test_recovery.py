@@ -15,12 +15,12 @@ from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
-from tbcad.formats.stl import write_stl
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import write_record
+from tbcad.cad.formats.stl import write_stl
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.spec.load import load_spec
 from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import camera_a_mesh
-from tbcad.spec.load import load_spec
 from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import Cells, Design, export, facets_of, stl
 

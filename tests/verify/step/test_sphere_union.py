@@ -18,10 +18,10 @@ from tbcad_verify.step.sphere_union import (
 )
 from tbcad_verify.types import Floats
 
-from tbcad.mirrors.array import MirrorDesign, design
-from tbcad.mirrors.record import COLUMNS, mirror_rows
-from tbcad.optics.cells import cell_areas
-from tbcad.spec.load import load_spec
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.mirrors.record import COLUMNS, mirror_rows
+from tbcad.core.optics.cells import cell_areas
+from tbcad.core.spec.load import load_spec
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 NO_WALLS = np.zeros((0, 4))

@@ -1,0 +1,1 @@
+"""The public functions of `import tbcad`, and the command line that calls them."""

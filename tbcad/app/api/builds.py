@@ -1,0 +1,255 @@
+"""Files from a spec, verified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from tbcad.app.api.arguments import chosen_spec
+from tbcad.app.api.verification import verify as verification
+from tbcad.common.atomic_files import InFolder
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.load import option_texts
+from tbcad.errors import InputError
+from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions
+from tbcad.options.call import keywords, silent
+from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
+from tbcad.options.tolerances import check_yield
+
+if TYPE_CHECKING:
+    from tbcad_verify.report.as_made import AsMade
+    from tbcad_verify.report.report import Report
+
+    from tbcad.app.whole_design import Design
+    from tbcad.core.mirrors.array import MirrorDesign
+    from tbcad.tolerancing.process.process import Process
+    from tbcad.types import Progress
+
+
+@dataclass(frozen=True)
+class Build(InFolder):
+    """What a build wrote.
+
+    Attributes:
+        folder: that holds all files.
+        design: the mirrors.
+        parts: what was built: "shell", "prototype" or both.
+        note: why the prototype was left out; empty when it was not.
+        report: the verification of the files; None when it was not asked for.
+    """
+
+    folder: Path
+    design: Design
+    parts: tuple[str, ...]
+    note: str
+    report: Report | None
+
+    def __repr__(self) -> str:
+        """Return folder and verdict."""
+        verdict = "not verified" if self.report is None else self.report.verdict
+        return f"<Build {self.folder}: {' and '.join(self.parts)}; {verdict}>"
+
+    @property
+    def passed(self) -> bool:
+        """Whether the files are verified and pass every check."""
+        return self.report is not None and self.report.passed
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A build that can be begun."""
+
+    spec: Spec  # as asked for, before a process changes it
+    # that are built, but no prototype where it is not asked for and cannot be
+    parts: tuple[str, ...]
+    process: Process | None  # that edges and margins are chosen for
+
+
+def planned(options: BuildOptions) -> Plan:
+    """Refuse, before any work, what cannot be built or replaced.
+
+    Raises:
+        InputError: as said.
+    """
+    from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import design_files, files_named
+    from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
+
+    asked = parse_parts(options.parts) if isinstance(options.parts, str) else options.parts
+    changes = option_texts(options.settings)
+    changes += [f"mirrors.radius_rule={options.radius_rule}"] if options.radius_rule else []
+    spec = chosen_spec(options.spec, options.n, changes)
+    process = _asked_process(options)
+    if asked is not None:
+        check_parts(spec, asked)
+    parts = default_parts(spec) if asked is None else tuple(asked)
+    check_lists(spec, parts)
+    file = None if isinstance(options.spec, Spec) else options.spec
+    inputs = [*design_files(spec, file), *files_named(options.for_process)]
+    check_replaceable(Path(options.out), "build", options.force, inputs)
+    return Plan(spec, parts, process)
+
+
+@keywords(BuildOptions)
+def build(options: BuildOptions) -> Build:
+    """Compute the mirrors, write all files into a folder, verify them, and write report.html.
+
+    The folder is replaced as a whole or not at all. A design may also be a spec.
+
+    Raises:
+        InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
+    """
+    started, plan = monotonic(), planned(options)
+    plan = replace(plan, spec=spec_for_process(plan, options))
+    options.progress("mirrors: radii and cells")
+    finished = _build_files(plan, options)
+    if finished.report is None:
+        return finished
+    return replace(finished, report=replace(finished.report, seconds=monotonic() - started))
+
+
+def _asked_process(options: BuildOptions) -> Process | None:
+    """The process whose margins are wanted: checked before anything takes long."""
+    from tbcad.tolerancing.process.process import load_process
+
+    if options.wanted_yield is not None:
+        if options.for_process is None:
+            raise InputError(
+                f"--yield {options.wanted_yield:g} is of no use without --for-process: name a "
+                "process, or leave --yield out"
+            )
+        check_yield(options.wanted_yield)
+    return None if options.for_process is None else load_process(options.for_process)
+
+
+def spec_for_process(plan: Plan, options: BuildOptions) -> Spec:
+    """The design with edges and margins for its process; the answer says what they cost."""
+    spec, process = plan.spec, plan.process
+    if process is None:
+        return spec
+    from tbcad.tolerancing.process_design import (
+        costs_text,
+        edges_for_process,
+        edges_text,
+        margins_text,
+        pixel_costs,
+        ssim_costs,
+        ssim_text,
+    )
+
+    options.progress(f"edges and margins for {process.name}")
+    wanted = DEFAULT_YIELD if options.wanted_yield is None else options.wanted_yield
+    choice = edges_for_process(spec, process, wanted, options.detail)
+    found = choice.made
+    options.answer(edges_text(choice))
+    options.answer(f"{margins_text(found)}, for {wanted:.1%} by {process.name}")
+    options.detail("pixels")
+    options.answer(costs_text(pixel_costs(found, choice.pixels)))
+    options.detail("views")
+    options.answer(ssim_text(ssim_costs(found)))
+    return found.spec
+
+
+def _build_files(plan: Plan, options: BuildOptions) -> Build:
+    """Write all files, verify them, write report.html, and replace the folder.
+
+    The files are read back before they replace the old ones.
+    """
+    from tbcad.common.background import background_processes
+    from tbcad.output.folder import replacing
+
+    out, verify, progress = Path(options.out), options.verify, options.progress
+    with replacing(out, "build", options.force) as folder:
+        with background_processes() as submit:
+            submit(_load_libraries)  # while the mirrors are computed here
+            from tbcad.core.mirrors.array import design
+
+            mirrors = design(plan.spec, options.detail)
+            simulated = submit(_as_made, mirrors) if verify and "shell" in plan.parts else None
+            from tbcad.output.build import write_export
+
+            optional = options.parts is None
+            export = write_export(
+                mirrors, folder, plan.parts, progress, submit, optional_prototype=optional
+            )
+        report = None
+        if verify:
+            report = replace(
+                verification(folder, progress=progress),
+                folder=out,
+                note=export.note,
+                as_made=simulated.result() if simulated else None,
+            )
+        progress("report")
+        from tbcad.report.page.write import write_report
+
+        write_report(folder, as_made=report.as_made if report else None)
+    from tbcad.app.whole_design import Design
+
+    return Build(out, Design(export.spec, mirrors.arrays), export.parts, export.note, report)
+
+
+def _load_libraries() -> None:
+    """Load what the background process works with."""
+    import tbcad.tolerancing.as_made  # noqa: F401
+
+
+def _as_made(mirrors: MirrorDesign) -> AsMade:
+    """Simulate a few builds of a design by every built-in process."""
+    from tbcad.light.simulate.scene.reflector import reflectors
+    from tbcad.tolerancing.as_made import as_made
+
+    spec = mirrors.spec
+    target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
+    return as_made(reflectors(mirrors), target, coat)
+
+
+def as_made(
+    exports: Path | str, progress: Progress = silent, detail: Progress = silent
+) -> AsMade | None:
+    """Simulate a few builds of an export by every built-in process.
+
+    Returns:
+        Their yields; None where no shell was built, or its record cannot be read.
+    """
+    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.tolerancing.as_made import as_made as simulated
+
+    folder = Path(exports)
+    if not (folder / "shell_a.stl").is_file():
+        return None
+    progress("simulated builds by each process")
+    try:
+        export = read_export(folder)
+    except InputError:  # the verification says what is wrong with it
+        return None
+    coat = export.spec.mirrors.coating_um
+    return simulated(export.reflectors, export.capture_mm, coat, detail)
+
+
+@keywords(ReportOptions)
+def report_page(options: ReportOptions) -> Path:
+    """Write the page that shows an export: one HTML file with its verdict, 3D view and tables.
+
+    Returns:
+        The file.
+
+    Raises:
+        InputError: the export or the capture cannot be read, or the file may not be written.
+    """
+    folder = Path(options.exports)
+    file, light_field = (
+        None if one is None else Path(one) for one in (options.out, options.capture)
+    )
+    check_is_folder(folder)
+    check_is_export(folder)
+    if light_field is not None:
+        check_is_capture(light_field)
+    from tbcad.report.page.write import check_writable, write_report
+
+    check_writable(file or folder / "report.html", options.force)
+    simulated = as_made(folder, options.progress, options.detail)
+    options.progress("report")
+    return write_report(folder, file, simulated, light_field, force=options.force)

@@ -1,0 +1,195 @@
+"""Simulated photographs of both cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tbcad.options.call import keywords
+from tbcad.options.captures import CaptureOptions
+from tbcad.options.checks import check_is_export, check_is_object
+from tbcad.options.shared import AnyPath
+
+if TYPE_CHECKING:
+    from tbcad.light.reflectance.environment import LightFormat
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.photograph import CameraPhotographs
+    from tbcad.light.simulate.scene.object import SceneObject
+
+
+@keywords(CaptureOptions)
+def capture(options: CaptureOptions) -> LightField:
+    """Simulate the photographs of both cameras through the mirrors of a build.
+
+    Returns:
+        The light field, in memory: for every pixel the ray it sees along and its colour.
+
+    Raises:
+        InputError: export, object or lamps cannot be read, or the folder cannot be replaced.
+    """
+    photographs = photograph(options)
+    from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
+
+    if options.out is not None:
+        write_photographs(photographs, options)
+        return LightField.read(Path(options.out))
+    options.progress("photographs and light field")
+    bands = ((reflector, bands()) for reflector, bands in photographs.cameras)
+    return light_field_in_memory(bands, photographs.capture_mm, photographs.facts)
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """Both photographs before they are taken: light is traced when their bands are asked for."""
+
+    cameras: CameraPhotographs  # each camera with what gives its bands of pixel rows
+    subject: SceneObject  # the object before the cameras
+    capture_mm: float  # diameter of the capture sphere
+    facts: dict[str, Any]  # how they are taken: design, n, geometry, samples
+    sources: tuple[AnyPath | None, ...] = ()  # files and folders that they are made from
+
+
+def photograph(options: CaptureOptions) -> Photographs:
+    """Prepare both photographs, when all that can be refused at once has been."""
+    options.check()
+    exports, file = Path(options.exports), options.object_file
+    check_is_export(exports)
+    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    from tbcad.light.simulate.camera_photographs import camera_photographs
+    from tbcad.light.simulate.prototype.lamps import lit_by, read_lamps
+    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.ray_casting import prepared_scene
+    from tbcad.output.folder import check_replaceable
+    from tbcad.output.inputs import files_named
+
+    sources = (exports, file, *files_named(options.lights))
+    if options.out is not None:
+        check_replaceable(Path(options.out), "capture", options.force, sources)
+    options.progress("object and scene")
+    export = read_export(exports)
+    taken = ObjectOptions(options.fit, options.paint, options.up, options.unit)
+    subject = load_or_built_in(file, export.capture_mm, taken, options.answer)
+    lamps = read_lamps(export.folder) if options.geometry == "prototype" else None
+    subject = lit_by(lamps, subject) if lamps else subject
+    cameras = camera_photographs(
+        export, prepared_scene(subject), options.geometry, options.samples, options.detail
+    )
+    facts = {
+        "object": subject.name,
+        "design": export.spec.name,
+        "n": export.spec.optics.n,
+        "geometry": options.geometry,
+        "samples": options.samples,
+    } | ({"light": "lamps of the prototype"} if lamps else {})
+    if subject.reading is not None:
+        facts["object_file"] = asdict(subject.reading)
+    return Photographs(cameras, subject, export.capture_mm, facts, sources)
+
+
+def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:
+    """Take both photographs and replace a folder by their files; return the record of them."""
+    from tbcad.light.simulate.capture.files import write_capture
+    from tbcad.output.folder import replacing
+    from tbcad.output.manifest import write_manifest
+
+    write_field = None if options.lights is None else _field_writer(photographs, options)
+    options.progress("photographs and light field")
+    out = Path(options.out or "")
+    with replacing(out, "capture", options.force, photographs.sources) as folder:
+        record = write_capture(
+            folder,
+            photographs.cameras,
+            photographs.subject,
+            photographs.capture_mm,
+            photographs.facts,
+        )
+        if write_field is not None:
+            options.progress("a photograph for each lamp")
+            record["reflectance"] = write_field(folder)
+        if options.frames is not None:
+            options.progress("a photograph for each frame")
+            record["sequence"] = _write_frames(folder, photographs, options.frames, options)
+        write_manifest(folder, "capture")
+    return record
+
+
+def _write_frames(
+    folder: Path, photographs: Photographs, count: int, options: CaptureOptions
+) -> dict[str, Any]:
+    from math import radians
+
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.sequence import turns, write_turning
+    from tbcad.light.simulate.scene.ray_casting import prepared_scene
+
+    angles, scene = turns(count, radians(options.turn)), prepared_scene(photographs.subject)
+    with LightField.open(folder) as source:
+        return write_turning(folder, source, scene, angles, options.detail)
+
+
+def _field_writer(
+    photographs: Photographs, options: CaptureOptions
+) -> Callable[[Path], dict[str, Any]]:
+    """What writes the reflectance field; a table of lamps is read at once, before long work."""
+    from tbcad.light.reflectance.lamp_places import (
+        MIRRORS,
+        PROJECTORS,
+        lamps_of_mirrors,
+        read_lamp_places,
+    )
+    from tbcad.light.reflectance.transport import write_reflectance
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.scene.ray_casting import prepared_scene
+
+    table, lights = None, str(options.lights)
+    if lights not in (MIRRORS, PROJECTORS):
+        table = read_lamp_places(Path(lights), photographs.capture_mm)
+
+    def write(folder: Path) -> dict[str, Any]:
+        with LightField.open(folder) as source:
+            lamps = table or lamps_of_mirrors(source, options.every)
+            scene = prepared_scene(photographs.subject)
+            thrown = lights == PROJECTORS
+            return write_reflectance(folder, source, scene, lamps, options.detail, thrown)
+
+    return write
+
+
+def relight(
+    capture_folder: Path | str,
+    light: Path | str,
+    *,
+    turn_deg: float = 0.0,
+    light_format: LightFormat | None = None,
+) -> LightField:
+    """A light field in the light of its surroundings, as `tbcad view --light` shows it.
+
+    Args:
+        capture_folder: that `capture` wrote with lights.
+        light: picture of the surroundings by direction, +x in the middle: Radiance (.hdr), OpenEXR
+            (.exr) or TIFF in floating point.
+        turn_deg: turns it about z.
+        light_format: of that picture, "latlong", "angular", "mirror-ball" or "cross"; None:
+            latlong, if it is twice as wide as high.
+
+    Returns:
+        The light field in memory, with other colours.
+
+    Raises:
+        InputError: the folder has no reflectance field, or the picture cannot be read.
+    """
+    from math import radians
+
+    from tbcad.light.reflectance.environment import read_environment
+    from tbcad.light.reflectance.field_file import open_reflectance, relit
+    from tbcad.light.simulate.capture.light_field import LightField
+
+    folder, environment = (
+        Path(capture_folder),
+        read_environment(Path(light), radians(turn_deg), light_format),
+    )
+    with open_reflectance(folder) as reflectance:
+        return relit(LightField.read(folder), reflectance, environment).field

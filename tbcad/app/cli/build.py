@@ -1,0 +1,176 @@
+"""Build, verify and draw: heavy libraries are imported inside the commands."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad.app.cli.app import app, command
+from tbcad.app.cli.output_mode import Full, Json, Quiet, output_mode, print_json
+from tbcad.common.screen import report_console, stages
+from tbcad.errors import InputError
+from tbcad.options.builds import BuildOptions, VerificationOptions
+from tbcad.options.checks import check_is_calibration
+from tbcad.options.shared import Exports, ForceFile, JsonResult
+
+if TYPE_CHECKING:
+    from tbcad_verify.report.report import Output
+
+    from tbcad.app.doctor import Finding
+
+# About as many stages has a build, without and with its verification.
+SHELL_STAGES, PROTOTYPE_STAGES, VERIFICATION_STAGES = (5, 14), (9, 27), 19
+FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
+
+
+@command()
+def build(
+    options: BuildOptions,
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Only show what would be built: mirrors, balls, masses, time and estimates of "
+            "printing and cost; seconds, and nothing is written.",
+        ),
+    ] = False,
+    full: Full = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Compute the mirrors, build shells and prototype, write STEP, STL and 3MF, and verify them.
+
+    Exit code 0: built and verified. 1: built, but the verification fails (the files stay). 2: bad
+    input, nothing written.
+    """
+    output = output_mode(full, quiet, json)
+    if not options.verify and not dry_run and output in ("full", "json"):
+        raise InputError(f"--{output} shows a verification: leave --no-verify out")
+    from tbcad.app.api import build as build_files
+    from tbcad.app.api.builds import planned, spec_for_process
+    from tbcad.app.cli.memory import keep_freed_memory
+    from tbcad.output.parts import PROTOTYPE
+
+    keep_freed_memory()
+    plan = planned(options)
+    number = (PROTOTYPE_STAGES if PROTOTYPE in plan.parts else SHELL_STAGES)[options.verify]
+    with stages(number, silent=quiet) as screen:
+        shown = options.on(screen)
+        if dry_run:
+            from tbcad.app.cli.dry_run import show_overview
+
+            spec = spec_for_process(plan, shown)
+            return show_overview(spec, plan.parts, options.parts is None, output, screen)
+        built = build_files(shown)
+    if built.report is None:
+        note = f"{built.note}\n" if built.note else ""
+        out = options.out
+        typer.echo(f"{note}{out}: built, not verified: run tbcad verify {out}")
+        return 0
+    built.report.show(report_console(), output)
+    return 0 if built.passed else 1
+
+
+@command("verify")
+def verify_command(
+    options: VerificationOptions,
+    as_built: Annotated[
+        Path | None,
+        typer.Option(
+            "--as-built",
+            metavar="CALIBRATION",
+            help="Instead of the files, verify the prototype as tbcad calibrate found it: what it "
+            "covers, and what to shim. Writes nothing.",
+        ),
+    ] = None,
+    full: Full = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Verify an export on its files, and write verify.json there.
+
+    Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
+    """
+    output, folder = output_mode(full, quiet, json), Path(options.exports)
+    if as_built is not None and (options.printers or options.clients or options.strict):
+        raise InputError(
+            "--as-built is about no files: leave out --printer, --clients and --strict"
+        )
+    options.check()
+    if as_built is not None:
+        return _verify_as_built(folder, as_built, output)
+    from tbcad.app.api import as_made, verify
+
+    started = monotonic()
+    with stages(VERIFICATION_STAGES, silent=quiet) as screen:
+        # Before the verification, which writes: a command that is stopped has changed nothing.
+        simulated = as_made(folder, screen.stage, screen.detail)
+        report = verify(options.on(screen))
+    report = replace(report, as_made=simulated, seconds=monotonic() - started)
+    report.show(report_console(), output)
+    return 0 if report.passed else 1
+
+
+def _verify_as_built(folder: Path, calibration: Path, output: "Output") -> int:
+    check_is_calibration(calibration)
+    from tbcad.app.api import verify_as_built
+
+    with stages(3, silent=output == "quiet") as screen:
+        report = verify_as_built(folder, calibration, progress=screen.stage)
+    report.show(report_console(), output)
+    return 0 if report.passed else 1
+
+
+@app.command()
+def picture(
+    folder: Exports[Path],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="PNG file to write; by default named after the subject."),
+    ] = None,
+    of: Annotated[
+        str,
+        typer.Option(
+            help="Subject: shell (both halves from outside, and the mirrors from a camera); edges "
+            "or seam (of the mirrors, close up); rig, sides, base, seat or exploded (the "
+            "prototype)."
+        ),
+    ] = "shell",
+    force: ForceFile = False,
+) -> int:
+    """Draw the shells or the prototype from the files of an export."""
+    from tbcad.report.drawing import picture as draw
+
+    file = out or Path(f"{of}.png")
+    draw(folder, file, of, force)
+    typer.echo(f"{file}: written")
+    return 0
+
+
+@app.command()
+def doctor(json: JsonResult = False) -> int:
+    """Check that this Python environment has all that tbcad needs, and say how to repair it."""
+    from tbcad.app.doctor import diagnose
+
+    findings = diagnose()
+    if json:
+        print_json({"schema": "tbcad-doctor/1", "findings": [asdict(one) for one in findings]})
+    for finding in findings if not json else ():
+        _show_finding(finding)
+    return 0 if all(finding.ok for finding in findings) else 1
+
+
+def _show_finding(finding: "Finding") -> None:
+    """Show what was found, and below it, after an arrow, what to do."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    row = Table.grid(padding=(0, 1))
+    for width in FINDING_WIDTHS:
+        row.add_column(width=width, overflow="fold")
+    row.add_row("ok" if finding.ok else "NO", escape(finding.name), escape(finding.detail))
+    if finding.remedy:
+        row.add_row("", "->", escape(finding.remedy))
+    report_console().print(row, highlight=False)

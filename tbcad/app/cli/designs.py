@@ -1,0 +1,132 @@
+"""Designs: one to begin with, and the search for a better one."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad.app.cli.app import app, command
+from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.common.screen import paragraph, stages
+from tbcad.errors import InputError
+from tbcad.options.designs import OptimizeOptions
+from tbcad.options.shared import ForceFile, JsonResult
+
+if TYPE_CHECKING:
+    from tbcad.optimizing.search import SearchResult
+
+
+PAPER = "turtleback"
+
+
+@app.command()
+def init(
+    file: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="Design file (TOML) to write.")
+    ] = None,
+    design: Annotated[
+        str,
+        typer.Option(
+            "--from", metavar="NAME", help="Design that comes with tbcad to begin from: see --list."
+        ),
+    ] = PAPER,
+    show: Annotated[
+        bool, typer.Option("--list", help="Only list the designs that come with tbcad.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="With --list: print it as JSON.")] = False,
+    force: ForceFile = False,
+) -> int:
+    """Write a design to change: every key with its meaning, unit, default and allowed values.
+
+    Keys that are comments have their defaults, so the file as written is the design it begins from.
+    """
+    from tbcad.core.spec.load import shipped_designs
+
+    if show:
+        about = _about_designs()
+        lines = (paragraph(f"{name}: {text}") for name, text in about.items())
+        print_result({"schema": "tbcad-designs/1", "designs": about}, lines, json)
+        return 0
+    if json:
+        raise InputError("--json is about --list: leave it out, or add --list")
+    if file is None:
+        raise InputError("FILE is missing: name the design to write, such as tbcad init my.toml")
+    if design not in shipped_designs():
+        known = ", ".join(shipped_designs())
+        raise InputError(f"--from is {design!r}, allowed is one of {known}: change it")
+    from tbcad.common.atomic_files import replace_files
+    from tbcad.output.single_files import check_file
+
+    check_file(file, force)
+    from tbcad.app.reference.template import design_template
+
+    replace_files(file.parent, {file.name: design_template(design).encode()})
+    typer.echo(f"{file}: written; build it by tbcad build {file}")
+    return 0
+
+
+def _about_designs() -> dict[str, str]:
+    """The designs that come with tbcad, with the first paragraph that each says of itself."""
+    from tbcad.core.spec.files import read_text
+    from tbcad.core.spec.load import shipped_designs
+
+    about = {}
+    for name, file in shipped_designs().items():
+        lines = read_text(file, name, "design").partition("\n#\n")[0].splitlines()
+        about[name] = " ".join(line.strip("# ") for line in lines)
+    return about
+
+
+@command()
+def optimize(options: OptimizeOptions, json: JsonResult = False) -> int:
+    """Search better places of cameras and mirrors for the same sensor and number of mirrors.
+
+    Camera and ellipsoid are moved, directions stretched and the lens fitted; every candidate's
+    mirrors are solved by exact rays, and pixels counted one by one. Object, sensor, number of
+    mirrors and all else stay.
+    """
+    from tbcad.app.api import optimize as searched
+
+    with stages(2) as screen:
+        result = searched(replace(options, progress=screen.stage, detail=screen.detail))
+    if json:
+        print_json(_record(result, options.files))
+        return 0
+    _show(result, *options.files)
+    return 0
+
+
+def _record(result: "SearchResult", files: tuple[Path, ...]) -> dict[str, object]:
+    """What was found, for other programs."""
+    from dataclasses import asdict
+
+    return {
+        "schema": "tbcad-optimize/1",
+        "before": asdict(result.start),
+        "after": asdict(result.best),
+        "limits": asdict(result.limits),
+        "candidates": len(result.candidates),
+        "front": [
+            asdict(one)
+            for one, kept in zip(result.candidates, result.on_front, strict=True)
+            if kept
+        ],
+        "files": [str(file) for file in files],
+    }
+
+
+def _show(result: "SearchResult", out: Path, *others: Path) -> None:
+    from tbcad.optimizing.files import comparison
+
+    if result.best.place == result.start.place:
+        typer.echo(f"No better one among {len(result.candidates)} candidates within the limits.")
+    for line in comparison(result):
+        typer.echo(line)
+    x, z, semi_minor, *stretch = result.best.place
+    typer.echo(
+        f"camera at x = {x:g}, z = {z:g} mm; semi-minor axis {semi_minor:g} mm; "
+        f"directions stretched by {stretch[0]:g} and {stretch[1]:g}"
+    )
+    beside = ", ".join(file.name for file in others)
+    typer.echo(f"{out}: written, with {beside}; build and verify it by tbcad build {out}")

@@ -1,0 +1,71 @@
+"""Write a light field as data that other programs read."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from tbcad.app.cli.app import command
+from tbcad.app.cli.output_mode import print_result
+from tbcad.common.screen import stages
+from tbcad.options.captures import ExportOptions
+from tbcad.options.shared import JsonResult
+
+STAGES = 4
+WRITTEN = {
+    "nerfstudio": "transforms.json, images, masks and points.ply",
+    "colmap": "images, masks and the model in sparse/0, binary and text",
+    "ngp-rays": "transforms.json, and images with rays_*.dat and dynamic_mask_*.png",
+    "rays": "rays.npz and rays.h5 with origin, direction, colour and camera of every ray",
+    "mitsuba": "camera_a.xml, camera_b.xml and blender.py with their meshes",
+}
+
+NOTES = {
+    "rms_distance_from_common_point_mm": " RMS",
+    "central_error_at_capture_radius_mm": " at the ends of the capture sphere",
+}
+
+
+@command()
+def export(options: ExportOptions, json: JsonResult = False) -> int:
+    """Write virtual cameras of a capture for nerfstudio, COLMAP or instant-ngp, rays, or a scene.
+
+    Each mirror's crop is resampled to the picture of a pinhole at the point that its rays come
+    nearest to, right way round, with a mask. Prints how far rays and pinholes are apart.
+    """
+    to = options.check()
+    from tbcad.app.api import export as exported
+
+    with stages(STAGES) as screen:
+        record = exported(replace(options, progress=screen.stage, detail=screen.detail))
+    figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
+    files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
+    lines = _scene_lines(record) if to == "mitsuba" else _lines(record)
+    print_result(record, [*lines, files], json)
+    return 0
+
+
+def _scene_lines(record: dict[str, Any]) -> Iterator[str]:
+    for part, count in record["facets"].items():
+        yield f"{part}: {count} facets"
+
+
+def _lines(record: dict[str, Any]) -> Iterator[str]:
+    """What is written first, then how well pinholes fit."""
+    fit, left_out = record["fit"], len(record["left_out"])
+    size = record.get("size_px")
+    content = f"{record['rays']} rays" if size is None else f"{size} x {size} pixels each"
+    missing = f"; {left_out} mirrors give none" if left_out else ""
+    yield f"{record['virtual_cameras']} virtual cameras, {content}{missing}"
+    for text, name in (
+        ("captured rays miss the pinhole by", "rms_distance_from_common_point_mm"),
+        ("rays of the pinhole are off by", "central_error_at_capture_radius_mm"),
+        ("captured pixels are apart by", "pixel_pitch_mm"),
+    ):
+        note = NOTES.get(name, "")
+        yield f"{text} {fit[name]['median']:.2f} mm (median), {fit[name]['max']:.2f} (worst){note}"
+    errors = record.get("reprojection_error_px")
+    if errors:
+        yield (
+            f"points of the object appear {errors['median']:.3f} pixels off (median), "
+            f"{errors['percentile_95']:.3f} (95 %)"
+        )

@@ -1,0 +1,198 @@
+"""The built machine: simulated, calibrated, merged, drawn."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from tbcad.app.cli.app import command
+from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.common.screen import paragraph, stages
+from tbcad.options.machines import (
+    AsBuiltOptions,
+    CalibrateOptions,
+    IntrinsicsOptions,
+    MergeOptions,
+    SimulateRunOptions,
+)
+from tbcad.options.shared import JsonResult
+
+if TYPE_CHECKING:
+    from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
+
+FAILED = 1  # exit code of a calibration that is not good enough
+FEW_NAMES = 6  # of missing mirrors in a line
+
+
+@command("simulate-run")
+def simulate_run(options: SimulateRunOptions) -> int:
+    """Simulate all photographs of a run by a random build of the prototype, or of the shell.
+
+    Writes the folder that tbcad run writes, with truth.json: the build, which a calibration of
+    these photographs should find.
+    """
+    from tbcad.app.api import simulate_run as simulate
+    from tbcad.rig.machine.record import truth_file
+
+    with stages(2) as screen:
+        run = simulate(
+            replace(options, progress=screen.stage, detail=screen.detail, answer=screen.note)
+        )
+    record = run.record
+    count = len(record.frames) * len(record.phases)
+    typer.echo(
+        f"{options.out}: {count} photographs of {len(record.frames)} frames, and the build as "
+        f"{' and '.join(truth_file(name) for name in record.machines)}"
+    )
+    return 0
+
+
+@command()
+def calibrate(options: CalibrateOptions, json: JsonResult = False) -> int:
+    """Find the machine that took the photographs of a run, and how well its rays are known.
+
+    Writes machine.json, calibration.json, tables of spheres, angles, rays and residuals, the
+    covariance and plots. Exits with 1 where the calibration is not good enough.
+    """
+    from tbcad.app.api import calibrate as calibrated
+
+    with stages(4) as screen:
+        written = calibrated(replace(options, progress=screen.stage, detail=screen.detail))
+    if json:
+        found = [{"folder": str(one.folder), **one.record} for one in written.every]
+        print_json({"schema": "tbcad-calibrations/1", "calibrations": found})
+    process = options.process or "fdm (the default)"
+    for one in written.every if not json else ():
+        typer.echo(one.text)
+        typer.echo(f"process: {process}; files: {one.folder}")
+    return FAILED if any(one.verdict.answer == "not good" for one in written.every) else 0
+
+
+@command()
+def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
+    """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
+
+    Boards may be partly out of the picture. Writes focal lengths, principal point and distortion
+    with their standard deviations, for tbcad calibrate --intrinsics.
+    """
+    from tbcad.app.api import intrinsics as solve_intrinsics
+    from tbcad.rig.calibration.intrinsics.checkerboard import EDGE_SHARE
+
+    out = Path(options.out)
+    with stages(1) as screen:
+        solved = solve_intrinsics(replace(options, progress=screen.stage, detail=screen.detail))
+    if json:
+        print_json(_lens_record(solved, out))
+        return 0
+    lens, sigma = solved.lens, solved.sigma
+    typer.echo(
+        f"{solved.boards} boards, {solved.corners} corners ({solved.outliers} outliers left out), "
+        f"RMS {solved.rms_px:.3f} px; focal length {lens.focal[0]:.2f} +- {sigma[0]:.2f} px"
+    )
+    typer.echo(
+        f"principal point {lens.principal[0]:.2f} +- {sigma[2]:.2f}, {lens.principal[1]:.2f} +- "
+        f"{sigma[3]:.2f} px; k1 {lens.distortion[0]:.5f} +- {sigma[4]:.5f}"
+    )
+    if solved.unused:
+        typer.echo(paragraph(f"no board found in: {', '.join(solved.unused)}"))
+    if solved.reach < EDGE_SHARE:
+        typer.echo(
+            paragraph(
+                f"corners reach {solved.reach:.0%} of the way to the picture's corners: photograph "
+                "boards there too, the distortion is not known beyond"
+            )
+        )
+    typer.echo(f"{out}: give it to tbcad calibrate --intrinsics")
+    return 0
+
+
+def _lens_record(solved: "SolvedLens", file: Path) -> dict[str, object]:
+    """A solved lens for other programs, lengths in pixels."""
+    lens = solved.lens
+    figures = {
+        name: [float(value) for value in getattr(lens, name)]
+        for name in ("focal", "principal", "distortion")
+    }
+    unused = {"unused": list(solved.unused), "reach": solved.reach, "file": str(file)}
+    return {"schema": "tbcad-intrinsics/1", **figures, **solved.facts(), **unused}
+
+
+@command()
+def merge(options: MergeOptions, json: JsonResult = False) -> int:
+    """Merge the photographs of a run into the light field that the shell would have given.
+
+    Writes what tbcad capture writes: both pictures at the size of the shell's, and the light field
+    with the rays of the calibrated machine, for view, refocus and the studies. Mirrors without a
+    usable photograph are left out and named.
+    """
+    from tbcad.app.api import merge as merged
+
+    with stages(2) as screen:
+        record = merged(replace(options, progress=screen.stage, detail=screen.detail))
+    out = options.folder
+    files = f"{out}: the light field as lightfield.h5, pictures, capture.json with all of this"
+    print_result(record, [*_merge_lines(record), files], json)
+    return 0
+
+
+def _merge_lines(record: dict[str, Any]) -> list[str]:
+    """The verdict first, then each camera, then what is missing and not used."""
+    halves = record["based_on"]
+    absent = sum(half["mirrors"] - half["mirrors_with_rays"] for half in halves.values())
+    mirrors = sum(half["mirrors"] for half in halves.values())
+    verdict = "complete" if not absent and len(halves) == 2 else "incomplete"
+    lines = [f"{verdict}: {mirrors - absent} of {mirrors} mirrors have rays"]
+    if len(halves) == 1:
+        lines.append(f"only camera {next(iter(halves))}: the other run was not photographed")
+    for camera, half in halves.items():
+        counts = record["cameras"][camera]
+        lines.append(
+            f"camera {camera}: {counts['pixels_on_mirrors']} pixels on "
+            f"{half['mirrors_with_rays']} mirrors, "
+            f"{counts['pixels_that_see_the_capture_sphere']} see the capture sphere"
+        )
+        for reason, names in half["mirrors_missing"].items():
+            lines.append(f"  {len(names)} missing ({_few(names)}): {reason}")
+        unused = half["photographs_not_used"]
+        if unused:
+            lines.append(f"  {len(unused)} photographs not used: {_few(list(unused))}")
+        if half["without_dark"]:
+            names = half["without_dark"]
+            lines.append(
+                f"  {len(names)} without a dark photograph of their exposure: {_few(names)}"
+            )
+        if half["dark_scaled"]:
+            names = half["dark_scaled"]
+            lines.append(
+                f"  {len(names)} whose dark photograph was exposed otherwise, and is scaled: "
+                f"{_few(names)}"
+            )
+    return lines
+
+
+def _few(names: list[str]) -> str:
+    more = len(names) - FEW_NAMES
+    return ", ".join(names[:FEW_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+@command("as-built")
+def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
+    """Write the measured spheres of a calibrated prototype as exact, coloured solids (STEP).
+
+    The colour says how far a ball's centre is off, in micrometres; legend.png and deviations.csv
+    give the scale and all figures.
+    """
+    from tbcad.app.api import as_built as written
+
+    with stages(1) as screen:
+        record = written(replace(options, progress=screen.stage))
+    if json:
+        print_json(record)
+        return 0
+    typer.echo(
+        f"{record['balls']} balls: centres off by {record['median_um']:.0f} micrometres (median), "
+        f"{record['largest_um']:.0f} at most"
+    )
+    typer.echo(f"{options.out}: as_built.step, deviations.csv, legend.png, as_built.json")
+    return 0

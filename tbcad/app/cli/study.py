@@ -1,0 +1,267 @@
+"""The studies of the paper: heavy libraries are imported inside the commands."""
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tbcad.app.cli.app import app
+from tbcad.app.cli.study_output import Work, of_design, of_export
+from tbcad.options.checks import check_is_object
+from tbcad.options.shared import (
+    Distance,
+    MethodOfStudy,
+    ObjectFile,
+    PaintOption,
+    Scheduler,
+    UnitOption,
+    UpOption,
+)
+
+if TYPE_CHECKING:
+    from tbcad.core.spec.design import Spec
+    from tbcad.light.simulate.capture.pixel_counts import Sensor
+    from tbcad.light.simulate.scene.object import SceneObject
+    from tbcad.light.simulate.views.viewpoints import StudyMethod
+
+study = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="Reproduce a study of the paper: tables, notes and a plot, next to the paper's figures.",
+)
+app.add_typer(study, name="study")
+
+First = Annotated[int, typer.Option("--from", metavar="N", help="Smallest n, 1 or more.")]
+Last = Annotated[int, typer.Option("--to", metavar="N", help="Largest n, up to 60.")]
+Sensors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sensor",
+        metavar="WxH",
+        help="Width x height, pixels; repeatable. By default the sensor of the design, and half, "
+        "twice and four times its width and height (Table II).",
+    ),
+]
+Azimuths = Annotated[int, typer.Option(help="Number of azimuths at each elevation.")]
+
+
+@study.command("resolution")
+@of_design
+def resolution_command(
+    spec: "Spec",
+    first: First = 2,
+    last: Last = 40,
+    sensors: Sensors = None,
+    ratios: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--ratio",
+            metavar="C:P",
+            help="Virtual cameras to pixels; repeatable. By default 1:1, 1:4 and 4:1.",
+        ),
+    ] = None,
+    scheduler: Scheduler = None,
+) -> Work:
+    """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
+    from tbcad.studies.resolution import parse_ratio, resolution
+    from tbcad.studies.sweep import n_range
+
+    ns, counted = n_range(first, last), _sensors(sensors, spec)
+    wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
+    return partial(resolution, spec, ns, counted, wanted, scheduler=scheduler)
+
+
+@study.command("capture-area")
+@of_design
+def capture_area_command(
+    spec: "Spec",
+    first: First = 2,
+    last: Last = 36,
+    scheduler: Scheduler = None,
+) -> Work:
+    """Measure how large an object flat and convex mirrors can see whole (Fig. 5c)."""
+    from tbcad.studies.capture_area import capture_area
+    from tbcad.studies.sweep import n_range
+
+    ns = n_range(first, last)
+    return partial(capture_area, spec, ns, scheduler=scheduler)
+
+
+@study.command("elevation")
+@of_design
+def elevation_command(spec: "Spec") -> Work:
+    """Correlate the mirrors' radii with polar angle, and their pixels with elevation (4.2, 5.1)."""
+    from tbcad.studies.elevation import elevation
+
+    return partial(elevation, spec)
+
+
+@study.command("depth-of-field")
+@of_design
+def depth_command(
+    spec: "Spec",
+    blur_px: Annotated[float, typer.Option(help="Largest blur circle, in pixels.")] = 1.0,
+    pixel_um: Annotated[float, typer.Option(help="Width of a pixel, micrometres.")] = 3.45,
+    wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
+) -> Work:
+    """Find the depth of the virtual images, and the f-number that a lens needs (section 6)."""
+    from tbcad.studies.depth_of_field import LensOptions, depth_of_field
+
+    optics = LensOptions(blur_px, pixel_um, wide_open).checked()
+    return partial(depth_of_field, spec, optics)
+
+
+@study.command("ssim")
+@of_design
+def ssim_command(
+    spec: "Spec",
+    object_file: ObjectFile[Path] = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
+    paint: PaintOption = "own",
+    sensors: Sensors = None,
+    method: MethodOfStudy = "nearest",
+    azimuths: Azimuths = 4,
+    distance: Distance = 640.0,
+) -> Work:
+    """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
+    check_is_object(object_file, up, unit)
+    from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
+    from tbcad.studies.ssim import ssim
+
+    simulated = _sensors(sensors, spec)
+    places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
+    subject = _subject(object_file, spec.optics.capture_diameter_mm, paint, up, unit)
+    return partial(ssim, spec, subject, simulated, places, _by(method))
+
+
+@study.command("balance")
+@of_design
+def balance_command(
+    spec: "Spec",
+    ns: Annotated[
+        list[int] | None,
+        typer.Option("--n", help="Subdivision; repeatable. By default eight from 6 to 33."),
+    ] = None,
+    method: MethodOfStudy = "nearest",
+    views: Annotated[
+        int, typer.Option(help="Number of viewpoints, evenly over the hemisphere.")
+    ] = 12,
+    distance: Distance = 640.0,
+) -> Work:
+    """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
+    from tbcad.studies.balance import balance, parse_subdivisions
+
+    wanted = parse_subdivisions(ns)
+    return partial(balance, spec, wanted, views, distance, _by(method))
+
+
+@study.command("prototype")
+@of_export
+def prototype_command(
+    folder: Path,
+    object_file: ObjectFile[Path] = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
+    paint: PaintOption = "own",
+    method: MethodOfStudy = "nearest",
+    azimuths: Azimuths = 4,
+    distance: Distance = 640.0,
+    samples: Annotated[
+        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
+    ] = 3,
+) -> Work:
+    """Compare views from the prototype's merged photographs with those of the full shell."""
+    check_is_object(object_file, up, unit)
+    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
+    from tbcad.studies.prototype_vs_shell import prototype_vs_shell
+
+    places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
+    export = read_export(folder)
+    subject = _subject(object_file, export.capture_mm, paint, up, unit)
+    return partial(prototype_vs_shell, export, subject, places, _by(method), samples)
+
+
+@study.command("low-pass")
+@of_export
+def low_pass_command(
+    folder: Path,
+    object_file: ObjectFile[Path] = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
+    paint: PaintOption = "own",
+    azimuths: Azimuths = 4,
+    distance: Distance = 640.0,
+    filter_px: Annotated[
+        list[float] | None,
+        typer.Option(
+            metavar="PX",
+            help="Separation of the filter's four images, pixels; repeatable. By default 0.75, 1 "
+            "and 2.",
+        ),
+    ] = None,
+    lens_px: Annotated[
+        list[float] | None,
+        typer.Option(
+            metavar="PX",
+            help="Diameter of a lens's blur circle, pixels; repeatable. By default 2.4, the least "
+            "that the depth of field allows.",
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
+    ] = 2,
+) -> Work:
+    """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
+    check_is_object(object_file, up, unit)
+    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.views.viewpoints import viewpoints_around
+    from tbcad.studies.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass
+
+    usual = BlurOptions()
+    options = BlurOptions(
+        tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples
+    ).checked()
+    places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
+    export = read_export(folder)
+    subject = _subject(object_file, export.capture_mm, paint, up, unit)
+    return partial(low_pass, export, subject, places, options)
+
+
+@study.command("calibration")
+@of_export
+def calibration_command(folder: Path) -> Work:
+    """Find how well rays are known after calibration, by LEDs, noise and process (5.2)."""
+    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.rig.calibration.study import calibration_study
+
+    export = read_export(folder)
+    return partial(calibration_study, export)
+
+
+def _by(method: MethodOfStudy) -> "StudyMethod":
+    if method != "field":
+        return method
+    from tbcad.light.reconstruction.picture import BY_FIELD
+
+    return BY_FIELD
+
+
+def _subject(
+    object_file: Path | None, capture_mm: float, paint: PaintOption, up: UpOption, unit: UnitOption
+) -> "SceneObject":
+    """The object of a study; one line on stderr says how its file was taken."""
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+
+    options = ObjectOptions(paint=paint, up=up, unit=unit)
+    return load_or_built_in(object_file, capture_mm, options, partial(typer.echo, err=True))
+
+
+def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:
+    """The sensors that are wanted, each once; by default those of Table II for the design."""
+    from tbcad.light.simulate.capture.pixel_counts import parse_sensor
+    from tbcad.studies.resolution import default_sensors
+
+    return tuple(map(parse_sensor, dict.fromkeys(given or ()))) or default_sensors(spec)

@@ -1,0 +1,297 @@
+"""Synthesise views from a light field."""
+
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+
+import typer
+
+from tbcad.app.cli.app import app
+from tbcad.app.cli.compared_pictures import (
+    check_pictures,
+    has_object,
+    scene_of,
+    true_picture,
+    viewpoint_of,
+    write_compared,
+)
+from tbcad.app.cli.view_files import ViewFiles, field_view, write_depth
+from tbcad.common.screen import stages
+from tbcad.errors import InputError
+from tbcad.options.checks import check_is_capture
+from tbcad.options.shared import (
+    Azimuth,
+    Capture,
+    Distance,
+    Elevation,
+    ForceFile,
+    Fov,
+    Height,
+    MethodOfView,
+    OutPicture,
+    Width,
+)
+
+if TYPE_CHECKING:
+    from tbcad.core.optics.camera import Camera
+    from tbcad.light.reflectance.environment import Environment
+    from tbcad.light.reflectance.field_file import Relit
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.scene.point_lights import PointLights
+    from tbcad.light.simulate.scene.ray_casting import Scene
+    from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.types import Bytes, Progress
+
+# Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
+LIT_SAMPLES = 2
+
+Surface = Literal["plane", "depth", "object"]
+LightFormat = Literal["latlong", "angular", "mirror-ball", "cross"]
+
+
+class _Choice(NamedTuple):
+    """Method and surface of a view, and in words why."""
+
+    method: str
+    surface: Surface | None
+    reason: str
+
+
+BY_DEFAULT = _Choice("field", None, "its file is in the capture's folder")
+
+
+@app.command()
+def view(
+    capture_folder: Capture[Path],
+    azimuth: Azimuth = 0.0,
+    elevation: Elevation = 30.0,
+    distance: Distance = 640.0,
+    out: OutPicture[Path] = Path("view.png"),
+    method: MethodOfView = None,
+    surface: Annotated[
+        Surface | None,
+        typer.Option(
+            help="Surface of the points that are compared by blend: the depth that the light field "
+            "itself shows (the default), the plane through the centre of the object, or the object "
+            "itself."
+        ),
+    ] = None,
+    depth_files: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--depth",
+            metavar="FILE",
+            help="Also write the depth that is found: as PNG of 16 bits, or as points (PLY); "
+            "repeatable.",
+        ),
+    ] = None,
+    normals_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--normals", metavar="FILE", help="Of a field: also write the surface's normals (PNG)."
+        ),
+    ] = None,
+    opacity_file: Annotated[
+        Path | None,
+        typer.Option("--opacity", metavar="FILE", help="Of a field: also write the opacity (PNG)."),
+    ] = None,
+    light: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show the object in the light of its surroundings, a picture by direction (.hdr, "
+            ".exr), by the reflectance field of tbcad capture --lights.",
+        ),
+    ] = None,
+    light_turn: Annotated[
+        float, typer.Option(help="Turns that light about z, degrees, counterclockwise from above.")
+    ] = 0.0,
+    light_format: Annotated[
+        LightFormat | None,
+        typer.Option(
+            help="How that picture has its directions, +x in the middle and up at the top: latlong "
+            "(the default where it is 2:1), a disc (angular, mirror-ball), or a cross of six faces."
+        ),
+    ] = None,
+    frame: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="K", help="Frame of tbcad capture --frames to show, from 0 on."
+        ),
+    ] = None,
+    width: Width = 640,
+    height: Height = 480,
+    fov: Fov = None,
+    force: ForceFile = False,
+) -> int:
+    """Synthesise the view of a camera anywhere around the object from a light field.
+
+    For a simulated capture also writes the ray-traced ground truth and a comparison, and prints
+    PSNR and SSIM.
+    """
+    check_is_capture(capture_folder)
+    files = ViewFiles(tuple(depth_files or ()), normals_file, opacity_file)
+    by_default = method is None and surface is None and light is None
+    choice = _choice("field" if by_default and files.of_field else method, surface)
+    from tbcad.light.reconstruction.field import wanted_field
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+
+    check_pictures(capture_folder, out, force, light)
+    files.check(out, choice.method, force, (capture_folder, light))
+    _check_light(light, light_turn, light_format, choice)
+    if frame is not None and (light is not None or surface == "object"):
+        raise InputError("--frame has its own light and place: leave out --light and --surface")
+    if choice.surface == "object" and not has_object(capture_folder):
+        raise InputError(f"{capture_folder} has no object: leave out --surface object")
+    wanted = None if light is None else _environment(light, light_turn, light_format)
+    with stages(3) as screen, LightField.open(capture_folder) as stored:
+        screen.stage("light field")
+        source = stored if frame is None else _frame(stored, capture_folder, frame)
+        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
+        scene, tiles = scene_of(capture_folder), MirrorTiles(source)
+        relit = None if wanted is None else _relit(capture_folder, source, wanted)
+        shown = tiles if relit is None else MirrorTiles(relit.field)
+        asked = None if by_default and not files.of_field else choice.method
+        made = wanted_field(asked, capture_folder, source, frame)
+        choice = BY_DEFAULT if made is not None and asked is None else choice
+        screen.stage("view")
+        if made is not None:
+            picture = field_view(made, at, files)
+        else:
+            picture = _view((tiles, shown), at, choice, scene, files, screen.detail)
+        screen.stage("truth")
+        truth, same_lamps = None, None
+        if scene is not None and relit is not None and wanted is not None:
+            truth, same_lamps = _lit_truths(scene, at, relit, wanted)
+        elif scene is not None:
+            where = (scene, at) if frame is None else _turned(scene, at, capture_folder, frame)
+            truth = true_picture(*where)
+    typer.echo(f"method {choice.method}: {choice.reason}")
+    if relit is not None:
+        typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
+    write_compared(out, picture, truth, (choice.method, "ray-traced"))
+    if same_lamps is not None:
+        ssim = _ssim(same_lamps, picture)
+        if not isnan(ssim):
+            typer.echo(f"SSIM {ssim:.4f} against one lit by the same lamps")
+    files.tell()
+    return 0
+
+
+def _frame(source: "LightField", folder: Path, number: int) -> "LightField":
+    from tbcad.light.simulate.capture.sequence import sequence_frame
+
+    return sequence_frame(source, folder, number)
+
+
+def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
+    """Object and camera as they are to each other in a frame."""
+    from tbcad.light.simulate.capture.sequence import (
+        camera_before_turn,
+        lit_when_turned,
+        turn_of_frame,
+    )
+
+    angle = turn_of_frame(folder, number)
+    return lit_when_turned(scene, angle), camera_before_turn(at, angle)
+
+
+def _environment(light: Path, turn_deg: float, kind: LightFormat | None) -> "Environment":
+    from math import radians
+
+    from tbcad.light.reflectance.environment import read_environment
+
+    return read_environment(light, radians(turn_deg), kind)
+
+
+def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
+    from tbcad.light.reflectance.field_file import open_reflectance, relit
+
+    with open_reflectance(folder) as reflectance:
+        return relit(source, reflectance, wanted)
+
+
+def _lit_truths(
+    scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
+) -> tuple["Bytes", "Bytes | None"]:
+    """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
+    from tbcad.light.reflectance.field_file import TRUE_LIGHTS, lit_scene
+
+    def truth(lights: "PointLights") -> "Bytes":
+        return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
+
+    return truth(wanted.far_lights(TRUE_LIGHTS)), truth(relit.lamps) if relit.points else None
+
+
+def _ssim(truth: "Bytes", picture: "Bytes") -> float:
+    from tbcad.light.simulate.views.viewpoints import image_quality
+
+    return image_quality(truth, picture).ssim
+
+
+def _check_light(
+    light: Path | None, turn: float, kind: LightFormat | None, choice: _Choice
+) -> None:
+    if light is None and turn:
+        raise InputError(f"--light-turn {turn:g} turns no light: add --light")
+    if light is None and kind is not None:
+        raise InputError(f"--light-format {kind} is of no light: add --light")
+    if light is not None and choice.method == "field":
+        raise InputError(f"--light {light}: a field has its own light: leave out --method field")
+
+
+def _choice(method: str | None, surface: Surface | None) -> _Choice:
+    """What is wanted: a blend at the depth that is found, if nothing is said and found.
+
+    Raises:
+        InputError: method and surface exclude each other.
+    """
+    if method in ("nearest", "field") and surface is not None:
+        raise InputError(f"--method {method} asks for no surface: leave out --surface {surface}")
+    if method == "depth" and surface not in (None, "depth"):
+        raise InputError(
+            f"--method depth finds the surface itself: leave out --surface {surface}, or choose "
+            "--method blend"
+        )
+    if method in ("nearest", "field"):
+        return _Choice(method, None, "as --method says")
+    if surface in ("plane", "object"):
+        reason = f"--surface {surface} is for a blend" if method is None else "as --method says"
+        return _Choice("blend", surface, reason)
+    reason = "as --method says" if method == "depth" else "a blend at the depth that is found"
+    return _Choice("depth", "depth", reason)
+
+
+def _view(
+    fields: tuple["MirrorTiles", "MirrorTiles"],
+    at: "Camera",
+    choice: _Choice,
+    scene: "Scene | None",
+    files: ViewFiles,
+    progress: "Progress",
+) -> "Bytes":
+    """The picture by nearest rays or blended, and files of the depth that is found for it.
+
+    Args:
+        fields: the light field, and the one of the same rays whose colours are shown.
+        at: the viewpoint.
+        choice: how.
+        scene: the object.
+        files: of the depth.
+        progress: called with what the depth needs first.
+    """
+    from tbcad.light.depth.depth_map import depth_views
+    from tbcad.light.simulate.scene.ray_casting import depth_along_rays
+    from tbcad.light.simulate.views.synthesis import synthesise
+
+    tiles, shown = fields
+    if choice.method == "nearest":
+        return synthesise(shown, at).image
+    if choice.surface == "depth":
+        picture, found = depth_views(tiles, progress=progress).of(at, shown)
+        write_depth(files.depth, found.png, lambda: found.ply(picture.image))
+        return picture.image
+    on_object = scene is not None and choice.surface == "object"
+    depth = depth_along_rays(scene) if scene is not None and on_object else None
+    return synthesise(shown, at, "blend", depth).image

@@ -1,0 +1,192 @@
+"""What is bought, printed and put together: heavy libraries are imported inside the commands."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tbcad.app.cli.app import app, command
+from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.common.screen import stages
+from tbcad.options.checks import check_is_export, check_is_folder
+from tbcad.options.shared import Design, Exports, ForceFile, JsonResult, Out, Settings
+from tbcad.options.tolerances import InspectionOptions
+
+
+@app.command()
+def camera(
+    design: Design[Path] = None,
+    n: Annotated[
+        int | None, typer.Option(help="Subdivision of the icosahedron, 2 to 60; the paper has 18.")
+    ] = None,
+    settings: Settings = None,
+    cameras: Annotated[
+        Path | None,
+        typer.Option(
+            "--cameras",
+            metavar="FILE",
+            help="CSV list of further cameras, with the columns of docs/camera.md.",
+        ),
+    ] = None,
+    lenses: Annotated[
+        Path | None,
+        typer.Option(
+            "--lenses",
+            metavar="FILE",
+            help="CSV list of further lenses, with the columns of docs/camera.md.",
+        ),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the sheet as JSON.")] = False,
+) -> int:
+    """Say which sensor, lens, stop and focus a design needs, and which cameras on sale have them.
+
+    Exit code 0: some camera of the lists does. 1: none does. 2: bad input.
+    """
+    from tbcad.core.camera.catalogue import load_cameras, load_lenses
+    from tbcad.core.spec.load import load_spec
+
+    options = list(settings or []) + ([f"optics.n={n}"] if n is not None else [])
+    spec = load_spec(design, options)
+    listed = load_cameras(cameras), load_lenses(lenses)
+
+    from tbcad.app.api import design as mirror_design
+    from tbcad.core.camera.requirements import camera_requirements
+    from tbcad.core.camera.sheet import best_lenses, sheet_lines, sheet_record
+
+    array = mirror_design(spec).arrays[0]
+    needed = camera_requirements(array, spec.optics.capture_diameter_mm / 2)
+    best = best_lenses(needed, *listed)
+    print_result(sheet_record(needed, best), sheet_lines(needed, best), json)
+    return 0 if any(not one.faults for one in best) else 1
+
+
+@command()
+def inspection(options: InspectionOptions, json: JsonResult = False) -> int:
+    """Write what a workshop needs for the shells: limits of every mirror, tolerances in STEP.
+
+    inspection_a.csv and inspection_b.csv have each mirror's sphere and by how much it may be off;
+    shell_a_tolerances.step and shell_b_tolerances.step (AP242) the same with datums A, B, C.
+    """
+    from tbcad.app.api import inspect
+
+    out = Path(options.out)
+    with stages(3) as screen:
+        record = inspect(replace(options, progress=screen.stage))
+    if json:
+        print_json(record)
+        return 0
+    smallest = record["limits"]["smallest"]
+    walls = f", its walls by {smallest['wall_um']:.1f} um" if "wall_um" in smallest else ""
+    typer.echo(
+        f"Every mirror may be off by {smallest['offset_um']:.2f} um along its normal, "
+        f"{smallest['tilt_mrad']:.2f} mrad and {smallest['radius_mm'] * 1000:.0f} um of radius"
+        f"{walls}, all at once;\nmost by more: see the tables. Shells at their limits show "
+        f"{record['simulated_minimum_mm']:.2f} of {record['target_mm']:g} mm (simulated)."
+    )
+    typer.echo(f"{out}: {', '.join(sorted(p.name for p in out.iterdir()))}")
+    return 0
+
+
+@app.command()
+def parts(
+    folder: Exports[Path],
+    prices: Annotated[
+        Path | None,
+        typer.Option(
+            "--prices",
+            metavar="FILE",
+            help="CSV list of prices to use in place of the build's, with the columns of "
+            "docs/prototype.md; bom.csv stays as it is.",
+        ),
+    ] = None,
+    full: Annotated[bool, typer.Option("--full", help="Show every row.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print totals and all rows as JSON.")
+    ] = False,
+) -> int:
+    """Show what an export's prototype needs: totals of price, mass, filament and hours, then rows.
+
+    Without --full the rows are those that cost most. Exit code 0, or 2 for bad input.
+    """
+    from tbcad.prototype.files.bom_view import read_parts_list
+    from tbcad.prototype.purchased.prices import load_prices
+
+    check_is_folder(folder)
+    listed = read_parts_list(folder, load_prices([str(prices)]) if prices else None)
+    print_result(listed.record(), listed.lines(full=full), json)
+    return 0
+
+
+@app.command()
+def drawings(
+    folder: Exports[Path],
+    out: Out[Path] = Path("drawings"),
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only",
+            metavar="PART",
+            help="Draw this only, such as bearing_head or optical_layout; repeatable. By default "
+            "everything.",
+        ),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print what was written as JSON, without progress.")
+    ] = False,
+    force: ForceFile = False,
+) -> int:
+    """Draw an export for the workshop: sheets as PDF to scale and as DXF at full size.
+
+    A sheet for each printed part with views, sizes and a table of its holes; the assembly with
+    call-outs by number of the parts list; sections of the shells; the optical layout. Exit code 0,
+    or 2 for bad input.
+    """
+    check_is_export(folder)
+    from tbcad.common.schedule import cores
+    from tbcad.drawings.write import record, write_drawings
+
+    with stages(0, silent=json) as screen:
+        written = write_drawings(
+            folder,
+            out,
+            only or (),
+            force=force,
+            progress=lambda name: screen.stage(f"drew {name}"),
+            workers=cores(),
+        )
+    line = f"{out}: {len(written)} sheets, each as PDF and DXF"
+    print_result(record(out, written), [line], json)
+    return 0
+
+
+@app.command()
+def assembly(
+    folder: Exports[Path],
+    out: Out[Path] = Path("assembly"),
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="Draw a picture for each step.")
+    ] = True,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the steps as JSON and write nothing.")
+    ] = False,
+    force: ForceFile = False,
+) -> int:
+    """Write assembly.html: how an export's prototype is assembled, step by step, with pictures.
+
+    Each step names its parts by their numbers in the list, torque or fit, and what to check. Exit
+    code 0, or 2 for bad input.
+    """
+    from tbcad.prototype.assembly_steps.machine import read_machine
+    from tbcad.prototype.assembly_steps.steps import assembly_steps, record
+    from tbcad.report.assembly_page import write_page
+
+    check_is_folder(folder)
+    machine = read_machine(folder)
+    steps = assembly_steps(machine)
+    if json:
+        print_json({"steps": record(steps)})
+        return 0
+    file = write_page(folder, out, machine, steps, pictures=pictures, force=force)
+    typer.echo(f"{file}: {len(steps)} steps, {sum(machine.quantities.values())} parts")
+    return 0

@@ -1,0 +1,107 @@
+"""What can be explained, by all the names that a user may type for it."""
+
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from tbcad.app.reference.keys import KeySection, key_sections
+from tbcad.app.reference.terms import Term, glossary
+from tbcad.errors import InputError
+
+GREEK = {"θ": "theta", "\N{GREEK SMALL LETTER RHO}": "rho"}
+MOST_SUGGESTED = 3
+LIKENESS = 0.6
+
+
+@dataclass(frozen=True)
+class ReferenceEntry:
+    """One thing that is explained."""
+
+    kind: str  # "term", "key", "section" or "check"
+    name: str  # its own
+    facts: dict[str, str | list[str]]  # text or list of texts of each heading
+    names: tuple[str, ...] = field(default=())  # all that it is found by, besides its own
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The entry as plain JSON values."""
+        return {"kind": self.kind, "name": self.name, **self.facts}
+
+
+def plain(name: str) -> str:
+    """A name as it is compared: Greek as words, no subscripts, blanks, commas, bars or case."""
+    text = "".join(GREEK.get(c, c) for c in unicodedata.normalize("NFKC", name))
+    return re.sub(r"[\s_,`-]+", "", text).casefold()
+
+
+def terms_and_keys() -> Iterator[ReferenceEntry]:
+    """Every term, section and key."""
+    for term in glossary().terms:
+        yield _term_entry(term)
+    for section in key_sections():
+        yield from _section_entries(section)
+
+
+def explained(word: str, entries: Iterable[ReferenceEntry]) -> list[ReferenceEntry]:
+    """All entries of one name.
+
+    Raises:
+        InputError: there is none; it names those that are alike.
+    """
+    by_name: dict[str, list[ReferenceEntry]] = {}
+    shown: dict[str, str] = {}
+    for entry in entries:
+        for name in dict.fromkeys((entry.name, *entry.names)):
+            by_name.setdefault(plain(name), []).append(entry)
+            if name.isascii() or plain(name) not in shown:  # what can be typed
+                shown[plain(name)] = name
+    found = {entry.kind + entry.name: entry for entry in by_name.get(plain(word), [])}
+    if found:
+        return list(found.values())
+    near = get_close_matches(plain(word), by_name, MOST_SUGGESTED, LIKENESS)
+    names = " or ".join(shown[one] for one in near)
+    hint = f"did you mean {names}?" if near else "tbcad explain lists what there is"
+    raise InputError(f"nothing is known of {word!r}: {hint}")
+
+
+def _term_entry(term: Term) -> ReferenceEntry:
+    columns = [column for file in term.files for column in file.partition(": ")[2].split(", ")]
+    symbols = [symbol for symbol in term.symbol.split(", ") if symbol]
+    facts: dict[str, str | list[str]] = {
+        "meaning": term.meaning,
+        "equation": term.equation or ("" if term.symbol == term.name else term.symbol),
+        "unit": term.unit,
+        "source": term.source,
+        "keys": list(term.keys),
+        "files": list(term.files),
+        "code": list(term.code),
+    }
+    return ReferenceEntry("term", term.name, _filled(facts), (*term.aliases, *symbols, *columns))
+
+
+def _section_entries(section: KeySection) -> Iterator[ReferenceEntry]:
+    if section.name:
+        names = [key.name for key in section.keys]
+        facts: dict[str, str | list[str]] = {"meaning": section.description, "keys": names}
+        yield ReferenceEntry("section", section.name, facts, _ends(section.name))
+    for key in section.keys:
+        facts = {
+            "meaning": key.description,
+            "type": key.type,
+            "default": key.default,
+            "unit": key.unit,
+            "allowed": key.allowed,
+        }
+        yield ReferenceEntry("key", key.name, _filled(facts), _ends(key.name))
+
+
+def _ends(name: str) -> tuple[str, ...]:
+    """The ends of a dotted name: a.b.c also as b.c and c."""
+    words = name.split(".")
+    return tuple(".".join(words[k:]) for k in range(1, len(words)))
+
+
+def _filled(facts: dict[str, str | list[str]]) -> dict[str, str | list[str]]:
+    return {heading: value for heading, value in facts.items() if value}

@@ -1,0 +1,1 @@
+"""Pictures: raw, TIFF, OpenEXR, Radiance, PNG."""

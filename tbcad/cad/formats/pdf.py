@@ -1,0 +1,170 @@
+"""PDF 1.4 (ISO 32000) of a flat drawing: lines and Helvetica, the same bytes every time.
+
+Written here because importing a plotting library takes as long as ten drawings.
+"""
+
+import csv
+import math
+from collections.abc import Iterable, Sequence
+from functools import cache, singledispatch
+from importlib.resources import files
+from pathlib import Path
+
+from tbcad.cad.formats.entities import (
+    Arc,
+    Circle,
+    Entity,
+    Layer,
+    Line,
+    Point,
+    Polyline,
+    Simple,
+    Text,
+    simple,
+)
+
+POINTS_PER_MM = 72 / 25.4
+THICK_MM, THIN_MM, FINE_MM = 0.5, 0.25, 0.13  # lines by ISO 128; of hatching and many rays
+WIDTHS = {
+    **{Layer.CUT: THICK_MM, Layer.FRAME: THICK_MM},
+    **{Layer.HIDDEN: 0.18, Layer.HATCH: FINE_MM, Layer.RAYS: FINE_MM},
+}
+DASHES = {Layer.FOLD: "[3 1.5]", Layer.HIDDEN: "[2 1]", Layer.CENTRE: "[8 2 1 2]"}  # mm
+EM = 1000.0  # units of the font's widths
+CAPITAL = 0.718  # height of capital letters in Helvetica, of its size
+QUARTER = math.pi / 2
+ALIGNED = {"left": 0.0, "centre": 0.5, "right": 1.0}  # share of the width before the place
+
+
+@cache
+def _widths() -> dict[str, float]:
+    """Widths of characters in Helvetica, as in Adobe's metrics of the 14 standard fonts."""
+    table = (files("tbcad.cad.formats") / "helvetica.csv").read_text(encoding="utf-8")
+    rows = csv.reader(table.splitlines()[1:])
+    return {character: float(width) for character, width in rows}
+
+
+def text_width(text: str, height: float) -> float:
+    """Width of a text in mm, for a height of its capital letters in mm.
+
+    Raises:
+        KeyError: a character that drawings have not.
+    """
+    return sum(_widths()[character] for character in text) / EM * height / CAPITAL
+
+
+def write_pdf(
+    path: Path, title: str, size: tuple[float, float], entities: Iterable[Entity]
+) -> None:
+    """Write one page.
+
+    Args:
+        path: to write.
+        title: of the document.
+        size: of the page, mm.
+        entities: in mm from the page's lower left corner.
+    """
+    scale = _number(POINTS_PER_MM)
+    drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, simple(entities))])
+    box = " ".join(_number(side * POINTS_PER_MM) for side in size)
+    font = "<</Type/Font/Subtype/Type1/BaseFont/Helvetica/Encoding/WinAnsiEncoding>>"
+    objects = [
+        "<</Type/Catalog/Pages 2 0 R>>",
+        "<</Type/Pages/Kids[3 0 R]/Count 1>>",
+        f"<</Type/Page/Parent 2 0 R/MediaBox[0 0 {box}]/Contents 5 0 R"
+        "/Resources<</Font<</F1 4 0 R>>>>>>",
+        font,
+        f"<</Length {len(_encoded(drawn))}>>\nstream\n{drawn}\nendstream",
+        f"<</Title({_escaped(title)})>>",
+    ]
+    path.write_bytes(_file(objects))
+
+
+def _file(objects: Sequence[str]) -> bytes:
+    """Header, numbered objects, table of their places, and trailer."""
+    data, places = b"%PDF-1.4\n", []
+    for number, text in enumerate(objects, 1):
+        places.append(len(data))
+        data += _encoded(f"{number} 0 obj\n{text}\nendobj\n")
+    count, start = len(objects) + 1, len(data)
+    table = "".join(f"{place:010d} 00000 n \n" for place in places)
+    trailer = f"<</Size {count}/Root 1 0 R/Info {len(objects)} 0 R>>"
+    end = f"xref\n0 {count}\n0000000000 65535 f \n{table}trailer\n{trailer}\nstartxref\n{start}\n"
+    return data + _encoded(end + "%%EOF\n")
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode("cp1252")
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.4f}".rstrip("0").rstrip(".")
+
+
+def _point(point: Point) -> str:
+    return f"{_number(point[0])} {_number(point[1])}"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
+
+
+def _styled(entity: Simple) -> str:
+    if isinstance(entity, Text):
+        return _text(entity)
+    width, dash = WIDTHS.get(entity.layer, THIN_MM), DASHES.get(entity.layer, "[]")
+    return f"{_number(width)} w {dash} 0 d {_path(entity)} S"
+
+
+def _text(entity: Text) -> str:
+    turn = math.radians(entity.turn_deg)
+    along = math.cos(turn), math.sin(turn)
+    back = ALIGNED[entity.align] * text_width(entity.text, entity.height)
+    place = entity.place[0] - back * along[0], entity.place[1] - back * along[1]
+    matrix = f"{_point(along)} {_point((-along[1], along[0]))} {_point(place)} Tm"
+    size = _number(entity.height / CAPITAL)
+    return f"BT /F1 {size} Tf {matrix} ({_escaped(entity.text)}) Tj ET"
+
+
+@singledispatch
+def _path(entity: object) -> str:
+    raise TypeError(entity)
+
+
+@_path.register
+def _(entity: Line) -> str:
+    return f"{_point(entity.start)} m {_point(entity.end)} l"
+
+
+@_path.register
+def _(entity: Polyline) -> str:
+    first, *others = map(_point, entity.corners)
+    return " ".join([f"{first} m", *(f"{one} l" for one in others), *("h" * entity.closed)])
+
+
+@_path.register
+def _(entity: Circle) -> str:
+    return _curve(entity.centre, entity.radius, 0.0, 2 * math.pi)
+
+
+@_path.register
+def _(entity: Arc) -> str:
+    start = math.radians(entity.start_deg)
+    return _curve(
+        entity.centre, entity.radius, start, math.radians((entity.end_deg - entity.start_deg) % 360)
+    )
+
+
+def _curve(centre: Point, radius: float, start: float, turn: float) -> str:
+    """Cubic curves of at most a quarter each; they are off by 0.03 % of the radius."""
+    pieces = max(math.ceil(turn / QUARTER - 1e-9), 1)
+    step = turn / pieces
+    handle = 4 / 3 * math.tan(step / 4) * radius
+
+    def at(angle: float, along: float = 0.0) -> str:
+        x, y = math.cos(angle), math.sin(angle)
+        return _point((centre[0] + radius * x - along * y, centre[1] + radius * y + along * x))
+
+    angles = [(start + k * step, start + (k + 1) * step) for k in range(pieces)]
+    curves = [f"{at(a, handle)} {at(b, -handle)} {at(b)} c" for a, b in angles]
+    return " ".join([f"{at(start)} m", *curves])

@@ -1,0 +1,262 @@
+"""STEP: the exact solid, its faces named, the same bytes for the same design."""
+
+import errno
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from threading import RLock
+from typing import TypeAlias
+
+import numpy as np
+from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
+from OCP.gp import gp_Pnt
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
+from OCP.Message import Message, Message_Gravity
+from OCP.StepBasic import StepBasic_Product
+from OCP.STEPConstruct import STEPConstruct, STEPConstruct_ValidationProps
+from OCP.STEPControl import (
+    STEPControl_AsIs,
+    STEPControl_Controller,
+    STEPControl_Reader,
+    STEPControl_Writer,
+)
+from OCP.StepGeom import StepGeom_Plane, StepGeom_SphericalSurface
+from OCP.StepShape import StepShape_AdvancedFace, StepShape_ManifoldSolidBrep
+from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Solid
+from OCP.Transfer import Transfer_FinderProcess
+from scipy.spatial import cKDTree
+
+from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.measures import SolidProperties, properties
+from tbcad.cad.kernel.solids import faces
+from tbcad.errors import InputError
+from tbcad.types import Floats, Ints
+
+TAIL_BYTES = 64  # of a file, in which its last mark must be
+SURFACE_CURVES = "write.surfacecurve.mode"
+_SETTINGS = RLock()
+END = b"END-ISO-10303-21;"  # of every STEP file
+# A fixed time stamp: the file's bytes then depend on the design alone.
+TIME_STAMP = "2022-11-01T00:00:00"
+Place: TypeAlias = tuple[float, ...]
+"""Kind, location (mm) and axis of a surface."""
+PLANE, SPHERE = 1.0, 2.0
+OTHER: Place = (0.0,) * 7
+# Below any distance of surfaces, above what is left of a direction that is made a unit vector.
+SAME = 1e-6
+
+
+def incomplete(path: Path) -> OSError:
+    """The error of a file that could not be written in full."""
+    return OSError(errno.EIO, "a file could not be written in full; is the disk full?", str(path))
+
+
+def check_complete(path: Path, mark: bytes) -> None:
+    """Check that a file is there and ends as its format demands.
+
+    Args:
+        path: of the file.
+        mark: that is among its last bytes.
+
+    Raises:
+        OSError: it is missing or cut.
+    """
+    if not path.is_file():
+        raise incomplete(path)
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - TAIL_BYTES, 0))
+        if mark not in file.read():
+            raise incomplete(path)
+
+
+class StepError(RuntimeError):
+    """The kernel cannot translate a solid: a fault of tbcad."""
+
+
+def write_step(
+    path: Path, solid: Solid, pcurves: bool = False, known: SolidProperties | None = None
+) -> None:
+    """Write one solid as AP214 in millimetres.
+
+    Args:
+        path: file to write.
+        solid: with the names of its faces, which become the names of the advanced faces; its
+            volume, area and centroid go along as validation properties.
+        pcurves: write curves in the surfaces' parameters too; readers make their own.
+        known: the solid's properties; None: they are worked out.
+
+    Raises:
+        StepError: when the kernel fails.
+        OSError: when the file cannot be written in full.
+    """
+    with kernel_settings(pcurves):
+        _write(path, solid, known or properties(solid.shape))
+
+
+def _write(path: Path, solid: Solid, known: SolidProperties) -> None:
+    writer = STEPControl_Writer()
+    if writer.Transfer(solid.shape, STEPControl_AsIs) != IFSelect_RetDone:
+        raise StepError(f"{path.name}: the kernel cannot translate the solid")
+    finder = writer.WS().TransferWriter().FinderProcess()
+    for name, face in solid.faces:
+        _name(finder, face, name)
+    _validation_properties(writer, solid.shape, known)
+    _name_product(writer, solid.name)
+    write_header(writer, solid.name)
+    if writer.Write(str(path)) != IFSelect_RetDone:
+        raise incomplete(path)
+    check_complete(path, END)
+
+
+@contextmanager
+def kernel_settings(pcurves: bool = False, schema: str = "AP214IS") -> Iterator[None]:
+    """Settings of the kernel for the block: millimetres, a schema, statistics off the screen.
+
+    They are of the whole process: threads take turns, and the user finds them as they were.
+    Failures are raised, not printed.
+    """
+    texts = {"write.step.unit": "MM", "write.step.schema": schema}
+    with _SETTINGS:
+        STEPControl_Controller.Init_s()  # which declares the settings
+        printers = [(one, one.GetTraceLevel()) for one in Message.DefaultMessenger_s().Printers()]
+        before = {name: Interface_Static.CVal_s(name) for name in texts}
+        curves = Interface_Static.IVal_s(SURFACE_CURVES)
+        try:
+            for printer, _ in printers:
+                printer.SetTraceLevel(Message_Gravity.Message_Fail)
+            _set(texts, int(pcurves))
+            yield
+        finally:
+            _set(before, curves)
+            for printer, level in printers:
+                printer.SetTraceLevel(level)
+
+
+def _set(texts: Mapping[str, str], curves: int) -> None:
+    for name, value in texts.items():
+        Interface_Static.SetCVal_s(name, value)
+    Interface_Static.SetIVal_s(SURFACE_CURVES, curves)
+
+
+def _name(finder: Transfer_FinderProcess, face: TopoDS_Face, name: str) -> None:
+    item = STEPConstruct.FindEntity_s(finder, face)
+    if item is None:
+        raise StepError(f"the kernel lost face {name}")
+    item.SetName(TCollection_HAsciiString(name))
+
+
+def _validation_properties(
+    writer: STEPControl_Writer, solid: TopoDS_Solid, known: SolidProperties
+) -> None:
+    """Volume, area and centroid, for readers to compare with what they have read.
+
+    Source: CAx-IF, Recommended Practices for Geometric and Assembly Validation Properties.
+    """
+    validation = STEPConstruct_ValidationProps(writer.WS())
+    written = (
+        validation.AddVolume(solid, known.volume)
+        and validation.AddArea(solid, known.area)
+        and validation.AddCentroid(solid, gp_Pnt(*known.centroid))
+    )
+    if not written:
+        raise StepError("the kernel cannot write the validation properties")
+
+
+def _name_product(writer: STEPControl_Writer, name: str) -> None:
+    """Name the one product and its one solid; the kernel's own name counts up with every file."""
+    model, unnamed = writer.Model(), [StepBasic_Product, StepShape_ManifoldSolidBrep]
+    for k in range(1, model.NbEntities() + 1):
+        entity = model.Value(k)
+        kind = next((kind for kind in unnamed if isinstance(entity, kind)), None)
+        if kind is None:
+            continue
+        if kind is StepBasic_Product:
+            entity.SetId(TCollection_HAsciiString(name))
+        entity.SetName(TCollection_HAsciiString(name))
+        unnamed.remove(kind)
+        if not unnamed:  # both are among the first of ten thousands
+            return
+    raise StepError(f"the kernel wrote no product or no solid of {name}")
+
+
+def write_header(writer: STEPControl_Writer, name: str) -> None:
+    """Name the file; its time stamp is fixed."""
+    header = APIHeaderSection_MakeHeader(writer.Model())
+    header.SetName(TCollection_HAsciiString(name))
+    header.SetTimeStamp(TCollection_HAsciiString(TIME_STAMP))
+    header.SetOriginatingSystem(TCollection_HAsciiString("tbcad"))
+    header.SetAuthorValue(1, TCollection_HAsciiString(""))
+    header.SetOrganizationValue(1, TCollection_HAsciiString(""))
+
+
+@kernel_settings()
+def read_named_solid(path: Path) -> Solid:
+    """Read a file of one solid.
+
+    Raises:
+        InputError: it cannot be read, or is not one solid.
+    """
+    reader = STEPControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() != 1:
+        raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")
+    shape = reader.OneShape()
+    named, found = _face_entities(reader), faces(shape)
+    if shape.ShapeType() != TopAbs_ShapeEnum.TopAbs_SOLID or len(found) != len(named):
+        raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")
+    ordered = _as_in_file(
+        np.array([_of_entity(one) for one in named]), np.array([_of_face(one) for one in found])
+    )
+    names = (one.Name().ToCString() for one in named)
+    pairs = tuple((name, found[k]) for name, k in zip(names, ordered.tolist(), strict=True))
+    return Solid(path.stem, TopoDS.Solid_s(shape), pairs)
+
+
+def _face_entities(reader: STEPControl_Reader) -> list[StepShape_AdvancedFace]:
+    model = reader.WS().Model()
+    entities = (model.Value(k) for k in range(1, model.NbEntities() + 1))
+    return [one for one in entities if isinstance(one, StepShape_AdvancedFace)]
+
+
+def _as_in_file(file: Floats, shape: Floats) -> Ints:
+    """Which of a shape's faces each face of the file is, by their places (f, 7) each.
+
+    The kernel lets each face touch one before it: where the file does not, it changes the order.
+    Those on one surface keep theirs.
+    """
+    tree = cKDTree(file)
+    same = np.array([np.min(near) for near in tree.query_ball_point(file, SAME)])
+    apart, nearest = map(np.asarray, tree.query(shape))
+    found = same[nearest]
+    if apart.max() > SAME or not np.array_equal(np.sort(found), np.sort(same)):
+        raise StepError("the kernel reads other surfaces than the file has")
+    order = np.empty(len(file), dtype=np.int64)
+    order[np.argsort(same, kind="stable")] = np.argsort(found, kind="stable")
+    return order
+
+
+def _of_entity(face: StepShape_AdvancedFace) -> Place:
+    """Kind, location and axis of a plane or sphere; of others nothing."""
+    surface = face.FaceGeometry()
+    if not isinstance(surface, StepGeom_Plane | StepGeom_SphericalSurface):
+        return OTHER
+    at, axis = surface.Position().Location(), surface.Position().Axis()
+    location = (at.CoordinatesValue(k) for k in (1, 2, 3))
+    kind = PLANE if isinstance(surface, StepGeom_Plane) else SPHERE
+    return (kind, *location, *(axis.DirectionRatiosValue(k) for k in (1, 2, 3)))
+
+
+def _of_face(face: TopoDS_Face) -> Place:
+    """The same of the kernel's face."""
+    surface = BRepAdaptor_Surface(face)
+    if surface.GetType() == GeomAbs_Plane:
+        kind, at = PLANE, surface.Plane().Position()
+    elif surface.GetType() == GeomAbs_Sphere:
+        kind, at = SPHERE, surface.Sphere().Position()
+    else:
+        return OTHER
+    return (kind, *at.Location().Coord(), *at.Direction().Coord())

@@ -1,0 +1,1 @@
+"""The CAD kernel, wrapped: B-rep pieces, solids, meshes, checks."""

@@ -1,0 +1,157 @@
+"""What a design asks of its cameras and lenses, in figures to buy by."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.core.camera.lens import DepthRange, aperture_stop, lens_for, sharpest
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.types import Floats
+
+PLACES = ("nearest", "centre", "farthest")
+FANS = ("tangential", "sagittal")
+ROUNDING_PX = 1e-6
+WIDE_OPEN = 0.5  # F-number below any lens: no lens limits the requirement
+# Light on the object: ISO 2720's constant of incident and reflected metering, a mid-grey object,
+# and the light that a polished steel ball reflects (0.55 to 0.60 over the visible).
+METER_CONSTANT, OBJECT_REFLECTANCE, MIRROR_REFLECTANCE = 12.5, 0.18, 0.55
+
+
+@dataclass(frozen=True)
+class VirtualImages:
+    """Images of the object on the mirrors' principal rays, over m mirrors.
+
+    A principal ray runs from the camera over the apex to the centre of the capture sphere.
+    """
+
+    array: MirrorArray  # the camera and its mirrors
+    to_mirror: Floats  # from camera to apex, mm, (m,)
+    incidence: Floats  # at the apex, radians, (m,)
+    # from camera to the image of the sphere's nearest point, centre and farthest point, by the
+    # tangential and by the sagittal fan, mm, (m, 3, 2)
+    distance: Floats
+    depth: Floats  # the same along the camera's optical axis, mm, (m, 3, 2)
+
+
+def image_distances(
+    curvature: Floats, incidence: Floats, distance: Floats
+) -> tuple[Floats, Floats]:
+    """Distances of the tangential and the sagittal image behind convex mirrors, mm, each (...).
+
+    Coddington's equations for a mirror of curvature k = 1 / r, with distances counted from the
+    mirror, the object's before it and the image's behind it:
+
+        1/t = 1/s + 2 k / cos i        1/s' = 1/s + 2 k cos i
+
+    Args:
+        curvature: 1/mm, 0 for planes, (...).
+        incidence: radians, (...).
+        distance: of the object s, mm, (...).
+    """
+    cosine = np.cos(incidence)
+    tangential: Floats = 1 / (1 / distance + 2 * curvature / cosine)
+    sagittal: Floats = 1 / (1 / distance + 2 * curvature * cosine)
+    return tangential, sagittal
+
+
+def virtual_images(array: MirrorArray, radius: float) -> VirtualImages:
+    """Images of a capture sphere of this radius (mm) in all mirrors of a camera."""
+    mirrors, pinhole = array.mirrors, array.camera.pinhole
+    toward = mirrors.apex - pinhole
+    to_mirror, ray = norm(toward), unit(toward)
+    incidence = np.arccos(np.clip(-dot(ray, mirrors.normal), -1, 1))
+    objects = norm(mirrors.apex)[:, None] + radius * np.array([-1.0, 0.0, 1.0])
+    image = image_distances(mirrors.curvature[:, None], incidence[:, None], objects)
+    distance = to_mirror[:, None, None] + np.stack(image, axis=2)
+    along = ray @ array.camera.forward
+    return VirtualImages(array, to_mirror, incidence, distance, distance * along[:, None, None])
+
+
+@dataclass(frozen=True)
+class CameraRequirements:
+    """What the camera and lens of either pinhole must do; a rectilinear lens is assumed."""
+
+    hfov_deg: float  # angle of view across that just holds all mirrors
+    vfov_deg: float  # angle of view down
+    width_px: int  # pixels across it, at least
+    height_px: int  # pixels down it, at least
+    # depth, from the entrance pupil along the optical axis, of the nearest virtual image of the
+    # capture sphere
+    near_mm: float
+    far_mm: float  # depth of the farthest
+    focus_mm: float  # depth to focus on, where the blur at both ends is the same
+    pupil_mm: float  # diameter of the entrance pupil with the least blur at both ends
+    blur_px: float  # circle of confusion there at both ends, in pixels of this design
+    airy_px: float  # diameter of the Airy disc there, 550 nm
+    total_px: float  # root of the sum of both squares
+
+    @property
+    def depths(self) -> DepthRange:
+        """Depths that are to be sharp together."""
+        return DepthRange(self.near_mm, self.far_mm)
+
+    @property
+    def half_sizes(self) -> tuple[float, float]:
+        """Half width and half height of the picture at unit distance."""
+        return (
+            math.tan(math.radians(self.hfov_deg) / 2),
+            math.tan(math.radians(self.vfov_deg) / 2),
+        )
+
+
+def camera_requirements(array: MirrorArray, radius: float) -> CameraRequirements:
+    """Requirements of camera a's array; camera b's are the same.
+
+    Args:
+        array: the camera and its mirrors.
+        radius: of the capture sphere, mm.
+    """
+    view, depth = array.camera, virtual_images(array, radius).depth
+    across, down = _half_sizes(array)
+    over = DepthRange(float(depth.min()), float(depth.max()))
+    lens = lens_for(view.hfov, view.width_px, 1.0, WIDE_OPEN)
+    pupil = sharpest(lens, over)
+    blur = aperture_stop(lens, over, pupil)
+    return CameraRequirements(
+        2 * math.degrees(math.atan(across)),
+        2 * math.degrees(math.atan(down)),
+        math.ceil(2 * across / view.pixel_pitch - ROUNDING_PX),
+        math.ceil(2 * down / view.pixel_pitch - ROUNDING_PX),
+        over.near,
+        over.far,
+        over.focus,
+        pupil,
+        blur["blur_px"],
+        blur["airy_px"],
+        blur["total_px"],
+    )
+
+
+def _half_sizes(array: MirrorArray) -> tuple[float, float]:
+    """Half width and half height that the mirrors fill of a picture at unit distance.
+
+    A frame that the spec sets smaller cuts off corners of mirrors that show none of the object.
+    """
+    view = array.camera
+    image = (array.cells.corners - view.pinhole) @ view.axes.T
+    filled = np.abs(image[:, :2] / image[:, 2:]).max(axis=0)
+    across, down = np.minimum(filled, view.half_sizes)
+    return float(across), float(down)
+
+
+def exposure_seconds(f_number: float, magnification: float, lux: float, iso: float) -> float:
+    """Time of exposure for a mid-grey object seen by reflection in the mirrors, s.
+
+    t = pi K N'^2 / (E S rho R), with the working F-number N' = N (1 + magnification).
+
+    Args:
+        f_number: as engraved on the lens.
+        magnification: image distance over focal length, less 1.
+        lux: illuminance on the object.
+        iso: speed of the sensor.
+    """
+    working = f_number * (1 + magnification)
+    light = lux * iso * OBJECT_REFLECTANCE * MIRROR_REFLECTANCE
+    return math.pi * METER_CONSTANT * working**2 / light

@@ -1,0 +1,185 @@
+"""Radius rules: what curvature each mirror gets."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tbcad.core.mirrors.seam import aimed, cut_positions, seam_gaps
+from tbcad.core.optics.cells import Cells, cells_of
+from tbcad.core.optics.pedestals.cells import pedestal_cells
+from tbcad.core.optics.pedestals.plan import PedestalPlan, pedestal_plan
+from tbcad.core.optics.power_diagram import NotRegularError
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.optics.windows import coverage_diameters
+from tbcad.core.spec.errors import SpecError
+from tbcad.types import Floats, Ints, Progress
+
+# A hundredth of a millimetre would do; verification's figures are steadier with an exact design.
+CONVERGED_MM = 1e-4
+MAX_ITERATIONS = 400
+MAX_STALLED = 40  # of them in which the least error so far does not fall
+# Designs that settle need none; each costs as much as a step, and further ones have never helped.
+MAX_HALVINGS = 4
+# How often a groove that is too wide is halved in search of one that is not.
+GROOVE_HALVINGS = 5
+# Mirrors that an error names at most.
+NAMED_MIRRORS = 5
+
+
+@dataclass(frozen=True)
+class RadiusProblem:
+    """What a radius rule starts from: poses, bounding planes and a first dual triangulation."""
+
+    # surfaces with the curvatures of eq. 2, zero or less where flat is enough, (m,).
+    mirrors: Surfaces
+    planes: Surfaces  # the seam and the foot plane
+    triangles: Ints  # dual triangulation, (t, 3)
+    pinhole: Floats  # of the camera, mm, (3,)
+    min_curvature: Floats  # smallest curvature a sphere may have, 1/mm, (m,)
+    diameter: float  # of the capture sphere, mm
+    margin: Floats  # that the rule traced adds to it for each mirror, mm, (m,)
+    # width of the grooves between mirrors on pedestals, mm; None: neighbouring spheres meet
+    groove: float | None = None
+
+    @property
+    def target(self) -> Floats:
+        """Coverage diameter that the rule traced gives each mirror, mm, (m,)."""
+        return self.diameter + self.margin
+
+    def cells(
+        self, curvature: Floats, aim: Floats | None = None, triangles: Ints | None = None
+    ) -> Cells:
+        """Cells for curvatures (m,) and aims (m,), from the given triangulation or the first.
+
+        Raises:
+            NotRegularError: the mirrors bound no proper cells.
+            SpecError: the grooves leave nothing of a mirror.
+        """
+        mirrors = self.mirrors.with_curvature(curvature)
+        mirrors = mirrors if aim is None else aimed(mirrors, self.pinhole, aim)
+        start = self.triangles if triangles is None else triangles
+        if self.groove is None:
+            return cells_of(mirrors.joined(self.planes), start)
+        try:
+            return pedestal_cells(self.plan, mirrors)
+        except NotRegularError as error:
+            raise SpecError(f"{error}: {self._narrower_groove()}") from None
+
+    @cached_property
+    def plan(self) -> PedestalPlan:
+        """Of pedestals, which depends neither on curvatures nor on aims."""
+        return self._plan(self.groove or 0.0)
+
+    def _plan(self, groove: float) -> PedestalPlan:
+        surfaces = self.mirrors.joined(self.planes)
+        return pedestal_plan(surfaces, self.triangles, self.pinhole, groove)
+
+    def _narrower_groove(self) -> str:
+        """What to set so that mirrors on pedestals have room; it was tried with the paper's."""
+        mirrors = self.mirrors.with_curvature(self.paper_curvature)
+        for narrower in (self.groove or 0.0) * 0.5 ** np.arange(1, GROOVE_HALVINGS):
+            with suppress(NotRegularError):
+                pedestal_cells(self._plan(narrower), mirrors)
+                return (
+                    f"set shell.groove_mm to {narrower:g}, which was tried with mirrors like these"
+                )
+        return "make optics.n smaller"
+
+    def coverage(self, cells: Cells) -> Floats:
+        """Coverage diameter of each mirror's virtual camera, mm, (m,).
+
+        That of a halved mirror falls short of the capture sphere by what neither half sees of it.
+        """
+        gap = seam_gaps(cells, self.pinhole, self.diameter / 2)
+        coverage = coverage_diameters(cells, self.pinhole)
+        return np.where(gap > 0, np.minimum(coverage, self.diameter - gap), coverage)
+
+    def missing_aim(self, cells: Cells) -> Floats:
+        """How much farther beyond the seam each halved mirror has to be aimed, mm, (m,).
+
+        Both halves are to see as far beyond x = 0 as each other edge has for a margin.
+        """
+        position = cut_positions(cells, self.pinhole, self.target / 2)
+        return np.where(cells.halved, position + self.margin / 2, 0.0)
+
+    @property
+    def paper_curvature(self) -> Floats:
+        """Curvatures of eq. 2, but at least the smallest a sphere may have, 1/mm, (m,)."""
+        return np.maximum(self.mirrors.curvature, self.min_curvature)
+
+
+def solve_radii(
+    rule: str, problem: RadiusProblem, progress: Progress = lambda _: None
+) -> tuple[Cells, Floats]:
+    """Cells of the mirrors with radii by a rule, and their coverage diameters (m,), mm.
+
+    Rules are "traced" (exact rays), "paper" (eqs. 1 and 2 of the paper; nearly flat where those
+    give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.).
+
+    Raises:
+        SpecError: when the mirrors do not close to one array, or rule traced finds no radii.
+    """
+    try:
+        if rule == "traced":
+            return _traced(problem, progress)
+        flat = np.zeros(len(problem.mirrors))
+        cells = problem.cells(flat if rule == "flat" else problem.paper_curvature)
+    except NotRegularError as error:
+        raise SpecError(
+            f"mirrors with radius rule {rule} do not close to one array ({error}): "
+            "change mirrors.radius_rule, optics.n or optics.capture_diameter_mm"
+        ) from None
+    return cells, problem.coverage(cells)
+
+
+def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
+    """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
+
+    Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
+    curvature is scaled by target / coverage, all together, until none is off; the mirrors that the
+    seam halves are aimed farther beyond it by what they miss. Where a step goes so far that spheres
+    no longer meet it is halved: flat mirrors always close.
+    """
+    curvature, lowest = problem.paper_curvature, problem.min_curvature
+    aim = np.zeros(len(curvature))
+    closed, triangles = (np.zeros(len(curvature)), aim), problem.triangles
+    coverage, error, halvings = np.zeros(len(curvature)), np.full(len(curvature), np.inf), 0
+    least, stalled = np.inf, 0
+    for _ in range(MAX_ITERATIONS):
+        try:
+            cells = problem.cells(curvature, aim, triangles)
+        except NotRegularError:
+            halvings += 1
+            if halvings > MAX_HALVINGS:
+                break
+            curvature, aim = (curvature + closed[0]) / 2, (aim + closed[1]) / 2
+            lowest = np.minimum(lowest, curvature)
+            continue
+        closed, triangles = (curvature, aim), cells.triangles
+        coverage = coverage_diameters(cells, problem.pinhole)
+        error = np.where(curvature > lowest, np.abs(coverage - problem.target), 0.0)
+        error = np.maximum(error, problem.target - coverage)
+        # A half that sees beyond the seam without being aimed stays as it is.
+        step = np.maximum(problem.missing_aim(cells), -aim)
+        error = np.maximum(error, np.abs(step))
+        if error.max() < CONVERGED_MM:
+            return cells, problem.coverage(cells)
+        stalled = 0 if error.max() < least else stalled + 1
+        least = min(least, error.max())
+        if stalled > MAX_STALLED:
+            break
+        progress(f"largest error of coverage {error.max():.1g} mm")
+        curvature = np.maximum(curvature * problem.target / coverage, lowest)
+        aim = aim + step
+    worst = np.argsort(-error)[:NAMED_MIRRORS]
+    named = ", ".join(
+        f"a{i + 1:04d} ({coverage[i]:.3f} of {problem.target[i]:g} mm)" for i in worst
+    )
+    # Borders of pedestals that vanish with some radii and not with others may never settle.
+    groove = "" if problem.groove is None else "shell.groove_mm, "
+    raise SpecError(
+        f"no radius gives these mirrors the coverage that is wanted: {named}: change {groove}"
+        "optics.n, optics.capture_diameter_mm or mirrors.margin_mm"
+    )

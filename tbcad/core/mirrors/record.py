@@ -1,0 +1,96 @@
+"""The record of a design: mirrors.csv, and design.json with the resolved spec and the cameras."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.records.design import NAME as DESIGN_FILE
+from tbcad.records.design import CameraRecord, DesignRecord, MandrelRecord, ShellFiles
+from tbcad.records.tables import MirrorRow
+
+COLUMNS = MirrorRow.columns()
+
+
+def mirror_rows(array: MirrorArray) -> list[Row]:
+    """One row for each mirror, in the order of COLUMNS; planar mirrors have no sphere."""
+    mirrors = array.mirrors
+    numbers = np.column_stack(
+        [
+            array.u,
+            mirrors.apex,
+            mirrors.normal,
+            mirrors.centre,
+            mirrors.radius,
+            array.half_width,
+            np.degrees([array.theta0, array.theta1, array.polar, array.azimuth]).T,
+            array.area,
+            array.coverage,
+        ]
+    )
+    values = [[None if np.isnan(x) else x + 0.0 for x in row] for row in numbers.tolist()]
+    return [
+        dict(zip(COLUMNS, [name, array.camera_id, *row], strict=True))
+        for name, row in zip(array.ids, values, strict=True)
+    ]
+
+
+def write_record(
+    folder: Path, design: MirrorDesign, shells: bool, mandrels: Sequence[MandrelRecord] = ()
+) -> None:
+    """Write mirrors.csv and design.json, with shells and their negatives where they are there."""
+    write_table(
+        folder / MirrorRow.FILE,
+        COLUMNS,
+        (row for array in design.arrays for row in mirror_rows(array)),
+    )
+    design_record(design, shells, mandrels).write(folder / DESIGN_FILE)
+
+
+def design_record(
+    design: MirrorDesign, shells: bool, mandrels: Sequence[MandrelRecord] = ()
+) -> DesignRecord:
+    """What design.json holds; the mirrors are in the file that it names."""
+    spec, (a, b) = design.spec, design.arrays
+    return DesignRecord(
+        spec=spec,
+        target_mm=spec.optics.capture_diameter_mm,
+        coating_mm=spec.mirrors.coating_um / 1000,
+        foot_z_mm=a.foot,
+        cameras=(_camera(a), _camera(b)),
+        parts=tuple(ShellFiles(**shell_record(one)) for one in (a, b) if shells),
+        mandrels=tuple(mandrels),
+        mirrors=MirrorRow.FILE,
+    )
+
+
+def _camera(array: MirrorArray) -> CameraRecord:
+    view = array.camera
+    return CameraRecord(
+        id=array.camera_id,
+        pinhole_mm=(view.pinhole + 0.0).tolist(),
+        forward=(view.forward + 0.0).tolist(),
+        right=(view.right + 0.0).tolist(),
+        width_px=view.width_px,
+        height_px=view.height_px,
+        hfov_deg=round(float(np.degrees(view.hfov)), 12),
+    )
+
+
+def shell_record(array: MirrorArray) -> dict[str, Any]:
+    """Name, camera and files of one shell."""
+    return _part_files("shell", array)
+
+
+def mandrel_files(array: MirrorArray) -> dict[str, Any]:
+    """Name, camera and files of one shell's negative."""
+    return _part_files("mandrel", array)
+
+
+def _part_files(part: str, array: MirrorArray) -> dict[str, Any]:
+    name = f"{part}_{array.camera_id}"
+    files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
+    return {"name": name, "camera": array.camera_id, **files}

@@ -1,0 +1,171 @@
+"""Cells of mirrors that stand on pedestals: no edge depends on a neighbour's sphere.
+
+Each cell is cut from its sphere by planes, so its sides are circular arcs; below them planar walls
+with straight edges reach down to the bottoms of the grooves, which are straight lines (see
+`borders`). All of it has a closed form.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tbcad.core.geometry.vectors import FLIP_X
+from tbcad.core.optics.cells import Arcs, Cells, plane_sections
+from tbcad.core.optics.pedestals.borders import ON_PLANE_MM, PedestalLayout
+from tbcad.core.optics.pedestals.plan import PedestalPlan, planned
+from tbcad.core.optics.pedestals.sides import Sides, outline_sides
+from tbcad.core.optics.power_diagram import PLANES, NotRegularError
+from tbcad.core.optics.surfaces import Surfaces, planes
+from tbcad.types import Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class PedestalCells(Cells):
+    """Cells of one camera's mirrors on pedestals, and the walls below them.
+
+    Faces are the m mirrors, the seam, the foot plane, then w walls. Corners are those of the
+    mirrors in the order of `rings`, then those of the grooves' bottoms.
+    """
+
+    layout: PedestalLayout  # where the pedestals stand
+    edges: Arcs  # see `arcs`
+    outlines: tuple[Ints, Ints]  # see `rings`
+    walls: Ints  # for each wall the mirror above it and the one across its groove, (w, 2)
+    wall_rings: Ints  # sides of each wall, counter-clockwise from outside, (w, 4)
+
+    @property
+    def mirrors(self) -> int:
+        """Number of mirrors m."""
+        return len(self.surfaces) - PLANES - len(self.walls)
+
+    @cached_property
+    def arcs(self) -> Arcs:
+        """Arcs along the mirrors, then the straight edges of the walls."""
+        return self.edges
+
+    @cached_property
+    def rings(self) -> tuple[Ints, Ints]:
+        """Sides of each mirror's cell, as `Cells.rings` has them."""
+        return self.outlines
+
+    def mirrored(self) -> "PedestalCells":
+        """The other camera's cells: mirror image in the plane x = 0."""
+        layout = self.layout
+        plan = planned(layout.flat.mirrored(), layout.pinhole * FLIP_X, layout.groove)
+        other = pedestal_cells(plan, layout.mirrors.mirrored())
+        return other.with_mirrors(self.mirror_surfaces.mirrored())
+
+    def with_mirrors(self, mirrors: Surfaces) -> "PedestalCells":
+        """Other mirrors (m of them) on the same pedestals: borders and grooves stay.
+
+        Raises:
+            NotRegularError: a mirror lies below the bottom of its grooves.
+        """
+        bounding = self.surfaces.subset(slice(self.mirrors, self.mirrors + PLANES))
+        return _cells(self.layout, mirrors.joined(bounding))
+
+
+def pedestal_cells(plan: PedestalPlan, mirrors: Surfaces) -> PedestalCells:
+    """Cells of mirrors on pedestals.
+
+    Args:
+        plan: of pedestals for mirrors with these apices.
+        mirrors: m of them.
+
+    Raises:
+        NotRegularError: the grooves leave no outline of a mirror, or a pedestal sticks out beyond
+            a bounding plane.
+    """
+    layout = plan.layout_for(mirrors)
+    cells = _cells(layout, layout.with_planes(mirrors))
+    planes = np.arange(cells.mirrors, cells.mirrors + PLANES)
+    lowest = cells.surfaces.value(planes, cells.corners[:, None]).min()
+    if lowest < -ON_PLANE_MM:
+        beyond = f"{-lowest:.3g} mm beyond the seam or the foot"
+        raise NotRegularError(f"grooves of {layout.groove:g} mm reach {beyond}")
+    return cells
+
+
+def _cells(layout: PedestalLayout, surfaces: Surfaces) -> PedestalCells:
+    """Cells of mirrors, followed by the two bounding planes, on pedestals."""
+    return _Assembly(layout, surfaces, outline_sides(layout, surfaces)).cells()
+
+
+@dataclass(frozen=True)
+class _Assembly:
+    """What the faces, edges and corners of pedestals are numbered from."""
+
+    layout: PedestalLayout
+    surfaces: Surfaces
+    sides: Sides
+
+    def cells(self) -> PedestalCells:
+        """All faces and edges."""
+        sides, across = self.sides, self._across
+        has_wall = across < len(self.surfaces) - PLANES
+        wall = np.flatnonzero(has_wall)
+        start = self.layout.corners.bottom[sides.corner[wall]]
+        surfaces = self.surfaces.joined(planes(start, -sides.normal[wall]))
+        beyond = across.copy()
+        beyond[wall] = len(self.surfaces) + np.arange(len(wall))
+        arcs, wall_rings = self._edges(surfaces, beyond, has_wall)
+        return PedestalCells(
+            surfaces,
+            self.layout.flat.triangles,
+            np.concatenate([sides.point, self.layout.corners.bottom]),
+            self.layout,
+            arcs,
+            (sides.offsets, 2 * np.arange(len(sides.cell))),
+            np.column_stack([sides.cell, across])[wall],
+            wall_rings[wall],
+        )
+
+    @property
+    def _across(self) -> Ints:
+        """The face across each side, (q,)."""
+        return np.asarray(self.layout.borders.faces[self.sides.border, 1 - self.sides.back])
+
+    def _edges(self, surfaces: Surfaces, beyond: Ints, has_wall: Bools) -> tuple[Arcs, Ints]:
+        """All edges, and four sides for each side of a cell: those of its wall, if it has one.
+
+        First come the sides themselves, then the walls' upright edges, then the grooves' bottoms.
+
+        Args:
+            surfaces: with the walls.
+            beyond: face across each side: its wall or a bounding plane, (q,).
+            has_wall: which sides have one, (q,).
+        """
+        sides, q = self.sides, len(self.sides.cell)
+        before = np.empty(q, dtype=np.int64)
+        before[sides.following] = np.arange(q)
+        upright = np.flatnonzero(has_wall | has_wall[before])
+        forward, backward = self._both_sides(has_wall)
+        bottom = q + sides.corner
+        left = np.concatenate([sides.cell, beyond[upright], beyond[forward]])
+        right = np.concatenate([beyond, beyond[before[upright]], beyond[backward]])
+        start = np.concatenate([np.arange(q), upright, bottom[forward]])
+        end = np.concatenate([sides.following, bottom[upright], bottom[backward]])
+        points, weight = self._curves(surfaces, start, end)
+        arcs = Arcs(left, right, start, end, points, weight, np.zeros(0, dtype=np.int64))
+        down, along = np.full((2, q), -1)
+        down[upright] = q + np.arange(len(upright))
+        along[forward] = 2 * (q + len(upright) + np.arange(len(forward)))
+        along[backward] = along[forward] + 1
+        rings = [2 * np.arange(q) + 1, 2 * down, along, 2 * down[sides.following] + 1]
+        return arcs, np.column_stack(rings)
+
+    def _both_sides(self, has_wall: Bools) -> tuple[Ints, Ints]:
+        """The sides on the two walls of each groove, the one that follows its border first."""
+        back, border = self.sides.back[has_wall], self.sides.border[has_wall]
+        side, order = np.flatnonzero(has_wall), np.lexsort((back, border))
+        return side[order][0::2], side[order][1::2]
+
+    def _curves(self, surfaces: Surfaces, start: Ints, end: Ints) -> tuple[Floats, Floats]:
+        """Control polygons and weights: arcs on the mirrors first, the others straight."""
+        sides, q = self.sides, len(self.sides.cell)
+        every = np.concatenate([sides.point, self.layout.corners.bottom])
+        a, b = every[start], every[end]
+        points, weight = np.stack([a, (a + b) / 2, b], axis=1), np.ones(len(start))
+        points[:q], weight[:q] = plane_sections(surfaces, sides.cell, sides.normal, a[:q], b[:q])
+        return points, weight

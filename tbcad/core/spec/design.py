@@ -1,0 +1,228 @@
+"""The design spec: what a user may choose, in named units, checked before anything is computed.
+
+Every key, its unit, range, default and explanation stand here once; `tbcad init`, `tbcad explain`
+and the site tell them. The defaults are the design of the paper, `designs/turtleback.toml`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import PrototypeSpec
+from tbcad.core.spec.section import OrWord, Section, as_tuple
+from tbcad.core.spec.sizes import OpticsSpec, with_sizes
+
+_HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
+FIT: Any = "fit"  # value of camera.hfov_deg that follows from the mirrors
+MAX_HFOV = 170  # degrees
+
+
+def _current(value: object) -> object:
+    if type(value) is not int:  # 2.0 equals 2, so Literal[2] would take it
+        raise ValueError("allowed is the whole number 2: change it")
+    if value == 1:
+        raise ValueError(
+            "1 is the version before the section [printer]: move bed_mm, bed_margin_mm and "
+            "density_g_cm3 from [prototype.base] to [printer] if they are set, and set schema to 2"
+        )
+    return value
+
+
+EdgeKind: TypeAlias = Literal["valley", "pedestal"]
+RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
+MAX_MARGIN = 20.0
+MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
+Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
+
+
+class CameraSpec(Section):
+    """The sensor and lens of both cameras."""
+
+    width_px: int = Field(2080, ge=16, le=32_768)
+    """Columns of the sensor."""
+    height_px: int = Field(1552, ge=16, le=32_768)
+    """Rows of the sensor."""
+    hfov_deg: Annotated[float, OrWord(FIT)] = Field(FIT, ge=1, le=MAX_HFOV)
+    """Angle of view across the columns; fit: the smallest whole number of degrees that leaves a
+    border of 2 % round the mirrors, 89 for the paper's design; more for a smaller n."""
+
+
+class MirrorsSpec(Section):
+    """How the mirrors are curved."""
+
+    radius_rule: RadiusRule = "traced"
+    """How mirrors get their radii. traced: by exact ray tracing, as large as possible for
+    seeing the whole capture sphere; paper: by eqs. 1 and 2 of the paper, which are paraxial and
+    see about 51 mm of 60; flat: planar mirrors."""
+    margin_mm: float = Field(0.6, ge=0, le=MAX_MARGIN)
+    """Coverage that rule traced adds to the capture diameter, for errors of manufacture and
+    mounting."""
+    own_margins_mm: Annotated[tuple[Margin, ...], BeforeValidator(as_tuple)] = Field(
+        (), max_length=MAX_MIRRORS
+    )
+    """The same for each mirror, in the order of one camera's, none below margin_mm; empty: every
+    mirror has margin_mm. tbcad build --for-process computes them."""
+    max_radius_widths: float = Field(30.0, ge=5, le=1000)
+    """Largest radius in half widths l of the mirror; one that needs less curvature than this
+    gets this radius, nearly flat, and sees more than it must."""
+    coating_um: float = Field(0.0, ge=0, le=500)
+    """Thickness of the reflecting coat; the modelled sphere is smaller by it, so that the
+    coated one has the right radius."""
+
+    @model_validator(mode="after")
+    def _own_margins_fit(self) -> Self:
+        least = min(self.own_margins_mm, default=self.margin_mm)
+        if least < self.margin_mm:
+            raise ValueError(
+                f"own_margins_mm has a margin of {least:g}, less than margin_mm "
+                f"{self.margin_mm:g}, which every mirror has at least: make margin_mm smaller or "
+                "leave own_margins_mm out"
+            )
+        return self
+
+
+class FlangeSpec(Section):
+    """A flange with its bolt and dowel holes."""
+
+    width_mm: float = Field(12.0, ge=4, le=100)
+    """How far the flange stands out."""
+    thickness_mm: float = Field(5.0, ge=1, le=50)
+    """Thickness of the plate."""
+    bolt_hole_mm: float = Field(4.3, ge=1, le=30)
+    """Diameter of the bolts' clearance holes: 4.3 for M4. It leaves 1 mm of the width on either
+    side."""
+    bolts: int = Field(6, ge=2, le=60)
+    """Number of bolt holes."""
+    dowel_hole_mm: float = Field(4.0, ge=1, le=30)
+    """Diameter of the dowel pins' holes, with the same 1 mm on either side."""
+    dowels: int = Field(2, ge=0, le=10)
+    """Number of dowel holes."""
+
+    @model_validator(mode="after")
+    def _holes_fit(self) -> Self:
+        largest = self.width_mm - 2 * _HOLE_EDGE_MM
+        for key in ("bolt_hole_mm", "dowel_hole_mm"):
+            if (hole := getattr(self, key)) > largest:
+                raise ValueError(
+                    f"{key} {hole:g} does not fit in width_mm {self.width_mm:g}, which leaves room "
+                    f"for {largest:g}: make the hole smaller or the flange wider"
+                )
+        return self
+
+
+class FootFlangeSpec(FlangeSpec):
+    """The flange that carries the shell on its base plate."""
+
+    bolts: int = Field(5, ge=2, le=60)
+    """Number of bolt holes."""
+
+
+class ShellSpec(Section):
+    """The body behind the mirrors, and the edges between them."""
+
+    wall_mm: float = Field(3.0, ge=0.4, le=50)
+    """Material behind the deepest valley or groove between mirrors."""
+    edges: EdgeKind = "valley"
+    """Where mirrors end. valley: where neighbouring spheres meet, without step or groove, but
+    an edge moves where either of its two mirrors is off; pedestal: each mirror stands on a
+    pedestal with straight walls, and a groove parts it from its neighbours: errors cost less
+    than a third, the grooves some of the pixels."""
+    groove_mm: float = Field(0.1, ge=0.02, le=5)
+    """Width of the grooves between pedestals at the mirrors' corners; they are four times as
+    deep. Without pedestals unused."""
+    negative: bool = False
+    """Whether to write the negative of each shell's mirrors too: mandrel_a and mandrel_b, solids
+    with concave mirrors on which a shell is electroformed."""
+    seam_flange: FlangeSpec = FlangeSpec()
+    """Joins the two halves at x = 0."""
+    foot_flange: FootFlangeSpec = FootFlangeSpec()
+    """Joins a half to the base plate."""
+
+
+class MeshSpec(Section):
+    """How fine the STL and 3MF are."""
+
+    ray_error_mm: float = Field(0.05, ge=0.01, le=10)
+    """How far a ray off a facet at a mirror's rim may miss, at the capture sphere, the ray off
+    the exact sphere: a facet reflects like a flat mirror."""
+    chord_error_mm: float = Field(0.015, ge=0.0002, le=1)
+    """Distance of a mirror's facets from its sphere; the stricter of this and ray_error_mm
+    counts."""
+    structure_error_mm: float = Field(0.02, ge=0.002, le=5)
+    """Distance of all other facets (back, flanges, holes) from the exact surface."""
+
+
+class StepSpec(Section):
+    """How the STEP is written."""
+
+    pcurves: bool = False
+    """Write the curves in the surfaces' parameters too, which some old programs need: files
+    grow about eightfold."""
+
+
+class Spec(Section):
+    """A whole design: every key with its value, checked and frozen."""
+
+    name: str = Field("turtleback", pattern="^[A-Za-z0-9][A-Za-z0-9 ._-]{0,79}$")
+    """Name of the design, for file headers and reports."""
+    schema_version: Annotated[Literal[2], BeforeValidator(_current)] = Field(2, alias="schema")
+    """Version of this table's keys."""
+    optics: OpticsSpec = OpticsSpec()
+    camera: CameraSpec = CameraSpec()
+    mirrors: MirrorsSpec = MirrorsSpec()
+    shell: ShellSpec = ShellSpec()
+    mesh: MeshSpec = MeshSpec()
+    step: StepSpec = StepSpec()
+    printer: PrinterSpec = PrinterSpec()
+    prototype: PrototypeSpec = PrototypeSpec()
+
+    def __repr__(self) -> str:
+        return f"<Spec {self.name!r}: n = {self.optics.n}>"
+
+    __str__ = __repr__
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> Self:
+        _check_capture_sphere(self.optics)
+        # Not an assignment: the design is frozen from here on.
+        self.__dict__["prototype"] = with_sizes(self.prototype, self.optics)
+        if self.mesh.structure_error_mm > self.shell.wall_mm / 2:
+            raise ValueError(
+                f"mesh.structure_error_mm {self.mesh.structure_error_mm:g} is more than half of "
+                f"shell.wall_mm {self.shell.wall_mm:g}: make it {self.shell.wall_mm / 2:g} or less"
+            )
+        return self
+
+
+def spec_with(spec: Spec, **sections: dict[str, object]) -> Spec:
+    """The spec with other values of some keys, by section; they are not checked.
+
+    Margins of single mirrors belong to the mirrors of the spec: another n, size or margin has none.
+    """
+    mirrors = sections.get("mirrors", {})
+    if "optics" in sections or "margin_mm" in mirrors:
+        sections["mirrors"] = {"own_margins_mm": ()} | mirrors
+    changed = {name: getattr(spec, name).model_copy(update=keys) for name, keys in sections.items()}
+    return spec.model_copy(update=changed)
+
+
+def _check_capture_sphere(optics: OpticsSpec) -> None:
+    radius, to_pinhole = optics.capture_diameter_mm / 2, math.hypot(*optics.camera_mm)
+    if radius >= to_pinhole:
+        raise ValueError(
+            f"optics.camera_mm is inside the capture sphere: bring it more than {radius:g} mm "
+            "from the origin or make optics.capture_diameter_mm smaller"
+        )
+    c = to_pinhole / 2
+    nearest = math.hypot(optics.semi_minor_mm, c) - c  # of the ellipsoid to its focus
+    if radius >= nearest:
+        raise ValueError(
+            f"the capture sphere of {radius:.4g} mm radius does not fit inside the ellipsoid, "
+            f"which comes to {nearest:.4g} mm of the origin: make optics.semi_minor_mm more than "
+            f"{math.sqrt(radius**2 + 2 * radius * c):.4g} or optics.capture_diameter_mm less than "
+            f"{2 * nearest:.4g}"
+        )

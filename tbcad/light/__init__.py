@@ -1,0 +1,1 @@
+"""Light fields: simulated photographs, datasets, depth, fields, relighting, and their viewer."""

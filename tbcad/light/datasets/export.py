@@ -1,0 +1,212 @@
+"""A capture as a folder for another program, with the figures of how well it fits."""
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.cad.formats.colmap import SparseModel
+from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.errors import InputError
+from tbcad.light.datasets.crops import chosen_mirrors
+from tbcad.light.datasets.machine_scene import write_machine_scene
+from tbcad.light.datasets.nerfstudio import write_nerfstudio, write_pictures
+from tbcad.light.datasets.ngp_rays import write_ngp_rays
+from tbcad.light.datasets.pictures import Pictures, default_size, taken_pictures
+from tbcad.light.datasets.pinholes import pinhole_of
+from tbcad.light.datasets.ray_table import write_ray_table
+from tbcad.light.datasets.seed_points import SeedPoints, seed_points
+from tbcad.light.datasets.virtual_cameras import FittedCameras, virtual_cameras
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.options.captures import ExportOptions
+from tbcad.types import Floats, Progress
+
+SCHEMA = "tbcad-dataset/1"
+RECORD, TABLE = "dataset.json", "cameras.csv"
+DIGITS = 6
+COLUMNS = ("name", "x", "y", "z", "rays", "pitch_mm", "rms_mm", "worst_mm", "central_error_mm")
+MODEL = Path("sparse", "0")
+# COLMAP looks for the mask of a0001.png as a0001.png.png.
+MASK_SUFFIX = ".png.png"
+
+
+def write_dataset(
+    folder: Path,
+    source: LightField,
+    scene: Scene | None,
+    options: ExportOptions,
+) -> dict[str, Any]:
+    """Write all files of an export into a folder, and return its record.
+
+    Args:
+        folder: exists, is empty, and is the caller's to replace.
+        source: the light field.
+        scene: the object of a simulated capture; None where it is not known.
+        options: what is wanted, and what is told of it.
+
+    Raises:
+        InputError: a mirror is not in the capture, or none gives a camera.
+    """
+    options.progress("virtual cameras")
+    mirrors = chosen_mirrors(source, options.cameras, options.every)
+    virtual = virtual_cameras(source, mirrors, options.detail)
+    if not len(virtual):
+        raise InputError("no mirror of the capture gives a virtual camera: choose other --cameras")
+    record = {
+        "schema": SCHEMA,
+        "target": options.to,
+        "capture": source.facts,
+        "capture_mm": source.capture_mm,
+        "virtual_cameras": len(virtual),
+        "left_out": virtual.left_out,
+        **_written(folder, source, virtual, scene, options),
+        "fit": _fit(virtual),
+    }
+    write_table(folder / TABLE, COLUMNS, _rows(virtual))
+    text = json.dumps(record, indent=1, sort_keys=False, allow_nan=False) + "\n"
+    (folder / RECORD).write_text(text, encoding="utf-8")
+    return record
+
+
+def write_scene(
+    folder: Path, source: LightField, scene: Scene | None, exports: Path, progress: Progress
+) -> dict[str, Any]:
+    """Write scenes of the machine into a folder, and return their record.
+
+    Args:
+        folder: exists, is empty, and is the caller's to replace.
+        source: the light field.
+        scene: its object.
+        exports: the export that it was captured with.
+        progress: called with each stage.
+
+    Raises:
+        InputError: the capture names no object, or the export has other cameras or no shells.
+    """
+    if scene is None:
+        raise InputError("the capture names no object, so there is none in the scene: capture one")
+    export = read_export(exports)
+    _check_same_cameras(source, export)
+    record = {
+        "schema": SCHEMA,
+        "target": "mitsuba",
+        "capture": source.facts,
+        "capture_mm": source.capture_mm,
+        **write_machine_scene(folder, export, scene, progress),
+    }
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    (folder / RECORD).write_text(text, encoding="utf-8")
+    return record
+
+
+def _check_same_cameras(source: LightField, export: ExportedDesign) -> None:
+    """Refuse an export whose mirrors are not those of the capture."""
+    for reflector in export.reflectors:
+        frame = source.frames.get(reflector.camera_id)
+        if (
+            frame is None
+            or len(frame.u) != len(reflector)
+            or frame.camera.width_px != reflector.camera.width_px
+            or not np.allclose(frame.mirrors.apex, reflector.mirrors.apex, atol=1e-6)
+        ):
+            raise InputError(
+                f"{export.folder} is not the export of this capture: its camera "
+                f"{reflector.camera_id} has other mirrors or pixels: name the one it was taken with"
+            )
+
+
+def _written(
+    folder: Path,
+    source: LightField,
+    virtual: FittedCameras,
+    scene: Scene | None,
+    options: ExportOptions,
+) -> dict[str, Any]:
+    """Write what the target reads, and return what is in it."""
+    progress, detail = options.progress, options.detail
+    if options.to == "ngp-rays":
+        progress("crops and rays")
+        write_ngp_rays(folder, source, virtual, detail)
+        return {"rays": int(virtual.rays.sum())}
+    if options.to == "rays":
+        progress("rays")
+        return {"rays": write_ray_table(folder, source, virtual, detail)}
+    progress("pictures")
+    size = options.size or default_size(virtual, source.capture_mm)
+    pictures = taken_pictures(source, virtual, size, scene, detail)
+    progress("seed points")
+    seeds = seed_points(pictures.cameras, pictures.picture, pictures.mask, source.capture_mm)
+    progress("files")
+    write = write_nerfstudio if options.to == "nerfstudio" else write_colmap
+    write(folder, [one.name for one in virtual.mirrors], pictures, seeds)
+    return _of_pictures(size, pictures, seeds)
+
+
+def _of_pictures(size: int, pictures: Pictures, seeds: SeedPoints) -> dict[str, Any]:
+    errors = pictures.reprojection_px
+    found = {
+        "size_px": size,
+        "seed_points": len(seeds.points),
+        "known_pixels": round(float(pictures.mask.mean()), DIGITS),
+    }
+    if errors is None or not len(errors):
+        return found
+    figures = {"rays": len(errors), "median": _rounded(np.median(errors))}
+    figures["percentile_95"] = _rounded(np.percentile(errors, 95))
+    return {**found, "reprojection_error_px": figures}
+
+
+def _fit(virtual: FittedCameras) -> dict[str, dict[str, float]]:
+    """Median and maximum over the virtual cameras, mm."""
+    columns = {
+        "rms_distance_from_common_point_mm": virtual.rms_mm,
+        "worst_distance_from_common_point_mm": virtual.worst_mm,
+        "central_error_at_capture_radius_mm": virtual.central_error_mm,
+        "pixel_pitch_mm": virtual.pitch_mm,
+    }
+    return {
+        name: {"median": _rounded(np.median(values)), "max": _rounded(values.max())}
+        for name, values in columns.items()
+    }
+
+
+def _rounded(value: np.floating[Any]) -> float:
+    return round(float(value), DIGITS)
+
+
+def _rows(virtual: FittedCameras) -> Iterator[Row]:
+    figures: Iterable[Floats] = np.column_stack(
+        [virtual.pitch_mm, virtual.rms_mm, virtual.worst_mm, virtual.central_error_mm]
+    )
+    for mirror, centre, rays, row in zip(
+        virtual.mirrors, virtual.centre.tolist(), virtual.rays, figures, strict=True
+    ):
+        cells = [mirror.name, *centre, int(rays), *np.round(row, DIGITS).tolist()]
+        yield dict(zip(COLUMNS, cells, strict=True))
+
+
+def write_colmap(folder: Path, names: list[str], pictures: Pictures, seeds: SeedPoints) -> None:
+    """Write images, masks and the sparse model into a folder that exists."""
+    write_pictures(folder, names, pictures, MASK_SUFFIX)
+    (folder / MODEL).mkdir(parents=True)
+    for name, data in sparse_model(names, pictures, seeds).files().items():
+        (folder / MODEL / name).write_bytes(data)
+
+
+def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> SparseModel:
+    """The cameras and points as COLMAP has them."""
+    pinholes = [pinhole_of(camera) for camera in pictures.cameras]
+    intrinsics = [np.concatenate([one.focal_px, one.principal_px]) for one in pinholes]
+    return SparseModel(
+        tuple(f"{name}.png" for name in names),
+        pinholes[0].size_px,
+        np.array(intrinsics),
+        np.array([one.axes for one in pinholes]),
+        np.array([one.centre for one in pinholes]),
+        seeds.points,
+        seeds.colours,
+    )

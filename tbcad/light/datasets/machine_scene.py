@@ -1,0 +1,243 @@
+"""Scenes of the machine for Mitsuba 3 and Blender: meshes, and a camera each.
+
+The object sends out the light that a capture shows it in, whatever shines on it: a picture then
+differs from the capture's by geometry alone. After Mitsuba's documentation of scene files
+(mitsuba.readthedocs.io): cameras look along their forward axis with `up` given, mirrors are smooth
+conductors without loss, `mesh_attribute` takes colours from the corners.
+"""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from tbcad.cad.formats.ply import mesh_ply
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.geodesic import triangle_grid
+from tbcad.light.simulate.object_files.normals import is_closed
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.light.simulate.scene.ray_casting import Scene, SurfaceHits
+from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.shell_meshes import facet_owners, read_facets
+from tbcad.types import Floats, Ints, Progress
+
+MESHES = "meshes"
+SAMPLES = 16
+BLENDER = "blender.py"
+# Colours that are no function of the facets' corners, patterns and textures, are sampled so finely.
+FINEST_MM, MOST_PARTS = 1.0, 64
+BEHIND_MM = 1e-3
+
+
+def write_machine_scene(
+    folder: Path, export: ExportedDesign, scene: Scene, progress: Progress
+) -> dict[str, Any]:
+    """Write meshes and scenes into a folder that exists, and return what is in it.
+
+    Raises:
+        InputError: the export has no shells.
+    """
+    (folder / MESHES).mkdir()
+    facets, cameras = {}, {}
+    for reflector in export.reflectors:
+        name = reflector.camera_id
+        progress(f"shell {name}")
+        mirrors, walls = shell_meshes(export, reflector)
+        for part, mesh in ((f"mirrors_{name}", mirrors), (f"walls_{name}", walls)):
+            (folder / MESHES / f"{part}.ply").write_bytes(mesh.ply())
+            facets[part] = len(mesh.faces)
+        cameras[name] = reflector.camera
+    progress("object")
+    mesh = object_mesh(scene)
+    (folder / MESHES / "object.ply").write_bytes(mesh.ply())
+    facets["object"] = len(mesh.faces)
+    for name, camera in cameras.items():
+        (folder / f"camera_{name}.xml").write_bytes(mitsuba_scene(camera, list(facets)))
+    (folder / BLENDER).write_text(blender_script(cameras, list(facets)), encoding="utf-8")
+    return {"facets": facets}
+
+
+def mitsuba_scene(camera: Camera, parts: list[str]) -> bytes:
+    """The scene file of a camera (XML)."""
+    scene = Xml.Element("scene", version="3.0.0")
+    # What a capture sees: from the camera, by one mirror at most. The object is no lamp: Mitsuba
+    # 3.9 crashes when it chooses points on one whose colours are those of its corners.
+    integrator = _child(scene, "integrator", type="direct")
+    _child(integrator, "integer", name="emitter_samples", value="0")
+    _child(integrator, "integer", name="bsdf_samples", value="1")
+    _add_sensor(scene, camera)
+    for part in parts:
+        shape = _child(scene, "shape", type="ply", id=part)
+        _child(shape, "string", name="filename", value=f"{MESHES}/{part}.ply")
+        _add_material(shape, part)
+    Xml.indent(scene)
+    return bytes(Xml.tostring(scene, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _add_sensor(scene: Xml.Element, camera: Camera) -> None:
+    sensor = _child(scene, "sensor", type="perspective")
+    _child(sensor, "string", name="fov_axis", value="x")
+    _child(sensor, "float", name="fov", value=repr(float(np.degrees(camera.hfov))))
+    _child(sensor, "float", name="near_clip", value="1")
+    _child(sensor, "float", name="far_clip", value="10000")
+    view = _child(_child(sensor, "transform", name="to_world"), "lookat")
+    view.set("origin", _text(camera.pinhole))
+    view.set("target", _text(camera.pinhole + 100 * camera.forward))
+    view.set("up", _text(-camera.axes[1]))
+    film = _child(sensor, "film", type="hdrfilm")
+    _child(film, "integer", name="width", value=str(camera.width_px))
+    _child(film, "integer", name="height", value=str(camera.height_px))
+    _child(film, "rfilter", type="box")
+    sampler = _child(sensor, "sampler", type="stratified")
+    _child(sampler, "integer", name="sample_count", value=str(SAMPLES))
+
+
+def _add_material(shape: Xml.Element, part: str) -> None:
+    """Mirrors reflect all light, walls none; the object sends out its colours."""
+    if part.startswith("mirrors"):
+        sides = _child(shape, "bsdf", type="twosided")
+        _child(_child(sides, "bsdf", type="conductor"), "string", name="material", value="none")
+        return
+    black = _child(shape, "bsdf", type="diffuse")
+    _child(black, "rgb", name="reflectance", value="0")
+    if part == "object":
+        emitter = _child(shape, "emitter", type="area")
+        colour = _child(emitter, "texture", type="mesh_attribute", name="radiance")
+        _child(colour, "string", name="name", value="vertex_color")
+
+
+def _child(parent: Xml.Element, tag: str, **attributes: str) -> Xml.Element:
+    return Xml.SubElement(parent, tag, attributes)
+
+
+def _text(values: Floats) -> str:
+    return ", ".join(repr(float(value)) for value in values)
+
+
+def blender_script(cameras: dict[str, Camera], parts: list[str]) -> str:
+    """A program for Blender's own Python that builds the same scene."""
+    data = {
+        "parts": parts,
+        "samples": SAMPLES,
+        "cameras": {name: _blender_camera(camera) for name, camera in cameras.items()},
+    }
+    script = files("tbcad.light.datasets") / "blender_scene.py.txt"
+    return script.read_text(encoding="utf-8").replace("{{DATA}}", json.dumps(data))
+
+
+def _blender_camera(camera: Camera) -> dict[str, Any]:
+    """Matrix of a camera that looks along -z with +y up, angle of view, and size."""
+    right, down, forward = camera.axes
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([right, -down, -forward, camera.pinhole])
+    return {
+        "matrix": matrix.tolist(),
+        "angle": float(camera.hfov),
+        "size": [camera.width_px, camera.height_px],
+    }
+
+
+class SceneMesh(NamedTuple):
+    """Triangles: points (v, 3), mm, unit normals there (v, 3), faces (f, 3), colours (v, 3)."""
+
+    points: Floats
+    normals: Floats
+    faces: Ints
+    colours: Floats | None = None
+
+    def ply(self) -> bytes:
+        """The mesh as a file."""
+        return mesh_ply(*self)
+
+
+def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[SceneMesh, SceneMesh]:
+    """Mirrors of a camera's shell, with the normals of their spheres; and its walls.
+
+    A facet reflects like a flat mirror, but renderers reflect at normals that they interpolate
+    between its corners, and there these are exact.
+
+    Raises:
+        InputError: the shell's STL file is not there, or cannot be read.
+    """
+    corners = read_facets(export.folder / f"shell_{reflector.camera_id}.stl")
+    bare = reflector.mirrors.offset(-export.spec.mirrors.coating_um / 1000)
+    owner = facet_owners(bare, corners)
+    mirrors, walls = corners[owner >= 0], corners[owner < 0]
+    number = np.repeat(owner[owner >= 0], 3)
+    normals = unit(bare.gradient(number, mirrors.reshape(-1, 3)))
+    return _outward(mirrors, normals), _flat(walls)
+
+
+def _outward(corners: Floats, normals: Floats) -> SceneMesh:
+    """Facets (f, 3, 3) and normals at their corners (3 f, 3), turned as the facets are."""
+    across = np.repeat(_facet_normals(corners), 3, axis=0)
+    turned = np.where((normals * across).sum(axis=1, keepdims=True) < 0, -normals, normals)
+    return SceneMesh(corners.reshape(-1, 3), turned, _separate(len(corners)))
+
+
+def _flat(corners: Floats) -> SceneMesh:
+    normals = np.repeat(_facet_normals(corners), 3, axis=0)
+    return SceneMesh(corners.reshape(-1, 3), normals, _separate(len(corners)))
+
+
+def _facet_normals(corners: Floats) -> Floats:
+    return unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+
+
+def _separate(count: int) -> Ints:
+    return np.arange(3 * count).reshape(-1, 3)
+
+
+def object_mesh(scene: Scene) -> SceneMesh:
+    """The object with the colours that a capture shows, light included: what it sends out.
+
+    Renderers see light on the outside of facets; one that does not enclose a body has a back too.
+    """
+    subject, divided = scene.subject, _divided(scene.subject)
+    outside = _side(scene, *divided, 1.0)
+    if is_closed(subject.points, subject.faces):
+        return outside
+    back = _side(scene, *divided, -1.0)
+    return SceneMesh(
+        np.concatenate([outside.points, back.points]),
+        np.concatenate([outside.normals, back.normals]),
+        np.concatenate([outside.faces, back.faces[:, ::-1] + len(outside.points)]),
+        np.concatenate([outside.colours, back.colours]),
+    )
+
+
+def _side(scene: Scene, facet: Ints, weight: Floats, faces: Ints, side: float) -> SceneMesh:
+    """The outside (1), or the back (-1), which is a little behind it."""
+    subject = scene.subject
+    toward = -side * _facet_normals(subject.points[subject.faces])[facet]
+    hits = SurfaceHits(np.arange(len(facet)), np.zeros(len(facet)), facet, weight, toward)
+    spots, light = hits.spots(subject), hits.light(subject, scene.shade)
+    place = spots.place if side > 0 else spots.place + BEHIND_MM * spots.facet_normal
+    return SceneMesh(place, spots.normal, faces, hits.albedo(subject) * light[:, None])
+
+
+def _divided(subject: SceneObject) -> tuple[Ints, Floats, Ints]:
+    """Points on facets: facet (v,), barycentric weights (v, 3), and the triangles of them."""
+    count, parts = len(subject.faces), _parts(subject)
+    grid, small = triangle_grid(parts)
+    i, j = np.array(grid).T
+    weight = np.column_stack([parts - i - j, i, j]) / parts
+    number = np.zeros((parts + 1, parts + 1), dtype=np.int64)
+    number[i, j] = np.arange(len(grid))
+    local = number[small[..., 0], small[..., 1]]
+    faces = (local[None] + len(weight) * np.arange(count)[:, None, None]).reshape(-1, 3)
+    return np.repeat(np.arange(count), len(weight)), np.tile(weight, (count, 1)), faces
+
+
+def _parts(subject: SceneObject) -> int:
+    """Into how many parts the sides of all facets are divided."""
+    if not subject.patterned and subject.texture is None:
+        return 1
+    corners = subject.points[subject.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    return int(np.clip(np.ceil(longest / FINEST_MM), 1, MOST_PARTS))

@@ -1,0 +1,253 @@
+"""The pictures of all virtual cameras: of a dataset, and in memory for views."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.common.compiled import compiled
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.camera import Camera
+from tbcad.errors import InputError
+from tbcad.light.datasets.crops import Crop, MirrorId, chosen_mirrors, read_crop, reading_order
+from tbcad.light.datasets.virtual_cameras import FittedCameras, at_middle, virtual_cameras
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.parallel import in_batches
+from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.light.simulate.scene.rays import meets_sphere, unit_directions
+from tbcad.types import Bools, Bytes, Colours, Floats, Ints, Progress
+
+MOST_SAMPLES = 8
+# A sample on the edge of two triangles belongs to both but for rounding.
+ROUNDING = 1e-9
+# Nine of ten virtual cameras lose nothing in pictures as fine as the finest tenth of them.
+FINEST = 10  # percent
+MOST_BYTES = 4 << 30
+MOST_VIEW_BYTES, BYTES_PER_PIXEL = 1 << 30, 4  # of all pictures with their masks
+
+
+def places(crop: Crop, camera: Camera) -> Floats:
+    """Column and row in the picture of each ray of a crop, (h, w, 2); whole numbers are centres."""
+    points = at_middle(crop.origin, crop.direction, camera.forward)
+    return camera.project(points)
+
+
+def resampled(crop: Crop, camera: Camera, radius: float) -> tuple[Bytes, Bools]:
+    """The picture of a pinhole camera from the rays of a crop.
+
+    Args:
+        crop: pixels of a mirror.
+        camera: stands for the mirror; square pictures.
+        radius: of the capture sphere, mm.
+
+    Returns:
+        Picture (h, w, 3), black where nothing is known, and its mask (h, w): pixels inside the
+        cell whose rays meet the capture sphere.
+    """
+    place = places(crop, camera)
+    samples = _samples(place, crop.meets)
+    size = camera.width_px * samples
+    total, hit = np.zeros((size, size, 3), dtype=np.float32), np.zeros((size, size), dtype=np.bool_)
+    _fill((place + 0.5) * samples - 0.5, crop.colour, crop.valid, total, hit)
+    blocks = (camera.height_px, samples, camera.width_px, samples)
+    picture = total.reshape(*blocks, 3).mean(axis=(1, 3))
+    mask = hit.reshape(blocks).all(axis=(1, 3)) & _sees_sphere(camera, radius)
+    return np.where(mask[..., None], np.rint(picture), 0).astype(np.uint8), mask
+
+
+def _sees_sphere(camera: Camera, radius: float) -> Bools:
+    direction = unit_directions(camera, range(camera.height_px)).reshape(-1, 3)
+    origin = np.broadcast_to(camera.pinhole, direction.shape)
+    meets = meets_sphere(np.ascontiguousarray(origin), direction, radius)
+    return meets.reshape(camera.height_px, camera.width_px)
+
+
+def _samples(place: Floats, known: Bools) -> int:
+    """Samples across a pixel, one at least for each ray."""
+    inside = known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1]
+    if not inside.any():
+        return 1
+    across = (place[:-1, 1:] - place[:-1, :-1])[inside]
+    down = (place[1:, :-1] - place[:-1, :-1])[inside]
+    area = np.abs(across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0])
+    return int(np.clip(np.ceil(1 / np.sqrt(np.median(area))), 1, MOST_SAMPLES))
+
+
+@compiled
+def _fill(place: Floats, colour: Bytes, valid: Bools, total: Colours, hit: Bools) -> None:
+    """Interpolate colours in the triangles of neighbouring rays.
+
+    Of four rays in a square, the triangle without ray k is filled: two triangles where all four
+    are valid, one where one is missing.
+    """
+    square, corners = np.empty((4, 2), dtype=np.int64), np.empty((3, 2), dtype=np.int64)
+    for y in range(place.shape[0] - 1):
+        for x in range(place.shape[1] - 1):
+            count = 0
+            for k in range(4):
+                square[k, 0], square[k, 1] = y + (k >= 2), x + (k == 1 or k == 2)  # noqa: PLR1714
+                count += valid[square[k, 0], square[k, 1]]
+            for k in range(4):
+                missing = not valid[square[k, 0], square[k, 1]]
+                if (count == 4 and k % 2 == 1) or (count == 3 and missing):
+                    for j in range(3):
+                        corners[j] = square[(k + 1 + j) % 4]
+                    _fill_triangle(place, colour, corners, total, hit)
+
+
+@compiled
+def _fill_triangle(place: Floats, colour: Bytes, corners: Ints, total: Colours, hit: Bools) -> None:
+    """Fill the samples between three rays, whose rows and columns are in corners (3, 2)."""
+    first = place[corners[0, 0], corners[0, 1]]
+    second = place[corners[1, 0], corners[1, 1]]
+    third = place[corners[2, 0], corners[2, 1]]
+    ax, ay = first[0], first[1]
+    bx, by, cx, cy = second[0] - ax, second[1] - ay, third[0] - ax, third[1] - ay
+    area = bx * cy - by * cx
+    if area == 0:
+        return
+    low_x, high_x = ax + min(0.0, bx, cx), ax + max(0.0, bx, cx)
+    low_y, high_y = ay + min(0.0, by, cy), ay + max(0.0, by, cy)
+    for y in range(max(int(np.ceil(low_y)), 0), min(int(np.floor(high_y)) + 1, hit.shape[0])):
+        for x in range(max(int(np.ceil(low_x)), 0), min(int(np.floor(high_x)) + 1, hit.shape[1])):
+            b = ((x - ax) * cy - (y - ay) * cx) / area
+            c = (bx * (y - ay) - by * (x - ax)) / area
+            if b < -ROUNDING or c < -ROUNDING or b + c > 1 + ROUNDING:
+                continue
+            hit[y, x] = True
+            for channel in range(3):
+                total[y, x, channel] = (
+                    (1 - b - c) * colour[corners[0, 0], corners[0, 1], channel]
+                    + b * colour[corners[1, 0], corners[1, 1], channel]
+                    + c * colour[corners[2, 0], corners[2, 1], channel]
+                )
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Pictures of m pinhole cameras, of one size."""
+
+    cameras: list[Camera]  # (m,)
+    picture: Bytes  # (m, h, w, 3)
+    mask: Bools  # where it is known, (m, h, w)
+    # distance of each ray's place from where its point of the object appears through the pinhole,
+    # of all rays that hit the object; None without the object
+    reprojection_px: Floats | None
+
+
+def default_size(virtual: FittedCameras, capture_mm: float) -> int:
+    """An even number of pixels, as fine as the finest tenth of the virtual cameras."""
+    return 2 * int(np.ceil(capture_mm / np.percentile(virtual.pitch_mm, FINEST) / 2))
+
+
+def taken_pictures(
+    source: LightField,
+    virtual: FittedCameras,
+    size_px: int,
+    scene: Scene | None,
+    progress: Progress = lambda _: None,
+) -> Pictures:
+    """Resample the crops of all virtual cameras.
+
+    Args:
+        source: the light field.
+        virtual: its virtual cameras, m of them.
+        size_px: width and height of the pictures.
+        scene: the object, where it is known.
+        progress: called with each step.
+
+    Raises:
+        InputError: so many pictures of this size do not fit into memory.
+    """
+    cameras, radius = virtual.pinhole_cameras(source.capture_mm, size_px), source.capture_mm / 2
+    if len(cameras) * size_px**2 * 4 > MOST_BYTES:
+        raise InputError(
+            f"{len(cameras)} pictures of {size_px} x {size_px} pixels are more than "
+            f"{MOST_BYTES >> 30} GiB: choose a smaller --size, or fewer with --every"
+        )
+    picture = np.zeros((len(cameras), size_px, size_px, 3), dtype=np.uint8)
+    mask = np.zeros(picture.shape[:3], dtype=np.bool_)
+
+    def take(k: int) -> Floats:
+        crop = crop_of(source, virtual.mirrors[k])
+        picture[k], mask[k] = resampled(crop, cameras[k], radius)
+        return np.zeros(0) if scene is None else reprojection_errors(crop, cameras[k], scene)
+
+    order = reading_order(source, virtual.mirrors).tolist()
+    errors = list(in_batches(take, order, lambda k: progress(virtual.mirrors[k].name)))
+    return Pictures(cameras, picture, mask, None if scene is None else np.concatenate(errors))
+
+
+def crop_of(source: LightField, mirror: MirrorId) -> Crop:
+    """The pixels of a mirror that is known to have some."""
+    crop = read_crop(source, mirror)
+    if crop is None:
+        raise InputError(f"{mirror.name} has lost its pixels: the light field changed meanwhile")
+    return crop
+
+
+def reprojection_errors(crop: Crop, camera: Camera, scene: Scene) -> Floats:
+    """Pixels between the place of each ray and where the camera sees the point it hits, (n,)."""
+    origin, direction = crop.rays
+    depth = cast_rays(scene, origin, direction).depth
+    hit = np.isfinite(depth)
+    points = origin[hit] + depth[hit, None] * direction[hit]
+    return norm(camera.project(points) - places(crop, camera)[crop.meets][hit])
+
+
+@dataclass(frozen=True)
+class PinholePictures:
+    """Pictures of m virtual cameras that look at the origin."""
+
+    centre: Floats  # of the pinholes, mm, (m, 3)
+    axes: Floats  # rows: along the rows, down the columns, forward, (m, 3, 3)
+    focal_px: Floats  # (m,)
+    picture: Bytes  # (m, s, s, 3)
+    mask: Bools  # where it is known, (m, s, s)
+    capture_mm: float  # diameter of the capture sphere
+
+
+def pinhole_pictures(source: LightField, progress: Progress = lambda _: None) -> PinholePictures:
+    """The pictures of all virtual cameras of a light field."""
+    virtual = virtual_cameras(source, chosen_mirrors(source, None, 1), progress)
+    taken = taken_pictures(source, virtual, _size(virtual, source.capture_mm), None, progress)
+    axes = np.array([one.axes for one in taken.cameras]).reshape(-1, 3, 3)
+    focal = np.array([1 / one.pixel_pitch for one in taken.cameras])
+    return PinholePictures(
+        virtual.centre, axes, focal, taken.picture, taken.mask, source.capture_mm
+    )
+
+
+def _size(virtual: FittedCameras, capture_mm: float) -> int:
+    """Width and height of the pictures, smaller where they would take too much memory."""
+    if not len(virtual):
+        return 1
+    most = math.isqrt(MOST_VIEW_BYTES // (BYTES_PER_PIXEL * len(virtual)))
+    return min(default_size(virtual, capture_mm), most)
+
+
+def facing(pictures: PinholePictures, view: Camera) -> tuple[Ints, Floats]:
+    """Virtual cameras on the side of a view (k,), and their places along its axes, (k, 3).
+
+    The places are weighted: a target ray to image point (x, y), at unit distance, is at least
+    |(px - pz x, py - pz y)| from all rays of a camera with place p, mm, as root mean square over
+    the depth of the capture sphere (`two_plane`).
+    """
+    scale, plane = pictures.capture_mm / 2 / np.sqrt(3), -float(view.pinhole @ view.forward)
+    place = (pictures.centre - view.pinhole) @ view.axes.T
+    depth = place[:, 2] - plane
+    near = np.flatnonzero(depth < 0)  # the others see the back of the object
+    return near, place[near] / np.sqrt(1 + (depth[near, None] / scale) ** 2)
+
+
+def projections(pictures: PinholePictures, view: Camera, some: Ints) -> Floats:
+    """Matrices (k, 3, 4) from points (right, down, forward, 1) of a view into some pictures.
+
+    The result is homogeneous: column and row, of which whole numbers are pixel centres.
+    """
+    lens = np.zeros((len(some), 3, 3))
+    lens[:, 0, 0] = lens[:, 1, 1] = pictures.focal_px[some]
+    lens[:, :2, 2], lens[:, 2, 2] = (pictures.mask.shape[1] - 1) / 2, 1.0
+    into = lens @ pictures.axes[some]
+    offset = into @ (view.pinhole - pictures.centre[some])[..., None]
+    return np.concatenate([into @ view.axes.T, offset], axis=2)

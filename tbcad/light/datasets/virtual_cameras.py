@@ -1,0 +1,146 @@
+"""Virtual cameras as central ones: the best common point of each mirror's rays, and its errors.
+
+The rays after a curved mirror pass no common point. Nearest to all of them is one point, the centre
+of the pinhole camera that stands for the mirror. A pixel is given the place where its ray meets the
+plane through the middle of the capture sphere: there the pinhole is right, and before and behind
+that plane it is off by the ray's distance from the centre times depth over distance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.camera import Camera
+from tbcad.light.datasets.crops import Crop, MirrorId, read_crop, reading_order
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.parallel import in_batches
+from tbcad.light.simulate.views.mirror_tiles import convergence_point
+from tbcad.types import Floats, Progress
+
+UP = np.array([0.0, 0.0, 1.0])
+# Straight down, where "up" says nothing about the rows, they run along this.
+ROWS_AT_ZENITH = np.array([1.0, 0.0, 0.0])
+MIN_UP = 1e-6
+# Fewer rays, or none side by side, are no picture.
+MIN_RAYS = 16
+# A centre in the capture sphere or at its border is none of a camera that looks at all of it.
+MIN_DISTANCE = 1.05
+
+
+@dataclass(frozen=True)
+class FittedCameras:
+    """m virtual cameras of a light field, and how well each is central."""
+
+    mirrors: tuple[MirrorId, ...]  # which mirrors they are
+    centre: Floats  # best common points of their rays, mm, (m, 3)
+    rays: Floats  # how many rays of each meet the capture sphere, (m,)
+    pitch_mm: Floats  # distance of neighbouring rays in the plane through the origin, (m,)
+    rms_mm: Floats  # root mean square distance of the rays from the centre, (m,)
+    worst_mm: Floats  # largest distance of a ray from the centre, (m,)
+    # most that a ray of the pinhole is off the captured one a capture radius before and behind the
+    # middle, (m,)
+    central_error_mm: Floats
+    left_out: dict[str, str]  # reason by name of each mirror that gives no camera
+
+    def __len__(self) -> int:
+        return len(self.mirrors)
+
+    def pinhole_cameras(self, capture_mm: float, size_px: int) -> list[Camera]:
+        """The pinhole cameras, whose square pictures the capture sphere just fills."""
+        return [camera_at(centre, capture_mm, size_px) for centre in self.centre]
+
+
+def virtual_cameras(
+    source: LightField, mirrors: list[MirrorId], progress: Progress = lambda _: None
+) -> FittedCameras:
+    """Measure the virtual cameras of some mirrors.
+
+    Args:
+        source: the light field.
+        mirrors: which of its mirrors.
+        progress: called with each step.
+    """
+    radius = source.capture_mm / 2
+
+    def measured(mirror: MirrorId) -> Floats | str:
+        crop = read_crop(source, mirror)
+        return "no pixels" if crop is None else _measured(crop, radius)
+
+    order = reading_order(source, mirrors)
+    read = in_batches(measured, [mirrors[k] for k in order], lambda one: progress(one.name))
+    rows = [row for _, row in sorted(zip(order, read, strict=True), key=lambda pair: pair[0])]
+    left_out = {
+        mirror.name: row for mirror, row in zip(mirrors, rows, strict=True) if isinstance(row, str)
+    }
+    kept = tuple(one for one in mirrors if one.name not in left_out)
+    table = np.array([row for row in rows if not isinstance(row, str)]).reshape(-1, 8)
+    rays, pitch, rms, worst, error = table[:, 3:].T
+    return FittedCameras(kept, table[:, :3], rays, pitch, rms, worst, error, left_out)
+
+
+def _measured(crop: Crop, radius: float) -> Floats | str:
+    """Centre, rays, pitch, RMS, worst and central error of a crop; or why it is no camera."""
+    if crop.meets.sum() < MIN_RAYS:
+        return f"fewer than {MIN_RAYS} rays meet the capture sphere"
+    origin, direction = crop.rays
+    centre, worst = convergence_point(origin, direction)
+    distance = float(np.linalg.norm(centre))
+    if distance < MIN_DISTANCE * radius:
+        return "its rays have no common point outside the capture sphere"
+    pitch = _pitch(crop, centre)
+    if pitch is None:
+        return "no four rays side by side meet the capture sphere"
+    off = norm(foot_points(origin, direction, centre) - centre)
+    rms = np.sqrt(np.mean(off**2))
+    error = _central_errors(origin, direction, centre, radius).max()
+    return np.array([*centre, len(origin), pitch, rms, worst, error])
+
+
+def foot_points(origin: Floats, direction: Floats, point: Floats) -> Floats:
+    """Points (n, 3) of rays nearest to a point (3,)."""
+    return np.asarray(origin + dot(point - origin, direction)[:, None] * direction)
+
+
+def at_middle(origin: Floats, direction: Floats, forward: Floats, depth: float = 0.0) -> Floats:
+    """Where rays (..., 3) meet the plane across `forward` at a depth (mm) behind the origin.
+
+    NaN where there is no ray: its direction is zero.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (depth - dot(origin, forward)) / dot(direction, forward)
+    return np.asarray(origin + along[..., None] * direction)
+
+
+def _central_errors(origin: Floats, direction: Floats, centre: Floats, radius: float) -> Floats:
+    """How far the pinhole's rays are off (n,), mm, at the worse of both ends of the sphere."""
+    forward, distance = -unit(centre), float(np.linalg.norm(centre))
+    central = at_middle(origin, direction, forward) - centre
+    errors = []
+    for depth in (-radius, radius):
+        captured = at_middle(origin, direction, forward, depth)
+        pinhole = centre + central * (distance + depth) / distance
+        errors.append(norm(captured - pinhole))
+    return np.maximum(*errors)
+
+
+def _pitch(crop: Crop, centre: Floats) -> float | None:
+    """Side of the square that is as large as four neighbouring rays span, in the middle, mm."""
+    forward = -unit(centre)
+    points = at_middle(crop.origin, crop.direction, forward)
+    inside = crop.meets[:-1, :-1] & crop.meets[:-1, 1:] & crop.meets[1:, :-1]
+    if not inside.any():
+        return None
+    across = (points[:-1, 1:] - points[:-1, :-1])[inside]
+    down = (points[1:, :-1] - points[:-1, :-1])[inside]
+    return float(np.sqrt(np.median(norm(np.cross(across, down)))))
+
+
+def camera_at(centre: Floats, capture_mm: float, size_px: int) -> Camera:
+    """A pinhole camera that looks at the origin, z up, its picture filled by the capture sphere."""
+    forward = -unit(centre)
+    across = np.cross(forward, UP)
+    right = unit(across) if np.linalg.norm(across) > MIN_UP else ROWS_AT_ZENITH
+    right = unit(right - (right @ forward) * forward)
+    half = np.arcsin(capture_mm / 2 / np.linalg.norm(centre))
+    return Camera(centre, forward, right, size_px, size_px, float(2 * half))

@@ -1,0 +1,173 @@
+"""The depth of a view as a surface: for views as a blend on it, as points, and as files.
+
+Depth is in mm behind the plane through the origin that faces the view, NaN where it is unknown.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from PIL import Image
+
+from tbcad.cad.formats.ply import points_ply
+from tbcad.common.compiled import compiled_loop
+from tbcad.common.picture_bytes import png_bytes
+from tbcad.core.optics.camera import Camera
+from tbcad.errors import InputError
+from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
+from tbcad.light.depth.plane_sweep import FINE, Sweep, swept_depth
+from tbcad.light.simulate.scene.viewpoint import view_directions
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.synthesis import SynthesisedView, synthesise
+from tbcad.types import Bytes, Floats, Progress
+
+FRONT = 65535  # the number of the capture sphere's front; 0 is unknown
+# A plane that is less different than a middling one, by colour, is no surface but empty or even.
+MIN_CONFIDENCE = 3.0
+BLACK = 8  # of 255: no brighter is the background, which is matt black
+
+
+def depth_png(depth: Floats, capture_mm: float) -> bytes:
+    """Depth (h, w) as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
+    share = 0.5 - depth / capture_mm
+    number = np.rint(1 + (FRONT - 1) * np.clip(share, 0, 1))
+    return png_bytes(np.nan_to_num(number).astype(np.uint16))
+
+
+def depth_points(view: Camera, depth: Floats) -> Floats:
+    """Points (h, w, 3) of a view's depth (h, w), mm; NaN where it is unknown."""
+    along = view_directions(view)
+    along /= (along @ view.forward)[..., None]
+    plane = -float(view.pinhole @ view.forward)
+    return np.asarray(view.pinhole + (plane + depth)[..., None] * along)
+
+
+def depth_ply(view: Camera, depth: Floats, image: Bytes) -> bytes:
+    """The points that are known as PLY, with the colours of a picture (h, w, 3)."""
+    points = depth_points(view, depth).reshape(-1, 3)
+    known = np.isfinite(points).all(axis=1)
+    return points_ply(points[known], image.reshape(-1, 3)[known])
+
+
+@dataclass(frozen=True)
+class DepthMap:
+    """Depth of a view."""
+
+    view: Camera  # the camera of the depth's pixels
+    # mm behind the plane through the origin that faces the view, (h, w); NaN where nothing shows it
+    depth: Floats
+    confidence: Floats  # by how much colours differ more on other planes, (h, w)
+    capture_mm: float  # diameter of the capture sphere
+
+    def along_rays(self, origin: Floats, direction: Floats) -> Floats:
+        """Distance (n,) along rays (n, 3) of the view's pinhole to the surface, mm."""
+        plane = -float(self.view.pinhole @ self.view.forward)
+        away = plane + np.nan_to_num(self.depth)
+        return _along(away, self.view.axes, self.view.pixel_pitch, np.ascontiguousarray(direction))
+
+    def known(self) -> Floats:
+        """Depth (h, w), NaN where no plane stands out as well."""
+        return np.where(self.confidence > MIN_CONFIDENCE, self.depth, np.nan)
+
+    def points(self) -> Floats:
+        """Points (h, w, 3) of the surface, mm; NaN where it is not known."""
+        return depth_points(self.view, self.known())
+
+    def png(self) -> bytes:
+        """The depth as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
+        return depth_png(self.known(), self.capture_mm)
+
+    def ply(self, image: Bytes) -> bytes:
+        """The points that are known as PLY, with the colours of a picture of the view (h, w, 3).
+
+        What is black there is left out: the background, whose depth nothing shows.
+        """
+        size = self.view.width_px, self.view.height_px
+        smaller = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
+        bright = smaller.max(axis=2) > BLACK
+        return depth_ply(self.view, np.where(bright, self.known(), np.nan), smaller)
+
+
+@compiled_loop
+def _along(away: Floats, axes: Floats, pitch: float, direction: Floats) -> Floats:
+    """Distance (n,) along rays from a pinhole to a surface, between four of its known points.
+
+    Args:
+        away: of the surface along the view, for each pixel, mm, (h, w).
+        axes: of the view, (3, 3).
+        pitch: width of a pixel at unit distance.
+        direction: of the rays, (n, 3).
+    """
+    height, width = away.shape
+    result = np.empty(len(direction))
+    for k in range(len(direction)):
+        x = y = ahead = 0.0
+        for j in range(3):
+            x += axes[0, j] * direction[k, j]
+            y += axes[1, j] * direction[k, j]
+            ahead += axes[2, j] * direction[k, j]
+        column = min(max(x / ahead / pitch + (width - 1) / 2, 0.0), width - 1.0)
+        row = min(max(y / ahead / pitch + (height - 1) / 2, 0.0), height - 1.0)
+        left, top = min(int(column), max(width - 2, 0)), min(int(row), max(height - 2, 0))
+        right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
+        u, v = column - left, row - top
+        above = (1 - u) * away[top, left] + u * away[top, right]
+        below = (1 - u) * away[bottom, left] + u * away[bottom, right]
+        result[k] = ((1 - v) * above + v * below) / ahead
+    return result
+
+
+def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> DepthMap:
+    """The depth of a view.
+
+    Args:
+        pictures: of all virtual cameras.
+        view: a camera that looks at the origin.
+        sweep: how fine it is.
+
+    Raises:
+        InputError: the camera does not look at the origin, so planes across it mean nothing.
+    """
+    aside = np.linalg.norm(np.cross(view.pinhole, view.forward))
+    if aside > pictures.capture_mm / 2:
+        raise InputError("the view does not look at the object: turn its camera to the origin")
+    size = -(-view.width_px // sweep.step_px), -(-view.height_px // sweep.step_px)
+    smaller = replace(view, width_px=max(size[0], 1), height_px=max(size[1], 1))
+    depth, confidence = swept_depth(pictures, smaller, sweep)
+    return DepthMap(smaller, depth, confidence, pictures.capture_mm)
+
+
+@dataclass(frozen=True)
+class DepthViews:
+    """What views of a light field are made from, one after the other."""
+
+    tiles: MirrorTiles  # the light field
+    pictures: PinholePictures  # of its virtual cameras
+    sweep: Sweep = FINE  # how fine the depth is looked for
+
+    def of(
+        self, view: Camera, shown: MirrorTiles | None = None
+    ) -> tuple[SynthesisedView, DepthMap]:
+        """The picture that a pinhole camera would see, and its depth.
+
+        Args:
+            view: the camera, which looks at the origin.
+            shown: another light field of the same rays, whose colours the picture has.
+
+        Raises:
+            InputError: the camera looks elsewhere.
+        """
+        found = depth_map(self.pictures, view, self.sweep)
+        return synthesise(shown or self.tiles, view, "blend", found.along_rays), found
+
+
+def depth_views(
+    tiles: MirrorTiles, sweep: Sweep = FINE, progress: Progress = lambda _: None
+) -> DepthViews:
+    """Make the pictures of all virtual cameras, from which views are then made quickly.
+
+    Args:
+        tiles: the light field.
+        sweep: how fine the depth is looked for.
+        progress: called with each virtual camera whose picture is made.
+    """
+    return DepthViews(tiles, pinhole_pictures(tiles.source, progress), sweep)

@@ -1,0 +1,183 @@
+"""The fit of a field to rays: coarse to fine, by Adam on random batches.
+
+Each batch is cut into a fixed number of parts, each with a gradient of its own, which are added in
+their order: the result is the same, to the last bit, on any number of threads.
+"""
+
+from collections.abc import Iterator
+from math import ceil, cos, pi
+
+import numpy as np
+
+from tbcad.light.reconstruction.field import Field
+from tbcad.light.reconstruction.gradient import (
+    ColumnSteps,
+    Pixels,
+    adam,
+    add_gradient,
+    unbiased_size,
+)
+from tbcad.light.reconstruction.grid import LONGEST_LEAP, Grid
+from tbcad.light.reconstruction.marching import Medium, Singles, spans
+from tbcad.light.reconstruction.rays import CapturedRays
+from tbcad.light.reconstruction.start import (
+    CENTRAL,
+    NUMBERS,
+    Settings,
+    State,
+    finer,
+    first_state,
+    hull,
+)
+from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.types import Bools, Ints
+
+PARTS = 8  # of a batch and of the nodes
+FEWEST_STEPS = 40  # of an epoch
+COLOURS = (-0.1, 1.1)
+SLOPES = (-0.5, 0.5)
+
+
+def fit(
+    rays: CapturedRays, settings: Settings, used: Bools | None = None, state: State | None = None
+) -> Iterator[State]:
+    """Fit a field; each epoch's state is given before the next, which changes it.
+
+    Args:
+        rays: what was captured.
+        settings: how.
+        used: which rays it is fitted to, (n,); None: all.
+        state: to go on from; None: from the hull.
+    """
+    state = state or first_state(hull(rays), rays.capture_mm, settings)
+    while state.level < len(settings.levels):
+        yield from _epochs(rays, settings, used, state)
+        if state.level + 1 == len(settings.levels):
+            return
+        state = finer(state, settings)
+
+
+def _epochs(
+    rays: CapturedRays, settings: Settings, used: Bools | None, state: State
+) -> Iterator[State]:
+    """The epochs of a level that are left."""
+    final = state.level + 1 == len(settings.levels)
+    places = settings.places if final else CENTRAL
+    pixels = _pixels(rays, state.grid, places)
+    ray = np.flatnonzero(pixels.first >= 0 if used is None else (pixels.first >= 0) & used)
+    epochs = settings.levels[state.level].epochs
+    count = len(ray) // min(settings.batch, len(ray) // FEWEST_STEPS + 1) + 1
+    parts = np.zeros((PARTS, *state.values.shape), dtype=np.float32)
+    add_gradient(ray[:0], pixels, 0, medium_of(state.field(), settings.stride), parts[0])  # compile
+    while state.epoch < epochs:
+        random = np.random.default_rng([settings.seed, state.level, state.epoch])
+        batches = np.array_split(random.permutation(ray), count)
+        error = 0.0
+        for k, batch in enumerate(batches):
+            medium = medium_of(state.field(), settings.stride)
+            error += _gradient(pixels, medium, batch, state.step, parts)
+            progress = (state.epoch * count + k + 1) / (epochs * count)
+            _step(settings, state, progress, len(batch) / len(state.grid), parts)
+        state.epoch += 1
+        state.loss = error / max(len(ray), 1)
+        yield state
+
+
+def all_spans(rays: CapturedRays, grid: Grid, around_mm: float = 0.0) -> tuple[Singles, Singles]:
+    """Where all rays may meet something within that distance first and last, (n,) each."""
+    leap = grid.leap
+    near = min(1 + ceil(around_mm / grid.pitch_mm), LONGEST_LEAP - 1)
+
+    def part(here: slice) -> tuple[Singles, Singles]:
+        return spans(
+            rays.entry[here], rays.direction[here], rays.length[here], leap, grid.width_mm, near
+        )
+
+    part(slice(0, 0))  # compiled before any thread
+    found = in_threads(part, chunks(len(rays), max(-(-len(rays) // PARTS), 1)))
+    first, last = (np.concatenate(one) for one in zip(*found, strict=True))
+    return first, last
+
+
+def _pixels(rays: CapturedRays, grid: Grid, places: Singles) -> Pixels:
+    """Rays as the loops take them, from where they come near to a grid's nodes."""
+    span = all_spans(rays, grid, rays.spread_mm(places))
+    return Pixels(
+        rays.entry, rays.direction, *span, rays.colour, rays.weight, rays.footprint, places
+    )
+
+
+def _gradient(pixels: Pixels, medium: Medium, batch: Ints, seed: int, parts: Singles) -> float:
+    """Fill `parts` with the gradient of a batch; return the sum of its squared errors."""
+    shares = np.array_split(batch, PARTS)
+
+    def part(k: int) -> float:
+        return float(add_gradient(shares[k], pixels, seed, medium, parts[k])[0])
+
+    return sum(in_threads(part, range(PARTS)))
+
+
+def _step(settings: Settings, state: State, progress: float, share: float, parts: Singles) -> None:
+    """One step of Adam on the gradient in `parts`, which is empty afterwards.
+
+    Args:
+        settings: of the fit.
+        state: changed.
+        progress: share of the level's steps that are done.
+        share: rays of the batch for each node.
+        parts: of the gradient of the batch.
+    """
+    state.step += 1
+    columns = _columns(settings, state, progress, share)
+    changed = np.empty_like(state.values)
+    neighbours, count = state.grid.neighbours, len(state.grid)
+
+    def part(nodes: slice) -> None:
+        adam(
+            (nodes.start, nodes.stop), state.values, changed, parts, state.moments, neighbours,
+            columns, settings.sparse * share,
+        )  # fmt: skip
+
+    if state.step == 1:
+        part(slice(0, 0))  # compiled before any thread
+    in_threads(part, chunks(count, max(-(-count // PARTS), 1)))
+    state.values = changed
+
+
+def _columns(settings: Settings, state: State, progress: float, share: float) -> ColumnSteps:
+    """What holds for the columns of the values."""
+    final = state.level + 1 == len(settings.levels)
+    slowing = 0.5 * (1 + cos(pi * progress)) if final else 1.0
+    number, colour = (
+        large * slowing + small
+        for large, small in zip(settings.steps, settings.last_steps, strict=True)
+    )
+    rest = state.values.shape[1] - 1
+    smooth = settings.smooth_colour * share
+    return ColumnSteps(
+        unbiased_size(_column(number, *[colour] * rest), state.step),
+        _column(settings.smooth_density * share, *[smooth] * rest),
+        _column(NUMBERS[0], *[COLOURS[0]] * 3, *[SLOPES[0]] * (rest - 3)),
+        _column(NUMBERS[1], *[COLOURS[1]] * 3, *[SLOPES[1]] * (rest - 3)),
+    )
+
+
+def _column(*values: float) -> Singles:
+    return np.array(values, dtype=np.float32)
+
+
+def medium_of(made: Field, stride: float) -> Medium:
+    """A field as the loops take it, with samples that many distances of nodes apart."""
+    grid = made.grid
+    return Medium(grid.width_mm, stride * grid.pitch_mm, grid.row, grid.leap, made.values)
+
+
+def squared_error(rays: CapturedRays, which: Bools, made: Field, settings: Settings) -> float:
+    """Mean squared error, summed over the colours, of some pixels (n,) by a field; NaN of none."""
+    ray = np.flatnonzero(which)
+    pixels = _pixels(rays, made.grid, settings.places)
+    parts = np.zeros((PARTS, *made.values.shape), dtype=np.float32)
+    medium = medium_of(made, settings.stride)
+    add_gradient(ray[:0], pixels, 0, medium, parts[0])  # compile
+    total = _gradient(pixels, medium, ray, 0, parts)
+    return total / len(ray) if len(ray) else float("nan")

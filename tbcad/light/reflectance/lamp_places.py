@@ -1,0 +1,227 @@
+"""Where the lamps of a reflectance field are: given, or where the virtual cameras are.
+
+A projector in the place of a camera, by a half mirror, throws the pixels of a mirror's cell
+through that mirror onto the object: as light from the virtual camera (the paper, section 2). All
+pixels of a cell at once are a lamp in that place, whose light is as wide as the capture sphere.
+Mirrors are convex, so these places are not far behind them: light falls off over the object.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.common.compiled import compiled_loop
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.csv_rows import number, read_rows
+from tbcad.errors import InputError
+from tbcad.light.datasets.crops import MirrorId, chosen_mirrors, spread_evenly
+from tbcad.light.datasets.virtual_cameras import virtual_cameras
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.scene.point_lights import Spots, lit_cosine
+from tbcad.types import Floats
+
+MIRRORS = "mirrors"
+COLUMNS = ("x_mm", "y_mm", "z_mm")
+MAX_MM = 1e9
+# Both halves of a mirror on the seam have one virtual camera.
+ON_SEAM = 1e-9
+PROJECTORS = "projectors"
+# A plane is taken as a sphere so large that it differs by 1e-5 mm over a cell.
+LEAST_CURVATURE = 1e-7
+# Both halves of a mirror on the seam have one direction.
+SAME_DIRECTION = 1e-9
+# Newton's steps at most, and the last one's share of the whole angle.
+STEPS, LAST_STEP = 60, 1e-12
+
+
+@dataclass(frozen=True)
+class LampPlaces:
+    """Lamps."""
+
+    name: tuple[str, ...]  # of the mirror, or lamp0001 ...
+    place: Floats  # mm, (l, 3)
+
+
+def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
+    """Lamps of a table with the columns x_mm, y_mm and z_mm.
+
+    Raises:
+        InputError: it cannot be read, has no rows, or a lamp is in the capture sphere.
+    """
+    if not path.exists():
+        raise InputError(f"{path} is not there: give a table with {','.join(COLUMNS)}, or mirrors")
+    rows = list(read_rows(path, str(path), COLUMNS, COLUMNS, others=True))
+    if not rows:
+        raise InputError(f"{path} has no lamps: give a row for each")
+    place = np.array([[number(where, row, one, MAX_MM) for one in COLUMNS] for where, row in rows])
+    inside = np.flatnonzero(np.linalg.norm(place, axis=1) <= capture_mm / 2)
+    if len(inside):
+        raise InputError(
+            f"{rows[inside[0]][0]}: a lamp in the capture sphere: place it more than "
+            f"{capture_mm / 2:g} mm from the origin"
+        )
+    return LampPlaces(tuple(f"lamp{k + 1:04d}" for k in range(len(place))), place)
+
+
+def lamps_of_mirrors(source: LightField, every: int) -> LampPlaces:
+    """Lamps at virtual cameras: one of so many, the kept ones spread evenly.
+
+    Raises:
+        InputError: no mirror gives a virtual camera.
+    """
+    mirrors = [one for one in chosen_mirrors(source, None, 1) if not _second_half(source, one)]
+    u = np.array([source.frames[one.frame].u[one.index] for one in mirrors])
+    kept = spread_evenly(u, -(-len(mirrors) // every))
+    virtual = virtual_cameras(source, [mirrors[k] for k in kept])
+    if not len(virtual):
+        raise InputError("no mirror of the capture gives a virtual camera: give lamps as a table")
+    return LampPlaces(tuple(one.name for one in virtual.mirrors), virtual.centre)
+
+
+def _second_half(source: LightField, mirror: MirrorId) -> bool:
+    on_seam = abs(float(source.frames[mirror.frame].u[mirror.index, 0])) < ON_SEAM
+    return mirror.frame == "b" and "a" in source.frames and on_seam
+
+
+@dataclass(frozen=True)
+class MirrorPixels:
+    """The pixels of a projector that one mirror throws onto the object."""
+
+    camera: Camera  # the projector's pinhole and pixels
+    number: int  # of the mirror, from 1
+    owner: NDArray[np.uint16]  # number of the mirror that each pixel is on, (h, w)
+    centre: Floats  # of the sphere, mm, (3,)
+    radius: float  # mm
+    at_origin: float  # how far light spreads until it is at the origin, mm2
+
+    def light(self, embree: Any, spots: Spots) -> Floats:
+        """Light on spots (k,), if a white surface at the origin that faces it gets 1."""
+        light = np.zeros(len(spots.place))
+        height = dot(self.centre - spots.place, spots.normal)
+        faces = np.flatnonzero(height + self.radius > 0)  # the sphere is not all below the horizon
+        some = Spots(spots.place[faces], spots.normal[faces], spots.facet_normal[faces])
+        known, spread = reflected(self.centre, self.radius, self.camera.pinhole, some.place)
+        toward = known - some.place
+        cosine = lit_cosine(embree, some, toward / norm(toward)[:, None])
+        light[faces] = np.where(self._owns(known), cosine * self.at_origin / spread, 0.0)
+        return light
+
+    def _owns(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether a pixel of this mirror is where points (k, 3) of its sphere appear."""
+        column, row = np.rint(self.camera.project(points)).astype(np.int64).T
+        height, width = self.owner.shape
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        owner = self.owner[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+        return np.asarray(inside & (owner == self.number))
+
+
+@dataclass(frozen=True)
+class Projectors:
+    """The mirrors of some lamps."""
+
+    # of each lamp: one, or both halves of one on the seam
+    mirrors: tuple[tuple[MirrorPixels, ...], ...]
+
+    def light(self, embree: Any, lamp: int, spots: Spots) -> Floats:
+        """Light on spots (k,) of a lamp by its number."""
+        return np.asarray(sum(one.light(embree, spots) for one in self.mirrors[lamp]))
+
+
+def projectors(source: LightField, lamps: tuple[MirrorId, ...]) -> Projectors:
+    """The projectors of mirrors, in the places of the cameras of a light field."""
+    owner = {name: np.asarray(frame.planes["mirror"][:]) for name, frame in source.frames.items()}
+    return Projectors(
+        tuple(
+            tuple(_pixels(source, one, owner[one.frame]) for one in _halves(source, lamp))
+            for lamp in lamps
+        )
+    )
+
+
+def _halves(source: LightField, mirror: MirrorId) -> list[MirrorId]:
+    """A mirror, and its other half if it is on the seam."""
+    found, direction = [mirror], source.frames[mirror.frame].u[mirror.index]
+    for name, frame in source.frames.items():
+        same = np.flatnonzero(norm(frame.u - direction) < SAME_DIRECTION)
+        found += [MirrorId(name, int(k)) for k in same if name != mirror.frame]
+    return found
+
+
+def _pixels(source: LightField, mirror: MirrorId, owner: NDArray[np.uint16]) -> MirrorPixels:
+    frame = source.frames[mirror.frame]
+    surface = frame.mirrors
+    radius = 1 / max(float(surface.curvature[mirror.index]), LEAST_CURVATURE)
+    centre = surface.apex[mirror.index] - radius * surface.normal[mirror.index]
+    _, spread = reflected(centre, radius, frame.camera.pinhole, np.zeros((1, 3)))
+    return MirrorPixels(frame.camera, mirror.index + 1, owner, centre, radius, float(spread[0]))
+
+
+@compiled_loop
+def reflected(
+    centre: Floats, radius: float, pinhole: Floats, place: Floats
+) -> tuple[Floats, Floats]:
+    """Points (k, 3) of a sphere that reflect a pinhole into others, and how far light spreads.
+
+    That is the area that a unit of solid angle of the pinhole falls on, across the ray, mm2, (k,).
+    With the curvatures 1/s + 2/(r cos i) in the plane of incidence and 1/s + 2 cos i/r across it,
+    of light that has gone s from the pinhole, it is s^2 (1 + t c1) (1 + t c2) after t more.
+    """
+    points, spread = np.empty_like(place), np.empty(len(place))
+    a = pinhole - centre
+    p = np.sqrt((a**2).sum())
+    for k in range(len(place)):
+        b = place[k] - centre
+        q = np.sqrt((b**2).sum())
+        across = b - (a @ b) / p**2 * a
+        height = np.sqrt((across**2).sum())
+        turn = _turn(p, q, np.arctan2(height, (a @ b) / p), radius)
+        normal = np.cos(turn) * a / p
+        if height > 0:
+            normal += np.sin(turn) * across / height
+        points[k] = centre + radius * normal
+        to_pinhole, to_place = pinhole - points[k], place[k] - points[k]
+        s, t = np.sqrt((to_pinhole**2).sum()), np.sqrt((to_place**2).sum())
+        cosine = (normal @ to_pinhole) / s
+        within, aside = 1 / s + 2 / (radius * cosine), 1 / s + 2 * cosine / radius
+        spread[k] = s**2 * (1 + t * within) * (1 + t * aside)
+    return points, spread
+
+
+@compiled_loop
+def _turn(p: float, q: float, whole: float, radius: float) -> float:
+    """Angle at a circle's centre from the pinhole to the normal that reflects it, radians.
+
+    The angles of incidence and reflection differ by a sum that grows with the turn, from below
+    zero where the normal looks at the pinhole to above zero where it looks at the other point.
+
+    Args:
+        p: distance of the pinhole from the centre, mm.
+        q: of the other point.
+        whole: angle between both, radians.
+        radius: of the circle, less than p and q.
+    """
+    low, high = 0.0, whole
+    turn = whole / 2
+    for _ in range(STEPS):
+        x, y = turn, turn - whole
+        px, py = p * np.cos(x) - radius, q * np.cos(y) - radius
+        value = np.arctan2(p * np.sin(x), px) + np.arctan2(q * np.sin(y), py)
+        if value > 0:
+            high = turn
+        else:
+            low = turn
+        # d atan2(p sin x, p cos x - r) / dx
+        slope = p * (p - radius * np.cos(x)) / (px**2 + (p * np.sin(x)) ** 2)
+        slope += q * (q - radius * np.cos(y)) / (py**2 + (q * np.sin(y)) ** 2)
+        after = turn - value / slope
+        if not low <= after <= high:
+            after = (low + high) / 2
+        done = abs(after - turn) <= LAST_STEP * whole
+        turn = after
+        if done:
+            break
+    return turn

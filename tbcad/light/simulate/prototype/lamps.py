@@ -1,0 +1,89 @@
+"""The lamps of a prototype as the simulation lights an object with them.
+
+Their light is fixed to the object: they stand so that a half turn about z leaves it as it was.
+Shadows are not cast, as with the built-in light.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from tbcad.core.geometry.vectors import norm
+from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.types import Floats
+
+TILES = (2, 5)  # across and along a lamp's face
+EXPOSED = 99.0  # percentile of the light on the object that a photograph shows as white
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class RectangularLamps:
+    """Equal rectangular lamps, upright or level, with Lambertian faces."""
+
+    places: Floats  # middles of the faces, mm, (l, 3)
+    inward: Floats  # unit directions that they face, level, (l, 3)
+    width: float  # of a face, across, mm
+    length: float  # of a face, upward, mm
+    lumen: float  # light of each
+
+    def tiles(self) -> tuple[Floats, Floats]:
+        """Middles (t, 3) of the tiles of all faces, and the directions that they face, (t, 3)."""
+        across, along = (
+            ((np.arange(count) + 0.5) / count - 0.5) * size
+            for count, size in zip(TILES, (self.width, self.length), strict=True)
+        )
+        x, z = (values.ravel() for values in np.meshgrid(across, along, indexing="ij"))
+        side = np.cross(UP, self.inward)
+        middles = self.places[:, None] + x[:, None] * side[:, None] + z[:, None] * UP
+        return middles.reshape(-1, 3), np.repeat(self.inward, len(x), axis=0)
+
+
+def read_lamps(folder: Path) -> RectangularLamps | None:
+    """The lamps of an export's prototype; None where it has none.
+
+    Raises:
+        InputError: the record cannot be read.
+    """
+    found = Prototype.read(folder / NAME).lamps
+    if found is None:
+        return None
+    places = np.array([place.position_mm for place in found.places])
+    inward = np.array([place.direction for place in found.places])
+    sides = found.width_mm, found.length_mm
+    return RectangularLamps(
+        places, inward, *(sides[::-1] if found.level else sides), found.lumen_each
+    )
+
+
+def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floats:
+    """Irradiance (n,) of surfaces at points (n, 3) with unit normals (n, 3), lux.
+
+    A tile that gives F lumen in all, Lambertian, gives F / pi cos cos' / r^2 at a distance r.
+    """
+    total = np.zeros(len(points))
+    middles, facing = lamps.tiles()
+    flux = lamps.lumen * len(lamps.places) / len(middles)
+    for middle, way in zip(middles, facing, strict=True):
+        toward = middle - points
+        distance = norm(toward)
+        leaves = np.maximum(-(toward @ way), 0) / distance
+        meets = np.maximum((toward * normals).sum(axis=1), 0) / distance
+        total += 1e6 * flux / np.pi * leaves * meets / distance**2
+    return total
+
+
+def lit_by(lamps: RectangularLamps, subject: SceneObject) -> SceneObject:
+    """An object with the light of lamps at its corners, as bright as a good exposure shows it.
+
+    The exposure is that of the outside, or of an open surface whose normals are away from the lamps
+    that of its back.
+    """
+    both = np.column_stack(
+        [irradiance(lamps, subject.points, side * subject.normals) for side in (1, -1)]
+    )
+    front, back = np.percentile(both, EXPOSED, axis=0)
+    white = float(front or back)
+    return replace(subject, light=np.minimum(both / white, 1.0) if white > 0 else both)

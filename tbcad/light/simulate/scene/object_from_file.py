@@ -1,0 +1,297 @@
+"""The object before the cameras from a file: in millimetres, z up, with the file's colours."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from tbcad.core.geometry.smallest_sphere import smallest_sphere
+from tbcad.core.geometry.vectors import norm
+from tbcad.errors import InputError
+from tbcad.light.simulate.object_files.contents import (
+    UNITS_MM,
+    ObjectFile,
+    ObjectPart,
+    Up,
+    units_that_fit,
+    warn_of_left_out,
+    warn_of_small_object,
+    without_facets,
+)
+from tbcad.light.simulate.object_files.normals import (
+    corner_normals,
+    facet_vectors,
+    first_of_each,
+    turned_outward,
+    usable,
+)
+from tbcad.light.simulate.object_files.read import read_object_file
+from tbcad.light.simulate.scene.object import GREY, Reading, SceneObject, built_in_object
+from tbcad.types import Bytes, Floats, Ints, Progress
+
+Paint = Literal["own", "pattern", "plain"]
+Unit = Literal["mm", "cm", "m", "in"]
+
+MAX_FACETS = 20_000_000
+MAX_TEXTURE_BYTES = 2 << 30
+MAX_COORDINATE_MM = 1e9
+# Larger than the capture sphere by less than rounding in a file: not too large.
+ROUNDING = 1e-6
+# Facets of less than this share of their longest side squared are lines.
+LEAST_AREA = 1e-12
+PATTERN, PLAIN = "the built-in pattern", "plain grey"
+
+
+@dataclass(frozen=True)
+class ObjectOptions:
+    """How an object's file is taken."""
+
+    fit: bool = False  # move and scale it so that it just fits the capture sphere
+    # its own colours, or the built-in pattern where the file has none; the pattern in any case; or
+    # plain grey
+    paint: Paint = "own"
+    # the file's axis that points up; None: as the file or its format says, else z
+    up: Up | None = None
+    unit: Unit | None = None  # of the file; None: as the file or its format says, else mm
+
+    def __post_init__(self) -> None:
+        """Refuse what is none of these.
+
+        Raises:
+            InputError: it is not.
+        """
+        for name, value, allowed in (
+            ("paint", self.paint, get_args(Paint)),
+            ("up", self.up, (None, *get_args(Up))),
+            ("unit", self.unit, (None, *get_args(Unit))),
+        ):
+            if value not in allowed:
+                names = ", ".join(str(one) for one in allowed if one)
+                raise InputError(f"{name} {value!r} is not known: allowed is {names}")
+
+
+def load_or_built_in(
+    path: str | PathLike[str] | None,
+    capture_mm: float,
+    options: ObjectOptions | None = None,
+    told: Progress | None = None,
+) -> SceneObject:
+    """The object of a file, as `load_object` reads it, or without one the built-in one."""
+    if path is None:
+        return built_in_object(capture_mm)
+    return load_object(Path(path), capture_mm, options, told)
+
+
+def load_object(
+    path: Path,
+    capture_mm: float,
+    options: ObjectOptions | None = None,
+    told: Progress | None = None,
+) -> SceneObject:
+    """Read a triangle mesh.
+
+    Args:
+        path: PLY, STL, OBJ, OFF, GLB, glTF or 3MF; its textures must be in the same folder.
+        capture_mm: diameter of the capture sphere.
+        options: how it is taken.
+        told: called with a line that says which unit, axis and colours were taken.
+
+    Raises:
+        InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
+
+    Warns:
+        PlausibilityWarning: it is so small that its unit is likely to be another one, or it names
+            what was not found or is left out.
+    """
+    asked = options or ObjectOptions()
+    with np.errstate(all="ignore"):  # what is not finite is refused, in words
+        found = read_object_file(path)
+        unit, up = asked.unit or found.unit or "mm", asked.up or found.up or "z"
+        parts = [_in_frame(part, UNITS_MM[unit], up) for part in found.parts]
+    mesh = _Mesh.of(path, parts)
+    points = _fitted(mesh.points, capture_mm) if asked.fit else mesh.points
+    _check_size(path, points, capture_mm, unit)
+    colours, notes = _painted(path, mesh, found, asked.paint)
+    reading = Reading(unit, up, colours.pop("text"), tuple(notes))
+    if notes:
+        warn_of_left_out(path.name, notes)
+    if told is not None:
+        told(reading.line(path.name))
+    return SceneObject(path.name, points, mesh.faces, mesh.normals, reading=reading, **colours)
+
+
+def _in_frame(part: ObjectPart, unit_mm: float, up: str) -> ObjectPart:
+    """The part in millimetres, z up."""
+    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) if up == "y" else np.eye(3)
+    matrix = np.eye(4)
+    matrix[:3, :3] = unit_mm * turn
+    return part.moved(matrix)
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """All parts as one mesh that can be shaded: facets have area, corners a normal.
+
+    Attributes:
+        points, faces, normals: as of SceneObject.
+        part: of each facet, (f,).
+        kept: number of each facet in its part, (f,).
+        turned: whether its corners go the other way than in its part, (f,).
+    """
+
+    points: Floats
+    faces: Ints
+    normals: Floats
+    part: Ints
+    kept: Ints
+    turned: Any
+
+    @classmethod
+    def of(cls, path: Path, parts: Sequence[ObjectPart]) -> "_Mesh":
+        """The mesh of some parts."""
+        _check(path, parts)
+        points = np.concatenate([part.points for part in parts])
+        begin = np.cumsum([0, *(len(part.points) for part in parts)])
+        faces = np.concatenate([p.faces + k for p, k in zip(parts, begin[:-1], strict=True)])
+        given = np.concatenate([
+            np.full_like(p.points, np.nan) if p.normals is None else p.normals for p in parts
+        ])  # fmt: skip
+        part = np.repeat(np.arange(len(parts)), [len(p.faces) for p in parts])
+        kept = np.concatenate([np.arange(len(p.faces)) for p in parts])
+        shown = _shown(path, points, faces)
+        faces, part, kept = faces[shown], part[shown], kept[shown]
+        used, faces = np.unique(faces, return_inverse=True)
+        points, given, faces = points[used], given[used], faces.reshape(-1, 3)
+        turned = turned_outward(points, faces)
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
+        known = np.isfinite(given).all(axis=1, keepdims=True) & (norm(given) > 0)[:, None]
+        normals = np.where(known, given, corner_normals(points, faces))
+        return cls(*usable(points, faces, normals), part, kept, turned)
+
+    def corners(self, values: Floats, facets: Any) -> Floats:
+        """Values (k, 3, ...) at the corners of some facets of a part, as they go in the mesh."""
+        own = values[self.kept[facets]]
+        turned = self.turned[facets].reshape(-1, *[1] * (own.ndim - 1))
+        return np.asarray(np.where(turned, own[:, ::-1], own), dtype=np.float64)
+
+
+def _check(path: Path, parts: Sequence[ObjectPart]) -> None:
+    count = sum(len(part.faces) for part in parts)
+    if count == 0:
+        points = sum(len(part.points) for part in parts)
+        raise InputError(f"{path} cannot be read as a mesh: {without_facets(points)}")
+    if count > MAX_FACETS:
+        raise InputError(f"{path} has {count} facets, allowed are {MAX_FACETS}: reduce it")
+    for part in parts:
+        if len(part.faces) == 0:
+            continue
+        if part.faces.min() < 0 or part.faces.max() >= len(part.points):
+            raise InputError(f"{path} has facets with corners that do not exist: repair the mesh")
+        used = part.points[part.faces]
+        if not np.isfinite(used).all():
+            raise InputError(f"{path} has points that are not finite: repair the mesh")
+        if np.abs(used).max() > MAX_COORDINATE_MM:
+            raise InputError(
+                f"{path} has coordinates up to {np.abs(used).max():.3g} mm, allowed is "
+                f"{MAX_COORDINATE_MM:g}: repair the mesh, or give another --unit"
+            )
+        if part.uv is not None and not np.isfinite(part.uv).all():
+            raise InputError(f"{path} has texture coordinates that are not finite: repair the mesh")
+
+
+def _shown(path: Path, points: Floats, faces: Ints) -> Ints:
+    """Numbers of the facets that have an area, without the backs of others."""
+    corners = points[faces]
+    if np.ptp(corners.reshape(-1, 3), axis=0).max() == 0:
+        raise InputError(f"{path} has no extent: all its points are one: name another")
+    longest = norm(corners - np.roll(corners, 1, axis=1)).max(axis=1)
+    shown = np.flatnonzero(norm(facet_vectors(points, faces)) > LEAST_AREA * longest**2)
+    if len(shown) == 0:
+        raise InputError(f"{path} has no area: all its facets are lines or points: name another")
+    return shown[first_of_each(faces[shown])]
+
+
+def _check_size(path: Path, points: Floats, capture_mm: float, unit: str) -> None:
+    size, reach = np.ptp(points, axis=0), 2 * float(norm(points).max())
+    other = units_that_fit(float(size.max()) / UNITS_MM[unit], capture_mm)
+    if reach > capture_mm * (1 + ROUNDING):
+        raise InputError(
+            f"{path} does not fit the capture sphere: it is {size[0]:.4g} x {size[1]:.4g} x "
+            f"{size[2]:.4g} mm and reaches {reach / 2:.4g} mm from the origin, allowed is "
+            f"{capture_mm / 2:g}: move or scale it, "
+            f"{''.join(f'give --unit {name}, ' for name in other)}or use --fit"
+        )
+    warn_of_small_object(path.name, float(size.max()), capture_mm, other)
+
+
+def _fitted(points: Floats, capture_mm: float) -> Floats:
+    """Points moved and scaled so that the smallest sphere about them is the capture sphere."""
+    middle, reach = smallest_sphere(points)
+    return np.asarray((points - middle) * (capture_mm / 2 / reach))
+
+
+def _painted(
+    path: Path, mesh: _Mesh, found: ObjectFile, paint: Paint
+) -> tuple[dict[str, Any], list[str]]:
+    """Colours as fields of SceneObject, with what they are as "text"; and what is left out."""
+    plain = np.full((len(mesh.faces), 3, 3), GREY)
+    if paint != "own":
+        patterned = paint == "pattern"
+        text = PATTERN if patterned else PLAIN
+        return {"albedo": plain, "patterned": patterned, "text": text}, []
+    sources = list(dict.fromkeys(part.source for part in found.parts if part.source))
+    notes = list(found.notes)
+    if not sources:
+        text = f"{PATTERN}, for the file has none"
+        return {"albedo": plain, "patterned": True, "text": text}, notes
+    if bare := sum(len(part.faces) for part in found.parts if not part.source):
+        notes.append(f"{bare} of its {sum(len(p.faces) for p in found.parts)} facets have no "
+                     "colour and are grey")  # fmt: skip
+    text = ", ".join(sources[:4]) + (f" and {len(sources) - 4} more" if len(sources) > 4 else "")
+    return {"albedo": _albedo(mesh, found.parts, plain), "text": text,
+            **_textures(path, mesh, found.parts)}, notes  # fmt: skip
+
+
+def _albedo(mesh: _Mesh, parts: Sequence[ObjectPart], plain: Floats) -> Floats:
+    albedo = plain.copy()
+    for k, part in enumerate(parts):
+        facets = np.flatnonzero(mesh.part == k)
+        if part.colours is not None:
+            albedo[facets] = mesh.corners(part.colours, facets)
+        elif part.picture is not None:
+            albedo[facets] = 1.0
+    return albedo
+
+
+def _textures(path: Path, mesh: _Mesh, parts: Sequence[ObjectPart]) -> dict[str, Any]:
+    """Fields uv, texture and tiles: each picture once, one below the other."""
+    pictures = list({id(p.picture): p.picture for p in parts if p.picture is not None}.values())
+    if not pictures:
+        return {}
+    texture, first = _stacked(path, pictures)
+    tile = {id(picture): (row, *picture.shape[:2])
+            for picture, row in zip(pictures, first, strict=True)}  # fmt: skip
+    uv, tiles = np.zeros((len(mesh.faces), 3, 2)), np.zeros((len(mesh.faces), 3), dtype=np.int64)
+    for k, part in enumerate(parts):
+        if part.picture is not None and part.uv is not None:
+            facets = np.flatnonzero(mesh.part == k)
+            uv[facets] = mesh.corners(part.uv, facets)
+            tiles[facets] = tile[id(part.picture)]
+    return {"uv": uv, "texture": texture, "tiles": tiles}
+
+
+def _stacked(path: Path, pictures: Sequence[Bytes]) -> tuple[Bytes, list[int]]:
+    """Pictures below each other, as wide as the widest, and their first rows."""
+    if len(pictures) == 1:
+        return pictures[0], [0]
+    heights, width = [len(picture) for picture in pictures], max(p.shape[1] for p in pictures)
+    if 3 * sum(heights) * width > MAX_TEXTURE_BYTES:
+        raise InputError(f"{path} has textures of over 2 GiB in all: reduce them")
+    texture = np.zeros((sum(heights), width, 3), dtype=np.uint8)
+    first = np.cumsum([0, *heights[:-1]]).tolist()
+    for picture, row in zip(pictures, first, strict=True):
+        texture[row : row + len(picture), : picture.shape[1]] = picture
+    return texture, first

@@ -1,0 +1,280 @@
+"""Rays of pixels off the exact mirrors: where each meets its mirror, and its direction after."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.common.compiled import compiled
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.types import Bools, Floats, Ints
+
+MirrorNumbers = NDArray[np.int32]
+Shift = tuple[float, float]
+
+AT_PINHOLE = np.zeros(3)
+
+# A point on the edge of two cells lies on both spheres but for rounding.
+ROUNDING_MM = 1e-9
+
+
+@dataclass(frozen=True)
+class TracedRays:
+    """Rays after the mirrors, of a band of h rows and w columns."""
+
+    # number of the mirror, from 1 in the order of the ids; 0 where there is none of this camera's,
+    # (h, w)
+    mirror: MirrorNumbers
+    origin: Floats  # points on the mirrors, mm, (h, w, 3); zero where there is none
+    direction: Floats  # unit vectors after the mirror, (h, w, 3); zero where there is none
+
+    def meeting(self, radius: float) -> Bools:
+        """Which rays meet the sphere of a radius (mm) about the origin, (h, w)."""
+        meets = meets_sphere(self.origin.reshape(-1, 3), self.direction.reshape(-1, 3), radius)
+        return (self.mirror > 0) & meets.reshape(self.mirror.shape)
+
+    def without(self, removed: Bools) -> "TracedRays":
+        """These rays without those of some pixels (h, w)."""
+        if not removed.any():
+            return self
+        none = removed[..., None]
+        return TracedRays(
+            np.where(removed, np.int32(0), self.mirror),
+            np.where(none, 0.0, self.origin),
+            np.where(none, 0.0, self.direction),
+        )
+
+
+def pixel_directions(view: Camera, rows: range, shift: Shift = (0.0, 0.0)) -> Floats:
+    """Directions (h, w, 3) through pixels, their component along `forward` one.
+
+    Args:
+        view: the camera.
+        rows: rows of the band.
+        shift: from the pixels' centres, in pixels: to the right and down.
+    """
+    columns, lines = _lattice(view, rows, shift)
+    return np.asarray(columns + lines[:, None])
+
+
+def unit_directions(
+    view: Camera,
+    rows: range,
+    shift: Shift = (0.0, 0.0),
+    depth: float = 1.0,
+    aside: Floats = AT_PINHOLE,
+) -> Floats:
+    """Unit vectors (h, w, 3) toward what pixels see at a depth, from a place beside the pinhole.
+
+    Args:
+        view: the camera.
+        rows: rows of the band.
+        shift: from the pixels' centres, in pixels: to the right and down.
+        depth: along `forward`, mm; it matters beside the pinhole only.
+        aside: place less the pinhole, mm, (3,).
+    """
+    return _toward(*_lattice(view, rows, shift), depth, aside)
+
+
+def _lattice(view: Camera, rows: range, shift: Shift) -> tuple[Floats, Floats]:
+    """Directions to columns (w, 3), and what rows add to them (h, 3)."""
+    right, down, forward = view.axes
+    x = np.arange(view.width_px) - (view.width_px - 1) / 2 + shift[0]
+    y = np.arange(rows.start, rows.stop) - (view.height_px - 1) / 2 + shift[1]
+    pitch = view.pixel_pitch
+    return forward + (x * pitch)[:, None] * right, (y * pitch)[:, None] * down
+
+
+@compiled
+def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floats:
+    result = np.empty((len(lines), len(columns), 3))
+    for y in range(len(lines)):
+        for x in range(len(columns)):
+            a = (columns[x, 0] + lines[y, 0]) * depth - aside[0]
+            b = (columns[x, 1] + lines[y, 1]) * depth - aside[1]
+            c = (columns[x, 2] + lines[y, 2]) * depth - aside[2]
+            length = np.sqrt(a * a + b * b + c * c)
+            result[y, x, 0], result[y, x, 1], result[y, x, 2] = a / length, b / length, c / length
+    return result
+
+
+def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], TracedRays]:
+    """A function that traces rows of a camera's pixels off its exact mirrors (`part_tracer`)."""
+    trace, columns = part_tracer(reflector), range(reflector.camera.width_px)
+    return lambda rows, shift: trace(rows, columns, shift)
+
+
+def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], TracedRays]:
+    """A function that traces some rows and columns of a camera's pixels off its exact mirrors.
+
+    The mirror that a ray meets first is the one whose surface it enters first, since a cell is
+    what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror,
+    nor what lies beyond a wall of the mirror's own pedestal: there the ray ends in a groove.
+    """
+    boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
+    camera, edges = reflector.camera, (reflector.side, reflector.foot)
+    table = _table(reflector.mirrors, camera.pinhole)
+    walls = reflector.walls.of_mirrors(len(reflector))
+
+    def trace(rows: range, columns: range, shift: Shift) -> TracedRays:
+        direction = pixel_directions(camera, rows, shift)[:, columns.start : columns.stop]
+        in_part = boxes - np.repeat([columns.start, rows.start], 2)
+        in_part[:, :2] = np.clip(in_part[:, :2], 0, len(columns))
+        near = np.flatnonzero(
+            (in_part[:, 2] < len(rows)) & (in_part[:, 3] > 0) & (in_part[:, 0] < in_part[:, 1])
+        )
+        mirror = _first_mirror(camera.pinhole, direction, table, near, in_part, walls, edges)
+        rays = reflect_pixels(camera.pinhole, direction, reflector.mirrors, mirror)
+        return rays.without(_inside_neighbours(table, neighbours, mirror, rays.origin))
+
+    return trace
+
+
+def reflect_pixels(
+    pinhole: Floats, direction: Floats, mirrors: Surfaces, mirror: MirrorNumbers
+) -> TracedRays:
+    """Rays along (h, w, 3) from the pinhole after mirrors of given numbers (h, w)."""
+    origin, reflected = np.zeros_like(direction), np.zeros_like(direction)
+    _reflect(pinhole, direction, _table(mirrors, pinhole), mirror, origin, reflected)
+    return TracedRays(mirror, origin, reflected)
+
+
+def _table(mirrors: Surfaces, pinhole: Floats) -> Floats:
+    """For each mirror apex, normal, curvature, and value and gradient at the pinhole, (m, 11)."""
+    every = np.arange(len(mirrors))
+    at_pinhole = np.broadcast_to(pinhole, mirrors.apex.shape)
+    value, gradient = mirrors.value(every, at_pinhole), mirrors.gradient(every, at_pinhole)
+    return np.column_stack([mirrors.apex, mirrors.normal, mirrors.curvature, value, gradient])
+
+
+@compiled
+def meets_sphere(origin: Floats, direction: Floats, radius: float) -> Bools:
+    """Which rays (n, 3) along unit directions meet the sphere of a radius about (0, 0, 0), (n,)."""
+    meets = np.zeros(len(origin), dtype=np.bool_)
+    for i in range(len(origin)):
+        along = squared = length = 0.0
+        for j in range(3):
+            along += origin[i, j] * direction[i, j]
+            squared += origin[i, j] * origin[i, j]
+            length += direction[i, j] * direction[i, j]
+        inside = squared <= radius * radius
+        ahead = along < 0 or inside
+        meets[i] = length > 0 and ahead and squared - along * along <= radius * radius
+    return meets
+
+
+@compiled
+def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
+    """Where a ray from the pinhole enters a mirror (11,), in lengths of its direction.
+
+    On the ray x = pinhole + t d the surface's f (tbcad.core.optics.surfaces) is k/2 d.d t^2 + g.d t + h;
+    the ray enters at the smaller root, in the form that loses no digits and holds for planes.
+    Infinite where it does not enter.
+    """
+    slope = mirror[8] * dx + mirror[9] * dy + mirror[10] * dz
+    root = slope * slope - 2 * mirror[6] * mirror[7] * (dx * dx + dy * dy + dz * dz)
+    if slope >= 0 or root < 0:
+        return np.inf
+    t: float = 2 * mirror[7] / (np.sqrt(root) - slope)
+    return t
+
+
+@compiled
+def within_walls(walls: Floats, point: tuple[float, float, float]) -> bool:
+    """Whether a point lies on the inner side of all walls (k, 6)."""
+    for wall in walls:
+        value = 0.0
+        for j in range(3):
+            value += (point[j] - wall[j]) * wall[3 + j]
+        if value < 0:
+            return False
+    return True
+
+
+@compiled
+def _first_mirror(
+    pinhole: Floats,
+    direction: Floats,
+    table: Floats,
+    near: Ints,
+    boxes: Ints,
+    walls: tuple[Ints, Floats],
+    edges: tuple[float, float],
+) -> MirrorNumbers:
+    """The mirror that each ray of the band enters first, from 1, out of those near it."""
+    (side, foot), (first_wall, every_wall) = edges, walls
+    height, width = direction.shape[0], direction.shape[1]
+    mirror = np.zeros((height, width), dtype=np.int32)
+    reach = np.full((height, width), np.inf)
+    for i in near:
+        for y in range(max(boxes[i, 2], 0), min(boxes[i, 3], height)):
+            for x in range(boxes[i, 0], boxes[i, 1]):
+                dx, dy, dz = direction[y, x, 0], direction[y, x, 1], direction[y, x, 2]
+                t = _entry(table[i], dx, dy, dz)
+                if (
+                    0 < t < reach[y, x]
+                    and side * (pinhole[0] + t * dx) >= 0
+                    and pinhole[2] + t * dz >= foot
+                    and within_walls(
+                        every_wall[first_wall[i] : first_wall[i + 1]],
+                        (pinhole[0] + t * dx, pinhole[1] + t * dy, pinhole[2] + t * dz),
+                    )
+                ):
+                    reach[y, x], mirror[y, x] = t, i + 1
+    return mirror
+
+
+@compiled
+def _inside_neighbours(
+    table: Floats, neighbours: Ints, mirror: MirrorNumbers, point: Floats
+) -> Bools:
+    """Which points (h, w, 3) on mirrors lie inside the sphere of a neighbour cut by the edge."""
+    inside = np.zeros(mirror.shape, dtype=np.bool_)
+    for y in range(mirror.shape[0]):
+        for x in range(mirror.shape[1]):
+            if mirror[y, x] == 0:
+                continue
+            for j in neighbours[mirror[y, x] - 1]:
+                if j < 0:
+                    break
+                value = 0.0
+                for axis in range(3):
+                    offset = point[y, x, axis] - table[j, axis]
+                    value += (table[j, 3 + axis] + table[j, 6] / 2 * offset) * offset
+                if value < -ROUNDING_MM:
+                    inside[y, x] = True
+    return inside
+
+
+@compiled
+def _reflect(
+    pinhole: Floats,
+    direction: Floats,
+    table: Floats,
+    mirror: MirrorNumbers,
+    origin: Floats,
+    reflected: Floats,
+) -> None:
+    """Fill in points on the numbered mirrors and unit directions after them.
+
+    The law of tbcad.core.optics.reflection, compiled: it is the inner loop of every photograph.
+    """
+    normal = np.empty(3)
+    for y in range(direction.shape[0]):
+        for x in range(direction.shape[1]):
+            if mirror[y, x] == 0:
+                continue
+            row = table[mirror[y, x] - 1]
+            dx, dy, dz = direction[y, x, 0], direction[y, x, 1], direction[y, x, 2]
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            t, slope = _entry(row, dx / length, dy / length, dz / length), 0.0
+            for j in range(3):
+                d = direction[y, x, j] / length
+                origin[y, x, j] = pinhole[j] + t * d
+                normal[j] = row[3 + j] + row[6] * (origin[y, x, j] - row[j])
+                slope += d * normal[j]
+            for j in range(3):
+                reflected[y, x, j] = direction[y, x, j] / length - 2 * slope * normal[j]

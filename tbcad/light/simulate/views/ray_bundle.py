@@ -1,0 +1,204 @@
+"""Captured rays near some target rays, and the search for the best one of a mirror.
+
+All rays of one mirror nearly meet in one point, its virtual pinhole. So a ray that passes that
+point at distance e, at depth L, is at least e / sqrt(1 + (L / s)^2) from all of them in the
+two-plane coordinates, less their own spread. Mirrors that are too far by that bound are left out;
+within one, neighbouring pixels are neighbouring rays, so a few steps from pixel to pixel lead to
+the best.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.common.compiled import compiled
+from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.views.mirror_tiles import MirrorTile
+from tbcad.types import Bools, Bytes, Floats, Ints
+
+# A ray at more than this to the direction has no coordinates.
+MIN_COSINE = 0.2
+COORDINATES_PER_CHUNK = 1 << 17
+# Target rays that go through the loops together: neighbours, so that few mirrors are near.
+RAYS_PER_CHUNK = 1 << 12
+# Target rays in a row that are so near to each other that a few mirrors do for all of them.
+RAYS_PER_RUN = 64
+TILES_PER_CHUNK = 16
+
+
+@dataclass(frozen=True)
+class TwoPlane:
+    """The parametrisation for one direction."""
+
+    axes: Floats  # rows: two unit vectors across, and the direction of the view, (3, 3)
+    scale: float  # s, mm
+
+    def coordinates(
+        self,
+        origin: NDArray[np.floating],
+        direction: NDArray[np.floating],
+        valid: Bools | None = None,
+    ) -> Floats:
+        """Rays as points (n, 4); NaN where too oblique, or not valid.
+
+        Args:
+            origin: mm, (n, 3).
+            direction: unit vectors, (n, 3).
+            valid: which rays there are, (n,); all of them if None.
+        """
+        origin, direction = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
+        valid = np.ones(len(direction), dtype=np.bool_) if valid is None else valid
+        result = np.empty((len(direction), 4))
+
+        def fill(part: slice) -> None:
+            self.fill(result[part], origin[part], direction[part], valid[part])
+
+        in_threads(fill, chunks(len(direction), COORDINATES_PER_CHUNK))
+        return result
+
+    def fill(
+        self,
+        result: Floats,
+        origin: NDArray[np.floating],
+        direction: NDArray[np.floating],
+        valid: Bools,
+    ) -> None:
+        """Write the `coordinates` of rays in contiguous arrays into an array (n, 4)."""
+        _coordinates(np.ascontiguousarray(self.axes), self.scale, origin, direction, valid, result)
+
+    def place(self, points: Floats) -> Floats:
+        """Points (n, 3), mm, along the axes, the third over s, (n, 3)."""
+        return np.asarray(points @ self.axes.T / [1, 1, self.scale])
+
+
+def two_plane_along(forward: Floats, right: Floats, capture_mm: float) -> TwoPlane:
+    """The parametrisation for a view along `forward`, whose rows run along `right`."""
+    axes = np.stack([right, np.cross(forward, right), forward])
+    return TwoPlane(axes, capture_mm / 2 / np.sqrt(3))
+
+
+@compiled
+def _coordinates(
+    axes: Floats,
+    scale: float,
+    origin: NDArray[np.floating],
+    direction: NDArray[np.floating],
+    valid: Bools,
+    result: Floats,
+) -> None:
+    for i in range(len(origin)):
+        depth = speed = 0.0
+        for j in range(3):
+            depth += axes[2, j] * origin[i, j]
+            speed += axes[2, j] * direction[i, j]
+        if not valid[i] or speed < MIN_COSINE:
+            result[i] = np.nan
+            continue
+        for k in range(2):
+            across = slope = 0.0
+            for j in range(3):
+                across += axes[k, j] * origin[i, j]
+                slope += axes[k, j] * direction[i, j]
+            slope /= speed
+            result[i, k] = across - depth * slope
+            result[i, 2 + k] = scale * slope
+
+
+@dataclass(frozen=True)
+class RayBundle:
+    """The rays of k mirrors, n in all."""
+
+    two_plane: TwoPlane  # the parametrisation of the rays
+    limit: float  # how far a ray may be from a target ray that it is used for, mm
+    points: Floats  # two-plane coordinates, (n, 4); NaN at pixels of another mirror or too oblique
+    # first pixel, height and width of each tile, and a pixel in its middle that has a ray, -1 if
+    # none has, (k, 4). Pixels on the border of a tile have no ray.
+    tiles: Ints
+    # of the virtual cameras: across, across, depth over s, and how far from there the rays pass at
+    # that depth, mm, (k, 4)
+    pinholes: Floats
+    colour: Bytes  # (n, 3)
+
+
+def ray_bundle(two_plane: TwoPlane, tiles: list[MirrorTile], limit: float) -> RayBundle:
+    """The rays of at least one tile."""
+    shape = np.array([tile.shape for tile in tiles])
+    ends = np.cumsum(shape.prod(axis=1))
+    first = ends - shape.prod(axis=1)
+    place = two_plane.place(np.stack([tile.pinhole for tile in tiles]))
+    points, spread = np.empty((ends[-1], 4)), np.empty(len(tiles))
+
+    def fill(part: slice) -> None:
+        for k, tile in enumerate(tiles[part], part.start):
+            rays = points[first[k] : ends[k]]
+            two_plane.fill(rays, tile.origin, tile.direction, tile.valid)
+            spread[k] = _spread(rays, place[k])
+
+    in_threads(fill, chunks(len(tiles), TILES_PER_CHUNK))
+    middle = first + np.array([tile.middle for tile in tiles])
+    start = np.where(np.isnan(points[middle, 0]), -1, middle)
+    return RayBundle(
+        two_plane=two_plane,
+        limit=limit,
+        points=points,
+        tiles=np.column_stack([first, shape, start]),
+        pinholes=np.column_stack([place, spread]),
+        colour=np.concatenate([tile.colour for tile in tiles]),
+    )
+
+
+@compiled
+def _spread(points: Floats, pinhole: Floats) -> float:
+    """Largest distance of rays (n, 4) from a point (3,) at its depth, mm; 0 without rays."""
+    largest = 0.0
+    for i in range(len(points)):
+        x = points[i, 0] + pinhole[2] * points[i, 2] - pinhole[0]
+        y = points[i, 1] + pinhole[2] * points[i, 3] - pinhole[1]
+        largest = max(largest, x * x + y * y)  # never NaN
+    return float(np.sqrt(largest))
+
+
+@compiled
+def boxes_around(targets: Floats, count: int) -> Floats:
+    """Middles and half sides (r, 2, 4) of boxes that hold `count` targets (n, 4) in a row each.
+
+    Targets without coordinates count for nothing; a box without any is NaN.
+    """
+    boxes = np.empty(((len(targets) + count - 1) // count, 2, 4))
+    for run in range(len(boxes)):
+        last = min((run + 1) * count, len(targets))
+        for j in range(4):
+            low, high = np.inf, -np.inf
+            for i in range(run * count, last):
+                low, high = min(low, targets[i, j]), max(high, targets[i, j])  # never NaN
+            boxes[run, 0, j], boxes[run, 1, j] = (low + high) / 2, (high - low) / 2
+    return boxes
+
+
+@compiled
+def mirrors_near_boxes(pinholes: Floats, boxes: Floats, limit: float) -> Ints:
+    """Mirrors (c,) whose rays may be within a limit of a target ray in any of some boxes.
+
+    Args:
+        pinholes: as in `RayBundle`, (k, 4).
+        boxes: middles and half sides, (r, 2, 4).
+        limit: mm.
+    """
+    kept = np.empty(len(pinholes), dtype=np.int64)
+    count = 0
+    for k in range(len(pinholes)):
+        depth = pinholes[k, 2]
+        margin = pinholes[k, 3] + limit * np.sqrt(1 + depth * depth)
+        for run in range(len(boxes)):
+            middle, half = boxes[run, 0], boxes[run, 1]
+            x = abs(middle[0] + depth * middle[2] - pinholes[k, 0])
+            y = abs(middle[1] + depth * middle[3] - pinholes[k, 1])
+            if (
+                x <= margin + half[0] + abs(depth) * half[2]
+                and y <= margin + half[1] + abs(depth) * half[3]
+            ):
+                kept[count] = k
+                count += 1
+                break
+    return kept[:count]

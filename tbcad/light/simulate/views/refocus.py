@@ -1,0 +1,197 @@
+"""A large lens made of many pinholes (section 4.3 of the paper): the mean of their pictures."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.optics.camera import Camera
+from tbcad.errors import InputError, PlausibilityWarning
+from tbcad.light.simulate.parallel import in_batches
+from tbcad.light.simulate.scene.rays import unit_directions
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.ray_bundle import two_plane_along
+from tbcad.light.simulate.views.synthesis import (
+    DepthFunction,
+    Rays,
+    SynthesisedView,
+    nearby_rays,
+    ray_colours,
+    rays_to_capture_sphere,
+    search_radius,
+)
+from tbcad.types import Bools, Colours, Floats, Ints, Progress
+
+# 69 points of a square lattice, the paper's number of pinholes, are within this squared radius
+# in steps of the lattice.
+LATTICE_RADIUS2 = 20
+# A lens as wide as it is far away is seen from the object under 53 degrees: wider than F/1.
+WIDE_LENS = 1.0
+
+
+@dataclass(frozen=True)
+class ThinLens:
+    """A lens."""
+
+    aperture_mm: float  # its diameter
+    # the plane that it makes sharp, across its axis, from the origin toward the lens
+    plane_mm: float
+
+    def check(self, view: Camera, capture_mm: float) -> None:
+        """Refuse what cannot be, and warn of what is unlikely.
+
+        Raises:
+            InputError: no aperture, or the plane that is to be sharp is not near the object.
+        """
+        if not 0 < self.aperture_mm < np.inf:
+            raise InputError(f"--aperture {self.aperture_mm:g} is no diameter: give mm above 0")
+        distance = float(np.linalg.norm(view.pinhole))
+        limit = min(capture_mm, distance - 1)
+        if not -limit <= self.plane_mm <= limit:
+            raise InputError(
+                f"--focus {self.plane_mm:g} is far from the object: allowed is "
+                f"{-limit:g} to {limit:g} mm from its middle, toward the camera"
+            )
+        if self.aperture_mm > WIDE_LENS * distance:
+            text = (
+                f"--aperture {self.aperture_mm:g} is more than --distance {distance:g}: a lens so "
+                "wide blurs all but one plane and looks past the mirrors; both are in mm"
+            )
+            warnings.warn(PlausibilityWarning(text), stacklevel=2)
+
+
+def lens_pinholes(radius2: int = LATTICE_RADIUS2) -> Floats:
+    """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them.
+
+    Args:
+        radius2: squared radius of the disc in steps of the lattice.
+    """
+    reach = int(np.sqrt(radius2))
+    x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
+    inside = x**2 + y**2 <= radius2
+    return np.asarray(np.stack([x[inside], y[inside]], axis=1) / np.sqrt(radius2))
+
+
+def lens_rays(
+    view: Camera, focus: ThinLens, place: Floats, shift: tuple[float, float] = (0.0, 0.0)
+) -> Rays:
+    """Rays from a point of the lens to where its middle sees each pixel on the sharp plane.
+
+    Args:
+        view: middle of the lens, and the picture.
+        focus: the lens.
+        place: on the lens, right and down from its middle, mm, (2,).
+        shift: from the pixels' centres, in pixels.
+
+    Returns:
+        Origins and unit directions, (h, w, 3) each.
+    """
+    offset = place @ view.axes[:2]
+    depth = -float(view.pinhole @ view.forward) - focus.plane_mm
+    direction = unit_directions(view, range(view.height_px), shift, depth, offset)
+    return np.broadcast_to(view.pinhole + offset, direction.shape), direction
+
+
+def refocus(
+    tiles: MirrorTiles,
+    view: Camera,
+    focus: ThinLens,
+    pinholes: Floats | None = None,
+    proceed: Callable[[], None] = lambda: None,
+) -> SynthesisedView:
+    """The picture of a lens, as the mean of what 69 pinholes all over it see.
+
+    Args:
+        tiles: the light field.
+        view: the middle of the lens, and the picture.
+        focus: the lens.
+        pinholes: their places on the unit disc, (n, 2), if not those 69.
+        proceed: called before every few pinholes; may raise to give up.
+
+    Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
+    the mean is of the others.
+    """
+    places = (lens_pinholes() if pinholes is None else pinholes) * focus.aperture_mm / 2
+    return _mean_of_pinholes(tiles, view, places, partial(lens_rays, view, focus), proceed)
+
+
+def refocus_everywhere(
+    tiles: MirrorTiles, view: Camera, aperture_mm: float, depth: DepthFunction
+) -> SynthesisedView:
+    """The picture of a lens that makes each pixel sharp at its own depth.
+
+    Each pixel is the mean of what the 69 pinholes see of its point of the surface: as bright and
+    as free of noise as the picture of a lens, and as sharp everywhere as that of a pinhole.
+
+    Args:
+        tiles: the light field.
+        view: the middle of the lens, and the picture.
+        aperture_mm: diameter of the lens.
+        depth: the surface; pixels whose rays pass it are made sharp on the plane through the
+            origin.
+    """
+    points = _points_on_surface(view, depth)
+
+    def rays(place: Floats) -> Rays:
+        origin = np.broadcast_to(view.pinhole + place @ view.axes[:2], points.shape)
+        return origin, unit(points - origin)
+
+    return _mean_of_pinholes(tiles, view, lens_pinholes() * aperture_mm / 2, rays)
+
+
+def _points_on_surface(view: Camera, depth: DepthFunction) -> Floats:
+    """What the middle of the lens sees in each pixel, (h, w, 3)."""
+    direction = unit_directions(view, range(view.height_px))
+    flat = direction.reshape(-1, 3)
+    distance = depth(np.broadcast_to(view.pinhole, flat.shape), flat)
+    plane = -float(view.pinhole @ view.forward) / (flat @ view.forward)
+    distance = np.where(np.isfinite(distance), distance, plane)
+    return np.asarray(view.pinhole + distance.reshape(*direction.shape[:2], 1) * direction)
+
+
+def _mean_of_pinholes(
+    tiles: MirrorTiles,
+    view: Camera,
+    places: Floats,
+    rays_from: Callable[[Floats], Rays],
+    proceed: Callable[[], None] = lambda: None,
+) -> SynthesisedView:
+    """The mean of what pinholes at places (n, 2) beside a view's see along rays of each."""
+    two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
+    square = np.abs(places).max() * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
+    corners = [rays_to_capture_sphere(tiles, rays_from(corner))[1] for corner in square]
+    origin, direction = (np.concatenate(part) for part in zip(*corners, strict=True))
+    bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
+    total = np.zeros((view.height_px * view.width_px, 3), dtype=np.float32)
+    count = np.full(len(total), len(places), dtype=np.float32)
+
+    def one(place: Floats) -> tuple[Ints, Colours, Bools]:
+        pixels, rays = rays_to_capture_sphere(tiles, rays_from(place))
+        return pixels, *ray_colours(bundle, rays)
+
+    for pixels, colours, seen in in_batches(one, list(places), lambda _: proceed()):
+        total[pixels] += colours
+        count[pixels] -= ~seen
+    mean = total / np.maximum(count, 1)[:, None]
+    shape = view.height_px, view.width_px
+    return SynthesisedView(mean.astype(np.float32).reshape(*shape, 3), count.reshape(shape) > 0)
+
+
+def refocus_sweep(
+    tiles: MirrorTiles,
+    view: Camera,
+    aperture_mm: float,
+    count: int,
+    progress: Progress = lambda _: None,
+) -> list[NDArray[np.uint8]]:
+    """Pictures (h, w, 3) focused on planes from the back of the capture sphere to its front."""
+    half = tiles.source.capture_mm / 2
+    pictures = []
+    for k, plane in enumerate(np.linspace(-half, half, count).tolist()):
+        progress(f"picture {k + 1} of {count}")
+        pictures.append(refocus(tiles, view, ThinLens(aperture_mm, plane)).image)
+    return pictures

@@ -1,0 +1,184 @@
+"""A server for one page on this computer: it makes the views of a light field or a field.
+
+Only programs of this computer reach it, at an address with a random word in it. A page of another
+site that guesses the port, or has its own name point to this computer, is refused: the word is
+missing, or the host is not ours.
+"""
+
+import secrets
+import sys
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from io import BufferedReader, RawIOBase
+from socket import socket
+from threading import BoundedSemaphore
+from time import monotonic
+from typing import Any
+
+from tbcad.errors import InputError
+from tbcad.light.viewer.page import Query, parse_query, viewer_page
+from tbcad.light.viewer.render import Superseded, ViewRenderer
+
+HOST = "127.0.0.1"
+NAMES = (HOST, "localhost")
+TOKEN_BYTES = 16
+# A connection is closed when its next request is not there after so many seconds, from the end of
+# the last one to the request's last header, or when an answer is not taken in this time.
+TIMEOUT_S = 60.0
+MAX_CONNECTIONS = 64  # of which a browser opens six
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Content-Security-Policy": "default-src 'none'; img-src 'self' blob: data:; connect-src 'self'"
+    "; style-src 'unsafe-inline'; script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+    "; frame-ancestors 'none'",
+}
+TEXT, HTML, JPEG = "text/plain; charset=utf-8", "text/html; charset=utf-8", "image/jpeg"
+
+
+class ViewServer(ThreadingHTTPServer):
+    """Serves one light field or field until it is shut down.
+
+    Attributes:
+        renderer: makes the views.
+        page: the page, HTML.
+        token: random word of the address.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = False
+    request_queue_size = MAX_CONNECTIONS
+
+    def __init__(self, renderer: ViewRenderer, title: str, start: Query, port: int = 0) -> None:
+        """Listen on this computer alone.
+
+        Args:
+            renderer: makes the views.
+            title: name of what is shown.
+            start: the first view.
+            port: 0 for any that is free.
+
+        Raises:
+            InputError: the port is taken.
+        """
+        self.renderer = renderer
+        page = viewer_page(
+            title, start, renderer.capture_mm, renderer.method, lens=renderer.lens is not None
+        )
+        self.page = page.encode("utf-8")
+        self.token = secrets.token_urlsafe(TOKEN_BYTES)
+        self._free = BoundedSemaphore(MAX_CONNECTIONS)
+        try:
+            super().__init__((HOST, port), _Handler)
+        except OSError as error:
+            raise InputError(f"port {port} cannot be used: {error.strerror}") from None
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        return f"http://{HOST}:{self.server_port}/{self.token}/"
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """What a browser that was given the address calls this server."""
+        return tuple(f"{name}:{self.server_port}" for name in NAMES)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection in a thread of its own, or close it when there are too many."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a connection to its end."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a connection that its client breaks off: only faults of ours are shown."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+
+class _Incoming(RawIOBase):
+    """What comes in before a deadline: a client that sends a byte now and then gains no time."""
+
+    def __init__(self, connection: socket) -> None:
+        super().__init__()
+        self._connection = connection
+        self.deadline = 0.0
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        left = self.deadline - monotonic()
+        if left <= 0:
+            raise TimeoutError
+        self._connection.settimeout(left)
+        return self._connection.recv_into(buffer)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: ViewServer
+    protocol_version = "HTTP/1.1"  # one connection for all views
+    disable_nagle_algorithm = True
+
+    def setup(self) -> None:
+        """Read with a deadline."""
+        super().setup()
+        self.rfile.close()
+        self._incoming = _Incoming(self.connection)
+        self.rfile = BufferedReader(self._incoming)
+
+    def handle_one_request(self) -> None:
+        """Wait for a request, read and answer it."""
+        self._incoming.deadline = monotonic() + TIMEOUT_S
+        super().handle_one_request()
+
+    def do_GET(self) -> None:
+        """Answer with the page or a view."""
+        if "Content-Length" in self.headers or "Transfer-Encoding" in self.headers:
+            self.close_connection = True  # what follows is no request
+        self.connection.settimeout(TIMEOUT_S)
+        if self.headers.get("Host") not in self.server.hosts:
+            return self._answer(403, TEXT, b"this server answers to its own address alone\n")
+        path, _, query = self.path.partition("?")
+        begin = f"/{self.server.token}/"
+        if not secrets.compare_digest(path[: len(begin)].encode(), begin.encode()):
+            return self._answer(404, TEXT, b"not here\n")
+        match path[len(begin) :]:
+            case "":
+                return self._answer(200, HTML, self.server.page)
+            case "view":
+                return self._view(query)
+        return self._answer(404, TEXT, b"not here\n")
+
+    def _view(self, text: str) -> None:
+        renderer = self.server.renderer
+        try:
+            picture = renderer.jpeg(parse_query(text, renderer.capture_mm))
+        except InputError as error:
+            return self._answer(400, TEXT, f"{error}\n".encode())
+        except Superseded:
+            return self._answer(204, TEXT, b"")
+        return self._answer(200, JPEG, picture)
+
+    def _answer(self, status: int, kind: str, body: bytes) -> None:
+        try:
+            self.send_response(status)
+            for name, value in {**HEADERS, "Content-Type": kind}.items():
+                self.send_header(name, value)
+            if status != 204:
+                self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+        except OSError:  # the page was closed, or takes no answer
+            self.close_connection = True
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing."""

@@ -1,0 +1,179 @@
+"""The folder of a machine as built: solids, table, legend and record."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from scipy.spatial.transform import Rotation
+
+from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.step_assembly import write_assembly
+from tbcad.cad.kernel.assembly import ColouredSolid, SolidGroup
+from tbcad.cad.kernel.solids import common, one_solid, sphere
+from tbcad.core.geometry.vectors import norm
+from tbcad.errors import InputError
+from tbcad.light.simulate.image_files import write_images
+from tbcad.light.simulate.prototype.plan import Plan, read_plan
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.rig.machine.machine import Machine
+from tbcad.rig.machine.record import RECORD as MACHINE
+from tbcad.rig.machine.record import read_machine
+from tbcad.types import Bytes, Floats
+
+SAME_MM = 1e-6  # centres and radii of a ball's front and body; a cap's are apart
+UM_PER_MM = 1000.0
+LEAST_BALLS = 3  # whose places tell a motion of the whole base from errors of balls
+STEPS = (1.0, 2.0, 5.0)  # of the scale's ends, times powers of ten
+# From none to the largest deviation: blue, green, yellow, red; red, green, blue from 0 to 1.
+COLOURS = np.array([[0.16, 0.38, 0.75], [0.20, 0.66, 0.36], [0.98, 0.83, 0.20], [0.83, 0.15, 0.16]])
+SCHEMA = "tbcad-as-built/1"
+STEP, TABLE, LEGEND, RECORD = "as_built.step", "deviations.csv", "legend.png", "as_built.json"
+COLUMNS = (
+    *("ball", "x_mm", "y_mm", "z_mm", "radius_mm"),
+    *("dx_um", "dy_um", "dz_um", "distance_um", "radius_error_um", "colour"),
+)
+# Of the legend, pixels.
+WIDTH, HEIGHT, EDGE, BAR, TICK, FONT = 640, 96, 40, 28, 6, 16
+TICKS = 5
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Deviations of k balls from the designed base, moved as a whole to fit best."""
+
+    offset: Floats  # of the centres, in the frame of the design, mm, (k, 3)
+    radius: Floats  # measured less designed, mm, (k,)
+    shift: Floats  # of the whole base, mm, (3,)
+    turn: Floats  # rotation vector of the whole base about the origin, radians, (3,)
+
+    @property
+    def distance_um(self) -> Floats:
+        """Of the centres from where the base should have them, micrometres, (k,)."""
+        return UM_PER_MM * norm(self.offset)
+
+    @property
+    def scale_um(self) -> float:
+        """End of a scale from 0 that holds all distances, micrometres."""
+        return round_up(float(self.distance_um.max()))
+
+
+def deviations(machine: Machine, plan: Plan) -> Deviations:
+    """Compare a calibrated machine with its plan, which has as many balls."""
+    designed, found = plan.centre, machine.centre
+    turn, shift = Rotation.identity(), np.zeros(3)
+    if len(designed) >= LEAST_BALLS:
+        middles = designed.mean(axis=0), found.mean(axis=0)
+        turn, _ = Rotation.align_vectors(found - middles[1], designed - middles[0])
+        shift = middles[1] - turn.apply(middles[0])
+    offset = found - turn.apply(designed) - shift
+    return Deviations(offset, machine.radius - plan.radius, shift, turn.as_rotvec())
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20 ... from a value on; 1 for less."""
+    power = 10.0 ** int(np.floor(np.log10(max(value, 1.0))))
+    return next(step * power for step in (*STEPS, 10.0) if step * power >= value)
+
+
+def colours(share: Floats) -> Floats:
+    """Colours (n, 3), 0 to 1, of shares (n,) of the scale."""
+    places = np.linspace(0, 1, len(COLOURS))
+    return np.stack([np.interp(share, places, column) for column in COLOURS.T], axis=-1)
+
+
+def ball_group(machine: Machine, plan: Plan, found: Deviations) -> SolidGroup:
+    """All balls at base angle zero; a cap is what its reflecting sphere and its body share."""
+    shades = colours(found.distance_um / found.scale_um).tolist()
+    bodies = []
+    for number, (red, green, blue) in enumerate(shades, 1):
+        k = number - 1
+        shape = sphere(machine.centre[k], float(machine.radius[k]))
+        apart = abs(plan.centre[k] - plan.body_centre[k]).max()
+        if max(apart, abs(plan.radius[k] - plan.body_radius[k])) > SAME_MM:
+            body = machine.centre[k] + plan.body_centre[k] - plan.centre[k]
+            cap = common(shape, sphere(body, float(plan.body_radius[k])))
+            shape = one_solid(f"ball_{number}", cap)
+        bodies.append(ColouredSolid(f"ball_{number}", shape, (red, green, blue, 1.0)))
+    return SolidGroup("balls", tuple(bodies))
+
+
+def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
+    """Write the files of a machine as built, and return their record.
+
+    Raises:
+        InputError: one cannot be read, or they do not belong together.
+    """
+    machine, _ = read_machine(calibration / MACHINE)
+    plan = read_plan(read_export(exports))
+    if len(machine.radius) != len(plan):
+        raise InputError(
+            f"{calibration} has {len(machine.radius)} balls, {exports} has {len(plan)}: name the "
+            "export that was calibrated with --exports"
+        )
+    facts = {"calibration": str(calibration), "exports": str(exports), "balls": len(plan)}
+    return write_as_built(folder, machine, plan, deviations(machine, plan), facts)
+
+
+def write_as_built(
+    folder: Path, machine: Machine, plan: Plan, found: Deviations, facts: dict[str, Any]
+) -> dict[str, Any]:
+    """Write all files into the caller's folder, and return the record, with the given facts."""
+    write_assembly(folder / STEP, "prototype_as_built", [ball_group(machine, plan, found)])
+    write_table(folder / TABLE, COLUMNS, _rows(machine, found))
+    write_images({folder / LEGEND: legend(found.scale_um)})
+    record = {
+        "schema": SCHEMA,
+        **facts,
+        "scale_um": [0.0, found.scale_um],
+        "base": {
+            "shift_mm": found.shift.tolist(),
+            "turn_deg": np.degrees(found.turn).tolist(),
+        },
+        "largest_um": float(found.distance_um.max()),
+        "median_um": float(np.median(found.distance_um)),
+        "files": {"solids": STEP, "table": TABLE, "legend": LEGEND},
+    }
+    (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    return record
+
+
+def legend(scale_um: float) -> Bytes:
+    """A picture of the colours from 0 to the end of the scale, (h, w, 3)."""
+    picture = np.full((HEIGHT, WIDTH, 3), 255, dtype=np.uint8)
+    share = np.linspace(0, 1, WIDTH - 2 * EDGE)
+    picture[EDGE // 2 : EDGE // 2 + BAR, EDGE:-EDGE] = np.rint(255 * colours(share))
+    image = Image.fromarray(picture)
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(FONT)
+    under = EDGE // 2 + BAR
+    for part in np.linspace(0, 1, TICKS + 1).tolist():
+        x = EDGE + part * (WIDTH - 2 * EDGE - 1)
+        draw.line([(x, under), (x, under + TICK)], fill="black")
+        draw.text((x, under + TICK), f"{part * scale_um:g}", fill="black", font=font, anchor="ma")
+    name = "centre off the designed base, micrometres"
+    draw.text((WIDTH / 2, HEIGHT - FONT), name, fill="black", font=font, anchor="ma")
+    return np.asarray(image)
+
+
+def _rows(machine: Machine, found: Deviations) -> list[Row]:
+    """Measured centre at base angle zero, radius, and what they are off by."""
+    shades = np.rint(255 * colours(found.distance_um / found.scale_um)).astype(int)
+    table = np.column_stack(
+        [
+            machine.centre,
+            machine.radius,
+            UM_PER_MM * found.offset,
+            found.distance_um,
+            UM_PER_MM * found.radius,
+        ]
+    )
+    return [
+        {
+            "ball": number,
+            **dict(zip(COLUMNS[1:-1], values, strict=True)),
+            "colour": "#{:02x}{:02x}{:02x}".format(*shade),
+        }
+        for number, (values, shade) in enumerate(zip(table.tolist(), shades, strict=True), 1)
+    ]

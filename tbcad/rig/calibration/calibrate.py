@@ -1,0 +1,231 @@
+"""From a run's highlights to a calibrated machine, and what it is based on."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.records.exposure import Frame
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.run import Geometry
+from tbcad.records.tables import StopRow
+from tbcad.rig.calibration.detection.detection import Detection
+from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.solve import Estimate, estimate
+from tbcad.rig.calibration.intrinsics.lens import CalibratedLens
+from tbcad.rig.calibration.priors import Measured, prototype_prior, shell_prior
+from tbcad.rig.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
+from tbcad.rig.machine.built import is_cap
+from tbcad.rig.machine.designed import designed_prototype
+from tbcad.rig.machine.machine import Highlights, Machine
+from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
+from tbcad.types import Bools, Ints, Progress
+
+MIN_HIGHLIGHTS = 10  # of a half
+HALVES = {"angles": "frame", "LEDs": "led"}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A machine before it is calibrated: a prototype, or of a shell see `ShellSetup`."""
+
+    export: ExportedDesign
+    plan: Plan
+    frames: tuple[Frame, ...]  # that are photographed, in the order of the machine's
+    designed: Machine  # the machine, at the angles of these frames
+    lens: CalibratedLens | None = None  # of its camera, where it is known
+
+    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
+        """Means and standard deviations by its process and by radii that are measured."""
+        home = Prototype.read(self.export.folder / NAME).home
+        stop = np.array([frame.stop - 1 for frame in self.frames])
+        known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
+        wind_up = read_wind_up(self.export, self.plan)[stop] if known else 0.0
+        return prototype_prior(
+            replace(self.designed, angle=self.designed.angle + wind_up),
+            errors,
+            self.plan.body_centre,
+            is_cap(self.plan),
+            np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
+            math.radians(home.zero_error_deg),
+            self.lens is not None,
+            measured,
+        )
+
+
+@dataclass(frozen=True)
+class ShellSetup(Setup):
+    """One camera of a shell before it is calibrated: its mirrors are the balls of its plan."""
+
+    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
+        """Means and standard deviations by its process.
+
+        Raises:
+            InputError: radii are given as measured, which only balls and caps can be.
+        """
+        if measured:
+            raise InputError("--measured is of balls and caps, and a shell has none: leave it out")
+        return shell_prior(self.designed, errors, self.lens is not None)
+
+
+def prepared_setup(
+    export: ExportedDesign,
+    frames: tuple[Frame, ...],
+    size: tuple[int, int],
+    lens: CalibratedLens | None,
+    geometry: Geometry = "prototype",
+) -> Setup:
+    """The machine of an export as frames of a run, of a shell those of one camera, show it.
+
+    Raises:
+        InputError: the export has no prototype or LEDs, or another picture's size than the run.
+    """
+    kind: type[Setup] = Setup if geometry == "prototype" else ShellSetup
+    plan = plan_of(export, geometry, frames)
+    machine = (
+        designed_prototype(export, plan)
+        if geometry == "prototype"
+        else designed_half(export, half_of(frames))
+    )
+    if (machine.camera.width_px, machine.camera.height_px) != size:
+        raise InputError(
+            f"{export.folder} has a camera of {machine.camera.width_px} x "
+            f"{machine.camera.height_px} pixels, the run's photographs have {size[0]} x {size[1]}: "
+            "name the export that was photographed"
+        )
+    stops = len(plan.angle)
+    if max(frame.stop for frame in frames) > stops:
+        raise InputError(
+            f"the run has a stop beyond the {stops} of {export.folder}: name the export that was "
+            "photographed"
+        )
+    angle = np.radians([frame.base_angle_deg for frame in frames])
+    camera = machine.camera if lens is None else lens.on(machine.camera)
+    return kind(export, plan, frames, replace(machine, angle=angle, camera=camera), lens)
+
+
+@dataclass(frozen=True)
+class MirrorRays:
+    """The middle rays of the mirrors whose stops were photographed, over m of them."""
+
+    ids: tuple[str, ...]
+    known: RayUncertainty
+    absent: tuple[str, ...]  # ids of the mirrors whose frames the run does not have
+
+
+@dataclass(frozen=True)
+class Halves:
+    """How two halves of the highlights agree, by rays at angles that are known."""
+
+    by: str  # what is apart: "angles" or "LEDs"
+    counts: tuple[int, int]  # highlights of each half
+    found_mm: float  # root mean square distance of both halves' rays at the object's centre
+    expected_mm: float  # as their covariances say
+
+    @property
+    def ratio(self) -> float:
+        """Of what is found to what is expected."""
+        return self.found_mm / self.expected_mm
+
+
+@dataclass(frozen=True)
+class MachineCalibration:
+    """A calibrated machine."""
+
+    setup: Setup
+    detection: Detection
+    found: Estimate
+    rays: MirrorRays
+    halves: tuple[Halves, ...]
+
+
+def calibrate(
+    setup: Setup, detection: Detection, prior: Prior, progress: Progress = lambda _: None
+) -> MachineCalibration:
+    """Estimate the machine, and how well its rays are known."""
+    found = estimate(prior, detection.highlights, progress)
+    progress("uncertainty of the rays")
+    ids, absent, frame, sphere = ray_places(setup)
+    known = ray_uncertainty(found, frame, sphere)
+    halves = cross_validation(found, frame, sphere, progress)
+    return MachineCalibration(setup, detection, found, MirrorRays(ids, known, absent), halves)
+
+
+def ray_places(setup: Setup) -> tuple[tuple[str, ...], tuple[str, ...], Ints, Ints]:
+    """Ids of mirrors with a frame, of those without, and frame and sphere of the former."""
+    number: dict[tuple[int, int], int] = {
+        (frame.object_turn_deg, frame.stop): k for k, frame in enumerate(setup.frames)
+    }
+    ids, absent, places = [], [], []
+    for half, (turn, letter) in enumerate(((0, "a"), (180, "b"))):
+        pairs = zip(setup.plan.ball[half].tolist(), setup.plan.stop[half].tolist(), strict=True)
+        for mirror, (ball, stop) in enumerate(pairs, 1):
+            if ball == NOT_SERVED:
+                continue
+            frame = number.get((turn, stop + 1))
+            name = f"{letter}{mirror:04d}"
+            if frame is None:
+                absent.append(name)
+            else:
+                ids.append(name)
+                places.append((frame, ball))
+    if not places:
+        raise InputError("the run has no stop of the plan: name the export that was photographed")
+    frame, sphere = np.array(places).T
+    return tuple(ids), tuple(absent), frame, sphere
+
+
+def cross_validation(
+    found: Estimate, frame: Ints, sphere: Ints, progress: Progress
+) -> tuple[Halves, ...]:
+    """Calibrate from every other frame and from the rest, likewise LEDs; compare rays (m,)."""
+    results = []
+    for by, field in HALVES.items():
+        even = getattr(found.highlights, field) % 2 == 0
+        parts = [found.used & side for side in (even, ~even)]
+        if min(part.sum() for part in parts) >= MIN_HIGHLIGHTS:
+            results.append(_compared(found, by, parts, (frame, sphere), progress))
+    return tuple(results)
+
+
+def _compared(
+    found: Estimate, by: str, parts: list[Bools], rays: tuple[Ints, Ints], progress: Progress
+) -> Halves:
+    progress(f"halves with {by} apart")
+    one, other = (estimate(found.prior, _subset(found, part), start=found.values) for part in parts)
+    slopes, _ = ray_slopes(found.prior, found.values, *rays)
+    slopes = slopes[:, _static(found)]
+    inverses = [np.linalg.inv(half.information.toarray()) for half in (one, other)]
+    both = inverses[0] @ inverses[1]
+    spread = (inverses[0] + inverses[1] - both - both.T)[np.ix_(_static(found), _static(found))]
+    difference = slopes @ (one.values - other.values)[_static(found)]
+    places = slopes.toarray().reshape(-1, 4, slopes.shape[1])[:, :2]
+    expected = np.einsum("mdq,qr,mdr->", places, spread, places, optimize=True)
+    squares = difference.reshape(-1, 4)[:, :2] ** 2
+    count = len(squares)
+    return Halves(
+        by=by,
+        counts=(len(one.highlights), len(other.highlights)),
+        found_mm=math.sqrt(float(squares.sum()) / count),
+        expected_mm=math.sqrt(float(expected) / count),
+    )
+
+
+def _static(found: Estimate) -> Ints:
+    """Free parameters that are not of single frames, of which a half sees every other one."""
+    prior = found.prior
+    single = np.zeros(len(prior.flat_sigma), dtype=bool)
+    for block in (Block.ANGLES, Block.RUNOUT):
+        single[prior.first[block] : prior.first[block] + prior.sigma[block].size] = True
+    return np.flatnonzero(~single[prior.free])
+
+
+def _subset(found: Estimate, part: Bools) -> Highlights:
+    h = found.highlights
+    sigma = h.sigma[part] * found.noise_factor
+    return Highlights(h.frame[part], h.sphere[part], h.led[part], h.pixel[part], sigma)

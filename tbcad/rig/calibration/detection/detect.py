@@ -1,0 +1,287 @@
+"""Find all highlights of a run."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.parallel import THREADS
+from tbcad.records.exposure import DARK, Frame, dark_factor, exposure_name
+from tbcad.rig.calibration.detection.detection import (
+    Detection,
+    Rejected,
+    Rejection,
+    no_highlights,
+    relative_light,
+    verdicts,
+)
+from tbcad.rig.calibration.detection.expected import Expected, Room, maybe_hidden
+from tbcad.rig.calibration.detection.matching import (
+    CameraMove,
+    NoPairs,
+    find_move,
+    highlights_of,
+    match,
+    shift_of,
+)
+from tbcad.rig.calibration.detection.spots import (
+    ROUNDING,
+    BrightSpots,
+    Unmeasured,
+    centroid_sigmas,
+    find_spots,
+    gain,
+    joined_spots,
+    reading_variance,
+)
+from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.machine.machine import Machine
+from tbcad.rig.runs.images import Image16
+from tbcad.rig.runs.photographs import Run, read_photograph
+from tbcad.types import Bools, Floats, Progress
+
+DOME_MM = 1.5  # radius of a 3 mm LED
+# An LED of which so few of the expected highlights are found does not shine.
+DEAD = 0.02
+LARGEST_8_BIT = 255.0
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What a frame's photographs show."""
+
+    spots: BrightSpots
+    unmeasured: Unmeasured
+    photographed: Bools  # which LEDs' photographs could be read, (l,)
+    faults: tuple[str, ...]  # of the others, and of the dark one
+    dark: Image16 | None  # the dark photograph, if it could be read
+
+
+@dataclass(frozen=True)
+class _Dark:
+    """A dark photograph, and its exposure time, s, if it is known."""
+
+    image: Image16
+    seconds: float | None
+
+    def at(self, run: Run, frame: Frame, led: int) -> tuple[Image16 | None, str | None]:
+        """What is subtracted from an LED's photograph, and what is to be said of it."""
+        phase = f"led_{led + 1}"
+        seconds = _seconds(run, frame, phase)
+        factor = dark_factor(self.seconds, seconds)
+        if factor == 1:
+            return self.image, None
+        fault = (
+            f"{exposure_name(frame, phase)} was exposed for {seconds:g} s, its dark photograph for "
+            f"{self.seconds:g} s, which is"
+        )
+        if factor is None:
+            return None, f"{fault} too short to be subtracted"
+        kind = self.image.dtype
+        scaled = np.minimum(np.rint(factor * self.image.astype(np.float32)), np.iinfo(kind).max)
+        return scaled.astype(kind), f"{fault} scaled"
+
+
+def detect(
+    run: Run,
+    prior: Prior,
+    room: Room | None = None,
+    dome: float = DOME_MM,
+    progress: Progress = lambda _: None,
+) -> Detection:
+    """Find all highlights of a run, and say of each that is not used why.
+
+    Args:
+        run: that was photographed.
+        prior: of the machine; its frames are those of the run's record.
+        room: that an object may fill; None where nothing stands between LEDs and spheres.
+        dome: radius of the LEDs' domes, mm.
+        progress: called with each step.
+
+    Raises:
+        InputError: no highlights are found, or the run has no phases of single LEDs.
+    """
+    frames, machine = run.record.frames, prior.mean
+    if not any(phase.startswith("led_") for phase in run.record.phases):
+        raise InputError(f"{run.folder} has no photographs of single LEDs: photograph them too")
+    read = _read_frames(run, len(machine.leds), progress)
+    spots = joined_spots([one.spots for one in read])
+    photographed = np.array([one.photographed for one in read])
+    faults = [*run.faults.values(), *(fault for one in read for fault in one.faults)]
+    nothing = partial(
+        no_highlights,
+        unmeasured=sum((one.unmeasured for one in read), Unmeasured()),
+        photographs=int(photographed.sum()),
+    )
+    try:
+        expected, partner, found = match(prior, spots, dome, progress)
+    except NoPairs:
+        raise nothing(spots) from None
+    counts = np.bincount(spots.frame, minlength=len(frames)).astype(np.float64)
+    move = find_move(found, len(frames), counts)
+    if move is not None:
+        left_out = spots.only(~move.kept[spots.frame])
+        spots = spots.only(move.kept[spots.frame])
+        expected, partner, found = match(prior, spots, dome, progress)
+        faults.append(_move_line(frames, move, shift_of(expected, left_out)))
+    exposure = _exposures(run, spots, faults)
+    hidden = (
+        np.zeros(len(partner), dtype=bool)
+        if room is None
+        else maybe_hidden(found.machine, expected, room)
+    )
+    share = relative_light(expected, partner, spots, exposure)
+    reasons = verdicts(expected, partner, spots, share, hidden)
+    _overrule(reasons, expected, photographed, move)
+    faults += _dead_leds(machine, expected, reasons)
+    used = np.array([reason is None for reason in reasons])
+    if not used.any():
+        raise nothing(spots, reasons=reasons)
+    paired = np.where(used, partner, -1)
+    sigma = _sigmas(spots.only(np.unique(paired[used])), spots, read)
+    highlights = highlights_of(expected, paired, spots, sigma[np.maximum(partner, 0)])
+    return Detection(highlights, _rejected(expected, reasons), tuple(faults))
+
+
+def _read_frames(run: Run, leds: int, progress: Progress) -> list[_Read]:
+    count = len(run.record.frames)
+    found: list[_Read] = []
+    spare = _spare_dark(run)
+    with ThreadPoolExecutor(THREADS) as pool:
+        for one in pool.map(lambda number: _read_frame(run, number, leds, spare), range(count)):
+            found.append(one)
+            progress(f"frame {len(found)} of {count}")
+    return found
+
+
+def _spare_dark(run: Run) -> _Dark | None:
+    """A dark photograph for frames without one: hot pixels stay."""
+    for frame in run.record.frames:
+        image, _ = _photograph(run, frame, DARK)
+        if image is not None:
+            return _Dark(image, _seconds(run, frame, DARK))
+    return None
+
+
+def _seconds(run: Run, frame: Frame, phase: str) -> float | None:
+    exposure = run.exposure(frame, phase)
+    return None if exposure is None else exposure.exposure_s
+
+
+def _read_frame(run: Run, number: int, leds: int, spare: _Dark | None) -> _Read:
+    frame = run.record.frames[number]
+    own, fault = _photograph(run, frame, DARK)
+    faults = [] if fault is None else [fault]
+    if own is None:
+        what = "without one" if spare is None else "with that of another frame"
+        faults.append(f"{exposure_name(frame, DARK)} is not there: its frame goes on {what}")
+    dark = spare if own is None else _Dark(own, _seconds(run, frame, DARK))
+    other_times = []
+    found, there = [], np.zeros(leds, dtype=bool)
+    for led in range(leds):
+        image, fault = _photograph(run, frame, f"led_{led + 1}")
+        if fault is not None:
+            faults.append(fault)
+        if image is not None:
+            there[led] = True
+            empty, fault = (None, None) if dark is None else dark.at(run, frame, led)
+            other_times += [] if fault is None else [fault]
+            found.append(find_spots(image, empty, number, led))
+    faults += other_times[:1]
+    spots, unmeasured = joined_spots([one for one, _ in found]), (other for _, other in found)
+    whole = sum(unmeasured, Unmeasured())
+    return _Read(spots, whole, there, tuple(faults), own if number < 2 else None)
+
+
+def _photograph(run: Run, frame: Frame, phase: str) -> tuple[Image16 | None, str | None]:
+    """A photograph, or why it cannot be read; neither where the run's faults say so."""
+    exposure = run.exposure(frame, phase)
+    if exposure is None:
+        return None, None
+    try:
+        return read_photograph(run, exposure), None
+    except InputError as error:
+        return None, str(error)
+
+
+def _exposures(run: Run, spots: BrightSpots, faults: list[str]) -> Floats:
+    """Exposure time of each spot's photograph over the usual one, (m,)."""
+    frames = run.record.frames
+    times = {
+        (number, led): exposure.exposure_s
+        for number, frame in enumerate(frames)
+        for led in range(int(spots.led.max(initial=-1)) + 1)
+        if (exposure := run.exposure(frame, f"led_{led + 1}")) is not None and exposure.exposure_s
+    }
+    usual = float(np.median(list(times.values()))) if times else 1.0
+    others = [key for key, time in times.items() if time != usual]
+    if others:
+        name = exposure_name(frames[others[0][0]], f"led_{others[0][1] + 1}")
+        faults.append(
+            f"{name} and {len(others) - 1} more were exposed otherwise than the rest, "
+            f"{times[others[0]]:g} s instead of {usual:g} s: their light is scaled"
+        )
+    keys = zip(spots.frame.tolist(), spots.led.tolist(), strict=True)
+    return np.array([times.get(key, usual) / usual for key in keys])
+
+
+def _overrule(
+    reasons: list[Rejection | None],
+    expected: Expected,
+    photographed: Bools,
+    move: CameraMove | None,
+) -> None:
+    """Name what no highlight says itself: photographs that are not there, or not kept."""
+    absent = ~photographed[expected.frame, expected.led] & expected.inside
+    for number in np.flatnonzero(absent).tolist():
+        reasons[number] = Rejection.NO_PHOTOGRAPH
+    if move is not None:
+        for number in np.flatnonzero(~move.kept[expected.frame] & expected.inside).tolist():
+            reasons[number] = Rejection.MOVED
+
+
+def _move_line(frames: tuple[Frame, ...], move: CameraMove, shift: Floats) -> str:
+    before, after = (exposure_name(frames[move.first - k], "")[:-1] for k in (1, 0))
+    far = np.hypot(*shift)
+    how = f"by {far:.2f} px" if np.isfinite(far) else "so far that its highlights are not found"
+    kept = int(move.kept.sum())
+    return (
+        f"the camera moved between {before} and {after}, {how}: the {kept} frames "
+        f"{'after' if move.kept[-1] else 'before'} that are used, the others are not"
+    )
+
+
+def _dead_leds(machine: Machine, expected: Expected, reasons: list[Rejection | None]) -> list[str]:
+    """Lines on LEDs that do not shine, of those that are photographed."""
+    lines = []
+    passed_over = (Rejection.OUTSIDE, Rejection.NO_PHOTOGRAPH, Rejection.MOVED)
+    counted = np.array([reason not in passed_over for reason in reasons])
+    absent = np.array([reason in (Rejection.MISSING, Rejection.HIDDEN) for reason in reasons])
+    for led in range(len(machine.leds)):
+        mine = counted & (expected.led == led)
+        if mine.any() and absent[mine].mean() > 1 - DEAD:
+            lines.append(
+                f"LED {led + 1} shines in no photograph: the others are used; see to its wires"
+            )
+    return lines
+
+
+def _sigmas(good: BrightSpots, spots: BrightSpots, read: list[_Read]) -> Floats:
+    """Standard deviation of all spots' centroids, pixels, (m,)."""
+    darks = [one.dark for one in read if one.dark is not None]
+    reading = reading_variance(*darks[:2]) if len(darks) > 1 else ROUNDING
+    largest = float(np.iinfo(darks[0].dtype).max) if darks else LARGEST_8_BIT
+    return centroid_sigmas(spots, reading, gain(good, reading, largest))
+
+
+def _rejected(expected: Expected, reasons: list[Rejection | None]) -> tuple[Rejected, ...]:
+    keys = zip(
+        expected.frame.tolist(), expected.sphere.tolist(), expected.led.tolist(), strict=True
+    )
+    return tuple(
+        Rejected(*key, reason)
+        for key, reason in zip(keys, reasons, strict=True)
+        if reason is not None
+    )

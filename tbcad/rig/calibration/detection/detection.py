@@ -1,0 +1,196 @@
+"""What a detection gives: the highlights to calibrate from, and what was not used, and why.
+
+`tbcad.rig.calibration.detection.detect.detect(run, prior)` makes it of a run that
+tbcad.rig.runs.photographs has read, and of the prior of its machine, whose frames are those of the
+run's record in the same order.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tbcad.errors import InputError
+from tbcad.rig.calibration.detection.expected import Expected
+from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, Unmeasured, stacked
+from tbcad.rig.machine.machine import Highlights
+from tbcad.types import Bools, Floats, Ints
+
+HALF = 0.5
+SHORTER = (
+    "photograph the LEDs again with a shorter exposure (tbcad run --exposure-leds; tbcad run "
+    "--preflight-only says which is right)"
+)
+LONGER = (
+    "see that the LEDs shine, or photograph them with a longer exposure (tbcad run "
+    "--preflight-only says which is right)"
+)
+ELSEWHERE = "is this the run of another export, or is the camera far out of place?"
+# Light over what the same sphere shows of the same LED elsewhere, in the middle: an edge that hides
+# a tenth of a dome shifts its centroid by 0.16 px where its image has a radius of 2 px.
+LEAST, MOST = 0.94, 1.08
+FAINT = 0.1
+BESIDE = 0.1  # share of a highlight's light from which another spot beside it matters
+
+
+class Rejection(StrEnum):
+    """Why a highlight is not used."""
+
+    NO_PHOTOGRAPH = "no photograph"
+    OUTSIDE = "outside of the picture"
+    HIDDEN = "hidden, or partly"
+    MISSING = "not found where it was expected"
+    DOUBLE = "two highlights where one was expected"
+    MERGED = "merged with another highlight"
+    FAINT = "too faint: a reflection of a reflection, or nearly hidden"
+    SATURATED = "saturated"
+    MOVED = "the camera moved"
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A highlight that is not used."""
+
+    frame: int  # from 0
+    sphere: int  # from 0
+    led: int  # from 0
+    reason: Rejection
+
+
+@dataclass(frozen=True)
+class Detection:
+    """The result of a detection."""
+
+    # that can be used; their pixels are where the LEDs' own positions appear, the centroids'
+    # offsets from that taken off
+    highlights: Highlights
+    rejected: tuple[Rejected, ...]  # highlights that were expected and are not used, each once
+    # of photographs, LEDs and frames, each in one line that names what, and what is done
+    faults: tuple[str, ...]
+
+
+def no_highlights(
+    spots: BrightSpots,
+    unmeasured: Unmeasured,
+    photographs: int,
+    reasons: Sequence[Rejection | None] = (),
+) -> InputError:
+    """The error of a run without highlights.
+
+    Args:
+        spots: of all photographs.
+        unmeasured: what is bright besides.
+        photographs: number of those by LEDs.
+        reasons: of all expected highlights; none where the spots fit no machine.
+    """
+    saturated = int(np.count_nonzero(spots.full >= FULL))
+    if reasons:
+        numbers = Counter(str(reason) for reason in reasons if reason is not None)
+        del numbers[Rejection.OUTSIDE]
+    else:
+        elsewhere = len(spots) - saturated
+        numbers = Counter({"saturated": saturated, "where no highlight is expected": elsewhere})
+    told = [f"{number} {what}" for what, number in numbers.most_common() if number]
+    told += _others(unmeasured, photographs)
+    step = _step(len(spots), saturated, unmeasured, photographs)
+    return InputError(f"no highlights to calibrate from: {'; '.join(told)}: {step}")
+
+
+def _others(unmeasured: Unmeasured, photographs: int) -> list[str]:
+    large, of = unmeasured.large, f"of {photographs} photographs by LEDs"
+    every = (
+        (large, f"{large} larger than a highlight, {unmeasured.saturated} of them saturated"),
+        (unmeasured.flooded, f"{unmeasured.flooded} {of} are full of light"),
+        (unmeasured.black, f"{unmeasured.black} {of} are black"),
+    )
+    return [text for number, text in every if number]
+
+
+def _step(spots: int, saturated: int, unmeasured: Unmeasured, photographs: int) -> str:
+    """What to do, by what there is most of."""
+    bright = spots + unmeasured.large
+    if unmeasured.flooded > HALF * photographs:
+        return f"most are full of light: darken the room, or {SHORTER}"
+    if saturated + unmeasured.saturated > HALF * bright:
+        return f"the light is saturated: {SHORTER}"
+    if unmeasured.black > HALF * photographs:
+        return f"most are too dark: {LONGER}"
+    return ELSEWHERE
+
+
+def relative_light(
+    expected: Expected, partner: Ints, spots: BrightSpots, exposure: Floats
+) -> Floats:
+    """Light of each paired highlight over its sphere's and LED's usual light, (n,); else NaN.
+
+    The spot of each is -1 for none, (n,); exposures (m,) are over the usual one.
+    """
+    share = np.full(len(partner), np.nan)
+    on = partner >= 0
+    spot = partner[on]
+    share[on] = spots.light[spot] / (exposure[spot] * expected.light[on])
+    for group in (expected.led, expected.sphere):
+        for number in np.unique(group[on]):
+            mine = on & (group == number)
+            share[mine] /= np.median(share[mine])
+    return share
+
+
+def verdicts(
+    expected: Expected, partner: Ints, spots: BrightSpots, share: Floats, hidden: Bools
+) -> list[Rejection | None]:
+    """Why each highlight is not used, or None; of n highlights, the spot of each or -1."""
+    found: list[Rejection | None] = [None] * len(partner)
+    on = partner >= 0
+    spot = np.where(on, partner, 0)
+    tests: tuple[tuple[Bools, Rejection], ...] = (
+        (on & (share > MOST), Rejection.MERGED),
+        (on & (share < LEAST), Rejection.HIDDEN),
+        (on & (share < FAINT), Rejection.FAINT),
+        (on & _beside_others(expected, partner, spots), Rejection.MERGED),
+        (on & _doubled(spots)[spot], Rejection.DOUBLE),
+        (on & (spots.full[spot] >= FULL), Rejection.SATURATED),
+        (~on & expected.inside, Rejection.MISSING),
+        (~on & expected.inside & hidden, Rejection.HIDDEN),
+        (~expected.inside, Rejection.OUTSIDE),
+    )
+    for wrong, reason in tests:
+        for number in np.flatnonzero(wrong).tolist():
+            found[number] = reason
+    return found
+
+
+def _doubled(spots: BrightSpots) -> Bools:
+    """Which spots have another of some light within the discs that both are summed over, (m,)."""
+    doubled = np.zeros(len(spots), dtype=bool)
+    places = stacked(spots.frame, spots.led, spots.pixel)
+    one, other = _near(places, 2 * float(spots.radius.max(initial=0)))
+    reach = spots.radius[one] + spots.radius[other]
+    near = ((places[one] - places[other]) ** 2).sum(axis=1) < reach**2
+    for here, there in ((one, other), (other, one)):
+        doubled[here[near & (spots.light[there] > BESIDE * spots.light[here])]] = True
+    return doubled
+
+
+def _beside_others(expected: Expected, partner: Ints, spots: BrightSpots) -> Bools:
+    """Which paired highlights have that of another sphere within their disc, found or not, (n,)."""
+    beside = np.zeros(len(partner), dtype=bool)
+    inside = np.flatnonzero(expected.inside)
+    pixel = expected.pixel + expected.centroid
+    places = stacked(expected.frame[inside], expected.led[inside], pixel[inside])
+    radius = np.where(partner >= 0, spots.radius[np.maximum(partner, 0)], 0.0)[inside]
+    one, other = _near(places, float(radius.max(initial=0)))
+    distance = ((places[one] - places[other]) ** 2).sum(axis=1)
+    for here in (one, other):
+        beside[inside[here[distance < radius[here] ** 2]]] = True
+    return beside
+
+
+def _near(places: Floats, radius: float) -> Ints:
+    """Pairs of places (n, 4) within a radius, (2, p)."""
+    if not len(places) or radius <= 0:
+        return np.zeros((2, 0), dtype=np.int64)
+    return np.asarray(cKDTree(places).query_pairs(radius, output_type="ndarray").T, np.int64)

@@ -1,0 +1,188 @@
+"""Which spot is which highlight: by a machine that is brought nearer to them step by step.
+
+At one LED a time every sphere shows one spot, so neighbours are far apart. At first the whole
+picture may be shifted by dozens of pixels, mostly alike: the shift that most pairs of spots and
+expected places agree on is taken. Then the machine is estimated from the nearest pairs, and paired
+again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tbcad.core.geometry.vectors import norm
+from tbcad.rig.calibration.detection.expected import Expected, expected_highlights
+from tbcad.rig.calibration.detection.spots import BrightSpots, stacked
+from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.calibration.estimate.solve import Estimate, estimate
+from tbcad.rig.machine.machine import Highlights
+from tbcad.types import Bools, Floats, Ints, Progress
+
+SHIFT_PX, BIN_PX = 160.0, 8.0  # farthest shift that is looked for, and how finely
+FIRST_FRAMES = 40  # that the first estimate is made of
+# Farthest spot from an expected place, pixels, before and after an estimate, and how far off spots
+# are taken to be in it: what the machine's model leaves open.
+FIRST_PX, NEAR_PX, FINAL_PX = 30.0, 10.0, 2.5
+FIRST_SIGMA_PX, SIGMA_PX = 2.0, 0.3
+FEW = 4  # highlights of a frame
+MIN_HIGHLIGHTS = 4  # of a frame, to say where it is
+MIN_FRAMES = 3  # on either side of a move
+MIN_MOVE_PX, MOVE_SIGMAS = 0.15, 8.0  # less is no move
+FEW_PAIRS = 0.3  # share of the usual number of pairs: fewer are not where the machine shows them
+
+
+class NoPairs(Exception):
+    """No spot is near any highlight that the machine should show."""
+
+
+def match(
+    prior: Prior, spots: BrightSpots, dome: float, progress: Progress
+) -> tuple[Expected, Ints, Estimate]:
+    """Pair spots with highlights of a prior's machine, whose LEDs have domes of a radius in mm.
+
+    Returns:
+        The highlights that the machine should show; the spot of each, or -1, (n,); and the machine
+        that was estimated on the way.
+
+    Raises:
+        NoPairs: the spots fit no machine near the prior.
+    """
+    expected = expected_highlights(prior.mean, dome)
+    some = np.unique(np.linspace(0, len(prior.mean.angle) - 1, FIRST_FRAMES).astype(np.int64))
+    first = np.isin(expected.frame, some)
+    places = _places(expected) + _common_shift(expected, spots)
+    partner = np.where(first, paired(expected, places, spots, FIRST_PX), -1)
+    progress("first estimate")
+    found = _estimated(prior, expected, partner, spots, FIRST_SIGMA_PX)
+    for radius in (NEAR_PX, FINAL_PX):
+        expected = expected_highlights(found.machine, dome)
+        partner = paired(expected, _places(expected), spots, radius)
+        if radius > FINAL_PX:
+            progress("second estimate")
+            found = _estimated(prior, expected, partner, spots, SIGMA_PX)
+    return expected, partner, found
+
+
+def _places(expected: Expected) -> Floats:
+    return expected.pixel + expected.centroid
+
+
+def _common_shift(expected: Expected, spots: BrightSpots) -> Floats:
+    """Shift (2,) from expected places to spots on which most pairs agree."""
+    mine, theirs = _tree(expected.frame, expected.led, _places(expected), expected.inside)
+    others = cKDTree(stacked(spots.frame, spots.led, spots.pixel))
+    pairs = others.sparse_distance_matrix(theirs, SHIFT_PX, output_type="ndarray")
+    spot, highlight = pairs["i"], mine[pairs["j"]]
+    shift = spots.pixel[spot] - _places(expected)[highlight]
+    if not len(shift):
+        raise NoPairs
+    edges = np.arange(-SHIFT_PX, SHIFT_PX + BIN_PX, BIN_PX)
+    count, _, _ = np.histogram2d(shift[:, 0], shift[:, 1], bins=[edges, edges])
+    # A peak is often on an edge between bins: four bins count together.
+    four = count[:-1, :-1] + count[1:, :-1] + count[:-1, 1:] + count[1:, 1:]
+    best = np.unravel_index(int(four.argmax()), four.shape)
+    return np.asarray(edges[np.array(best) + 1])
+
+
+def shift_of(expected: Expected, spots: BrightSpots) -> Floats:
+    """Middle shift (2,) of spots from the highlights next to them; NaN where few are near."""
+    partner = paired(expected, _places(expected), spots, NEAR_PX)
+    near = np.flatnonzero(partner >= 0)
+    if len(near) < FEW * len(np.unique(spots.frame)):
+        return np.full(2, np.nan)
+    return np.asarray(np.median(spots.pixel[partner[near]] - _places(expected)[near], axis=0))
+
+
+def paired(expected: Expected, places: Floats, spots: BrightSpots, radius: float) -> Ints:
+    """The spot of each highlight, or -1, (n,): each is the other's nearest within a radius."""
+    partner = np.full(len(places), -1)
+    mine, tree = _tree(expected.frame, expected.led, places, expected.inside)
+    places_of_spots = stacked(spots.frame, spots.led, spots.pixel)
+    if not len(mine) or not len(spots):
+        return partner
+    distance, nearest = np.array(
+        cKDTree(places_of_spots).query(tree.data, distance_upper_bound=radius)
+    )
+    nearest, back = nearest.astype(np.int64), np.array(tree.query(places_of_spots)[1])
+    near = np.isfinite(distance)
+    mutual = near & (back[np.where(near, nearest, 0)] == np.arange(len(mine)))
+    partner[mine[mutual]] = nearest[mutual]
+    return partner
+
+
+def _tree(frame: Ints, led: Ints, pixel: Floats, inside: Bools) -> tuple[Ints, cKDTree]:
+    """Numbers of the places that are in the picture, and a tree of them."""
+    which = np.flatnonzero(inside)
+    return which, cKDTree(stacked(frame[which], led[which], pixel[which]))
+
+
+def highlights_of(
+    expected: Expected, partner: Ints, spots: BrightSpots, sigma: Floats | float
+) -> Highlights:
+    """Paired highlights, their places less what shifts their centroids.
+
+    That is the dome's shape, and the lens, which lets more light through on one side of a spot.
+    """
+    which = np.flatnonzero(partner >= 0)
+    spot = partner[which]
+    # Mean square of one way: what the dome's image does not explain is blur, alike in all ways.
+    square, dome = (spots.shot / spots.light)[spot], expected.spread[which]
+    blur = square - np.trace(dome, axis1=1, axis2=2) / 2
+    brighter = expected.brighter[which]
+    lens = (dome @ brighter[..., None])[..., 0] + blur[:, None] * brighter
+    pixel = spots.pixel[spot] - expected.centroid[which] - lens
+    known = np.broadcast_to(sigma, len(partner))[which]
+    return Highlights(
+        expected.frame[which], expected.sphere[which], expected.led[which], pixel, known
+    )
+
+
+def _estimated(
+    prior: Prior, expected: Expected, partner: Ints, spots: BrightSpots, sigma: float
+) -> Estimate:
+    if (partner < 0).all():
+        raise NoPairs
+    return estimate(prior, highlights_of(expected, partner, spots, sigma))
+
+
+@dataclass(frozen=True)
+class CameraMove:
+    """A move of the camera."""
+
+    first: int  # number of the first frame after it
+    kept: Bools  # whether each frame is on the side that is kept, (f,)
+
+
+def find_move(estimate: Estimate, frames: int, spots: Floats) -> CameraMove | None:
+    """The one move of the camera that residuals, and spots in each frame (f,), show; or None."""
+    frame = estimate.highlights.frame
+    count = np.bincount(frame, minlength=frames).astype(np.int64)
+    lost = (count < FEW_PAIRS * np.median(count[count > 0])) & (spots > 0)
+    # All that is lost comes before or after one frame.
+    if lost.sum() >= MIN_FRAMES and np.count_nonzero(np.diff(lost.astype(int))) == 1:
+        first = int(np.flatnonzero(lost)[0]) if not lost[0] else int(np.flatnonzero(~lost)[0])
+        return CameraMove(first, ~lost)
+    return _step(estimate, count)
+
+
+def _step(estimate: Estimate, count: Ints) -> CameraMove | None:
+    known = np.flatnonzero(count >= MIN_HIGHLIGHTS)
+    if len(known) < 2 * MIN_FRAMES:
+        return None
+    frame = estimate.highlights.frame
+    middle = np.array([np.median(estimate.residual[frame == f], axis=0) for f in known])
+    before = np.arange(1, len(known))[:, None]
+    sums = np.cumsum(middle, axis=0)
+    step = (sums[-1] - sums[:-1]) / (len(known) - before) - sums[:-1] / before
+    # A step in the middle is known better than one near an end.
+    weight = np.sqrt(before * (len(known) - before) / len(known))
+    score = norm(step * weight)
+    score[: MIN_FRAMES - 1] = score[len(known) - MIN_FRAMES :] = 0
+    best = int(score.argmax())
+    scatter = float(np.median(np.abs(np.diff(middle, axis=0)))) + np.finfo(float).eps
+    if norm(step[best]) < MIN_MOVE_PX or score[best] < MOVE_SIGMAS * scatter:
+        return None
+    first = int(known[best + 1])
+    after = np.arange(len(count)) >= first
+    return CameraMove(first, after if after.sum() > (~after).sum() else ~after)

@@ -1,0 +1,166 @@
+"""What is known of a machine before it is photographed: the errors of the process that made it.
+
+Figures of a process come from tbcad/tolerancing/process/*.toml, each with its source there. What no
+process says is a judgement, below.
+"""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from tbcad.core.geometry.vectors import norm
+from tbcad.errors import InputError
+from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.machine.built import LED_MM
+from tbcad.rig.machine.machine import Machine
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.types import Bools, Floats, Ints
+
+PRINCIPAL_SHARE = 0.01
+"""Of the width, by which the principal point is off: a sensor placed to 0.25 mm is 72 px of 3.45 um
+off at 2,080 px (Allied Vision Prosilica GT), lenses are centred better; judgement between both."""
+OBLONG = 1e-3
+"""By which pixels are not square: mask-made sensors are square to better; judgement."""
+DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
+"""k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
+15); judgement, wider than tbcad.rig.machine.built, because highlights tell it well. k3 is fixed:
+those of a few balls do not tell it from k2."""
+MEASURED_MM = 0.01
+"""Standard deviation of a radius that is measured without saying how well: by a micrometer screw
+over the body, or a spherometer."""
+PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
+Measured = tuple[tuple[int, float, float], ...]
+
+
+def prototype_prior(
+    machine: Machine,
+    errors: Errors,
+    body_centre: Floats,
+    is_cap: Bools,
+    series: Ints,
+    zero_error: float = 0.0,
+    lens_known: bool = False,
+    measured: Measured = (),
+) -> Prior:
+    """Prior of a prototype as designed, whose balls are on a base that rotates.
+
+    Args:
+        machine: as designed.
+        errors: of its process.
+        body_centre: of the bodies in the seats, mm, (k, 3); the spheres' own for balls.
+        is_cap: which spheres are made instead of purchased, (k,).
+        series: number of the series that each frame belongs to, (f,).
+        zero_error: half width of the base's angle zero, radians.
+        lens_known: whether focal lengths, principal point and distortion are given.
+        measured: radii that are measured, mm, with their standard deviations, by number of sphere.
+    """
+    radius, radii = _radii(machine, errors, is_cap, measured)
+    arm = norm(machine.centre - body_centre)
+    tilted = np.where(is_cap, arm * errors.cap_tilt.sigma, 0.0)
+    centres = np.hypot(errors.seat.sigma, tilted)
+    growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
+    frames, offset = len(machine.angle), zero_error / math.sqrt(3)
+    sigma = _camera(machine, errors, lens_known) | {
+        Block.TILT: np.full(2, errors.axis_tilt.sigma),
+        Block.AXIS_POINT: np.full(2, errors.shell_shift.sigma),
+        Block.OFFSET: np.full(
+            int(series.max()) + 1, math.hypot(offset, errors.rotation_angle.sigma)
+        ),
+        Block.CARRIER: np.array([growth, errors.shell_shift.sigma]),
+        Block.LEDS: np.full(machine.leds.shape, _led(errors)),
+        Block.CENTRES: np.repeat(centres[:, None], 3, axis=1),
+        Block.RADII: radii,
+        Block.ANGLES: np.full(frames, errors.rotation_angle.sigma),
+        Block.RUNOUT: np.full((frames, 2), errors.axis_runout.sigma),
+    }
+    return Prior(replace(machine, radius=radius), series, sigma)
+
+
+def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> Prior:
+    """Prior of one designed shell with its camera; LEDs are held at the object's place together.
+
+    In the frame of the shell: how its whole place is off is the camera's and the LEDs' error here.
+    """
+    spheres, shift = len(machine.radius), errors.shell_shift.sigma
+    camera = _camera(machine, errors, lens_known)
+    camera[Block.CAMERA_TURN] = np.hypot(camera[Block.CAMERA_TURN], errors.shell_tilt.sigma)
+    camera[Block.PINHOLE] = np.hypot(camera[Block.PINHOLE], shift)
+    growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
+    sigma = camera | {
+        Block.TILT: np.zeros(2),
+        Block.AXIS_POINT: np.zeros(2),
+        Block.OFFSET: np.zeros(1),
+        Block.CARRIER: np.array([growth, 0.0]),
+        Block.LEDS: np.full(machine.leds.shape, math.hypot(_led(errors), shift)),
+        Block.CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
+        Block.RADII: np.full(spheres, errors.whole_radius.sigma),
+        Block.ANGLES: np.zeros(1),
+        Block.RUNOUT: np.zeros((1, 2)),
+    }
+    return Prior(machine, np.zeros(1, dtype=np.int64), sigma)
+
+
+def _centres(machine: Machine, errors: Errors) -> Floats:
+    """Of each centre along each axis, mm: its own error, and the warp that moves and turns it."""
+    warp, own = errors.warp, errors.sphere_centre.sigma
+    turned = machine.radius / warp.length if warp.length else 0.0 * machine.radius
+    return np.asarray(np.hypot(own, warp.spread * np.hypot(1, turned)))
+
+
+def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Floats]:
+    """Standard deviations of pose and lens.
+
+    A camera whose principal point is off is turned until its picture is in place again.
+    """
+    principal = 0.0 if lens_known else PRINCIPAL_SHARE * machine.camera.width_px
+    tilt = errors.camera_tilt.sigma
+    aimed = math.hypot(tilt, principal / float(machine.camera.focal.mean()))
+    known = 0.0 if lens_known else 1.0
+    return {
+        Block.CAMERA_TURN: np.array([aimed, aimed, tilt]),
+        Block.PINHOLE: np.full(3, errors.camera_shift.sigma),
+        Block.FOCAL: known * np.array([errors.camera_focal.sigma, OBLONG]),
+        Block.PRINCIPAL: np.full(2, principal),
+        Block.DISTORTION: known * np.array(DISTORTIONS),
+    }
+
+
+def _led(errors: Errors) -> float:
+    """Of an LED's light along each axis: the whole stage's, and its own."""
+    return math.hypot(errors.shell_shift.sigma, LED_MM)
+
+
+def _radii(
+    machine: Machine, errors: Errors, is_cap: Bools, measured: Measured
+) -> tuple[Floats, Floats]:
+    made, bought = errors.whole_radius, errors.ball_radius
+    radius = machine.radius + np.where(is_cap, made.mean, bought.mean)
+    sigma = np.where(is_cap, made.sigma, bought.sigma)
+    for number, value, uncertainty in measured:
+        radius[number], sigma[number] = value, uncertainty
+    return radius, sigma
+
+
+def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
+    """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm."""
+    return tuple(_measured(text, balls) for text in texts)
+
+
+def _measured(text: str, balls: int) -> tuple[int, float, float]:
+    found = PATTERN.fullmatch(text.replace(" ", ""))
+    try:
+        ball, radius, sigma = found.groups() if found else ("", "", "")
+        values = int(ball) - 1, float(radius), float(sigma or MEASURED_MM)
+    except ValueError:
+        raise InputError(
+            f"--measured {text!r:.60} is not BALL=RADIUS_MM or BALL=RADIUS_MM:SIGMA_MM: write for "
+            "instance 1=43.21:0.01"
+        ) from None
+    if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
+        raise InputError(
+            f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation above "
+            "0 mm: change it"
+        )
+    return values

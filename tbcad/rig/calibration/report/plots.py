@@ -1,0 +1,210 @@
+"""Plots of a calibration: residuals, their distribution, spheres, and rays."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tbcad.common.figure_files import PlotFormat, figure_file, legend_below
+from tbcad.rig.calibration.calibrate import MachineCalibration
+from tbcad.rig.calibration.report.recovered import SIGMAS, Kind
+from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INCHES = (7.0, 5.2)
+MOST_ARROWS = 2000
+ARROW_SHARE = 0.04  # of the picture's width, for a residual of the root mean square
+RANGE = 5.0  # standard deviations, of the histogram
+BINS = 60
+ELLIPSE_POINTS = 60
+ELLIPSE_SIGMAS = 2.0
+ENLARGED = 0.15  # of the spheres' distance, for the largest shift
+COLUMNS = 4
+PANEL_INCHES = 2.6  # width and height of a panel
+PANEL_RANGE, PANEL_BINS = 4.0, 32  # of the histogram, in standard deviations
+TITLE_LINE = 26  # letters
+
+
+def plots(
+    result: MachineCalibration, spheres: Floats, kind: PlotFormat = "png"
+) -> dict[str, bytes]:
+    """All plots by the names of their files; covariances of spheres in mm^2, (k, 4, 4)."""
+    drawings: dict[str, Callable[[Figure], None]] = {
+        "residuals": lambda figure: _residual_arrows(figure, result),
+        "residual_distribution": lambda figure: _histogram(figure, result),
+        "spheres": lambda figure: _shifts(figure, result, spheres),
+        "rays": lambda figure: _rays(figure, result),
+    }
+    return {f"{name}.{kind}": figure_file(draw, INCHES, kind) for name, draw in drawings.items()}
+
+
+def _residual_arrows(figure: "Figure", result: MachineCalibration) -> None:
+    """Where in the picture highlights are off, and which way."""
+    found, camera = result.found, result.setup.designed.camera
+    axes = figure.add_subplot()
+    every = max(1, len(found.highlights) // MOST_ARROWS)
+    size = np.sqrt((found.residual[found.used] ** 2).sum(axis=1).mean())
+    scale = float(size) / (ARROW_SHARE * camera.width_px)
+    for chosen, colour, label in (
+        (np.flatnonzero(found.used)[::every], "C0", "used"),
+        (np.flatnonzero(~found.used), "C1", "outliers, direction only"),
+    ):
+        if not len(chosen):
+            continue
+        place, off = found.highlights.pixel[chosen].T, found.residual[chosen]
+        if label != "used":
+            off = 2 * size * off / np.linalg.norm(off, axis=1)[:, None]
+        style: dict[str, Any] = {
+            "angles": "xy",
+            "scale_units": "xy",
+            "width": 0.0018,
+            "color": colour,
+        }
+        arrows = axes.quiver(*place, *off.T, scale=scale, label=label, **style)
+        if label == "used":
+            axes.quiverkey(arrows, 0.8, 1.03, float(size), f"{size:.3f} px", labelpos="E")
+    axes.set(xlim=(0, camera.width_px), ylim=(camera.height_px, 0), aspect="equal")
+    axes.set(title="Residuals of highlights", xlabel="column, px", ylabel="row, px")
+    legend_below(axes)
+
+
+def _histogram(figure: "Figure", result: MachineCalibration) -> None:
+    """Residuals in standard deviations, next to the normal law."""
+    found = result.found
+    sigma = found.highlights.sigma * found.noise_factor
+    axes = figure.add_subplot()
+    edges = np.linspace(-RANGE, RANGE, BINS + 1).tolist()
+    for column, name in enumerate(("columns", "rows")):
+        values = (found.residual[:, column] / sigma)[found.used]
+        axes.hist(values, edges, density=True, histtype="step", color=f"C{column}", label=name)
+    x = np.linspace(-RANGE, RANGE, 400)
+    axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), "k--", lw=1, label="normal law")
+    axes.set(yscale="log", ylim=(1e-4, 1))
+    axes.set(
+        title=f"Residuals of {int(found.used.sum())} highlights",
+        xlabel="residual, standard deviations",
+        ylabel="density",
+    )
+    legend_below(axes)
+    axes.grid(True, alpha=0.25)
+
+
+def _shifts(figure: "Figure", result: MachineCalibration, spheres: Floats) -> None:
+    """Spheres on the base along its axis, with enlarged shifts and error ellipses."""
+    prior = result.found.prior
+    designed = result.setup.designed.centre @ prior.across.T
+    shift = (result.found.machine.centre - result.setup.designed.centre) @ prior.across.T
+    flat = prior.across @ spheres[:, :3, :3] @ prior.across.T
+    largest = float(np.linalg.norm(shift, axis=1).max())
+    factor = ENLARGED * float(np.linalg.norm(designed, axis=1).max()) / max(largest, 1e-9)
+    axes = figure.add_subplot()
+    axes.plot(*designed.T, "k+", label="designed")
+    for k, (place, moved, one) in enumerate(zip(designed, shift, flat, strict=True)):
+        end = place + factor * moved
+        ring = end[:, None] + factor * ELLIPSE_SIGMAS * _ellipse(one)
+        axes.plot(*np.stack([place, end]).T, "C0-", lw=1, label="shift" if k == 0 else None)
+        axes.plot(*ring, "C1-", lw=1, label=f"{ELLIPSE_SIGMAS:g} sigma" if k == 0 else None)
+        axes.annotate(str(k + 1), place, xytext=(4, 4), textcoords="offset points", fontsize=7)
+    axes.set_aspect("equal")
+    axes.set(
+        title=f"Centres along the axis; shifts and ellipses x {factor:.0f}, longest "
+        f"{1000 * largest:.0f} um",
+        xlabel="first direction across the axis, mm",
+        ylabel="second direction, mm",
+    )
+    legend_below(axes)
+    axes.grid(True, alpha=0.25)
+
+
+def _ellipse(covariance: Floats) -> Floats:
+    """Points (2, n) of the ellipse of one standard deviation."""
+    values, vectors = np.linalg.eigh(covariance)
+    angle = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS)
+    ring = np.stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * ring))
+
+
+def _rays(figure: "Figure", result: MachineCalibration) -> None:
+    """How well rays are known over the hemisphere, the zenith in the middle."""
+    known = result.rays.known
+    turned = np.array([result.setup.frames[i].object_turn_deg for i in known.frame]) == 180
+    way = -known.direction * np.where(turned[:, None], [-1.0, -1.0, 1.0], 1.0)
+    from_zenith = np.degrees(np.arccos(np.clip(way[:, 2], -1, 1)))
+    level = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-12)
+    axes: Axes = figure.add_subplot()
+    points = axes.scatter(
+        from_zenith * way[:, 0] / level,
+        from_zenith * way[:, 1] / level,
+        c=known.relative.place_mm,
+        s=14,
+    )
+    figure.colorbar(points, ax=axes, label="standard deviation at the object's centre, mm")
+    axes.set_aspect("equal")
+    axes.set(
+        title="Rays of virtual cameras, the zenith in the middle",
+        xlabel="degrees from the zenith, toward x",
+        ylabel="degrees from the zenith, toward y",
+    )
+    axes.grid(True, alpha=0.25)
+
+
+def draw_recovered(figure: "Figure", kinds: tuple[Kind, ...]) -> None:
+    """One panel a kind, and one of all errors in standard deviations; sets the figure's size."""
+    rows = -(-(len(kinds) + 1) // COLUMNS)
+    figure.set_size_inches(PANEL_INCHES * COLUMNS, PANEL_INCHES * rows)
+    panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    for axes, kind in zip(panels, kinds, strict=False):
+        _panel(axes, kind)
+    _distribution(panels[len(kinds)], kinds)
+    for axes in panels[len(kinds) + 1 :]:
+        axes.set_visible(False)
+
+
+def _panel(axes: "Axes", kind: Kind) -> None:
+    both = np.concatenate([kind.injected, kind.recovered])
+    low, high = float(both.min()), float(both.max())
+    axes.plot([low, high], [low, high], "k-", lw=0.6, alpha=0.6)
+    axes.errorbar(
+        kind.injected,
+        kind.recovered,
+        yerr=SIGMAS * kind.sigma,
+        fmt="C0o",
+        ecolor="C1",
+        ms=2,
+        elinewidth=0.8,
+        label=kind.name,
+    )
+    axes.set_title(_wrapped(f"{kind.name}, {kind.unit}"), fontsize=7)
+    axes.set_xlabel("injected", fontsize=7)
+    axes.set_ylabel("recovered", fontsize=7)
+    axes.tick_params(labelsize=6)
+    text = f"{len(kind.sigma)} figures\n{kind.within:.0%} within {SIGMAS:g} sigma"
+    axes.text(0.04, 0.96, text, transform=axes.transAxes, va="top", fontsize=6)
+    axes.grid(True, alpha=0.25)
+
+
+def _distribution(axes: "Axes", kinds: tuple[Kind, ...]) -> None:
+    """All errors in their standard deviations next to the normal law, each kind alike."""
+    off = np.concatenate([kind.sigmas_off for kind in kinds])
+    weight = np.concatenate([np.full(len(k.sigma), 1 / len(k.sigma)) for k in kinds])
+    edges = np.linspace(-PANEL_RANGE, PANEL_RANGE, PANEL_BINS + 1).tolist()
+    axes.hist(
+        np.clip(off, -PANEL_RANGE, PANEL_RANGE), edges, density=True, weights=weight, color="C0"
+    )
+    x = np.linspace(-PANEL_RANGE, PANEL_RANGE, 200)
+    axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), "k--", lw=1)
+    axes.set_xlabel("error, standard deviations", fontsize=7)
+    axes.set_ylabel("density", fontsize=7)
+    axes.set_title("errors over their deviations,\neach kind alike; normal law", fontsize=7)
+    axes.tick_params(labelsize=6)
+    axes.grid(True, alpha=0.25)
+
+
+def _wrapped(title: str) -> str:
+    if len(title) <= TITLE_LINE:
+        return title
+    middle = title.rfind(" ", 0, TITLE_LINE)
+    return f"{title[:middle]}\n{title[middle + 1 :]}"

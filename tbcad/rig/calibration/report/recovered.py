@@ -1,0 +1,264 @@
+"""Recovered errors of a simulated build next to those that were injected."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from tbcad.common.results.tables import Table
+from tbcad.core.geometry.rotations import rotated
+from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
+from tbcad.core.optics.reflection import reflected_rays
+from tbcad.rig.calibration.calibrate import MachineCalibration
+from tbcad.rig.calibration.estimate.covariance import Covariance
+from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
+from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.solve import Estimate
+from tbcad.rig.calibration.report.tables import angle_sigmas
+from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
+from tbcad.rig.machine.built import is_cap
+from tbcad.rig.machine.machine import Machine
+from tbcad.types import Bools, Floats, Ints
+
+MICROMETRES, MILLI = 1000.0, 1000.0
+SIGMAS = 2.0
+BESIDES = "centres besides a motion and growth of all"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Errors of one kind, over n figures."""
+
+    name: str  # what they are of
+    unit: str  # of all three
+    injected: Floats  # by which the build differs from the design, (n,)
+    recovered: Floats  # by which the calibrated machine does, (n,)
+    sigma: Floats  # standard deviation that the calibration gives, (n,)
+
+    @property
+    def sigmas_off(self) -> Floats:
+        """Errors of the calibration in its standard deviations, (n,)."""
+        return (self.recovered - self.injected) / self.sigma
+
+    @property
+    def within(self) -> float:
+        """Share within two standard deviations."""
+        return float((np.abs(self.sigmas_off) <= SIGMAS).mean())
+
+
+def recovered_errors(
+    result: MachineCalibration, known: Covariance, truth: Machine
+) -> tuple[Kind, ...]:
+    """Errors by kind, against the true machine with the same frames; none that are fixed."""
+    kinds = (*_of_spheres(result, known, truth), *_of_base(result, known, truth))
+    return tuple(
+        _free(kind) for kind in (*kinds, *_of_camera(result, known, truth)) if kind.sigma.any()
+    )
+
+
+def recovered_table(kinds: tuple[Kind, ...]) -> Table:
+    """All errors, one a row."""
+    columns: dict[str, ArrayLike] = {
+        "kind": [kind.name for kind in kinds for _ in kind.sigma],
+        "unit": [kind.unit for kind in kinds for _ in kind.sigma],
+    }
+    for name in ("injected", "recovered", "sigma", "sigmas_off"):
+        columns[name] = np.concatenate([getattr(kind, name) for kind in kinds])
+    return Table.of_columns("recovered", columns)
+
+
+def _free(kind: Kind) -> Kind:
+    free = kind.sigma > 0
+    return Kind(kind.name, kind.unit, kind.injected[free], kind.recovered[free], kind.sigma[free])
+
+
+def _kind(name: str, unit: str, factor: float, *values: Floats) -> Kind:
+    """Of values designed, true, estimated, and their deviations, in a unit by its factor."""
+    designed, true, found, sigma = (factor * np.asarray(one).ravel() for one in values)
+    return Kind(name, unit, true - designed, found - designed, sigma)
+
+
+def _of_spheres(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
+    """Centres, also besides a motion and growth of all of them, and radii of balls and of caps."""
+    designed, found = result.setup.designed, result.found.machine
+    slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
+    covariance = np.asarray(slopes @ known.times(slopes.T.toarray()))
+    sigma = np.sqrt(np.diag(covariance)).reshape(-1, 4)
+    of_centres = np.arange(sigma.size).reshape(-1, 4)[:, :3].ravel()
+    rest = _besides_motion(designed.centre)
+    besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
+    moved = [rest @ one.centre.ravel() for one in (designed, truth, found)]
+    caps = is_cap(result.setup.plan)
+    centres = [one.centre for one in (designed, truth, found)]
+    return [
+        _kind("centres", "um", MICROMETRES, *centres, sigma[:, :3]),
+        _kind(BESIDES, "um", MICROMETRES, *moved, np.sqrt(np.maximum(np.diag(besides), 0))),
+        *(
+            _radii(name, which, sigma, designed, truth, found)
+            for name, which in (("radii of balls", ~caps), ("radii of caps", caps))
+        ),
+    ]
+
+
+def _radii(name: str, which: Bools, sigma: Floats, *machines: Machine) -> Kind:
+    return _kind(name, "um", MICROMETRES, *(one.radius[which] for one in machines), sigma[which, 3])
+
+
+def _besides_motion(centre: Floats) -> Floats:
+    """Takes a shift, rotation and growth of all centres (k, 3) off their errors, (3 k, 3 k)."""
+    place = centre - centre.mean(axis=0)
+    turns = [np.cross(one, place).ravel() for one in np.eye(3)]
+    shifts = [np.broadcast_to(one, place.shape).ravel() for one in np.eye(3)]
+    basis, _ = np.linalg.qr(np.stack([*shifts, *turns, place.ravel()], axis=1))
+    return np.asarray(np.eye(place.size) - basis @ basis.T)
+
+
+def _of_base(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
+    """Angles, the axis's direction, and where the base is in each frame beside its rotation."""
+    designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
+    machines = designed, truth, found
+    angles = [np.degrees(one.angle) for one in machines]
+    tilts = [one.axis @ prior.across.T for one in machines]
+    places = [_base_places(one, prior.across) for one in machines]
+    return [
+        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_sigmas(prior, known))),
+        _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, Block.TILT)),
+        _kind("base in each frame", "um", MICROMETRES, *places, _place_sigmas(result, known)),
+    ]
+
+
+def _base_places(machine: Machine, across: Floats) -> Floats:
+    """Where the base's origin goes in each frame, across the axis, mm, (f, 2)."""
+    point = np.broadcast_to(machine.axis_point, (len(machine.angle), 3))
+    turned = rotated(point, machine.axis, machine.angle)
+    shift = 0.0 if machine.shift is None else machine.shift
+    return np.asarray((point - turned + shift) @ across.T)
+
+
+def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
+    """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
+    prior, angle = result.found.prior, result.found.machine.angle
+    frames = np.arange(len(angle))
+    turned = np.stack(
+        [
+            rotated(np.broadcast_to(one, (len(angle), 3)), prior.mean.axis, angle)
+            for one in prior.across
+        ],
+        axis=2,
+    )
+    by_point = np.eye(2) - prior.across @ turned
+    columns = (
+        prior.first[Block.AXIS_POINT] + np.arange(2),
+        prior.first[Block.RUNOUT] + 2 * frames[:, None] + np.arange(2),
+    )
+    values = (by_point, np.broadcast_to(np.eye(2), by_point.shape))
+    covariance = known.of(Slopes(columns, values).matrix(prior), 2)
+    return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
+
+
+def _of_camera(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
+    """The camera's place and direction, its lens in deviations of the process, and LEDs."""
+    designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
+    machines = designed, truth, found
+    turns = [_turn(designed, one) for one in machines]
+    lens = Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION
+    width = np.concatenate([prior.sigma[block] for block in lens])
+    unit = np.where(width > 0, width, 1.0)
+    lenses = [_lens(one) / unit for one in machines]
+    sigma = np.concatenate([_sigma(result, known, block) for block in lens]) / unit
+    places = [one.camera.pinhole for one in machines]
+    return [
+        _kind("camera's place", "um", MICROMETRES, *places, _sigma(result, known, Block.PINHOLE)),
+        _kind(
+            "camera's direction", "mrad", MILLI, *turns, _sigma(result, known, Block.CAMERA_TURN)
+        ),
+        _kind("lens", "deviations of the prior", 1.0, *lenses, sigma),
+        _kind(
+            "LEDs",
+            "um",
+            MICROMETRES,
+            *(m.leds for m in machines),
+            _sigma(result, known, Block.LEDS),
+        ),
+    ]
+
+
+def _turn(designed: Machine, machine: Machine) -> Floats:
+    """By which a camera is rotated about its own axes, radians, (3,)."""
+    turn = machine.camera.axes @ designed.camera.axes.T
+    return np.asarray(Rotation.from_matrix(turn).as_rotvec())
+
+
+def _lens(machine: Machine) -> Floats:
+    """As the parameters of a lens are: see Prior."""
+    camera = machine.camera
+    logarithm = np.log(camera.focal)
+    focal = [logarithm.mean(), logarithm[0] - logarithm[1]]
+    return np.concatenate([focal, camera.principal, camera.distortion])
+
+
+def _sigma(result: MachineCalibration, known: Covariance, block: str) -> Floats:
+    prior = result.found.prior
+    every = np.zeros(len(prior.flat_sigma))
+    every[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
+    first = prior.first[block]
+    return every[first : first + prior.sigma[block].size]
+
+
+@dataclass(frozen=True)
+class RayErrors:
+    """Errors of m rays that show the object's centre: place in mm, direction in radians."""
+
+    whole: Floats  # in the frame of the design, (m, 4)
+    relative: Floats  # besides the motion of all rays that fits them best, (m, 4)
+    in_run: Floats  # besides such a motion in each run, (m, 4)
+
+
+def place_mm(errors: Floats) -> Floats:
+    """Distances at the object's centre of errors (m, 4), mm, (m,)."""
+    return norm(errors[:, :2])
+
+
+def turn_mrad(errors: Floats) -> Floats:
+    """Angles of errors (m, 4), mrad, (m,)."""
+    return 1000 * norm(errors[:, 2:])
+
+
+def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> RayErrors:
+    """Errors of rays of spheres (m,) in frames (m,), through the pixels that show the centre."""
+    machine = found.machine
+    pixel = centre_pixels(machine, frame, sphere)
+    _, direction = traced(machine, pixel, frame, sphere)
+    start, true_direction = traced(truth, pixel, frame, sphere)
+    across = perpendicular_axes(direction)
+    away = at_plane(start, true_direction, direction), true_direction - direction
+    errors = np.concatenate([(across @ one[..., None])[..., 0] for one in away], axis=1).ravel()
+    besides = [
+        errors - motions @ (motion_fit(motions) @ errors)
+        for motions in shared_motions(found.prior, frame, direction)
+    ]
+    return RayErrors(*(one.reshape(-1, FIGURES) for one in (errors, *besides)))
+
+
+def traced(machine: Machine, pixel: Floats, frame: Ints, sphere: Ints) -> tuple[Floats, Floats]:
+    """Points (m, 3) on spheres, and unit directions (m, 3) after them, of rays through pixels."""
+    camera = machine.camera
+    ray = camera.directions(pixel)
+    centre, radius = machine.centres(frame, sphere), machine.radius[sphere]
+    offset = centre - camera.pinhole
+    along = dot(ray, offset)
+    inside = radius**2 - dot(offset, offset) + along**2
+    point = camera.pinhole + (along - np.sqrt(inside))[:, None] * ray
+    return point, reflected_rays(camera.pinhole, point, unit(point - centre))
+
+
+def centre_pixels(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
+    """Pixels (m, 2) that show the object's centre."""
+    lit = replace(machine, leds=np.zeros((1, 3)))
+    return lit.highlights(frame, sphere, np.zeros_like(frame))
+
+
+def at_plane(point: Floats, direction: Floats, normal: Floats) -> Floats:
+    """Where lines meet planes through the origin, (m, 3)."""
+    return np.asarray(point - (dot(point, normal) / dot(direction, normal))[:, None] * direction)

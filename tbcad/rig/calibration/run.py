@@ -1,0 +1,176 @@
+"""`tbcad calibrate`: from a run's folder to the folder of its calibration."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from tbcad.common.atomic_files import InFolder
+from tbcad.common.figure_files import PlotFormat
+from tbcad.errors import InputError
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.options.machines import CalibrateOptions
+from tbcad.output.folder import check_replaceable, replacing
+from tbcad.output.inputs import Source, files_named
+from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
+from tbcad.rig.calibration.detection.detect import detect
+from tbcad.rig.calibration.detection.expected import Room
+from tbcad.rig.calibration.intrinsics.files import read_lens
+from tbcad.rig.calibration.priors import parse_measured
+from tbcad.rig.calibration.report.files import write_calibration, write_recovered
+from tbcad.rig.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
+from tbcad.rig.machine.designed import dome_radius
+from tbcad.rig.machine.machine import Machine
+from tbcad.rig.machine.record import TRUTH, read_machine
+from tbcad.rig.runs.photographs import Run, check_same_export, read_run
+from tbcad.tolerancing.process.process import Process, load_process, process_errors
+
+DEFAULT_PROCESS = "fdm"
+"""A prototype is printed; its design does not say how."""
+SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
+READING, DETECTING, ESTIMATING, WRITING = (
+    "run and export",
+    "highlights in photographs",
+    "machine and its uncertainty",
+    "files",
+)
+
+
+@dataclass(frozen=True)
+class WrittenCalibration(InFolder):
+    """A calibration whose files are written."""
+
+    folder: Path
+    result: MachineCalibration
+    verdict: CalibrationVerdict
+    text: str
+    record: dict[str, Any]
+    others: tuple["WrittenCalibration", ...] = ()  # of a shell's other camera
+
+    def __fspath__(self) -> str:
+        return str(self.folder.parent if self.others else self.folder)
+
+    @property
+    def every(self) -> tuple["WrittenCalibration", ...]:
+        """This one and the others."""
+        return (self, *self.others)
+
+
+def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
+    """Calibrate the machines that took a run's photographs, and write all that is found.
+
+    A prototype's files are in `options.out`, those of a shell's cameras in its folders a and b.
+
+    Raises:
+        InputError: one cannot be read, they do not belong together, there is nothing to calibrate
+            from, or out cannot be replaced.
+    """
+    folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
+    progress, detail = options.progress, options.detail
+    progress(READING)
+    process = load_process(options.process or DEFAULT_PROCESS, options.settings)
+    run = read_run(folder)
+    check_same_export(run, exports)
+    machines = {name: run.of_frames(frames) for name, frames in run.record.machines.items()}
+    inputs = (folder, exports, options.intrinsics, *files_named(options.process))
+    for name in machines:
+        check_replaceable(out / name, "calibration", options.force, inputs)
+    export = read_export(exports)
+    setups = [_setup(one, export, options) for one in machines.values()]
+    truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
+    found = []
+    for one, setup in zip(machines.values(), setups, strict=True):
+        progress(DETECTING)
+        measured = parse_measured(tuple(options.measured), len(setup.plan))
+        prior = setup.prior(process_errors(process), measured)
+        detection = detect(one, prior, _room(setup), dome_radius(export), detail)
+        progress(ESTIMATING)
+        found.append(calibrate(setup, detection, prior, detail))
+    progress(WRITING)
+    first, *others = (
+        _written(
+            result,
+            truth,
+            out / name,
+            _basis(one, result.setup, options, process),
+            inputs,
+            options.force,
+            options.plot,
+        )
+        for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
+    )
+    return replace(first, others=tuple(others))
+
+
+def _setup(run: Run, export: ExportedDesign, options: CalibrateOptions) -> Setup:
+    record = run.record
+    lens = None if options.intrinsics is None else read_lens(Path(options.intrinsics))
+    size = record.width_px, record.height_px
+    return prepared_setup(export, record.frames, size, lens, record.geometry)
+
+
+def _written(
+    result: MachineCalibration,
+    truth: Machine | None,
+    out: Path,
+    basis: dict[str, Any],
+    inputs: Iterable[Source],
+    force: bool,
+    plot: PlotFormat,
+) -> WrittenCalibration:
+    judged = verdict(result)
+    with replacing(out, "calibration", force, inputs) as new:
+        record = write_calibration(new, result, judged, basis, plot)
+        texts = [] if truth is None else [write_recovered(new, result, truth, plot)]
+    text = "\n".join([verdict_text(result, judged), *texts])
+    return WrittenCalibration(out, result, judged, text, record)
+
+
+def _truth(run: Run, setup: Setup) -> Machine | None:
+    """The machine of a simulated run; None of a real one, and where its file was taken away."""
+    if run.record.geometry == "shell":
+        return None  # its calibration is in the frame of the shell, its truth in the design's
+    path = run.folder / TRUTH
+    if run.record.source != SIMULATED or not path.is_file():
+        return None
+    truth, frames = read_machine(path)
+    shapes = [(len(one.radius), len(one.leds)) for one in (truth, setup.designed)]
+    if frames != run.record.frames or shapes[0] != shapes[1]:
+        raise InputError(
+            f"{path} is of another run: simulate the run again, or remove the file, which only "
+            "serves to compare"
+        )
+    return truth
+
+
+def _room(setup: Setup) -> Room:
+    """What the design lets an object fill: a cylinder on the disc within the capture sphere."""
+    stage = setup.export.spec.prototype.stage
+    radius = stage.object_diameter_mm / 2
+    return Room(radius, stage.top_mm, math.sqrt((setup.export.capture_mm / 2) ** 2 - radius**2))
+
+
+def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) -> dict[str, Any]:
+    """What the calibration is based on, for its record."""
+    lens = "estimated" if options.intrinsics is None else str(options.intrinsics)
+    return {
+        "run": str(run.folder.resolve()),
+        "exports": str(setup.export.folder.resolve()),
+        "export_sha256": run.record.export_sha256,
+        "source": run.record.source,
+        "geometry": run.record.geometry,
+        "camera": run.record.camera,
+        "photographs": {
+            "expected": len(run.record.frames) * len(run.record.phases),
+            "usable": len(run.exposures),
+        },
+        "process": {
+            "name": process.name,
+            "title": process.title,
+            "given": options.process is not None,
+            "settings": list(options.settings),
+        },
+        "lens": lens,
+        "measured_radii": list(options.measured),
+    }

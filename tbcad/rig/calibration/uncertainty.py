@@ -1,0 +1,207 @@
+"""How well a calibrated machine knows its rays at the object.
+
+A pixel that shows the object's centre by a sphere stays where it is, and the machine's errors move
+the ray behind it. Light can go both ways: the ray is where a light is shown at that pixel. A light
+at x in the plane through the centre, square to the ray, is shown at h(x, state), so
+
+    dh/dx dx + dh/dstate dstate = 0
+
+gives how the ray moves in that plane. The same for a second plane gives how it turns. This needs no
+single centre of projection, which this camera does not have.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from tbcad.core.geometry.vectors import perpendicular_axes, unit
+from tbcad.core.optics.reflection import reflected_rays
+from tbcad.light.simulate.prototype.plan import HALF_TURN
+from tbcad.rig.calibration.estimate.covariance import Covariance, covariance
+from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images
+from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.calibration.estimate.reflection import reflections
+from tbcad.rig.calibration.estimate.solve import Estimate
+from tbcad.rig.machine.machine import Machine
+from tbcad.types import Floats, Ints
+
+SPHERE_MM = 30.0
+"""Radius within which rays are to be known: there a rotation counts as much as a shift."""
+FIGURES = 4  # of a ray: two of its place, two of its direction
+APART_MM = 10.0
+"""Of both planes: lines are straight, so any distance gives the same."""
+
+
+@dataclass(frozen=True)
+class RayCovariance:
+    """Of m rays, from the sphere to the object."""
+
+    # of the place in the plane through the object's centre along two directions, mm, and of the
+    # rotation toward these, radians, (m, 4, 4)
+    covariance: Floats
+
+    @property
+    def place_mm(self) -> Floats:
+        """Root mean square distance at the object's centre, mm, (m,)."""
+        return _root(self.covariance[:, :2, :2])
+
+    @property
+    def turn_mrad(self) -> Floats:
+        """Root mean square angle between the ray and the true one, mrad, (m,)."""
+        return 1000 * _root(self.covariance[:, 2:, 2:])
+
+
+@dataclass(frozen=True)
+class RayUncertainty:
+    """Of the rays that show the object's centre, over m of them."""
+
+    frame: Ints  # in which each is photographed, (m,)
+    sphere: Ints  # that shows it, (m,)
+    direction: Floats  # unit vectors from the sphere toward the object, (m, 3)
+    whole: RayCovariance  # in the frame of the design
+    relative: RayCovariance  # besides what a motion of the whole machine would do
+    # besides a motion of its own in each run: what the rays of one run know of each other, wherever
+    # the axis of the object's half turn is
+    in_run: RayCovariance
+    pixel_mm: Floats  # width of a pixel of the photograph at the object's centre, mm, (m,)
+
+
+def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:
+    """Covariance of an estimate's rays by spheres (m,) in frames (m,)."""
+    known = covariance(found.prior, found.information)
+    return known_rays(found.prior, found.values, known, frame, sphere)
+
+
+def known_rays(
+    prior: Prior, values: Floats, known: Covariance, frame: Ints, sphere: Ints
+) -> RayUncertainty:
+    """Covariance of rays (m,) of a machine whose free parameters (q,) have a covariance."""
+    slopes, direction = ray_slopes(prior, values, frame, sphere)
+    of_all, of_each = shared_motions(prior, frame, direction)
+    every = known.of(slopes, FIGURES)
+    return RayUncertainty(
+        frame=frame,
+        sphere=sphere,
+        direction=direction,
+        whole=RayCovariance(every),
+        relative=RayCovariance(besides_motions(known, slopes, of_all, every)),
+        in_run=RayCovariance(besides_motions(known, slopes, of_each, every)),
+        pixel_mm=pixel_widths(prior, values, frame, sphere),
+    )
+
+
+def besides_motions(
+    known: Covariance, slopes: csr_array, motions: Floats, covariance: Floats
+) -> Floats:
+    """Covariance (m, 4, 4) of rays less the motion that fits all of them best.
+
+    A machine that is shifted and rotated as a whole, with its object, gives the same light field.
+    With S the rays' derivatives, M the motions and F what fits them to S, this is the covariance by
+    S - M F, without a matrix as large as that.
+
+    Args:
+        known: covariance of the parameters, (q, q).
+        slopes: derivatives of the rays, (4 m, q).
+        motions: what each motion does to the rays, (4 m, c).
+        covariance: of the rays with their motion, (m, 4, 4).
+    """
+    fitted = motion_fit(motions) @ slopes
+    spread = known.times(fitted.T)
+    by_ray = motions.reshape(len(covariance), FIGURES, -1)
+    across = by_ray.swapaxes(1, 2)
+    shared = (slopes @ spread).reshape(by_ray.shape) @ across
+    own = by_ray @ (fitted @ spread) @ across
+    return np.asarray(covariance - shared - shared.swapaxes(1, 2) + own)
+
+
+def motion_fit(motions: Floats) -> Floats:
+    """What tells the motion (c,) that fits n errors of rays (4 m,) best, (c, 4 m).
+
+    A rotation counts by what it does at the edge of the object's room.
+    """
+    weight = np.tile([1.0, 1.0, SPHERE_MM**2, SPHERE_MM**2], len(motions) // FIGURES)
+    weighted = (weight[:, None] * motions).T
+    return np.asarray(np.linalg.pinv(weighted @ motions) @ weighted)
+
+
+def shared_motions(prior: Prior, frame: Ints, direction: Floats) -> tuple[Floats, Floats]:
+    """Motions of the object to rays in frames (m,) of directions (m, 3): (4 m, 6) and (4 m, 12).
+
+    First of both runs together, the object turned between them; then of each run by itself.
+    """
+    turned = prior.series[frame] > 0
+    motions = rigid_motions(direction, np.where(turned[:, None], HALF_TURN, np.ones(3)))
+    of_run = np.repeat(np.stack([~turned, turned], axis=1), FIGURES, axis=0)
+    return motions, np.concatenate([motions * of_run[:, [run]] for run in (0, 1)], axis=1)
+
+
+def rigid_motions(direction: Floats, flip: Floats) -> Floats:
+    """Rays through the origin under shifts (mm) and rotations (rad) of the object, (4 m, 6).
+
+    Args:
+        direction: of the rays in the frame of the machine, (m, 3).
+        flip: factors that turn vectors from there into the frame of the object, (m, 3): the object
+            is turned by half a turn in the second series, and the machine is not.
+    """
+    across = perpendicular_axes(direction)
+    result = np.zeros((len(direction), 4, 6))
+    result[:, :2, :3] = across * flip[:, None]
+    result[:, 2:, 3:] = np.cross(direction[:, None], across) * flip[:, None]
+    return result.reshape(-1, 6)
+
+
+def pixel_widths(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> Floats:
+    """Root of the area that a pixel sees at the object's centre, square to its ray, mm, (m,)."""
+    machine = prior.machine(values)
+    across = perpendicular_axes(ray_directions(machine, frame, sphere))
+    light = np.zeros((len(frame), 3))
+    image = light_images(prior, values, machine, frame, sphere, light)
+    area = np.abs(np.linalg.det(image.by_light @ across.swapaxes(1, 2)))
+    return np.asarray(area**-0.5)
+
+
+def ray_slopes(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> tuple[csr_array, Floats]:
+    """Derivatives of rays by a machine's parameters, and their directions.
+
+    Returns:
+        Rows by ray: place along two directions, mm, rotation toward them, radians, (4 m, q).
+        Then unit vectors toward the object, (m, 3).
+    """
+    machine = prior.machine(values)
+    direction = ray_directions(machine, frame, sphere)
+    across = perpendicular_axes(direction)
+    near, far = (
+        _moved(prior, values, machine, (frame, sphere), distance * direction, across)
+        for distance in (0.0, APART_MM)
+    )
+    turns = [(b - a) / APART_MM for a, b in zip(near.values, far.values, strict=True)]
+    both = [np.concatenate(pair, axis=1) for pair in zip(near.values, turns, strict=True)]
+    return Slopes(near.columns, tuple(both)).matrix(prior), direction
+
+
+def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
+    """Unit vectors (m, 3) of the rays from spheres in frames to the object's centre."""
+    centre, radius = machine.centres(frame, sphere), machine.radius[sphere]
+    pinhole = machine.camera.pinhole
+    point = reflections(centre, radius, np.zeros_like(centre), pinhole).point
+    return reflected_rays(pinhole, point, unit(point - centre))
+
+
+def _moved(
+    prior: Prior,
+    values: Floats,
+    machine: Machine,
+    ray: tuple[Ints, Ints],
+    light: Floats,
+    across: Floats,
+) -> Slopes:
+    """How the rays move in the planes through lights (m, 3) on them, along across (m, 2, 3)."""
+    image = light_images(prior, values, machine, *ray, light)
+    by_place = image.by_light @ across.swapaxes(1, 2)
+    moved = [np.asarray(-np.linalg.solve(by_place, value)) for value in image.slopes.values]
+    return replace(image.slopes, values=tuple(moved))
+
+
+def _root(covariance_of_two: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.trace(covariance_of_two, axis1=1, axis2=2)))

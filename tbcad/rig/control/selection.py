@@ -1,0 +1,165 @@
+"""Which stops and phases of a plan are photographed, and in which order."""
+
+import re
+import shutil
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+
+from tbcad.errors import InputError
+from tbcad.records.exposure import DARK_LIT, Frame, PhaseTimes
+from tbcad.records.prototype_drive import Phase
+from tbcad.rig.control.base import travel_s
+from tbcad.rig.control.plan import ControlPlan
+
+_RANGE = re.compile(r"(\d+)(?:-(\d+))?$")
+RUNS = {"a": (0,), "b": (180,), "ab": (0, 180)}
+"""Whether one stop is looked at before a run, and whether the run follows."""
+SIDECAR_BYTES = 8_192  # with the journal's line, as a disk's blocks count them
+SPARE = 1.1  # of disk: a lit object takes more bytes than the dark
+LEAST_BYTES_PER_PX = 0.3  # of a lit object as a JPEG: the first photograph may be a dark one
+CAPTURE_S = 2.0  # of a camera that is not yet known, beyond its exposure
+BYTES_PER_PX = 1.0  # likewise: a large JPEG; dark photographs take less
+WRITE_S = 0.03  # a photograph to the disk
+MINUTE, HOUR = 60, 3600
+
+
+@dataclass(frozen=True)
+class RunSelection:
+    """What is photographed, and how."""
+
+    frames: tuple[Frame, ...]  # positions in order
+    phases: tuple[Phase, ...]  # lights at each, in order
+    size_px: tuple[int, int]  # columns and rows that photographs must have
+    # of exposure, as far as the camera is told them
+    times: PhaseTimes = field(default_factory=PhaseTimes)
+
+    @property
+    def capture_times(self) -> dict[str, float | None]:
+        """Exposure time of each phase, s; None: that which the camera has."""
+        return {phase.name: self.times.of(phase.name) for phase in self.phases}
+
+
+def chosen_phases(
+    plan: ControlPlan, text: str | None, times: PhaseTimes | None = None
+) -> tuple[Phase, ...]:
+    """Phases by names with commas between, in the plan's order; `leds` for all LEDs, None for all.
+
+    The dark one that exposure times ask for is added.
+    """
+    known = [phase.name for phase in plan.phases]
+    named = known if text is None else [name.strip() for name in text.split(",")]
+    if "leds" in named:
+        named += [name for name in known if name.startswith("led_")]
+    wrong = [name for name in named if name not in (*known, "leds")]
+    if wrong:
+        raise InputError(
+            f"--phases names {wrong[0]!r:.40}, this export has {', '.join(known)}: name some of "
+            "these, or leds for all LEDs"
+        )
+    chosen = {phase.name: phase for phase in plan.phases if phase.name in named}
+    dark = Phase(name=DARK_LIT, output=None)
+    return tuple(chosen.get(name, dark) for name in (times or PhaseTimes()).phases(tuple(chosen)))
+
+
+def chosen_frames(plan: ControlPlan, stops: str | None, runs: str) -> tuple[Frame, ...]:
+    """Frames of runs "a", "b" or "ab", at all stops or some, such as "1-10,40"."""
+    if runs not in RUNS:
+        raise InputError(f"--runs is {runs!r:.20}, allowed is a, b or ab: change it")
+    last = len(plan.program.stops)
+    wanted = set(range(1, last + 1)) if stops is None else set(_numbers(stops, last))
+    return tuple(
+        frame
+        for frame in plan.frames
+        if frame.stop in wanted and frame.object_turn_deg in RUNS[runs]
+    )
+
+
+def _numbers(text: str, last: int) -> Iterable[int]:
+    for part in text.split(","):
+        match = _RANGE.match(part.strip())
+        first, end = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+        if not 1 <= first <= end <= last:
+            raise InputError(
+                f"--stops names {part!r:.40}, allowed are 1 to {last}, such as 1-10,40: change it"
+            )
+        yield from range(first, end + 1)
+
+
+@dataclass(frozen=True)
+class Shots:
+    """Photographs that are still to be taken at one position."""
+
+    frame: Frame
+    phases: tuple[str, ...]  # names of their lights, in order
+
+    @property
+    def title(self) -> str:
+        """The position in words."""
+        run = "b" if self.frame.object_turn_deg else "a"
+        return f"run {run}, stop {self.frame.stop} at {self.frame.base_angle_deg:.1f} degrees"
+
+
+def expected_seconds(
+    plan: ControlPlan, remaining: Iterable[Shots], capture_s: float
+) -> dict[str, float]:
+    """Expected duration of each position, s, by its title."""
+    each = plan.motion.light_s + capture_s + WRITE_S
+    return {
+        shots.title: travel + plan.motion.settle_s + len(shots.phases) * each
+        for shots, travel in _with_travel(plan, remaining)
+    }
+
+
+def _with_travel(plan: ControlPlan, remaining: Iterable[Shots]) -> Iterator[tuple[Shots, float]]:
+    for _, run in groupby(remaining, lambda shots: shots.frame.object_turn_deg):
+        at = plan.program.start.angle_deg
+        for shots in run:
+            angle = shots.frame.base_angle_deg
+            yield shots, travel_s(abs(angle - at), plan)
+            at = angle
+
+
+def count(remaining: Iterable[Shots]) -> int:
+    """Number of photographs."""
+    return sum(len(shots.phases) for shots in remaining)
+
+
+def disk_bytes(photographs: int, each: float) -> int:
+    """Room that photographs need on the disk."""
+    return round(photographs * (SPARE * each + SIDECAR_BYTES))
+
+
+def bytes_each(first: int, width_px: int, height_px: int) -> float:
+    """Size of a photograph by that of the first."""
+    return max(float(first), LEAST_BYTES_PER_PX * width_px * height_px)
+
+
+def free_bytes(folder: Path) -> int:
+    """Free room where a folder is or will be."""
+    absolute = folder.absolute()
+    existing = next(path for path in (absolute, *absolute.parents) if path.exists())
+    return shutil.disk_usage(existing).free
+
+
+def check_disk(folder: Path, needed: int) -> None:
+    """Refuse a disk with too little room."""
+    if (free := free_bytes(folder)) < needed:
+        raise InputError(
+            f"{folder}: the photographs need about {size_text(needed)}, {size_text(free)} are "
+            "free: make room, or name a folder on another disk"
+        )
+
+
+def duration_text(seconds: float) -> str:
+    """A duration in hours and minutes, or in seconds if it is short."""
+    if seconds < MINUTE:
+        return f"{seconds:.0f} s"
+    hours, minutes = divmod(round(seconds / MINUTE), HOUR // MINUTE)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+def size_text(size: float) -> str:
+    """A number of bytes in MB or GB."""
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"

@@ -1,0 +1,268 @@
+"""A run from its start, or from where it stopped, to its end."""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, suppress
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+
+from tbcad.errors import InputError
+from tbcad.options.runs import Ask, Preflight, Show
+from tbcad.records.exposure import Frame, exposure_name
+from tbcad.rig.control.cameras.camera import RunCamera, Shot
+from tbcad.rig.control.machine import CameraFault, DrivenMachine, MachineFault
+from tbcad.rig.control.outcome import Outcome
+from tbcad.rig.control.plan import ControlPlan
+from tbcad.rig.control.selection import (
+    RunSelection,
+    Shots,
+    bytes_each,
+    check_disk,
+    count,
+    disk_bytes,
+    duration_text,
+    expected_seconds,
+    size_text,
+)
+from tbcad.rig.control.shooting import (
+    Photograph,
+    check_like_record,
+    exposure_of,
+    light_on,
+    run_record,
+    taken_twice,
+)
+from tbcad.rig.runs.writing import DiskFault, RunWriter, new_run, resumed_run
+from tbcad.types import Progress
+
+MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph
+STRAIGHT, TURNED = "object straight", "object turned by 180 degrees about z"
+
+
+class Session:
+    """One machine and one run."""
+
+    def __init__(
+        self, plan: ControlPlan, options: RunSelection, base: DrivenMachine, camera: RunCamera
+    ) -> None:
+        """Run with a machine and a camera that are connected."""
+        self._plan, self._options = plan, options
+        self._base, self._camera = base, camera
+        self._missed: dict[str, str] = {}
+        self._homed = False
+        self._expected: dict[str, float] = {}
+        self._note: Progress = lambda _: None
+        self._in_row = 0
+        self._writer: RunWriter
+
+    def begin(
+        self,
+        folder: Path,
+        ask: Ask,
+        note: Progress,
+        *,
+        resume: bool,
+        look: Preflight = "off",
+    ) -> None:
+        """Take a photograph with each exposure to know the camera, and begin or resume the folder.
+
+        A new run begins with a preflight, unless `look` is "off"; nothing is written if it is
+        "only". A camera on the controller's relay is released when the base is homed, not before.
+
+        Raises:
+            InputError: camera, disk, folder or exposure will not do; nothing was photographed.
+            MachineFault: the machine does not do what it is told.
+        """
+        self._note = note
+        if resume:
+            note("the photographs that are there are compared with their sha256")
+            self._writer = resumed_run(folder)
+            if not self._remaining():
+                return
+        remaining = self._remaining() if resume else self._all()
+        if self._camera.released:
+            self._get_known_angle(_turned(remaining), ask)
+        trials = self._trials()
+        if resume:
+            self._check_same_run(folder, trials)
+        trial = max(trials.values(), key=lambda one: len(one.shot.data))
+        if look != "off" and not resume:
+            self._preflight(trial, remaining, ask)
+            if look == "only":
+                return
+        each_s = sum(one.seconds for one in trials.values()) / len(trials)
+        self._expected = expected_seconds(self._plan, remaining, each_s + self._base.switch_s)
+        seconds = sum(self._expected.values())
+        facts = trial.facts
+        each = bytes_each(len(trial.shot.data), facts.width_px, facts.height_px)
+        needed = disk_bytes(count(remaining), each)
+        check_disk(folder, needed)
+        if not resume:
+            self._writer = new_run(folder, run_record(self._plan, self._options, trials, seconds))
+        self._writer.log("resumed" if resume else "started", camera=trial.model)
+        note(
+            f"{count(remaining)} photographs at {len(remaining)} positions take about "
+            f"{duration_text(seconds)} and {size_text(needed)} of disk"
+        )
+
+    def _trials(self) -> dict[str, Photograph]:
+        """A photograph for each phase that is not kept; one for all with the same exposure."""
+        times = self._options.capture_times
+        first = {seconds: self._trial(seconds) for seconds in dict.fromkeys(times.values())}
+        return {name: first[seconds] for name, seconds in times.items()}
+
+    def _trial(self, seconds: float | None) -> Photograph:
+        try:
+            trial = taken_twice(self._camera, self._base, seconds, lambda _: None)
+        except CameraFault as fault:
+            raise InputError(f"the camera: {fault}") from None
+        size = trial.facts.width_px, trial.facts.height_px
+        if size != self._options.size_px:
+            want = self._options.size_px
+            raise InputError(
+                f"the camera gives {size[0]} x {size[1]} pixels, {want[0]} x {want[1]} are wanted: "
+                f"set its image size, or say --size {size[0]}x{size[1]}"
+            )
+        return trial
+
+    def _preflight(self, trial: Photograph, remaining: list[Shots], ask: Ask) -> None:
+        """Look at the middle stop of the first run under each light; nothing is kept."""
+        from tbcad.rig.control.preflight import preflight  # numerical libraries, for this alone
+
+        if not self._homed:
+            self._get_known_angle(_turned(remaining), ask)
+        first = [one for one in remaining if _turned([one]) == _turned(remaining)]
+        shots = first[len(first) // 2]
+        self._base.drive(self._plan.program.start)
+        self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
+        where = f"{trial.model}, {shots.title}"
+        preflight(self._options.capture_times, self._looked_at, where, self._note)
+
+    def _looked_at(self, phase: str, seconds: float | None) -> Shot:
+        try:
+            with self._light(phase):
+                return taken_twice(self._camera, self._base, seconds, lambda _: None).shot
+        except CameraFault as fault:
+            raise InputError(f"the camera: {fault}") from None
+
+    def _light(self, phase: str) -> AbstractContextManager[None]:
+        lights = {one.name: one for one in self._options.phases}
+        return light_on(self._base, lights[phase], self._plan.motion.light_s)
+
+    def _check_same_run(self, folder: Path, trials: dict[str, Photograph]) -> None:
+        try:
+            for phase, trial in trials.items():
+                check_like_record(self._writer.record, phase, trial)
+        except CameraFault as fault:
+            raise InputError(f"{folder}: {fault}: set the camera as it was") from None
+
+    def _all(self) -> list[Shots]:
+        names = tuple(phase.name for phase in self._options.phases)
+        return [Shots(frame, names) for frame in self._options.frames]
+
+    def _remaining(self) -> list[Shots]:
+        """What is not yet there, in the order of photographing."""
+        taken = self._writer.taken
+        left = [
+            Shots(
+                one.frame,
+                tuple(name for name in one.phases if exposure_name(one.frame, name) not in taken),
+            )
+            for one in self._all()
+        ]
+        return [one for one in left if one.phases]
+
+    def photograph(self, ask: Ask, show: Show) -> None:
+        """Home, and photograph what remains.
+
+        Raises:
+            MachineFault: the machine cannot go on, or the operator will not.
+            DiskFault: the disk cannot.
+        """
+        for number, (turned, run) in enumerate(self._runs()):
+            if number:
+                self._base.drive(self._plan.program.start)
+                _have_done(ask, self._plan.program.turn)
+            elif not self._homed:
+                self._get_known_angle(turned, ask)
+            with show({one.title: self._expected[one.title] for one in run}) as screen:
+                self._base.drive(self._plan.program.start)
+                for shots in run:
+                    screen.stage(shots.title)
+                    self._position(shots, screen.note)
+        if self._expected:
+            self._base.drive(self._plan.program.end)
+
+    def _runs(self) -> Iterator[tuple[bool, list[Shots]]]:
+        for turn, run in groupby(self._remaining(), lambda one: one.frame.object_turn_deg):
+            yield bool(turn), list(run)
+
+    def _get_known_angle(self, turned: bool, ask: Ask) -> None:
+        """Have the operator prepare the machine, and home."""
+        ready = self._plan.program.ready
+        _have_done(ask, ready.replace(STRAIGHT, TURNED) if turned else ready)
+        self._note("homing" if self._plan.program.homes else "angle zero as the pin has it")
+        self._base.home()
+        self._homed = True
+
+    def _position(self, shots: Shots, note: Progress) -> None:
+        self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
+        for name in shots.phases:
+            with self._light(name):
+                self._one(shots.frame, name, note)
+
+    def _one(self, frame: Frame, phase: str, note: Progress) -> None:
+        """One photograph, or why there is none."""
+        name = exposure_name(frame, phase)
+        check = partial(check_like_record, self._writer.record, phase)
+        try:
+            seconds = self._options.times.of(phase)
+            photograph = taken_twice(self._camera, self._base, seconds, check)
+        except CameraFault as fault:
+            self._missed[name] = str(fault)
+            self._writer.log("missed", name=name, reason=str(fault))
+            note(f"{name} is missing: {fault}")
+            self._in_row += 1
+            if self._in_row >= MOST_MISSED:
+                raise MachineFault(
+                    f"{MOST_MISSED} photographs in a row are missing: {fault}"
+                ) from None
+        else:
+            self._writer.add(exposure_of(photograph, frame, phase), photograph.shot.data)
+            self._in_row = 0
+
+    def finish(self, stopped: str, seconds: float, before: int) -> Outcome:
+        """Hold the base, switch lights off, close the journal."""
+        unsafe = self._base.secure()
+        writer = self._writer
+        with suppress(DiskFault):
+            writer.log("stopped" if stopped else "finished", reason=stopped)
+        return Outcome(
+            folder=writer.folder,
+            wanted=len(writer.record.frames) * len(writer.record.phases),
+            taken=len(writer.taken),
+            new=len(writer.taken) - before,
+            missed=self._missed,
+            stopped=stopped,
+            unsafe=unsafe,
+            seconds=seconds,
+        )
+
+    @property
+    def taken(self) -> int:
+        """Number of photographs that are there."""
+        return len(self._writer.taken)
+
+
+def _turned(remaining: list[Shots]) -> bool:
+    return bool(remaining and remaining[0].frame.object_turn_deg)
+
+
+def _have_done(ask: Ask, text: str) -> None:
+    """Ask for what a pause of the program says.
+
+    Raises:
+        MachineFault: the operator will not.
+    """
+    if not ask(text.removesuffix("? Then resume").removesuffix(", then resume")):
+        raise MachineFault("the operator did not go on")

@@ -1,0 +1,192 @@
+"""A run's photographs, ready to be merged into the light field of the machine that took them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand
+from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
+from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.rays import meets_sphere
+from tbcad.options.machines import MergeOptions
+from tbcad.records.exposure import LIT, Frame
+from tbcad.rig.machine.machine import Machine
+from tbcad.rig.machine.photographed import TURNS, machine_run, stops_known
+from tbcad.rig.machine.record import RECORD, read_machine
+from tbcad.rig.machine.shells import NOT_SERVED, plan_of, tied
+from tbcad.rig.merged_run.ray_sigmas import ray_sigmas
+from tbcad.rig.merged_run.stop_photographs import (
+    CorrectedPhotographs,
+    Corrections,
+    common_exposure,
+    corrections,
+)
+from tbcad.rig.runs.photographs import Run, check_same_export, read_run
+from tbcad.types import Bools, Floats, Ints, Progress
+
+
+@dataclass(frozen=True)
+class HalfMerge:
+    """One run of the base, for one camera of the shell."""
+
+    run: PrototypeRun  # where camera and balls are
+    photographs: CorrectedPhotographs
+    pixels: Ints  # of each mirror with a ray, filled in as the merge goes on, (m,)
+
+    @property
+    def camera_id(self) -> str:
+        """Camera of the shell whose picture is merged."""
+        return self.run.reflector.camera_id
+
+    def bands(self, capture_mm: float, progress: Progress) -> Iterator[RowBand]:
+        """Bands of the merged picture; what they lack is known when all were given."""
+        in_front = partial(_shows_object, self.run.camera.pinhole, capture_mm / 2)
+        plan = merge_plan(self.run, capture_mm / 2, in_front, self._direct_stop())
+        for band in merge_photographs(plan, self.photographs, progress):
+            mirror = band.rays.mirror.ravel()
+            self.pixels[:] += np.bincount(mirror, minlength=len(self.pixels) + 1)[1:]
+            yield band
+
+    def missing_mirrors(self) -> dict[str, list[int]]:
+        """Numbers of the mirrors without rays, from 1, by the reason."""
+        reasons: dict[str, list[int]] = {}
+        for mirror in np.flatnonzero(self.pixels == 0).tolist():
+            reason = self.photographs.missing.get(int(self.run.stop[mirror]), "no ray by its ball")
+            reasons.setdefault(reason, []).append(mirror + 1)
+        return reasons
+
+    def _direct_stop(self) -> int:
+        """The first stop with a photograph, which also shows what is on no mirror."""
+        frames = self.photographs.frames
+        return next((stop for stop, frame in enumerate(frames) if frame is not None), 0)
+
+
+@dataclass(frozen=True)
+class Merge:
+    """Both runs of a folder, or the one that was photographed."""
+
+    halves: tuple[HalfMerge, ...]  # for each camera of the shell that photographs were taken for
+    capture_mm: float  # diameter of the capture sphere
+    facts: dict[str, Any]
+    # root mean square error of the rays of each mirror at the object, by camera; None where the
+    # calibration does not say
+    ray_sigma_mm: dict[str, list[float | None]]
+
+    def cameras(self, progress: Progress) -> CameraPhotographs:
+        """Each camera with what gives the bands of its picture."""
+        return [
+            (ball_reflector(half.run), partial(half.bands, self.capture_mm, progress))
+            for half in self.halves
+        ]
+
+
+def prepared_merge(folder: Path, calibration: Path, exports: Path, options: MergeOptions) -> Merge:
+    """Read what a merge needs, but the photographs themselves.
+
+    Raises:
+        InputError: one cannot be read, they do not belong together, or nothing was photographed.
+    """
+    run, export = read_run(folder), read_export(exports)
+    check_same_export(run, exports)
+    parts = run.record.machines
+    read = [read_machine(calibration / name / RECORD) for name in parts]
+    machines = [
+        _halves(run.of_frames(frames), export, calibration, (machine, known), options)
+        for frames, machine, (_, known) in zip(parts.values(), tied(read), read, strict=True)
+    ]
+    halves = tuple(half for one in machines for half in one if _photographed(half))
+    if not halves:
+        raise InputError(
+            f"{folder} has no photograph of the lit object at a stop that {calibration} knows: "
+            "photograph the object with tbcad run"
+        )
+    mirrors = {half.camera_id: len(half.pixels) for half in halves}
+    sigmas = ray_sigmas((calibration / name for name in parts), mirrors, export.capture_mm)
+    return Merge(halves, export.capture_mm, _facts(export, run, calibration, options), sigmas)
+
+
+def _halves(
+    run: Run,
+    export: ExportedDesign,
+    calibration: Path,
+    calibrated: tuple[Machine, tuple[Frame, ...]],
+    options: MergeOptions,
+) -> list[HalfMerge]:
+    """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
+    machine, frames = calibrated
+    _check_size(run, machine, calibration)
+    plan = plan_of(export, run.record.geometry, run.record.frames)
+    corrected = corrections(options, machine.camera)
+    known = stops_known(plan, frames)
+    return [
+        _half(run, plan, known, corrected, half, machine_run(export, plan, machine, frames, half))
+        for half in range(len(TURNS))
+        if (plan.ball[half] != NOT_SERVED).all()
+    ]
+
+
+def _half(
+    run: Run, plan: Plan, known: Bools, corrected: Corrections, half: int, placed: PrototypeRun
+) -> HalfMerge:
+    of_stop = {
+        frame.stop - 1: frame
+        for frame in run.record.frames
+        if frame.object_turn_deg == TURNS[half] and frame.stop <= len(plan.angle)
+    }
+    frames: list[Frame | None] = []
+    missing: dict[int, str] = {}
+    for stop in range(len(plan.angle)):
+        frames.append(of_stop.get(stop) if known[half, stop] else None)
+        if stop not in of_stop:
+            missing[stop] = "the run leaves this stop out"
+    photographs = CorrectedPhotographs(run, tuple(frames), corrected, common_exposure(run), missing)
+    return HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64))
+
+
+def _photographed(half: HalfMerge) -> bool:
+    run, frames = half.photographs.run, half.photographs.frames
+    return any(frame is not None and run.exposure(frame, LIT) is not None for frame in frames)
+
+
+def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
+    record, camera = run.record, machine.camera
+    if (record.width_px, record.height_px) != (camera.width_px, camera.height_px):
+        raise InputError(
+            f"{run.folder} has photographs of {record.width_px} x {record.height_px} pixels, the "
+            f"camera of {calibration} {camera.width_px} x {camera.height_px}: calibrate with this "
+            "run's camera"
+        )
+
+
+def _facts(
+    export: ExportedDesign, run: Run, calibration: Path, options: MergeOptions
+) -> dict[str, Any]:
+    return {
+        "object": f"photographs of {run.folder.name}",
+        "design": export.spec.name,
+        "n": export.spec.optics.n,
+        "geometry": f"photographed {run.record.geometry}",
+        "run": str(run.folder),
+        "source": run.record.source,
+        "camera": run.record.camera,
+        "calibration": str(calibration),
+        "vignetting": "flat field" if options.flat else options.vignetting,
+        "encoding": options.encoding,
+        "brightness": options.brightness,
+    }
+
+
+def _shows_object(
+    pinhole: Floats, radius: float, mirror: Ints, direction: Floats, distance: Floats
+) -> Bools:
+    """Where rays (n, 3) on no mirror meet the capture sphere: in front of mirrors it never is."""
+    del distance
+    origin = np.broadcast_to(pinhole, direction.shape).copy()
+    return np.asarray((mirror == 0) & meets_sphere(origin, direction, radius))

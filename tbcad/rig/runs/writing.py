@@ -1,0 +1,204 @@
+"""A run's folder as it is written: each photograph safe on disk before the next is taken.
+
+A photograph counts when its sidecar is there and fits it. The image takes its name first, the
+sidecar second, the journal's line last; each is on the disk before the next step. So whatever ends
+a run leaves photographs that count, and at most one that is taken again.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tbcad.cad.formats.checked_files import parse_json
+from tbcad.cad.formats.images.pictures import PICTURE_SUFFIXES
+from tbcad.errors import InputError
+from tbcad.records.exposure import PHOTOGRAPHS, Exposure, exposure_name
+from tbcad.records.run import JOURNAL, RECORD, RunRecord, read_record
+from tbcad.rig.runs.photographs import read_run
+
+PARTIAL = ".tbcad-"  # begin of the names of files that are not complete
+TAKEN = "taken"
+
+
+class DiskFault(Exception):
+    """A file of the run cannot be written; what was written before is safe."""
+
+
+class RunWriter:
+    """Adds photographs to a run's folder.
+
+    Attributes:
+        folder: of the run.
+        record: what is to be photographed.
+        taken: names of the photographs that count.
+    """
+
+    def __init__(self, folder: Path, record: RunRecord, taken: set[str]) -> None:
+        """Write to a folder that `new_run` or `resumed_run` prepared."""
+        self.folder, self.record, self.taken = folder, record, taken
+
+    def add(self, exposure: Exposure, data: bytes) -> None:
+        """Write a photograph with its sidecar, and its line in the journal.
+
+        Raises:
+            DiskFault: the disk is full, or fails; the photograph does not count then.
+        """
+        photographs = self.folder / PHOTOGRAPHS
+        name = exposure_name(exposure.frame, exposure.phase)
+        with _disk_faults(self.folder):
+            photographs.mkdir(exist_ok=True)
+            write_safely(photographs / exposure.file, data)
+            write_safely(photographs / f"{name}.json", exposure.text().encode())
+        self.log(TAKEN, name=name)
+        self.taken.add(name)
+
+    def log(self, event: str, **facts: Any) -> None:
+        """Add a line to the journal.
+
+        Raises:
+            DiskFault: the disk is full, or fails.
+        """
+        line = json.dumps({"time": datetime.now(UTC).isoformat(), "event": event} | facts)
+        with _disk_faults(self.folder), (self.folder / JOURNAL).open("ab") as file:
+            file.write(line.encode() + b"\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def check_new(folder: Path) -> None:
+    """Refuse a folder that holds anything.
+
+    Raises:
+        InputError: it does.
+    """
+    if folder.is_dir() and all(path.name.startswith(PARTIAL) for path in folder.iterdir()):
+        return
+    if (folder / RECORD).is_file():
+        raise InputError(f"{folder} holds a run: go on with it by --resume, or name another folder")
+    if folder.exists():
+        raise InputError(f"{folder} is not empty: name a new folder")
+
+
+def new_run(folder: Path, record: RunRecord) -> RunWriter:
+    """Begin a run in a folder that is new or empty.
+
+    Raises:
+        InputError: it is neither, or cannot be written.
+    """
+    check_new(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_safely(folder / RECORD, record.text().encode())
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written: {error.strerror}: choose another folder"
+        ) from None
+    return RunWriter(folder, record, set())
+
+
+def resumed_run(folder: Path) -> RunWriter:
+    """Go on with a run: keep each photograph that is complete, and remove remains of others.
+
+    Raises:
+        InputError: the folder holds no run, or cannot be written.
+    """
+    record = read_record(folder)
+    run = read_run(folder)
+    kept = {name: one for name, one in run.exposures.items() if _is_whole(folder, one)}
+    writer = RunWriter(folder, record, set(kept))
+    names = {exposure_name(frame, phase) for frame in record.frames for phase in record.phases}
+    try:
+        _remove_remains(folder, names, kept)
+        told = _end_journal(folder / JOURNAL)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written: {error.strerror}: make it writable"
+        ) from None
+    for name in sorted(set(kept) - told):
+        writer.log(TAKEN, name=name, found=True)
+    return writer
+
+
+def _is_whole(folder: Path, exposure: Exposure) -> bool:
+    """Whether the image is there, byte for byte."""
+    try:
+        with (folder / PHOTOGRAPHS / exposure.file).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest() == exposure.sha256
+    except OSError:
+        return False
+
+
+def _remove_remains(folder: Path, names: set[str], kept: dict[str, Exposure]) -> None:
+    """Remove what is left of photographs that do not count, and files that were not complete."""
+    for path in (*folder.glob(f"{PARTIAL}*"), *(folder / PHOTOGRAPHS).glob(f"{PARTIAL}*")):
+        path.unlink()
+    whole = {f"{name}.json" for name in kept} | {one.file for one in kept.values()}
+    for path in (folder / PHOTOGRAPHS).glob("*"):
+        ours = path.stem in names and path.suffix in (*PICTURE_SUFFIXES, ".json")
+        if ours and path.name not in whole:
+            path.unlink()
+
+
+def _end_journal(path: Path) -> set[str]:
+    """Cut off a line that is not complete; names of the photographs that the others tell."""
+    if not path.exists():
+        return set()
+    data = path.read_bytes()
+    whole = data[: data.rfind(b"\n") + 1]
+    if whole != data:
+        with path.open("r+b") as file:
+            file.truncate(len(whole))
+            os.fsync(file.fileno())
+    return {name for name in map(_name_taken, whole.splitlines()) if name}
+
+
+def _name_taken(line: bytes) -> str:
+    try:
+        told = parse_json(line)
+    except ValueError:
+        return ""
+    taken = isinstance(told, dict) and told.get("event") == TAKEN
+    return str(told.get("name", "")) if taken else ""
+
+
+def write_safely(path: Path, data: bytes) -> None:
+    """Write a file that has its name only when it is whole and on the disk.
+
+    Raises:
+        OSError: it cannot be written; nothing is left of it.
+    """
+    partial = path.with_name(PARTIAL + path.name)
+    try:
+        with partial.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise
+    _sync_folder(path.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make names in a folder safe, where the system can."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def _disk_faults(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise DiskFault(f"{folder} cannot be written: {error.strerror or error}") from None

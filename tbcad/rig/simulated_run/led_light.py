@@ -1,0 +1,255 @@
+"""The light of the LEDs in the balls, point by point: once reflected, and twice."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.camera import LensCamera
+from tbcad.core.optics.led_dome import disc_images, dome_samples
+from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.reflection import reflection_points
+from tbcad.errors import InputError
+from tbcad.light.simulate.prototype.ball_rays import (
+    ON_BALL_MM,
+    ball_hits,
+    balls_between,
+    points_within_walls,
+)
+from tbcad.light.simulate.prototype.plan import HALF_TURN
+from tbcad.light.simulate.scene.ray_casting import embree_scene
+from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
+from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.types import Bools, Floats, Ints
+
+NEAR_MM = 0.05  # of the LED: its dome stands in its pocket
+DOME_MM = 1.5  # radius of a 3 mm LED
+ROUNDS = 5  # of the search for both points of a light that is reflected twice
+# Less light than this of an LED that fills a pixel is nothing: 0.1 of 255, spread over four pixels.
+FAINT_PX2 = 2e-3
+
+
+@dataclass(frozen=True)
+class Occluders:
+    """Meshes before LEDs."""
+
+    # scene of the object, as it stands in the first run; None without an object
+    subject: Any | None
+    # scene of the stage, which does not turn; None where its meshes are not there
+    stage: Any | None
+
+    def hide(self, point: Floats, led: Floats, turned: bool) -> Bools:
+        """Which of n points (n, 3) have something between them and places on LEDs (n, 3)."""
+        way = led - point
+        length = norm(way)
+        direction = way / length[:, None]
+        flip = HALF_TURN if turned else np.ones(3)
+        hidden = _nearer(self.subject, point * flip, direction * flip, length)
+        return hidden | _nearer(self.stage, point, direction, length)
+
+
+def _nearer(scene: Any | None, origin: Floats, direction: Floats, length: Floats) -> Bools:
+    if scene is None or len(origin) == 0:
+        return np.zeros(len(origin), dtype=bool)
+    hits = scene.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
+    return np.asarray((hits["primID"] >= 0) & (hits["tfar"] < length - NEAR_MM))
+
+
+def stage_scene(folder: Path) -> Any | None:
+    """The stage's printed parts of an export in their places; None where it has none.
+
+    Raises:
+        InputError: the record or a mesh cannot be read.
+    """
+    parts = Prototype.read(folder / NAME).with_role("stage")
+    facets = [_placed(folder, part) for part in parts]
+    return embree_scene(np.concatenate(facets)) if facets else None
+
+
+def _placed(folder: Path, part: PrintedPartRecord) -> Floats:
+    """Facets of a part by their corners, mm, (f, 3, 3), back from the printer's bed."""
+    import trimesh
+
+    path = folder / Path(part.stl).name
+    try:
+        mesh: Any = trimesh.load(path, file_type="stl", force="mesh", process=False)
+        corners = np.asarray(mesh.triangles, dtype=np.float64)
+    except Exception as error:  # trimesh's readers raise whatever their libraries do
+        raise InputError(f"{path} cannot be read: {error}: build it again") from None
+    return np.asarray((corners - part.origin_mm) @ np.array(part.axes).T)
+
+
+@dataclass(frozen=True)
+class LightPoints:
+    """Points of light in a picture, over n of them."""
+
+    led: Ints  # that each is of, from 0, (n,)
+    pixel: Floats  # column and row, (n, 2)
+    # square pixels that each stands for, (n,); its light, if its surface is as bright as fills a
+    # pixel
+    area: Floats
+
+    def of(self, led: int) -> tuple[Floats, Floats]:
+        """Pixels and areas of one LED."""
+        own = self.led == led
+        return self.pixel[own], self.area[own]
+
+    def joined(self, other: "LightPoints") -> "LightPoints":
+        """These and others."""
+        return LightPoints(
+            np.concatenate([self.led, other.led]),
+            np.concatenate([self.pixel, other.pixel]),
+            np.concatenate([self.area, other.area]),
+        )
+
+
+def balls_of_frame(built: BuiltPrototype, frame: int) -> Floats:
+    """All balls in a frame, (k, 8), as tbcad.light.simulate.prototype.run.PrototypeRun has them."""
+    machine = built.machine
+    spheres = np.arange(len(machine.radius))
+    frames = np.full(len(spheres), frame)
+    bodies = replace(machine, centre=built.body_centre).centres(frames, spheres)
+    return np.column_stack(
+        [machine.centres(frames, spheres), machine.radius, bodies, built.body_radius]
+    )
+
+
+def led_light(
+    built: BuiltPrototype,
+    frame: int,
+    turned: bool,
+    occluders: Occluders,
+    dome: float = DOME_MM,
+    faint: float = FAINT_PX2,
+) -> LightPoints:
+    """All light of the LEDs that reaches the camera over the balls in a frame.
+
+    Args:
+        built: the prototype.
+        frame: from 0.
+        turned: whether the object is turned by 180 degrees.
+        occluders: what may hide LEDs.
+        dome: radius of an LED's dome, mm.
+        faint: area of an image of an image that is not followed, square pixels.
+    """
+    balls = balls_of_frame(built, frame)
+    once = _reflected_once(built, balls, turned, occluders, dome)
+    return once.joined(_reflected_twice(built, balls, turned, occluders, (dome, faint)))
+
+
+def _pairs(*counts: int) -> list[Ints]:
+    return [index.ravel() for index in np.indices(counts)]
+
+
+def _reflected_once(
+    built: BuiltPrototype, balls: Floats, turned: bool, occluders: Occluders, dome: float
+) -> LightPoints:
+    machine = built.machine
+    camera = machine.camera
+    ball, led = _pairs(len(balls), len(machine.leds))
+    centre, radius, place = balls[ball, :3], balls[ball, 3], machine.leds[led]
+    disc = disc_images(camera, centre, radius, place, dome)
+    from_place, share = dome_samples(disc.axes)
+    # As bright everywhere in the image: what is shown larger gives more light.
+    within = from_place @ disc.axes[:, :2].swapaxes(1, 2)
+    growth = (within @ disc.growth[..., None])[..., 0]
+    area = share * disc.area[:, None] * np.maximum(1 + growth, 0)
+    # Only samples that shine are followed. The eye sees them in the disc behind the dome.
+    which, sample = np.nonzero(share)
+    light = place[which] + dome * from_place[which, sample]
+    seen = np.einsum("na,nax->nx", within[which, sample], disc.axes[which, :2])
+    in_disc = place[which] + dome * seen
+    point = reflection_points(centre[which], radius[which], in_disc, camera.pinhole)
+    shown = _seen(camera, balls, built.walls, point, ball[which])
+    shown &= ~balls_between(point, light, balls, built.walls.of_mirrors(len(balls)))
+    shown[shown] = ~occluders.hide(point[shown], light[shown], turned)
+    which, sample, pixel = which[shown], sample[shown], camera.project(point[shown])
+    return LightPoints(led[which], pixel, area[which, sample])
+
+
+def _seen(
+    camera: LensCamera, balls: Floats, walls: GrooveWalls, point: Floats, ball: Ints
+) -> Bools:
+    """Which points (n, 3) on balls (n,) the camera sees, on their front."""
+    direction = unit(point - camera.pinhole)
+    hits = ball_hits(camera.pinhole, balls[None], direction, 0 * ball, walls)
+    return np.asarray(hits.ball == ball + 1)
+
+
+def _reflected_twice(
+    built: BuiltPrototype,
+    balls: Floats,
+    turned: bool,
+    occluders: Occluders,
+    dome_and_faint: tuple[float, float],
+) -> LightPoints:
+    """Images of images, each a point with the area that it has at normal incidence."""
+    dome, faint = dome_and_faint
+    camera = built.machine.camera
+    first, last, led = _pairs(len(balls), len(balls), len(built.machine.leds))
+    place = built.machine.leds[led]
+    bright = (first != last) & (_largest_area(camera, balls, first, last, dome) > faint)
+    first, last, led, place = first[bright], last[bright], led[bright], place[bright]
+    one, two = _path(balls, first, last, place, camera.pinhole)
+    area = _area_twice(camera, balls, (first, last), (place, one, two), dome)
+    walls = built.walls.of_mirrors(len(balls))
+    shown = (area > faint) & _on_front(balls, first, one, place, two)
+    shown &= points_within_walls(one, first, walls)
+    shown &= _seen(camera, balls, built.walls, two, last)
+    shown &= ~balls_between(one, place, balls, walls) & ~balls_between(two, one, balls, walls)
+    shown[shown] = ~occluders.hide(one[shown], place[shown], turned)
+    return LightPoints(led[shown], camera.project(two[shown]), area[shown])
+
+
+def _largest_area(
+    camera: LensCamera, balls: Floats, first: Ints, last: Ints, dome: float
+) -> Floats:
+    """More than the area of any image of an image, square pixels, (n,).
+
+    Zero where spheres meet, as those of caps do beyond their rims: no light is followed there.
+    """
+    between = norm(balls[first, :3] - balls[last, :3]) - balls[first, 3] - balls[last, 3]
+    from_camera = norm(balls[last, :3] - camera.pinhole) - balls[last, 3]
+    half = balls[last, 3] / 2
+    apart = np.maximum(between, 0.0)
+    seen = half / (half + apart) * dome * camera.focal.max() / from_camera
+    return np.asarray(np.where(apart > 0, np.pi * seen**2, 0.0))
+
+
+def _path(
+    balls: Floats, first: Ints, last: Ints, place: Floats, pinhole: Floats
+) -> tuple[Floats, Floats]:
+    """Where light from places (n, 3) meets one ball and then another on its way to the camera."""
+    one = balls[first, :3] + balls[first, 3:4] * unit(place - balls[first, :3])
+    two = one
+    # Balls that touch may leave no way between both points: it is none, and shows nothing.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(ROUNDS):
+            two = reflection_points(balls[last, :3], balls[last, 3], one, pinhole)
+            one = reflection_points(balls[first, :3], balls[first, 3], place, two)
+    return one, two
+
+
+def _area_twice(
+    camera: LensCamera,
+    balls: Floats,
+    pair: tuple[Ints, Ints],
+    way: tuple[Floats, Floats, Floats],
+    dome: float,
+) -> Floats:
+    """A convex mirror of radius r shows what is at a distance d smaller by r / (r + 2 d)."""
+    size = np.full(len(pair[0]), dome)
+    for ball, start, end in zip(pair, way, way[1:], strict=False):
+        radius = balls[ball, 3]
+        size *= radius / (radius + 2 * norm(end - start))
+    return np.asarray(np.pi * (size * camera.focal.mean() / norm(way[2] - camera.pinhole)) ** 2)
+
+
+def _on_front(balls: Floats, ball: Ints, point: Floats, before: Floats, after: Floats) -> Bools:
+    """Which points (n, 3) are on the mirror of their ball, with both ways outside of it."""
+    normal = point - balls[ball, :3]
+    outside = (dot(normal, before - point) > 0) & (dot(normal, after - point) > 0)
+    in_body = norm(point - balls[ball, 4:7]) <= balls[ball, 7] + ON_BALL_MM
+    return np.asarray(outside & in_body)

@@ -1,0 +1,249 @@
+"""The photographs of a simulated run, each by itself: the same whatever else is photographed."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import erf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
+
+from tbcad.common.compiled import compiled
+from tbcad.core.optics.pedestals.walls import NO_WALLS, GrooveWalls
+from tbcad.light.simulate.capture.photograph import row_bands
+from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
+from tbcad.light.simulate.prototype.plan import HALF_TURN
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.records.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
+from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.rig.simulated_run.led_light import (
+    DOME_MM,
+    FAINT_PX2,
+    Occluders,
+    balls_of_frame,
+    led_light,
+)
+from tbcad.rig.simulated_run.sensor import (
+    Image16,
+    PixelMaps,
+    Signal,
+    SimulatedSensor,
+    generator,
+    pixel_directions,
+    pixel_maps,
+    recorded,
+)
+from tbcad.types import Colours, Floats
+
+EXPOSURE_S = 1.0  # in which LEDs and object give the light that follows
+LED_LIGHT = 0.9  # of a full pixel: brightness of an LED's image on the optical axis
+OBJECT_LIGHT = 0.9  # likewise: of white, where the object is lit best
+NOISE_STREAM = 4000
+WHITE = 255.0
+REACH = 4.0  # standard deviations beyond which a point gives no light
+
+
+@dataclass(frozen=True)
+class PointSpread:
+    """Spread of a point's light, the same along rows and columns."""
+
+    separation_px: float = 1.0  # of the low-pass filter's images
+    lens_px: float = 0.4  # standard deviation of the lens's spread
+
+    @property
+    def half_px(self) -> int:
+        """Pixels that a point's light reaches on each side."""
+        return int(np.ceil(REACH * self.lens_px + self.separation_px / 2 + 0.5))
+
+
+@dataclass(frozen=True)
+class ImagingChain:
+    """From light to numbers."""
+
+    sensor: SimulatedSensor = field(default_factory=SimulatedSensor)  # of the camera
+    spread: PointSpread = field(default_factory=PointSpread)  # of a point's light
+    dome: float = DOME_MM  # radius of the LEDs' domes, mm
+    # of each LED, on the optical axis, 1 fills a pixel in an exposure of `EXPOSURE_S`; one for all,
+    # or (l,)
+    led_light: float | tuple[float, ...] = LED_LIGHT
+    object_light: float = OBJECT_LIGHT  # of the lit object where it is white, likewise
+    # of exposure; `EXPOSURE_S` where they are not said
+    times: PhaseTimes = field(default_factory=PhaseTimes)
+
+    def exposure(self, phase: str) -> float:
+        """Exposure time of a phase over `EXPOSURE_S`."""
+        return (self.times.of(phase) or EXPOSURE_S) / EXPOSURE_S
+
+
+@dataclass(frozen=True)
+class SimulatedRun:
+    """A prototype that is photographed."""
+
+    built: BuiltPrototype  # the prototype
+    frames: tuple[Frame, ...]  # in the order of the machine's
+    scene: Scene  # the lit object
+    occluders: Occluders  # what may hide LEDs
+    chain: ImagingChain  # from light to numbers
+    seed: int  # of noise, dust and hot pixels
+
+    @cached_property
+    def maps(self) -> PixelMaps:
+        """What is fixed to the pixels."""
+        return pixel_maps(self.built.machine.camera, self.directions, self.chain.sensor, self.seed)
+
+    @cached_property
+    def directions(self) -> Floats:
+        """Unit directions through the pixels, (h, w, 3)."""
+        return pixel_directions(self.built.machine.camera)
+
+    def frame_photographs(self, number: int, phases: tuple[str, ...]) -> dict[str, Image16]:
+        """The photographs of a frame, from 0, in some phases."""
+        frame = self.frames[number]
+        light: dict[str, Signal | None] = {DARK: None, DARK_LIT: None}
+        if LIT in phases:
+            light[LIT] = self._object(number)
+        if set(phases) - {LIT, *light}:
+            light.update(self._leds(number))
+        return {phase: self._recorded(frame, phase, light[phase]) for phase in phases}
+
+    def _recorded(self, frame: Frame, phase: str, light: Signal | None) -> Image16:
+        # Two more than an LED's own number: those before it are of the other phases.
+        kind = {DARK: 0, LIT: 1, DARK_LIT: 2}
+        number = kind[phase] if phase in kind else 2 + led_number(phase)
+        stream = (NOISE_STREAM, frame.object_turn_deg, frame.stop, number)
+        random, exposure = generator(self.seed, *stream), self.chain.exposure(phase)
+        return recorded(self.chain.sensor, self.maps, light, random, exposure)
+
+    def _object(self, number: int) -> Signal:
+        pinhole = self.built.machine.camera.pinhole
+        balls, turned = balls_of_frame(self.built, number), self._turned(number)
+        walls = self.built.walls
+        colour = object_light(pinhole, self.directions, balls, self.scene, turned, walls)
+        brightness = self.chain.object_light * self.chain.exposure(LIT)
+        share = colour.astype(np.float32) * np.float32(brightness / WHITE)
+        return blurred(share, self.chain.spread)
+
+    def _leds(self, number: int) -> dict[str, Signal]:
+        camera = self.built.machine.camera
+        leds = len(self.built.machine.leds)
+        times = np.array([self.chain.exposure(f"led_{led + 1}") for led in range(leds)])
+        light = np.broadcast_to(self.chain.led_light, leds) * times
+        faint = FAINT_PX2 / max(1.0, float(light.max(initial=0.0)))
+        turned, chain = self._turned(number), self.chain
+        points = led_light(self.built, number, turned, self.occluders, chain.dome, faint)
+        images: dict[str, Signal] = {}
+        for led, brightness in enumerate(light.tolist()):
+            image = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)
+            pixel, area = points.of(led)
+            add_points(image, pixel, brightness * area, self.chain.spread)
+            images[f"led_{led + 1}"] = image
+        return images
+
+    def _turned(self, number: int) -> bool:
+        return self.frames[number].object_turn_deg != 0
+
+
+def led_number(phase: str) -> int:
+    """Number of an LED, from 1, by its phase."""
+    return int(phase.removeprefix("led_"))
+
+
+def phases_of(leds: int) -> tuple[str, ...]:
+    """All phases at a stop, in the order of photographing."""
+    return (DARK, *(f"led_{led}" for led in range(1, leds + 1)), LIT)
+
+
+def frames_of(angles: Floats) -> tuple[Frame, ...]:
+    """The frames of both runs through stops at base angles (s,), degrees."""
+    return tuple(
+        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
+        for turn in (0, 180)
+        for stop, angle in enumerate(angles.tolist(), 1)
+    )
+
+
+def object_light(
+    pinhole: Floats,
+    directions: Floats,
+    balls: Floats,
+    scene: Scene,
+    turned: bool,
+    walls: GrooveWalls = NO_WALLS,
+) -> Colours:
+    """What a camera sees of a lit object, 0 to 255, (h, w, 3).
+
+    Args:
+        pinhole: of the camera, mm, (3,).
+        directions: of its pixels, (h, w, 3).
+        balls: in the frame, (k, 8).
+        scene: the object as it stands in the first run.
+        turned: whether it is turned by 180 degrees.
+        walls: of the balls.
+    """
+    # Seen from the object, which rests, camera and balls are turned instead.
+    flip = HALF_TURN if turned else np.ones(3)
+    pinhole, walls = pinhole * flip, walls.flipped(flip)
+    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    bands = (directions[rows.start : rows.stop] * flip for rows in row_bands(len(directions)))
+    return np.concatenate([_band(pinhole, balls, walls, scene, band) for band in bands])
+
+
+def _band(
+    pinhole: Floats, balls: Floats, walls: GrooveWalls, scene: Scene, directions: Floats
+) -> Colours:
+    direction = directions.reshape(-1, 3)
+    stop = np.zeros(len(direction), dtype=np.int64)
+    hits = ball_hits(pinhole, balls[None], direction, stop, walls)
+    return camera_colours(scene, pinhole, direction, hits).reshape(directions.shape)
+
+
+def add_points(image: NDArray[np.float32], pixel: Floats, light: Floats, psf: PointSpread) -> None:
+    """Add the light (n,) of points at columns and rows (n, 2) to an image (h, w).
+
+    A pixel takes what falls on its area: the integral of the spread over it.
+    """
+    _add_points(image, pixel, light, psf.separation_px, psf.lens_px, psf.half_px)
+
+
+def blurred(picture: NDArray[np.float32], psf: PointSpread) -> NDArray[np.float32]:
+    """A picture (h, w, c), of one ray a pixel, behind filter and lens."""
+    half = psf.half_px
+    line = np.zeros((1, 2 * half + 1), dtype=np.float32)
+    centre = np.array([[half, 0.0]])
+    # The middle row of a point's image is its spread along the row; its sum is made one.
+    _add_points(line, centre, np.ones(1), psf.separation_px, psf.lens_px, half)
+    kernel = (line[0] / line.sum()).astype(np.float32)
+    across = convolve1d(picture, kernel, axis=1, mode="constant")
+    return np.asarray(convolve1d(across, kernel, axis=0, mode="constant"))
+
+
+@compiled
+def _add_points(
+    image: NDArray[np.float32],
+    pixel: Floats,
+    light: Floats,
+    separation: float,
+    lens: float,
+    half: int,
+) -> None:
+    height, width = image.shape
+    size = 2 * half + 2
+    share = np.empty((2, size))
+    for i in range(len(pixel)):
+        first = np.empty(2, dtype=np.int64)
+        for axis in range(2):
+            first[axis] = int(np.floor(pixel[i, axis])) - half
+            for k in range(size):
+                share[axis, k] = 0.0
+                for side in (-0.5, 0.5):
+                    place = pixel[i, axis] + side * separation
+                    near = (first[axis] + k - 0.5 - place) / lens
+                    far = (first[axis] + k + 0.5 - place) / lens
+                    share[axis, k] += 0.25 * (erf(far / sqrt(2.0)) - erf(near / sqrt(2.0)))
+        for b in range(size):
+            y = first[1] + b
+            if 0 <= y < height:
+                for a in range(size):
+                    x = first[0] + a
+                    if 0 <= x < width:
+                        image[y, x] += light[i] * share[0, a] * share[1, b]

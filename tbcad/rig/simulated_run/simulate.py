@@ -1,0 +1,267 @@
+"""Simulate the run of a random build: all photographs, as files of a run's folder."""
+
+import hashlib
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from io import BytesIO
+from os import PathLike
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from tbcad.common.atomic_files import write_errors_as_input_errors
+from tbcad.errors import InputError
+from tbcad.light.simulate.parallel import THREADS
+from tbcad.light.simulate.prototype.lamps import lit_by, read_lamps
+from tbcad.light.simulate.prototype.plan import read_plan
+from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.object import SceneObject, built_in_object
+from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.options.machines import SimulateRunOptions
+from tbcad.output.folder import check_replaceable, replacing
+from tbcad.output.inputs import Source, refuse_inputs
+from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
+from tbcad.records.run import RECORD, Geometry, RunRecord
+from tbcad.rig.machine.built import BuiltPrototype, designed_build, random_build
+from tbcad.rig.machine.designed import designed_prototype, dome_radius
+from tbcad.rig.machine.record import truth_file, write_machine
+from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
+from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
+from tbcad.rig.simulated_run.photographs import (
+    EXPOSURE_S,
+    LED_LIGHT,
+    ImagingChain,
+    SimulatedRun,
+    frames_of,
+    phases_of,
+)
+from tbcad.rig.simulated_run.sensor import Image16, SimulatedSensor
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
+from tbcad.types import Progress
+
+CAMERA = "simulated"
+MIRRORS = ("design.json", "mirrors.csv")
+DEPENDS_ON: dict[Geometry, tuple[str, ...]] = {
+    "prototype": (*MIRRORS, "prototype.json", "balls.csv", "rotation_plan.csv"),
+    "shell": MIRRORS,
+}
+PNG_LEVEL = 1
+# Of a simulated camera there is no clock: photographs follow each other from here.
+BEGIN = datetime(2022, 11, 1, tzinfo=UTC)
+
+
+@dataclass(frozen=True)
+class _Subject:
+    """Machines to be photographed, each with its frames, and what is before them."""
+
+    builds: tuple[tuple[BuiltPrototype, tuple[Frame, ...]], ...]
+    scene: SceneObject
+    stage: Any | None
+
+
+def prepare_run(
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
+) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
+    """A random build of an export before it is photographed, and the phases to photograph.
+
+    Returns:
+        The prototype, or both cameras of the shell, and the phases.
+
+    Raises:
+        InputError: the export has no prototype with LEDs, or a shell with planar mirrors, or has
+            not the stops or phases asked for.
+    """
+    times = PhaseTimes(*options.seconds())
+    prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
+    leds = len(prepared.builds[0][0].machine.leds)
+    phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
+    scene = prepared_scene(prepared.scene)
+    occluders = Occluders(scene.embree, prepared.stage)
+    chain = ImagingChain(
+        SimulatedSensor(bits=options.bits, noise=options.noise),
+        dome=dome_radius(export),
+        led_light=LED_LIGHT * options.led_brightness,
+        times=times,
+    )
+    runs = []
+    for whole, every in prepared.builds:
+        frames = _chosen_stops(options.stop_numbers(), every)
+        kept = np.array([every.index(frame) for frame in frames])
+        built = replace(whole, machine=whole.machine.of_frames(kept))
+        runs.append(SimulatedRun(built, frames, scene, occluders, chain, options.seed))
+    return tuple(runs), phases
+
+
+def _prototype(
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
+) -> _Subject:
+    """All stops of both runs, the object lit by the prototype's lamps."""
+    plan = read_plan(export)
+    designed, seed = designed_prototype(export, plan), options.seed
+    built = (
+        designed_build(designed, plan)
+        if options.perfect
+        else random_build(designed, plan, errors, seed, wind_up=read_wind_up(export, plan))
+    )
+    lamps = read_lamps(export.folder)
+    lit = lit_by(lamps, subject) if lamps else subject
+    return _Subject(((built, frames_of(np.degrees(plan.angle))),), lit, stage_scene(export.folder))
+
+
+def _shell(
+    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
+) -> _Subject:
+    """One frame of each camera, the object as bright from all sides."""
+    builds = []
+    for half in range(len(export.reflectors)):
+        built = (
+            perfect_half(export, half)
+            if options.perfect
+            else random_half(export, half, errors, options.seed)
+        )
+        builds.append((built, (shell_frame(half),)))
+    return _Subject(tuple(builds), subject, None)
+
+
+def _chosen_phases(asked: tuple[str, ...] | None, every: tuple[str, ...]) -> tuple[str, ...]:
+    wrong = [phase for phase in asked or () if phase not in every]
+    if wrong:
+        raise InputError(f"phase {wrong[0]} is not photographed: allowed is {', '.join(every)}")
+    return tuple(phase for phase in every if asked is None or phase in asked)
+
+
+def _chosen_stops(asked: tuple[int, ...] | None, every: tuple[Frame, ...]) -> tuple[Frame, ...]:
+    last = max(frame.stop for frame in every)
+    wrong = [stop for stop in asked or () if not 1 <= stop <= last]
+    if wrong:
+        raise InputError(f"stop {wrong[0]} is not in the plan: allowed is 1 to {last}")
+    return tuple(frame for frame in every if asked is None or frame.stop in asked)
+
+
+def write_run(
+    runs: tuple[SimulatedRun, ...],
+    phases: tuple[str, ...],
+    export: Path,
+    out: Path,
+    progress: Progress,
+) -> None:
+    """Photograph all frames and write a run's folder, as a whole or not at all.
+
+    Args:
+        runs: the prototype, or both cameras of the shell.
+        phases: at each stop.
+        export: folder of the export.
+        out: folder to write, which must not hold anything.
+        progress: called with each step.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    check_is_free(out, (export,))
+    with replacing(out, "run", force=False, inputs=(export,)) as new:
+        (new / PHOTOGRAPHS).mkdir()
+        record = _record(runs, phases, export)
+        record.write(new / RECORD)
+        for name, run in zip(record.machines, runs, strict=True):
+            write_machine(new / truth_file(name), run.built.machine, run.frames)
+            _write_frames(run, phases, new / PHOTOGRAPHS, progress)
+
+
+def check_is_free(out: Path, inputs: Iterable[Source] = ()) -> None:
+    """Refuse a folder that holds something: photographs are never overwritten.
+
+    Args:
+        out: folder of the run.
+        inputs: files and folders that are read for it.
+
+    Raises:
+        InputError: it does, or it is not apart from what is read.
+    """
+    with write_errors_as_input_errors(out):
+        refuse_inputs(out, inputs)
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InputError(f"{out} holds files, and photographs are not replaced: name another")
+    check_replaceable(out, "run", force=False)
+
+
+def _write_frames(
+    run: SimulatedRun, phases: tuple[str, ...], folder: Path, progress: Progress
+) -> None:
+    run.maps  # noqa: B018 - once, before threads ask for it
+    count = len(run.frames)
+
+    def frame(number: int) -> None:
+        for phase, image in run.frame_photographs(number, phases).items():
+            seconds = EXPOSURE_S * run.chain.exposure(phase)
+            _write_photograph(folder, run.frames[number], phase, image, seconds)
+
+    started = monotonic()
+    with ThreadPoolExecutor(THREADS) as pool:
+        for done, _ in enumerate(pool.map(frame, range(count)), 1):
+            left = (monotonic() - started) / done * (count - done)
+            progress(f"frame {done} of {count}, {left:.0f} s left")
+
+
+def _write_photograph(
+    folder: Path, frame: Frame, phase: str, image: Image16, seconds: float
+) -> None:
+    name, data = exposure_name(frame, phase), BytesIO()
+    Image.fromarray(image).save(data, "png", compress_level=PNG_LEVEL)
+    (folder / f"{name}.png").write_bytes(data.getvalue())
+    sidecar = Exposure(
+        frame=frame,
+        phase=phase,
+        file=f"{name}.png",
+        sha256=hashlib.sha256(data.getvalue()).hexdigest(),
+        width_px=image.shape[1],
+        height_px=image.shape[0],
+        exposure_s=seconds,
+        taken=BEGIN,
+        settings={},
+    )
+    sidecar.write(folder / f"{name}.json")
+
+
+def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Path) -> RunRecord:
+    camera, frames = runs[0].built.machine.camera, tuple(f for run in runs for f in run.frames)
+    geometry: Geometry = "prototype" if len(runs) == 1 else "shell"
+    return RunRecord(
+        export_sha256={
+            name: hashlib.sha256((export / name).read_bytes()).hexdigest()
+            for name in DEPENDS_ON[geometry]
+        },
+        source="simulated",
+        camera=CAMERA,
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        phases=phases,
+        frames=frames,
+        locked={},
+        seconds=EXPOSURE_S * len(frames) * sum(map(runs[0].chain.exposure, phases)),
+        geometry=geometry,
+    )
+
+
+def run_object(
+    export: ExportedDesign,
+    file: str | PathLike[str] | None,
+    options: ObjectOptions | None = None,
+    told: Progress | None = None,
+) -> SceneObject:
+    """The object of a file, or the built-in one in the size that stands on the stage.
+
+    Raises:
+        InputError: the file cannot be read, or the object is larger than the capture sphere.
+    """
+    stage = export.spec.prototype.stage
+    room = min(export.capture_mm, stage.object_diameter_mm, 2 * abs(stage.top_mm))
+    if file is None:
+        return built_in_object(room)
+    return load_object(Path(file), export.capture_mm, options, told)

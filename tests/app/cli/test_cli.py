@@ -1,0 +1,197 @@
+"""The command as a user meets it: exit codes, one line of error, nothing half done."""
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tbcad_verify.report.summary import MAX_LINES
+
+from tbcad.app.cli import run
+from tbcad.version import __version__
+from tests.exported_files import contents, read_csv
+
+STOPPED = "tbcad: stopped; nothing was changed"
+COMMAND = [sys.executable, "-m", "tbcad"]
+STAGE = re.compile(r"\[ *\d+ s\] ")
+SHELL = ["--parts", "shell"]
+# A quarter of the pixels, all of which a verification traces.
+SENSOR = ["--set", "camera.width_px=1040", "--set", "camera.height_px=776"]
+SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05", *SHELL]
+WIDE = ["build", "--n", "6", "--set", "hfov_deg=110", *SENSOR, *SHELL]
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("cli") / "exports"
+    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
+    return out
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """Run a command that must end with exit code 2 and one line on stderr."""
+    assert run(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    lines = [line for line in shown.err.splitlines() if not STAGE.match(line)]
+    assert len(lines) == 1
+    assert lines[0].startswith("tbcad: ")
+    return lines[0]
+
+
+def test_build_without_verification(export: Path) -> None:
+    assert not (export / "verify.json").exists()
+    document = json.loads((export / "design.json").read_text())
+    assert document["spec"]["optics"]["n"] == 6
+    assert document["spec"]["mesh"]["chord_error_mm"] == 0.05
+
+
+@pytest.mark.slow
+def test_build_verifies_and_verify_agrees(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The camera of the paper does not hold the mirrors of n = 6; a wider one does."""
+    out = tmp_path / "exports"
+    code = run([*WIDE, "--out", str(out)])
+    shown = capsys.readouterr()
+    assert code == 0, shown.out
+    assert shown.out.startswith("PASS: ")
+    assert "As made (" in shown.out
+    assert len(shown.out.splitlines()) <= MAX_LINES
+    assert "Traceback" not in shown.err
+    verified = (out / "verify.json").read_bytes()
+    assert json.loads(verified)["pass"] is True
+    assert run(["verify", str(out)]) == 0
+    assert (out / "verify.json").read_bytes() == verified
+
+
+@pytest.mark.slow
+def test_failed_verification_keeps_the_files_and_names_mirrors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "paper"
+    paper = ["--n", "9", "--radius-rule", "paper", *SENSOR]
+    assert run(["build", *paper, *SHELL, "--out", str(out)]) == 1
+    shown = capsys.readouterr().out
+    assert shown.startswith("FAIL: ")
+    assert "virtual cameras see less than 60 mm" in shown
+    assert "coverage, facets" in shown
+    assert "mirrors.radius_rule traced" in shown
+    assert len(shown.splitlines()) <= MAX_LINES
+    assert (out / "shell_a.step").exists()
+    verdict = json.loads((out / "verify.json").read_text())
+    assert verdict["pass"] is False
+    passed = {check["name"]: check["pass"] for check in verdict["checks"]}
+    assert passed["coverage, facets"] is False
+    assert passed["coverage, spheres"] is False
+    exact = {row["id"]: float(row["coverage_mm"]) for row in read_csv(out / "mirrors.csv")}
+    for mirror in verdict["mirrors"]:
+        assert mirror["coverage_fitted_mm"] == pytest.approx(exact[mirror["id"]], abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = [", ["not valid TOML", "correct that line"]),
+        ('based_on = "slaa"', ["based_on is 'slaa'", "sla or cnc"]),
+        ('based_on = "sla"\nball_grade = "G7"', ["ball_grade is 'G7'", "G10"]),
+    ],
+    ids=["TOML", "base", "grade"],
+)
+@pytest.mark.parametrize(
+    "command", [["build", "--for-process"], ["tolerance", "no-such-folder", "--process"]]
+)
+def test_a_broken_process_is_found_before_anything_begins(
+    command: list[str],
+    text: str,
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Before stages, a missing export, and a folder that cannot be replaced."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(text)
+    out = ["--out", "mine.toml/out"]
+    assert run([*command, "mine.toml", *out]) == 2
+    shown = capsys.readouterr()
+    assert shown.err.startswith("tbcad: mine.toml: ")
+    assert shown.err.count("\n") == 1
+    assert all(word in shown.err for word in words)
+
+
+def test_foreign_files_are_refused_and_kept_on_force(
+    export: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.txt").write_text("years of work")
+    line = refused([*SMALL, "--out", str(out), "--no-verify"], capsys)
+    assert "thesis.txt" in line
+    assert "--force" in line
+    assert run([*SMALL, "--out", str(out), "--no-verify", "--force"]) == 0
+    assert (out / "thesis.txt").read_text() == "years of work"
+    assert (out / "shell_a.stl").read_bytes() == (export / "shell_a.stl").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
+    """SIGKILL while the new one is being written: not a byte of the old one changes."""
+    out = tmp_path / "exports"
+    shutil.copytree(export, out)
+    before = contents(out)
+    build = subprocess.Popen(
+        [*COMMAND, "build", "--n", "7", *SHELL, "--out", str(out)],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        encoding="utf-8",
+    )
+    assert build.stderr is not None
+    for line in build.stderr:
+        if "files" in line:
+            break
+    build.send_signal(signal.SIGKILL)
+    build.wait()
+    assert contents(out) == before
+    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # what the killed build left is gone
+
+
+def _accept_interrupts() -> None:
+    """A background job of a shell, and all that it starts, would ignore them."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.15])
+def test_interrupt_is_reported_in_one_line(tmp_path: Path, delay_s: float) -> None:
+    """At any moment, also while native libraries are loaded, which is after the first line."""
+    build = subprocess.Popen(
+        [*COMMAND, "build", "--n", "12", "--out", str(tmp_path / "exports")],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+        preexec_fn=_accept_interrupts,  # noqa: PLW1509 - no threads here
+    )
+    assert build.stderr is not None
+    build.stderr.readline()
+    time.sleep(delay_s)
+    build.send_signal(signal.SIGINT)
+    _, errors = build.communicate(timeout=60)
+    assert build.returncode == 130
+    assert errors.splitlines()[-1] == STOPPED
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out == f"tbcad {__version__}\n"
+    assert run(["build", "--help"]) == 0
+    shown = capsys.readouterr().out
+    for word in ("--n", "--out", "--radius-rule", "--set", "--no-verify", "--force"):
+        assert word in shown

@@ -1,0 +1,67 @@
+"""The overview of a build: a dozen lines, or a record, and nothing written."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tbcad.app.cli.app import app
+
+run = CliRunner().invoke
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_lines(tmp_path: Path) -> None:
+    result = run(app, ["build", "--n", "4", "--dry-run"])
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert len(lines) <= 12
+    assert max(map(len, lines)) <= 80
+    assert lines[0].startswith("mirrors           98 (89 virtual cameras), radius ")
+    assert any(line.startswith("prototype ") for line in lines)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_record() -> None:
+    result = run(app, ["build", "--n", "4", "--parts", "shell", "--dry-run", "--json"])
+    record = json.loads(result.stdout)
+    assert (record["mirrors"], record["virtual_cameras"], record["prototype"]) == (98, 89, None)
+    assert record["minimum_coverage_mm"] > 60
+    assert record["spec"]["camera"]["hfov_deg"] == record["view_angle_deg"]
+
+
+def test_planar_mirrors_have_no_radius_and_no_prototype() -> None:
+    result = run(app, ["build", "--n", "3", "--radius-rule", "flat", "--dry-run"])
+    assert "planar" in result.stdout
+    assert "prototype" not in result.stdout
+
+
+def test_why_there_is_no_prototype() -> None:
+    options = ["--set", "camera_mm=[100, 5, -100]"]
+    result = run(app, ["build", "--n", "3", *options, "--dry-run"])
+    assert result.exit_code == 0
+    assert "no prototype: a prototype needs cameras that a half turn about z swaps" in result.stdout
+
+
+def test_a_folder_that_cannot_be_replaced_is_refused_as_by_the_build(tmp_path: Path) -> None:
+    (tmp_path / "exports").mkdir()
+    (tmp_path / "exports" / "mine.txt").write_text("mine")
+    result = run(app, ["build", "--n", "3", "--parts", "shell", "--dry-run"])
+    assert "holds what tbcad did not write (mine.txt)" in str(result.exception)
+
+
+@pytest.mark.parametrize("dry_run", [["--dry-run"], []])
+@pytest.mark.parametrize("key", ["catalogues", "prices"])
+def test_a_list_that_is_not_there_is_no_reason_to_leave_the_prototype_out(
+    tmp_path: Path, key: str, dry_run: list[str]
+) -> None:
+    options = ["--n", "3", "--set", f'prototype.{key}=["absent.csv"]', *dry_run]
+    result = run(app, ["build", *options])
+    assert f"prototype.{key}: 'absent.csv' is neither" in str(result.exception)
+    assert result.stdout == ""
+    assert list(tmp_path.iterdir()) == []

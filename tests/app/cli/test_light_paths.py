@@ -1,0 +1,104 @@
+"""Help and bad input are answered before any heavy library is loaded, so that they take no time."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import pytest
+
+from tests.app.cli.commands import Words, commands
+
+HEAVY = (
+    *("numpy", "scipy", "OCP", "build123d", "cadquery", "trimesh", "numba", "pandas", "h5py"),
+    *("matplotlib", "pyvista", "embreex", "PIL", "lib3mf", "manifold3d", "distributed"),
+)
+BAD_INPUT = (
+    ("--no-such-option",),
+    ("no-such-command",),
+    ("build", "--no-such-option"),
+    ("build", "absent.toml"),
+    ("build", "broken.toml"),
+    ("build", "--set", "optics.nn=3"),
+    ("build", "--set", "optics.n=many"),
+    ("build", "--n", "999"),
+    ("build", "--parts", "wheel"),
+    ("build", "--parts", "prototype", "--radius-rule", "flat"),
+    ("build", "--parts", "shell,prototype", "--set", "optics.camera_mm=[100, 5, -100]"),
+    ("build", "--for-process", "woodwork"),
+    ("build", "--for-process", "sla", "--yield", "2"),
+    ("verify", "absent"),
+    ("verify", "absent", "--time-limit", "0"),
+    ("tolerance", "absent"),
+    ("tolerance", "absent", "--process", "woodwork"),
+    ("tolerance", "absent", "--set", "sphere_um=3"),
+    ("tolerance", "absent", "--builds", "many"),
+    ("tolerance", "absent", "--yield", "2"),
+    ("tolerance", ".", "--object", "absent.ply"),
+    ("capture", "absent"),
+    ("capture", ".", "--object", "absent.ply"),
+    ("capture", "absent", "--mesh", "--prototype"),
+    ("view", "absent"),
+    ("refocus", "absent"),
+    ("picture", "absent"),
+    ("study", "no-such-study"),
+    ("study", "prototype", "absent"),
+    ("study", "low-pass", ".", "--object", "absent.ply"),
+)
+# Answers commands one after another in one process, each with its exit code, the heavy libraries
+# that were loaded until then, and the files of its folder. What was loaded once stays loaded, so
+# none must be loaded to the end.
+ANSWERS = """
+import json, os, sys
+from tbcad.app.cli import run
+asked, heavy = json.load(sys.stdin)
+answers = []
+for words in asked:
+    code = run(words)
+    answers.append((words, code, sorted({*heavy} & sys.modules.keys()), sorted(os.listdir())))
+print(json.dumps(answers))
+"""
+GIVEN = {"broken.toml": "[optics\nn = 3\n", "design.json": "{}"}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Of one command.
+
+    Attributes:
+        code: with which it ends.
+        heavy: libraries that are loaded after it.
+        files: in its folder.
+    """
+
+    code: int
+    heavy: list[str]
+    files: list[str]
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[Words, Answer]:
+    """By the words of each command."""
+    folder = tmp_path_factory.mktemp("light")
+    for name, text in GIVEN.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    asked = [*BAD_INPUT, *((*words, "--help") for words in commands())]
+    done = subprocess.run(
+        [sys.executable, "-c", ANSWERS],
+        input=json.dumps([asked, HEAVY]),
+        capture_output=True, encoding="utf-8", check=True, cwd=folder,
+    )  # fmt: skip
+    return {
+        tuple(words): Answer(*rest) for words, *rest in json.loads(done.stdout.splitlines()[-1])
+    }
+
+
+@pytest.mark.parametrize("words", commands(), ids=lambda words: " ".join(["tbcad", *words]))
+def test_help_loads_no_heavy_library(words: Words, answers: dict[Words, Answer]) -> None:
+    answer = answers[*words, "--help"]
+    assert (answer.code, answer.heavy) == (0, [])
+
+
+@pytest.mark.parametrize("words", BAD_INPUT, ids=" ".join)
+def test_bad_input_loads_no_heavy_library(words: Words, answers: dict[Words, Answer]) -> None:
+    assert answers[words] == Answer(2, [], sorted(GIVEN))

@@ -1,0 +1,100 @@
+"""tbcad optimize: its files, its refusals, and that it goes on where it was stopped."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import tbcad
+from tbcad.app.cli import run
+from tbcad.core.spec.design import Spec
+from tbcad.errors import InputError
+from tbcad.optimizing import search as search_module
+from tbcad.optimizing.candidate import DesignCandidate, Figures, MachineLimits, Place
+from tests.exported_files import read_csv
+
+
+def closed_form(
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+) -> DesignCandidate:
+    """More pixels with a larger ellipsoid, in place of mirrors, which take long."""
+    axis = place[2]
+    return DesignCandidate(place, Figures(axis, 2 * axis, axis / 100, 100 / axis, 276, 89))
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search_module, "evaluate", closed_form)
+
+
+def words(tmp_path: Path, *more: str) -> list[str]:
+    out = str(tmp_path / "found" / "better.toml")
+    return ["optimize", "--set", "n=4", "--candidates", "80", "--out", out, *more]
+
+
+def test_design_table_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(words(tmp_path)) == 0
+    folder = tmp_path / "found"
+    names = {"better.toml", "better-candidates.csv", "better-candidates.jsonl", "better.png"}
+    assert {file.name for file in folder.iterdir()} == names
+    table = tomllib.loads((folder / "better.toml").read_text(encoding="utf-8"))
+    rows = read_csv(folder / "better-candidates.csv")
+    best = max(float(row["semi_minor_mm"]) for row in rows)
+    assert table["optics"]["semi_minor_mm"] == best > 100
+    assert float(rows[0]["semi_minor_mm"]) == 100
+    printed = capsys.readouterr().out
+    assert "pixels, minimum                    100" in printed
+    assert len(printed.splitlines()) <= 12
+
+
+def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(words(tmp_path, "--json", "--for", "minimum")) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["before"]["place"] == [100, -100, 100, 1, 1]
+    assert result["after"]["figures"]["minimum_px"] > 100
+    assert result["after"] in result["front"]
+
+
+def test_in_python(tmp_path: Path) -> None:
+    out = tmp_path / "found" / "better.toml"
+    asked = {"settings": ["n=4"], "out": out, "candidates": 80}
+    result = tbcad.optimize(objectives=("minimum",), **asked)  # type: ignore[call-overload]
+    assert result.best.figures.minimum_px > result.start.figures.minimum_px == 100
+    assert tbcad.load_spec(out).optics.semi_minor_mm == result.best.place[2]
+    again = tbcad.optimize(tbcad.load_spec(out), out=tmp_path / "more.toml", candidates=80)
+    assert again.start.place == result.best.place
+    with pytest.raises(InputError, match=r"better\.toml exists"):
+        tbcad.optimize(**asked)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match="design is 3, allowed is a spec, a design file"):
+        tbcad.optimize(3)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match="candidates is 3, allowed is a whole number from 80"):
+        tbcad.optimize(candidates=3)
+
+
+def test_a_search_that_was_stopped_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(
+        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+    ) -> DesignCandidate:
+        if place[2] > 130:
+            raise KeyboardInterrupt
+        return closed_form(spec, ssim_within, place)
+
+    monkeypatch.setattr(search_module, "evaluate", stopped)
+    assert run(words(tmp_path)) == 130
+    monkeypatch.setattr(search_module, "evaluate", closed_form)
+    assert run(words(tmp_path)) == 2
+    assert "go on with --resume, or begin anew with --force" in capsys.readouterr().err
+    assert run(words(tmp_path, "--resume")) == 0
+
+
+def test_what_exists_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "found" / "better.toml"
+    file.parent.mkdir()
+    file.write_text("mine", encoding="utf-8")
+    assert run(words(tmp_path)) == 2
+    assert file.read_text(encoding="utf-8") == "mine"
+    assert "better.toml exists" in capsys.readouterr().err
+    assert run(words(tmp_path, "--force")) == 0

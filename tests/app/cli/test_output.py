@@ -1,0 +1,219 @@
+"""What commands print: 80 columns, how much is asked for, progress, and interrupts."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tbcad_verify.report.summary import MAX_LINES
+
+from tbcad.app.cli import run
+from tbcad.app.cli.study_output import _show
+from tbcad.app.doctor import Finding
+from tbcad.common.results.study import Figure, Study
+from tbcad.common.screen import WIDTH, TimeLeft, paragraph, stages
+from tests.exported_files import contents
+from tests.verify.synthetic_export import Design
+from tests.verify.synthetic_export import export as write_export
+
+SMALL = ["build", "--n", "4", "--set", "hfov_deg=120", "--parts", "shell"]
+# Longest that a command may go on after an interrupt, seconds: reading the files takes longer.
+PATIENCE_S = 20
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An export without verify.json."""
+    out = tmp_path_factory.mktemp("output") / "exports"
+    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def synthetic(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_export(tmp_path_factory.mktemp("output") / "x", Design())[0]
+
+
+def fits(text: str) -> list[str]:
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
+    return lines
+
+
+@pytest.mark.slow
+def test_verify_says_what_matters_and_what_processes_make_of_it(
+    built: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(built.parent)
+    code = run(["verify", built.name])
+    lines = fits(capsys.readouterr().out)
+    assert len(lines) <= MAX_LINES
+    assert lines[0].startswith("PASS: as designed" if code == 0 else "FAIL: ")
+    made = next(k for k, line in enumerate(lines) if line.startswith("As made (50 simulated"))
+    assert all(name in lines[made + 1] for name in ("diamond", "cnc", "sla", "sls", "fdm"))
+    assert run(["verify", built.name, "--json"]) == code
+    document = json.loads(capsys.readouterr().out)
+    assert document["as_made"]["processes"][0]["process"] == "diamond"
+    assert document["folder"] == "exports"
+
+
+def test_outputs_of_verify(
+    synthetic: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(synthetic.parent)
+    assert run(["verify", "x", "--quiet"]) == 0
+    quiet = capsys.readouterr()
+    assert quiet.err == ""
+    assert quiet.out == "PASS: as designed, 89 virtual cameras see 40 mm or more\n"
+    assert run(["verify", "x", "--full"]) == 0
+    full = capsys.readouterr().out
+    assert quiet.out in full
+    assert "object clearance" in "\n".join(fits(full))
+    assert "parts can be made" in full
+
+
+def test_doctor_fits_and_shows_every_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    detail, remedy = "cadquery-ocp and cadquery-ocp-novtk [both] " * 5, "pip uninstall -y x " * 9
+    monkeypatch.setattr(
+        "tbcad.app.doctor.diagnose", lambda: [Finding("kernel", False, detail, remedy)]
+    )
+    assert run(["doctor"]) == 1
+    words = " ".join(fits(capsys.readouterr().out)).split()
+    assert words == ["NO", "kernel", *detail.split(), "->", *remedy.split()]
+
+
+def test_study_fits_and_shows_every_word(capsys: pytest.CaptureFixture[str]) -> None:
+    long = "smallest sphere that a virtual camera sees with radii by the rule of the paper"
+    figures = (Figure(long, "mm", 50.3412, 60.0, "section 4.2, " + long), Figure("n" * 70, "", 2))
+    _show(Study("x", figures, (), ()))
+    text = "\n".join(fits(capsys.readouterr().out))
+    assert "…" not in text
+    assert text.count("n" * 10) > 1
+    assert sorted(set(long.split()) - set(text.split())) == []
+
+
+def test_a_paragraph_fits_but_for_paths() -> None:
+    path = "/a" * 60
+    lines = paragraph(f"{path}: " + "tolerance-cameras.csv, " * 9).splitlines()
+    assert lines[0] == f"{path}:"
+    assert max(map(len, lines[1:])) <= WIDTH
+
+
+def test_time_left_follows_the_pace() -> None:
+    now = 100.0
+    left = TimeLeft({"a": 10, "b": 30, "c": 60}, lambda: now)
+    assert left.seconds == pytest.approx(100)
+    left.begin("a")
+    now += 20  # twice as long as expected
+    left.begin("b")
+    assert left.done == 10
+    assert left.seconds == pytest.approx((20 + 10) / (10 + 10) * 90)
+    now += 15
+    assert left.done == 25
+    left.begin("of nobody's list")
+    assert left.done == 25
+    now += 1000
+    assert left.done == 40  # a stage that takes too long is not more than done
+    left.begin("c")
+    now += 60
+    assert left.seconds == 0
+
+
+def test_piped_stages_are_lines_with_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    with stages({"a": 1}) as screen:
+        screen.stage("a")
+        screen.detail("of a")
+        screen.note("margin")
+    with stages(3, silent=True) as screen:
+        screen.stage("b")
+        screen.note("c")
+    shown = capsys.readouterr()
+    assert (shown.out, shown.err) == ("", "[  0 s] a\n[  0 s] margin\n")
+
+
+ON_A_TERMINAL = """
+import time
+from tbcad.common.screen import stages
+
+with stages({"first": 1.0, "second": 3.0}) as screen:
+    screen.stage("first")
+    time.sleep(0.2)
+    screen.stage("second")
+    screen.detail("of it")
+    time.sleep(0.5)
+print("done")
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no terminals of this kind")
+def test_a_terminal_shows_stage_and_time_left() -> None:
+    terminal, screen = os.openpty()
+    variables = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+    command = [sys.executable, "-c", ON_A_TERMINAL]
+    done = subprocess.run(command, stdout=-1, stderr=screen, env=variables, check=False)
+    drawn = os.read(terminal, 1 << 16).decode()
+    os.close(screen)
+    os.close(terminal)
+    assert (done.stdout, done.returncode) == (b"done\n", 0), drawn
+    assert re.search(r"about 0:0\d left first", drawn)
+    assert re.search(r"about 0:0\d left second: of it", drawn)
+
+
+def _accept_interrupts() -> None:
+    """A background job of a shell, and all that it starts, would ignore them."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def interrupted(command: list[str], stage: str) -> tuple[str, str, float]:
+    """Send SIGINT once a stage has begun: what was printed, and how long it went on."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", *command],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+        preexec_fn=_accept_interrupts,  # noqa: PLW1509 - no threads here
+    )
+    assert process.stderr is not None
+    for line in process.stderr:
+        if stage in line:
+            break
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    errors, out = process.stderr.read(), process.communicate(timeout=60)[0]
+    assert process.returncode == 130
+    return out, errors, time.monotonic() - sent
+
+
+@pytest.mark.parametrize("stage", ["files", pytest.param("STEP", marks=pytest.mark.slow)])
+def test_an_interrupted_build_leaves_the_old_export(
+    stage: str, built: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "exports"
+    shutil.copytree(built, out)
+    before = contents(out)
+    shown, errors, seconds = interrupted(["tbcad", *SMALL, "--out", str(out)], stage)
+    assert shown == ""
+    assert errors.splitlines()[-1] == "tbcad: stopped; nothing was changed"
+    assert "Traceback" not in errors
+    assert seconds < PATIENCE_S
+    assert contents(out) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["exports"]
+
+
+def test_an_interrupted_verification_ends_and_writes_nothing(built: Path, tmp_path: Path) -> None:
+    out = shutil.copytree(built, tmp_path / "exports", ignore=lambda *_: ["verify.json"])
+    before = contents(out)
+    shown, errors, seconds = interrupted(["tbcad_verify", str(out)], "reading")
+    assert shown == ""
+    assert errors.splitlines()[-1] == "tbcad_verify: stopped; nothing was changed"
+    assert "Traceback" not in errors
+    assert seconds < PATIENCE_S
+    assert contents(out) == before

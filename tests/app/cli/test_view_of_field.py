@@ -1,0 +1,134 @@
+"""tbcad view and show of captures with a field beside them, and of a field alone."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import tbcad
+from tbcad.app.cli import run
+from tbcad.errors import InputError
+from tbcad.light.simulate.capture.light_field import LightField
+from tests.light.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, write_ball
+
+SMALL = ["--width", "160", "--height", "120"]
+COLOUR_8 = tuple(np.rint(255 * np.array(COLOUR)).astype(int).tolist())
+
+
+@pytest.fixture
+def folder(captured: Path, tmp_path: Path) -> Path:
+    """A capture of the knot, with a ball as its field: so both are told apart."""
+    copied = tmp_path / "knot"
+    shutil.copytree(captured, copied)
+    with LightField.open(copied) as source:
+        write_ball(source, copied)
+    return copied
+
+
+def viewed(folder: Path, *more: str) -> int:
+    out = str(folder.parent / "v.png")
+    return run(["view", str(folder), *SMALL, "--force", "--out", out, *more])
+
+
+def middle(folder: Path) -> object:
+    return Image.open(folder.parent / "v.png").getpixel((80, 60))
+
+
+def refused(folder: Path, words: str, capsys: pytest.CaptureFixture[str], *more: str) -> None:
+    assert viewed(folder, *more) == 2
+    error = capsys.readouterr().err
+    assert words in error.splitlines()[-1]
+    assert not (folder.parent / "v.png").exists()
+
+
+def test_by_its_path_in_python(folder: Path, captured: Path) -> None:
+    light_field, size = LightField.open(captured), (160, 120)
+    views = tbcad.Views(str(folder))
+    ball = views.view(size=size).image
+    assert tuple(ball[60, 80]) == COLOUR_8
+    knot = tbcad.view(light_field, size=size, method="nearest").image
+    assert np.array_equal(views.view(size=size, method="nearest").image, knot)
+    assert np.array_equal(tbcad.view(captured, size=size, method="nearest").image, knot)
+    with pytest.raises(InputError, match="source is 3, allowed is a light field, the folder"):
+        tbcad.view(3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="no such file; give a light field"):
+        tbcad.view(folder.parent)
+
+
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        ([], "method field: its file is in the capture's folder"),
+        (["--method", "field"], "method field: as --method says"),
+    ],
+)
+def test_a_field_beside_the_capture(
+    folder: Path, capsys: pytest.CaptureFixture[str], more: list[str], line: str
+) -> None:
+    assert viewed(folder, *more) == 0
+    printed = capsys.readouterr()
+    assert line in printed.out.splitlines()
+    assert "PSNR" in printed.out
+    assert "warning" not in printed.err
+    assert middle(folder) == COLOUR_8
+
+
+@pytest.mark.parametrize(
+    "more", [["--method", "depth"], ["--method", "nearest"], ["--surface", "plane"]]
+)
+def test_other_methods_leave_the_field_alone(
+    folder: Path, capsys: pytest.CaptureFixture[str], more: list[str]
+) -> None:
+    assert viewed(folder, *more) == 0
+    assert "method field" not in capsys.readouterr().out
+    assert middle(folder) != COLOUR_8
+
+
+def test_depth_normals_and_opacity(folder: Path) -> None:
+    """The ball's front is 15 mm in front of the middle, and faces the view at elevation 30."""
+    names = {name: folder.parent / f"{name}.png" for name in ("depth", "normals", "opacity")}
+    points = folder.parent / "points.ply"
+    options = [word for name, file in names.items() for word in (f"--{name}", str(file))]
+    assert viewed(folder, *options, "--depth", str(points)) == 0
+    depth, normals, opacity = (np.asarray(Image.open(file)) for file in names.values())
+    assert depth.shape == opacity.shape == (120, 160)
+    front = 1 + 65534 * (0.5 + RADIUS_MM / CAPTURE_MM)
+    assert abs(int(depth[60, 80]) - front) < 65534 / CAPTURE_MM  # within a millimetre
+    assert (depth[0, 0], opacity[0, 0], opacity[60, 80]) == (0, 0, 255)
+    facing = 127.5 * (1 + np.array([np.cos(np.radians(30)), 0.0, 0.5]))
+    assert np.abs(normals[60, 80] - facing).max() < 16  # of a coarse grid
+    assert tuple(normals[0, 0]) == (0, 0, 0)
+    assert points.read_bytes().startswith(b"ply\n")
+
+
+def test_a_field_of_another_capture(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Refused when it is asked for; told and left alone when it is only beside the capture."""
+    with LightField.open(folder) as source:
+        other = LightField({"a": source.frames["a"]}, source.capture_mm, {})
+        file = write_ball(other, folder)
+    words = f"{file} is of another capture, or of an older one"
+    refused(folder, words, capsys, "--method", "field")
+    assert viewed(folder) == 0
+    printed = capsys.readouterr()
+    assert f"tbcad: warning: {words}" in printed.err
+    assert "method depth: a blend at the depth that is found" in printed.out
+
+
+def test_turntables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By a field beside the capture, and by a field alone: the same pictures and title."""
+    pages = []
+    for shown in (folder, folder / "field.npz"):
+        file = folder.parent / f"{len(pages)}.html"
+        words = ["show", str(shown), "--turntable", str(file), "--frames", "4", "--rows", "1"]
+        assert run([*words, *SMALL]) == 0
+        assert "4 views by method field" in capsys.readouterr().out
+        pages.append(file.read_bytes())
+    assert pages[0] == pages[1]
+    words = ["show", str(folder / "field.npz"), "--method", "nearest", "--no-open"]
+    assert run(words) == 2
+    assert "--method nearest is for a light field: leave it out" in capsys.readouterr().err
+    (folder / "field.npz").write_bytes(b"no")
+    assert run(["show", str(folder / "field.npz"), "--no-open"]) == 2
+    assert "is no field that tbcad wrote" in capsys.readouterr().err

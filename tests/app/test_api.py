@@ -1,0 +1,146 @@
+"""The public interface: names, import time, reprs, docstrings, and the README's example."""
+
+import doctest
+import inspect
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tbcad
+from tbcad.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+HEAVY = {"numpy", "scipy", "OCP", "build123d", "cadquery", "h5py", "numba", "pydantic", "rich"}
+
+
+def test_import_loads_no_heavy_library() -> None:
+    code = "import sys, tbcad; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True
+    ).stdout.split()
+    assert not HEAVY & set(loaded)
+    assert "tbcad.app.api" not in loaded
+
+
+@pytest.mark.parametrize("name", tbcad.__all__)
+def test_public_names_are_there_and_documented(name: str) -> None:
+    value = getattr(tbcad, name)
+    if name != "__version__":
+        assert len(inspect.getdoc(value) or "") > 40
+    assert name in dir(tbcad)
+
+
+@pytest.mark.parametrize("name", sorted({*tbcad.__all__} - {"__version__"}))
+def test_no_module_takes_the_place_of_a_public_name(name: str) -> None:
+    assert find_spec(f"tbcad.{name}") is None
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'desing'"):
+        _ = tbcad.desing  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", ["tbcad", "tbcad.app.api.designs"])
+def test_examples_in_docstrings(name: str) -> None:
+    module = __import__(name, fromlist=["design"])
+    tried = doctest.testmod(module)
+    assert tried.failed == 0
+    assert tried.attempted > 0
+
+
+@pytest.mark.slow
+def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    example = re.search(r"<!-- test: example -->\n```python\n(.*?)```", text, re.DOTALL)
+    assert example is not None
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(example[1], names)
+    result, field = names["result"], names["field"]
+    assert isinstance(result, tbcad.Build)
+    assert result.passed
+    assert (tmp_path / "exports" / "shell_a.step").is_file()
+    assert isinstance(field, tbcad.LightField)
+    spec = tbcad.load_spec(None)
+    for value in (spec, names["design"], names["array"], result, result.report, field):
+        assert len(repr(value)) < 250
+
+
+@pytest.mark.slow
+def test_printed_parts_are_valid_and_assembled() -> None:
+    """The post stands on the axis of the object, below it; the carrier is above the base plate."""
+    design = tbcad.design(n=6, settings={"prototype.k": "2"})
+    parts = design.printed_parts()
+    assert {"carrier", "bearing_head", "camera_bracket"} <= set(parts)
+    assert all(part.is_valid and part.volume > 0 for part in parts.values())
+    assert parts["carrier"].label == "carrier"
+    floor = design.spec.prototype.frame.floor_mm
+    assert all(
+        floor - 1e-6 < part.bounding_box().min.Z
+        for name, part in parts.items()
+        if not name.startswith("coupon")
+    )
+
+
+def test_python_m_tbcad_is_the_command() -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "tbcad", "--version"],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    assert (run.returncode, run.stdout.strip()) == (0, f"tbcad {tbcad.__version__}")
+
+
+def test_bad_input_is_one_line() -> None:
+    with pytest.raises(InputError, match=r"n and settings go with a design file"):
+        tbcad.design(tbcad.load_spec(None), n=4)
+    with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
+        tbcad.design(n=3).shell("c")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
+        tbcad.design(n=3).mandrel("c")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"optics\.n is 99"):
+        tbcad.design(n=99)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "calibrate",
+        "dataset",
+        "intrinsics",
+        "merge",
+        "optimize",
+        "refocus",
+        "simulate_run",
+        "tolerance",
+        "view",
+    ],
+)
+def test_a_function_says_in_one_line_what_it_wants(name: str) -> None:
+    with pytest.raises(InputError, match=r"\w+ is 3, allowed is [^\n]+: change it$"):
+        getattr(tbcad, name)(3)
+    with pytest.raises(InputError, match=r"(?i)^[^\n]+(no such f|is not there|is missing)[^\n]+$"):
+        getattr(tbcad, name)("absent")
+
+
+def test_from_a_design_to_a_view(tmp_path: Path) -> None:
+    small = ("camera.width_px=208", "camera.height_px=155")
+    built = tbcad.build(n=3, settings=small, out=tmp_path / "e", parts=["shell"], verify=False)
+    assert built.design.spec.optics.n == 3
+    knot = tbcad.capture(built, out=tmp_path / "knot")
+    asked = {"size": (64, 48), "method": "nearest"}
+    view = tbcad.view(tmp_path / "knot", **asked)  # type: ignore[arg-type]
+    assert np.array_equal(view.image, tbcad.view(knot, **asked).image)  # type: ignore[arg-type]
+
+
+def test_a_mandrel_is_a_part() -> None:
+    part = tbcad.design(n=2).mandrel("b")
+    assert part.label == "mandrel_b"
+    assert part.is_valid
+    assert abs(part.bounding_box().max.X) < 1e-6

@@ -1,0 +1,127 @@
+"""HDF5 files: plain arrays of the file itself are read, all else is refused before it is."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from tbcad.cad.formats.hdf5 import StoredGroup, open_hdf5
+from tbcad.errors import InputError
+
+SCHEMA = "tbcad-test/1"
+NUMBERS = np.arange(6.0)
+
+
+def made(path: Path, change: Callable[[h5py.File], object] = lambda _: None) -> Path:
+    with h5py.File(path, "w") as store:
+        store.attrs["schema"], store.attrs["facts"] = SCHEMA, '{"n": 1}'
+        store.create_group("a")["x"] = NUMBERS
+        store["a/y"] = NUMBERS
+        change(store)
+    return path
+
+
+def both(store: StoredGroup) -> tuple[Any, Any, Any]:
+    group = store.group("a")
+    return group.array("x"), group.array("y"), store.facts
+
+
+def read(path: Path) -> Any:
+    with open_hdf5(path, SCHEMA, "test", "make it again", both) as (x, y, facts):
+        return x[:], y[1:3], facts
+
+
+def put(name: str, value: object) -> Callable[[h5py.File], None]:
+    """Put something in the place of an array or group."""
+
+    def change(store: h5py.File) -> None:
+        del store[name]
+        store[name] = store[value] if isinstance(value, str) else value
+
+    return change
+
+
+def dataset(**options: Any) -> Callable[[h5py.File], None]:
+    def change(store: h5py.File) -> None:
+        del store["a/x"]
+        store["a"].create_dataset("x", **options)
+
+    return change
+
+
+def virtual(store: h5py.File) -> None:
+    layout = h5py.VirtualLayout((6,), "f8")
+    layout[:] = h5py.VirtualSource("/etc/other.h5", "x", (6,))
+    del store["a/x"]
+    store["a"].create_virtual_dataset("x", layout)
+
+
+def facts(text: str) -> Callable[[h5py.File], None]:
+    return lambda store: store.attrs.__setitem__("facts", text)
+
+
+BAD = {
+    "soft link": (put("a/x", h5py.SoftLink("/a/y")), "elsewhere"),
+    "link to nothing": (put("a/x", h5py.SoftLink("/none")), "elsewhere"),
+    "external link": (put("a/x", h5py.ExternalLink("/etc/other.h5", "/x")), "elsewhere"),
+    "group elsewhere": (put("a", h5py.ExternalLink("/etc/other.h5", "/a")), "elsewhere"),
+    "two names": (put("a/x", "a/y"), "another name"),
+    "its own parent": (put("a/x", "a"), "no dataset"),
+    "external data": (dataset(shape=(6,), dtype="f8", external=[("/etc/hostname", 0, 48)]),
+                      "elsewhere"),
+    "virtual": (virtual, "elsewhere"),
+    "group": (put("a/x", "/"), "no dataset"),
+    "kind of number": (put("a/x", np.dtype("f8")), "no dataset"),
+    "texts": (dataset(data=["a"], dtype=h5py.string_dtype()), "not numbers"),
+    "lists": (dataset(shape=(2,), dtype=h5py.vlen_dtype("i4")), "not numbers"),
+    "references": (dataset(shape=(2,), dtype=h5py.ref_dtype), "not numbers"),
+    "tables": (dataset(shape=(2,), dtype=[("q", "f8"), ("r", "f8")]), "not numbers"),
+    "empty": (put("a/x", h5py.Empty("f8")), "not numbers"),
+    "huge": (dataset(shape=(1 << 40, 9), dtype="f8", chunks=(1 << 10, 9)), "claims"),
+    "huge chunk": (dataset(shape=(1 << 30,), dtype="u1", chunks=(1 << 30,)), "claims"),
+    "other packing": (dataset(data=NUMBERS, compression="lzf"), "filter"),
+    "other schema": (lambda store: store.attrs.__setitem__("schema", "x/2"), "schema is 'x/2'"),
+    "facts": (facts("{"), "Expecting"),
+    "infinite fact": (facts('{"n": 1e400}'), "not finite"),
+    "list of facts": (facts("[1]"), "no table"),
+    "deep facts": (facts("[" * 100_000), "deeply"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "wrong"), BAD.values(), ids=BAD.keys())
+def test_what_tbcad_never_writes_is_refused(
+    tmp_path: Path, change: Callable[[h5py.File], None], wrong: str
+) -> None:
+    path = made(tmp_path / "bad.h5", change)
+    with pytest.raises(InputError, match=wrong) as error:
+        read(path)
+    text = str(error.value)
+    assert text.startswith(f"{path} is a damaged test: ")
+    assert text.endswith(": make it again")
+    assert "\n" not in text
+    assert len(text) < len(str(path)) + 300
+
+
+def test_arrays_and_facts_are_read(tmp_path: Path) -> None:
+    x, y, told = read(made(tmp_path / "good.h5"))
+    assert (x.tolist(), y.tolist(), told) == (NUMBERS.tolist(), [1.0, 2.0], {"n": 1})
+
+
+def test_damage_inside_an_array_is_told_when_it_is_read(tmp_path: Path) -> None:
+    path = made(tmp_path / "bad.h5", dataset(data=np.arange(9999) % 7, compression=1))
+    with h5py.File(path) as store:
+        place = store["a/x"].id.get_chunk_info(0).byte_offset
+    data = bytearray(path.read_bytes())
+    data[place : place + 8] = b"\xff" * 8
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="damaged test"):
+        read(path)
+
+
+def test_an_error_of_who_reads_is_none_of_the_file(tmp_path: Path) -> None:
+    path = made(tmp_path / "good.h5")
+    with pytest.raises(ValueError, match="mine"), open_hdf5(path, SCHEMA, "test", "", both):
+        raise ValueError("mine")

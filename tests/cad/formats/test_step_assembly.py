@@ -1,0 +1,54 @@
+"""prototype.step has the tree of solids that cadquery makes of them."""
+
+from pathlib import Path
+
+import cadquery
+import numpy as np
+import pytest
+from cadquery.occ_impl.assembly import toCAF
+from OCP.Interface import Interface_Static
+from OCP.TDocStd import TDocStd_Document
+
+from tbcad.cad.formats import step_assembly
+from tbcad.cad.formats.step_assembly import write_assembly
+from tbcad.cad.kernel.assembly import ColouredSolid, SolidGroup
+from tbcad.cad.kernel.solids import sphere
+
+GREY, CLEAR = (0.5, 0.5, 0.5, 1.0), (0.1, 0.2, 0.3, 0.4)
+
+
+def balls() -> tuple[ColouredSolid, ...]:
+    return tuple(
+        ColouredSolid(f"ball_{k}", sphere(np.array([10.0 * k, 0, 0]), 3.0 + k), GREY)
+        for k in range(3)
+    )
+
+
+def view() -> ColouredSolid:
+    return ColouredSolid("view", sphere(np.zeros(3), 30.0), CLEAR)
+
+
+def by_cadquery(name: str, groups: tuple[SolidGroup, ...]) -> TDocStd_Document:
+    tree = cadquery.Assembly(name=name)
+    for group in groups:
+        branch = cadquery.Assembly(name=group.name)
+        for body in group.bodies:
+            branch.add(cadquery.Shape.cast(body.shape), name=body.name)
+        tree.add(branch)
+    return toCAF(tree, True)[1]
+
+
+def test_the_same_bytes_as_by_cadquery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    groups = SolidGroup("balls", balls()), SolidGroup("views", (view(),))
+    write_assembly(tmp_path / "ours.step", "prototype", groups)
+    monkeypatch.setattr(step_assembly, "_document", by_cadquery)
+    write_assembly(tmp_path / "theirs.step", "prototype", groups)
+    assert (tmp_path / "ours.step").read_bytes() == (tmp_path / "theirs.step").read_bytes()
+
+
+def test_the_same_bytes_after_a_file_with_tolerances(tmp_path: Path) -> None:
+    groups = (SolidGroup("balls", balls()),)
+    write_assembly(tmp_path / "first.step", "prototype", groups)
+    Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")  # as such a file leaves it
+    write_assembly(tmp_path / "second.step", "prototype", groups)
+    assert (tmp_path / "first.step").read_bytes() == (tmp_path / "second.step").read_bytes()

@@ -1,0 +1,65 @@
+"""Work in the background: done, or told why not."""
+
+import os
+import signal
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.solids import cylinder, fused
+from tbcad.common.background import at_once, background_processes
+from tbcad.core.spec.errors import SpecError
+
+
+def write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def refuse(text: str) -> None:
+    raise SpecError(text)
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def joined_cylinders() -> float:
+    """Volume of a row of cylinders."""
+    up = np.array([0.0, 0.0, 1.0])
+    return volume(fused([cylinder(np.array([i, 0.0, 0.0]), up, 0.8, 1.0) for i in range(16)]))
+
+
+def test_all_is_done_at_the_end_of_the_block(tmp_path: Path) -> None:
+    with background_processes() as submit:
+        submit(write, tmp_path / "there", "x")
+        write(tmp_path / "here", "y")
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"there": "x", "here": "y"}
+
+
+def test_what_it_raises_is_raised() -> None:
+    with pytest.raises(SpecError, match="too thin"), background_processes() as submit:
+        submit(refuse, "too thin")
+    with pytest.raises(SpecError, match="too thin"):
+        at_once(refuse, "too thin")
+
+
+def test_a_process_that_dies_is_told() -> None:
+    with (
+        pytest.raises(RuntimeError, match=r"ended before .* \(crashed \(SIGKILL\)\): is memory"),
+        background_processes() as submit,
+    ):
+        submit(die)
+
+
+def test_two_threads_have_each_their_own() -> None:
+    """The kernel gives the same there as here."""
+
+    def in_background(_: int) -> float:
+        with background_processes() as submit:
+            return float(submit(joined_cylinders).result(timeout=60))
+
+    with ThreadPoolExecutor(2) as pool:
+        assert [*pool.map(in_background, range(2))] == [joined_cylinders()] * 2

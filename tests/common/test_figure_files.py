@@ -1,0 +1,58 @@
+"""Files of plots: kinds, bytes that repeat, colours of the palette, legends off the data."""
+
+import matplotlib
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from tbcad.common.figure_files import PlotFormat, figure_file, legend_below
+from tbcad.common.palette import CYCLE, SHADES
+
+INCHES = (4.0, 3.0)
+BEGINNING = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+
+
+def draw(figure: Figure) -> None:
+    axes = figure.add_subplot()
+    for k in range(2):
+        axes.plot([0, 1], [k, 1 - k], f"C{k}-", label=f"line {k}")
+    axes.set(xlabel="x, mm", ylabel="y, mm", title="title")
+    legend_below(axes)
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_the_same_figure_gives_the_same_file_of_each_kind(kind: PlotFormat) -> None:
+    first = figure_file(draw, INCHES, kind)
+    with matplotlib.rc_context({"lines.linewidth": 9, "svg.hashsalt": "other"}):
+        assert figure_file(draw, INCHES, kind) == first
+    assert first.startswith(BEGINNING[kind])
+
+
+def test_colours_are_those_of_the_palette() -> None:
+    seen = []
+
+    def note(figure: Figure) -> None:
+        axes = figure.add_subplot()
+        seen.extend(axes.plot([0, 1], f"C{k}-")[0].get_color() for k in range(len(CYCLE)))
+        seen.append(axes.scatter([0, 1], [0, 1], c=[0, 1]).get_cmap().name)
+
+    figure_file(note, INCHES)
+    assert [matplotlib.colors.to_hex(c) for c in CYCLE] == list(CYCLE)
+    assert seen[-1] == SHADES
+    text = figure_file(draw, INCHES, "svg").decode()
+    assert all(colour in text for colour in CYCLE[:2])
+
+
+def test_the_legend_hides_no_data() -> None:
+    figure = Figure(figsize=INCHES, layout="constrained")
+    FigureCanvasAgg(figure)
+    draw(figure)
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    legend = axes.get_legend()
+    assert legend is not None
+    assert not legend.get_window_extent().overlaps(axes.get_window_extent())
+    below = axes.xaxis.get_tightbbox()
+    assert below is not None
+    assert legend.get_window_extent().y1 <= below.y0 + 1
+    assert legend.get_window_extent().y0 >= 0

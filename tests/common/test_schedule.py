@@ -1,0 +1,397 @@
+"""The same results on any number of threads and workers, and when a worker dies among them.
+
+The cluster is a real one: a scheduler and workers as processes of their own, on loopback.
+"""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tbcad
+from tbcad.common import schedule
+from tbcad.common.schedule import cores, run_units, versions
+from tbcad.errors import InputError
+
+HOST = "127.0.0.1"
+Environment = dict[str, str]
+
+
+def drawn(unit: int) -> float:
+    """A figure that hangs on the unit alone, and on all its bits."""
+    return float(np.random.Generator(np.random.Philox(key=unit)).standard_normal(1000).sum())
+
+
+def refusal(*arguments: object, **options: object) -> str:
+    with pytest.raises(InputError) as error:
+        run_units(*arguments, **options)  # type: ignore[arg-type]
+    text = str(error.value)
+    assert text.isprintable()
+    assert text.startswith("--scheduler ")
+    return text
+
+
+class TestThreads:
+    @pytest.mark.parametrize("workers", [1, 2, 7, None])
+    def test_results_are_the_units_in_their_order(self, workers: int | None) -> None:
+        def work(unit: int) -> float:
+            time.sleep(0.01 * (unit % 3))  # later units overtake
+            return drawn(unit)
+
+        assert run_units(work, range(20), workers=workers) == [drawn(unit) for unit in range(20)]
+
+    def test_no_units(self) -> None:
+        assert run_units(drawn, []) == []
+
+    def test_as_many_as_cores_work_at_once(self) -> None:
+        together = threading.Barrier(cores(), timeout=10)
+        run_units(lambda _: together.wait(), range(cores()))
+
+    def test_progress_is_told_of_each_in_this_thread(self) -> None:
+        told = []
+        run_units(drawn, range(9), progress=lambda unit: told.append((unit, threading.get_ident())))
+        assert sorted(told) == [(unit, threading.get_ident()) for unit in range(9)]
+
+    def test_what_work_raises_ends_it(self) -> None:
+        begun = []
+
+        def work(unit: int) -> None:
+            begun.append(unit)
+            time.sleep(0.01)  # or all are done before the first is heard of
+            raise KeyError(unit)
+
+        with pytest.raises(KeyError):
+            run_units(work, range(1000), workers=1)
+        assert len(begun) < 1000
+
+    def test_an_interruption_ends_it(self) -> None:
+        begun = []
+
+        def work(unit: int) -> None:
+            begun.append(unit)
+            time.sleep(0.01)
+
+        def interrupted(unit: int) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_units(work, range(1000), progress=interrupted, workers=2)
+        assert len(begun) < 100
+
+
+class TestVersions:
+    def test_are_those_of_what_makes_figures(self) -> None:
+        assert versions()["tbcad"] == tbcad.__version__
+        assert versions()["numpy"] == np.__version__
+
+    def test_a_changed_module_is_another_version(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        copied(tmp_path)
+        monkeypatch.setattr(schedule, "__file__", str(tmp_path / "tbcad" / "schedule.py"))
+        assert schedule._code() == versions()["tbcad's code"]
+        with (tmp_path / "tbcad" / "optics" / "trace.py").open("a") as module:
+            module.write("\n")
+        assert schedule._code() != versions()["tbcad's code"]
+
+    def test_a_worker_that_came_late_is_asked_too(self) -> None:
+        other = {**versions(), "numpy": "0.1"}
+        with pytest.raises(InputError, match=r"numpy .* allowed is 0\.1 as here: install the same"):
+            schedule._on_worker(drawn, 1, other, "here")
+        assert schedule._on_worker(drawn, 1, versions(), "here") == drawn(1)
+
+
+def copied(folder: Path) -> Path:
+    """A copy of tbcad's modules, for a worker that has other ones."""
+    source = Path(tbcad.__file__).parent
+    pattern = shutil.ignore_patterns("__pycache__", "*.csv")
+    return Path(shutil.copytree(source, folder / "tbcad", ignore=pattern))
+
+
+class Cluster:
+    """A scheduler and its workers, each a process."""
+
+    def __init__(self, folder: Path, extra: Environment | None = None) -> None:
+        pytest.importorskip("distributed")
+        self.folder, file = folder, folder / "scheduler.json"
+        self.scheduler = self._started(
+            "scheduler", "--port", "0", "--scheduler-file", str(file), extra=extra
+        )
+        self.workers: list[subprocess.Popen[bytes]] = []
+        until(lambda: file.exists() and bool(file.read_text()))
+        self.address: str = json.loads(file.read_text())["address"]
+
+    def start(self, workers: int, extra: Environment | None = None) -> None:
+        from distributed import Client
+
+        versions.cache_clear()  # tbcad may have been edited since the tests began
+        options = (self.address, "--no-nanny", "--nthreads", "1")
+        self.workers += [self._started("worker", *options, extra=extra) for _ in range(workers)]
+        with Client(self.address, set_as_default=False) as client:
+            client.wait_for_workers(len(self.workers), timeout=30)
+
+    def stop(self) -> None:
+        for process in [*self.workers, self.scheduler]:
+            process.kill()
+            process.wait()
+
+    def _started(
+        self, kind: str, *options: str, extra: Environment | None = None
+    ) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "dask", kind, "--host", HOST, "--no-dashboard", *options]
+        return subprocess.Popen(
+            command,
+            cwd=self.folder,  # which Python's -m would look into first: not that of the tests
+            env={**os.environ, **(extra or {})},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+
+def until(happens: Callable[[], bool], seconds: float = 30) -> None:
+    end = time.monotonic() + seconds
+    while not happens():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    made = Cluster(tmp_path)
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """A cluster with two workers that no test may stop."""
+    made = Cluster(tmp_path_factory.mktemp("cluster"))
+    made.start(2)
+    yield made
+    made.stop()
+
+
+class Marks:
+    """Files that tell which process has begun and ended which unit."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir()
+
+    def work(self, seconds: float) -> Callable[[int], float]:
+        folder = str(self.folder)
+
+        def marked(unit: int) -> float:  # sent by value: a worker knows no tests
+            import os
+            import time
+            from pathlib import Path
+
+            import numpy as np
+
+            (Path(folder) / f"begun-{os.getpid()}-{unit}").touch()
+            time.sleep(seconds)
+            generator = np.random.Generator(np.random.Philox(key=unit))
+            result = float(generator.standard_normal(1000).sum())
+            (Path(folder) / f"ended-{os.getpid()}-{unit}").touch()
+            return result
+
+        return marked
+
+    def are_quiet(self) -> bool:
+        """Whether no unit begins for some time."""
+        begun = self.of("begun")
+        time.sleep(0.5)
+        return begun == self.of("begun") == self.of("ended")
+
+    def of(self, what: str, process: int | str = "*") -> list[int]:
+        found = self.folder.glob(f"{what}-{process}-*")
+        return sorted(int(path.name.rpartition("-")[2]) for path in found)
+
+
+class TestCluster:
+    def test_gives_what_threads_give(self, standing: Cluster, tmp_path: Path) -> None:
+        marks, told = Marks(tmp_path / "marks"), []
+        got = run_units(marks.work(0.05), range(20), standing.address, told.append)
+        assert got == [drawn(unit) for unit in range(20)]
+        assert sorted(told) == list(range(20))
+        assert all(marks.of("ended", worker.pid) for worker in standing.workers)
+
+    def test_a_worker_killed_in_mid_run_loses_nothing(
+        self, cluster: Cluster, tmp_path: Path
+    ) -> None:
+        cluster.start(2)
+        victim, other = (worker.pid for worker in cluster.workers)
+        marks, cut = Marks(tmp_path / "marks"), []
+
+        def kill(unit: int) -> None:
+            if not cut and len(marks.of("ended", victim)) >= 3:
+                until(lambda: marks.of("begun", victim) != marks.of("ended", victim))
+                os.kill(victim, signal.SIGKILL)
+                cut.extend(set(marks.of("begun", victim)) - set(marks.of("ended", victim)))
+
+        got = run_units(marks.work(0.15), range(24), cluster.address, kill)
+        assert got == [drawn(unit) for unit in range(24)]
+        assert len(cut) == 1
+        assert cluster.workers[0].wait(5) == -signal.SIGKILL
+        assert set(cut) <= set(marks.of("ended", other))
+
+    def test_an_interruption_ends_it_on_the_workers_too(
+        self, standing: Cluster, tmp_path: Path
+    ) -> None:
+        marks = Marks(tmp_path / "marks")
+
+        def interrupted(unit: int) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_units(marks.work(0.1), range(1000), standing.address, interrupted)
+        until(marks.are_quiet)
+        assert len(marks.of("begun")) < 50
+
+    def test_what_work_raises_is_raised_here(self, standing: Cluster) -> None:
+        def work(unit: int) -> None:
+            from tbcad.errors import InputError
+
+            raise InputError(f"unit {unit}: not allowed")
+
+        with pytest.raises(InputError, match=r"^unit 3: not allowed$"):
+            run_units(work, [3], standing.address)
+
+        def missing(unit: int) -> None:
+            raise FileNotFoundError(unit)  # no lost connection, though both are OSError
+
+        with pytest.raises(FileNotFoundError, match="3"):
+            run_units(missing, [3], standing.address)
+
+    def test_what_fails_once_is_tried_again(self, standing: Cluster, tmp_path: Path) -> None:
+        mark = str(tmp_path / "mark")
+
+        def work(unit: int) -> int:
+            from pathlib import Path
+
+            if not Path(mark).exists():
+                Path(mark).touch()
+                raise MemoryError
+            return unit
+
+        assert run_units(work, [5], standing.address) == [5]
+
+    def test_the_logs_level_is_given_back(self, standing: Cluster) -> None:
+        import logging
+
+        level = logging.getLogger("distributed").level
+        run_units(drawn_there(), [1], standing.address)
+        assert logging.getLogger("distributed").level == level
+
+
+def drawn_there() -> Callable[[int], float]:
+    """The same as drawn, for workers that know no tests."""
+
+    def work(unit: int) -> float:
+        import numpy as np
+
+        return float(np.random.Generator(np.random.Philox(key=unit)).standard_normal(1000).sum())
+
+    return work
+
+
+class TestRefused:
+    def test_without_dask(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "distributed", None)
+        assert "pip install 'tbcad[cluster]'" in refusal(drawn, [1], "tcp://host:8786")
+
+    @pytest.mark.parametrize("address", ["nonsense", "host:8786", "tcp://host", "tcp://h:99999"])
+    def test_what_is_no_address(self, address: str) -> None:
+        pytest.importorskip("distributed")
+        assert "no Dask scheduler answers there" in refusal(drawn, [1], address)
+
+    def test_where_nobody_listens(self) -> None:
+        pytest.importorskip("distributed")
+        with socket.socket() as taken:  # bound, but not listening
+            taken.bind((HOST, 0))
+            said = refusal(drawn, [1], f"tcp://{HOST}:{taken.getsockname()[1]}")
+        assert "no Dask scheduler answers there: start `dask scheduler`" in said
+
+    @pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH\r\n"])
+    def test_where_something_else_listens(
+        self, greeting: bytes, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """dask's own client would wait for a silent one without end."""
+        pytest.importorskip("distributed")
+        monkeypatch.setattr(schedule, "_CONNECT_TIMEOUT", 0.5)
+
+        def greet(server: socket.socket) -> None:
+            line, _ = server.accept()
+            line.sendall(greeting)
+            with suppress(ConnectionError):
+                line.recv(1)  # until the other end hangs up
+
+        with socket.create_server((HOST, 0)) as server:
+            threading.Thread(target=greet, args=(server,), daemon=True).start()
+            said = refusal(drawn, [1], f"tcp://{HOST}:{server.getsockname()[1]}")
+        assert "no Dask scheduler answers there" in said
+
+    def test_without_workers_and_with_wrong_ones(self, cluster: Cluster, tmp_path: Path) -> None:
+        said = refusal(drawn_there(), [1], cluster.address, patience=0.3)
+        assert f"no worker for 0.3 s: start `dask worker {cluster.address}`" in said
+
+        module = copied(tmp_path / "other") / "version.py"
+        module.write_text(module.read_text().replace(tbcad.__version__, "0.0.1"))
+        cluster.start(1, {"PYTHONPATH": str(tmp_path / "other")})
+        said = refusal(drawn_there(), [1], cluster.address)
+        assert f"has tbcad 0.0.1, allowed is {tbcad.__version__} as here" in said
+
+        cluster.workers.pop().kill()
+        (tmp_path / "none" / "tbcad").mkdir(parents=True)
+        (tmp_path / "none" / "tbcad" / "__init__.py").touch()
+        cluster.start(1, {"PYTHONPATH": str(tmp_path / "none")})
+        said = refusal(drawn_there(), [1], cluster.address)
+        assert "cannot use tbcad (No module named 'tbcad.common.schedule'): install tbcad " in said
+
+    def test_a_unit_that_kills_its_workers(self, tmp_path: Path) -> None:
+        cluster = Cluster(tmp_path, {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"})
+
+        def work(unit: int) -> None:
+            import os
+
+            os._exit(1)
+
+        try:
+            cluster.start(3)
+            said = refusal(work, [1], cluster.address)
+        finally:
+            cluster.stop()
+        assert "2 workers died over one unit of work: give the workers more memory" in said
+
+    def test_when_all_workers_die_and_when_the_scheduler_does(
+        self, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(schedule, "_CHECK_INTERVAL", 0.3)
+        cluster.start(1)
+        work = Marks(tmp_path / "marks").work(0.1)
+
+        def kill(unit: int) -> None:
+            cluster.workers[0].kill()
+
+        said = refusal(work, range(50), cluster.address, kill, patience=0.5)
+        assert "no worker for 0.5 s" in said
+
+        cluster.workers.clear()
+        cluster.start(1)
+
+        def end(unit: int) -> None:
+            with suppress(ProcessLookupError):
+                cluster.scheduler.kill()
+
+        assert "the scheduler went away" in refusal(work, range(50), cluster.address, end)

@@ -1,0 +1,382 @@
+"""The spec: what it takes, and the one line it says about what it does not take."""
+
+import json
+import math
+import os
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from annotated_types import Ge, Gt, Le, Lt
+from hypothesis import example, given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from tbcad.core.spec.design import FootFlangeSpec, Spec
+from tbcad.core.spec.errors import SpecError, allowed_text, dotted_fields, nearest_key, section_of
+from tbcad.core.spec.load import load_spec, spec_dict
+from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.prototype import GradeName
+from tbcad.core.spec.sizes import OpticsSpec
+from tbcad.errors import InputError
+from tbcad.prototype.balls.catalogue import load_grades
+
+KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
+NUMBERS = {key: field for key, field in KEYS.items() if field.annotation in (int, float)}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "design.toml"
+
+
+def refusal(path: Path | None, *options: str) -> str:
+    with pytest.raises(SpecError) as error:
+        load_spec(path, options)
+    text = str(error.value)
+    assert text.isprintable()
+    assert len(text) < 400 + len(str(path))
+    return text
+
+
+def refused(file: Path, text: str | bytes) -> str:
+    """The error about a file, which is always named."""
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    message = refusal(file)
+    assert message.startswith(f"{file}: ")
+    return message.removeprefix(f"{file}: ")
+
+
+class TestDefaults:
+    def test_are_the_papers_design(self) -> None:
+        optics = load_spec(None).optics
+        assert (optics.n, optics.capture_diameter_mm, optics.semi_minor_mm) == (18, 60, 100)
+        assert optics.camera_mm == (100, 0, -100)
+
+    def test_stay_where_a_section_is_given_in_part(self, file: Path) -> None:
+        file.write_text("[shell.foot_flange]\nwidth_mm = 20\n", encoding="utf-8")
+        assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
+        assert load_spec(file).shell.foot_flange.bolts == 5
+        assert load_spec(file).shell.seam_flange.bolts == 6
+
+    def test_cannot_be_changed(self) -> None:
+        with pytest.raises(ValidationError, match="frozen"):
+            load_spec(None).optics.n = 3  # type: ignore[misc]
+
+
+class TestPlainDict:
+    def test_is_json_and_leads_back(self) -> None:
+        spec = load_spec(None, ["n=7", "camera_mm=[90, 5, -80]", "radius_rule=paper"])
+        table = json.loads(json.dumps(spec_dict(spec)))
+        assert Spec.model_validate(table) == spec
+
+    def test_has_the_order_of_the_spec(self) -> None:
+        assert list(spec_dict(Spec())) == [
+            key for key in dict(dotted_fields(Spec)) if "." not in key
+        ]
+        backwards = {"optics": {"semi_minor_mm": 100.0, "n": 18}, "schema": 2, "name": "x"}
+        assert list(spec_dict(Spec.model_validate(backwards))) == list(spec_dict(Spec()))
+
+
+class TestFile:
+    def test_is_read(self, file: Path) -> None:
+        file.write_text(
+            'name = "x-1"\n[optics]\nn = 4\ncapture_diameter_mm = 20\n', encoding="utf-8"
+        )
+        spec = load_spec(file)
+        assert (spec.name, spec.optics.n, spec.optics.capture_diameter_mm) == ("x-1", 4, 20.0)
+
+    @pytest.mark.parametrize("text", [b"", b"\xef\xbb\xbfschema = 2", b"[optics]\r\nn = 18\r\n"])
+    def test_may_be_empty_or_from_windows(self, file: Path, text: bytes) -> None:
+        file.write_bytes(text)
+        assert load_spec(file) == Spec()
+
+    def test_missing(self, file: Path) -> None:
+        assert "No such file" in refusal(file)
+
+    def test_a_folder(self, tmp_path: Path) -> None:
+        assert "not a file" in refusal(tmp_path)
+
+    def test_a_pipe_does_not_hang(self, file: Path) -> None:
+        os.mkfifo(file)
+        assert "not a file" in refusal(file)
+
+    def test_not_utf8(self, file: Path) -> None:
+        assert refused(file, b"# a\n# \xff\n").startswith("not UTF-8 text (line 2)")
+        assert refused(file, b"# a\r# \xff\n").startswith("not UTF-8 text (line 2)")
+        assert refused(file, "n = 1".encode("utf-16-le")).startswith("no text")
+
+    @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32"])
+    @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+    def test_encodings(self, file: Path, encoding: str, end: str) -> None:
+        file.write_bytes(f"[optics]{end}n = 4{end}".encode(encoding))
+        assert load_spec(file).optics.n == 4
+
+    def test_over_one_megabyte(self, file: Path) -> None:
+        assert refused(file, b"#" * 1_000_001).startswith("over 1 MB")
+
+    @pytest.mark.parametrize("text", ["[optics\n", "\n\nn = \n", "n = 1\nn = 2\n", "a = 1 b = 2"])
+    def test_not_toml(self, file: Path, text: str) -> None:
+        message = refused(file, text)
+        assert message.startswith("not valid TOML")
+        assert " line " in message
+
+    def test_nested_too_deeply(self, file: Path) -> None:
+        assert refused(file, "a = " + "[" * 50_000).startswith("tables nested too deeply")
+        assert refused(file, "\na" + ".a" * 400_000 + " = 1").startswith("line 2: tables nested")
+
+    @given(text=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
+    @example(text=b'"" = 1')
+    @example(text=b'"a\\nb" = 1')
+    @example(text=b"optics = [1, [2]]")
+    @example(text=b"[optics]\nn = 2026-11-21")
+    @example(text=b"[optics]\nn = 0x" + b"f" * 9000)
+    @example(text=b"[optics]\nsemi_minor_mm = 0x" + b"f" * 9000)
+    @example(text=b"[optics]\nn = " + b"9" * 9000)
+    @example(text=b"[[optics]]\nn = 1")
+    @example(text=b"[shell.seam_flange.bolts]\nx = 1")
+    def test_any_file_is_a_spec_or_one_line(
+        self, tmp_path_factory: pytest.TempPathFactory, text: bytes
+    ) -> None:
+        file = tmp_path_factory.getbasetemp() / "any.toml"
+        file.write_bytes(text)
+        try:
+            assert isinstance(load_spec(file), Spec)
+        except SpecError as error:
+            assert str(error).isprintable()  # noqa: PT017
+
+
+class TestUnknownKey:
+    @pytest.mark.parametrize(
+        ("text", "key", "meant"),
+        [
+            ("[optics]\ncapture_diamter_mm = 1", "optics.capture_diamter_mm", "optics.capture_dia"),
+            ("[optic]\nn = 1", "optic", "optics"),
+            ("wall_mm = 1", "wall_mm", "shell.wall_mm"),
+            ("[mesh]\nwall = 1", "mesh.wall", "shell.wall_mm"),
+            ("[shell.seam_flange]\nbolt = 1", "shell.seam_flange.bolt", "shell.seam_flange.bolts"),
+            ("schema_version = 1", "schema_version", "schema"),
+            *(
+                (f"[prototype.base]\n{key} = 1", f"prototype.base.{key}", f"printer.{key}?")
+                for key in PrinterSpec.model_fields
+            ),
+        ],
+    )
+    def test_names_the_nearest(self, file: Path, text: str, key: str, meant: str) -> None:
+        assert refused(file, text).startswith(f"unknown key {key}: did you mean {meant}")
+
+    def test_lists_its_section_when_none_is_near(self, file: Path) -> None:
+        assert "known are step.pcurves" in refused(file, "[step]\nxyzzy = 1")
+
+    @given(st.sampled_from(sorted(KEYS)), st.data())
+    def test_one_wrong_letter_is_understood(self, key: str, data: st.DataObject) -> None:
+        at = data.draw(st.integers(key.rfind(".") + 1, len(key) - 1))
+        likely = nearest_key(key[:at] + "#" + key[at + 1 :], KEYS)
+        # One letter may be all of a leaf, and only the section is then known.
+        assert likely == key or len(key.rpartition(".")[2]) == 1
+
+
+class TestValue:
+    def test_range_ends_where_it_says(self) -> None:
+        limits = [
+            (key, field, limit)
+            for key, field in NUMBERS.items()
+            for limit in field.metadata
+            if isinstance(limit, (Ge, Gt, Le, Lt))
+        ]
+        for key, field, limit in limits:
+            ends = {name: getattr(limit, name, None) for name in ("ge", "gt", "le", "lt")}
+            value = next(end for end in ends.values() if end is not None)
+            outward = 1 if ends["le"] is not None or ends["lt"] is not None else -1
+            step = 1 if field.annotation is int else abs(value) * 1e-9 or 1e-9
+            message = refusal(None, f"{key}={value + outward * step!r}")
+            assert message.startswith(f"option: {key} is ")
+            assert allowed_text(field.annotation, field.metadata) in message
+            assert f"{value:g}" in message
+
+    @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "true", "'1'", "[1]", "{a = 1}", "x"])
+    def test_only_finite_numbers_are_numbers(self, value: str) -> None:
+        for key in NUMBERS:
+            assert f"{key} is " in refusal(None, f"{key}={value}")
+
+    def test_whole_numbers_are_numbers_but_not_the_reverse(self) -> None:
+        assert load_spec(None, ["wall_mm=4"]).shell.wall_mm == 4
+        assert "optics.n is 4.0, allowed is a whole number from 2 to 60" in refusal(None, "n=4.0")
+
+    @pytest.mark.parametrize("value", ["3", "true", "2.0", "'2'"])
+    def test_of_another_schema(self, value: str) -> None:
+        assert re.search(
+            "schema.* allowed is (the whole number )?2", refusal(None, f"schema={value}")
+        )
+
+    def test_of_the_schema_before_the_printer(self, file: Path) -> None:
+        text = refused(file, "schema = 1\n[prototype.base]\nbed_mm = [200, 200, 200]\n")
+        assert text.startswith("schema: 1 is the version before the section [printer]: move bed_mm")
+        assert "set schema to 2" in text
+
+    def test_names_the_choices(self) -> None:
+        message = refusal(None, "radius_rule=exact")
+        assert "mirrors.radius_rule is 'exact', allowed is traced or paper or flat" in message
+
+    @pytest.mark.parametrize(
+        ("given", "said"),
+        [
+            ("stretch=[3, 1]", "stretch[0] is 3, allowed is two numbers in brackets, each"),
+            ("stretch=[1]", "stretch[1] is missing, allowed is two numbers in brackets, each"),
+            ("stretch=1.2,1.3", "stretch is '1.2,1.3', allowed is two numbers in brackets, each"),
+            ("bed_mm=[9, 200, 200]", "bed_mm[0] is 9, allowed is three numbers in brackets, each"),
+            (
+                "camera_mm=[0, 0, -1]",
+                "three numbers in brackets: above 0 to 10000, from -10000 to 10000, from -10000 ",
+            ),
+            ("own_margins_mm=[21]", "allowed is numbers in brackets, each from 0 to 20: change"),
+        ],
+    )
+    def test_lists_in_words(self, given: str, said: str) -> None:
+        assert said in refusal(None, given)
+
+    @pytest.mark.parametrize("value", ["''", "'a\\nb'", "'../x'", "7", "'" + "a" * 81 + "'"])
+    def test_names_are_plain(self, value: str) -> None:
+        assert "name is " in refusal(None, f"name={value}")
+
+    def test_several_faults_are_counted(self, file: Path) -> None:
+        message = refused(file, "[optics]\nn = 99\nsemi_minor_mm = 0\n[mesh]\nx = 1\n")
+        assert message.startswith("optics.n is 99")
+        assert message.endswith("(and 2 more)")
+
+    def test_what_must_be_a_section(self, file: Path) -> None:
+        assert "optics is 3, allowed is a table" in refused(file, "optics = 3")
+
+
+class TestTogether:
+    @pytest.mark.parametrize("flange", ["seam_flange", "foot_flange"])
+    @pytest.mark.parametrize("hole", ["bolt_hole_mm", "dowel_hole_mm"])
+    def test_holes_fit_their_flange(self, flange: str, hole: str) -> None:
+        key = f"shell.{flange}.{hole}"
+        load_spec(None, [f"{key}=10"])
+        message = refusal(None, f"{key}=10.01")
+        assert f"shell.{flange}: {hole} 10.01 does not fit in width_mm 12" in message
+
+    def test_capture_sphere_fits_the_ellipsoid(self) -> None:
+        message = refusal(None, "semi_minor_mm=71")
+        least = float(message.split("semi_minor_mm more than ")[1].split()[0])
+        assert least == pytest.approx(math.sqrt(30**2 + 30 * math.sqrt(2) * 100), rel=1e-3)
+        load_spec(None, [f"semi_minor_mm={least * 1.001}"])
+        refusal(None, f"semi_minor_mm={least * 0.999}")
+
+    def test_pinhole_is_outside_the_capture_sphere(self) -> None:
+        assert "inside the capture sphere" in refusal(None, "camera_mm=[20, 0, -20]")
+
+    def test_facets_are_finer_than_the_wall(self) -> None:
+        assert "structure_error_mm" in refusal(None, "structure_error_mm=1", "wall_mm=1")
+
+    def test_options_are_blamed_with_the_file(self, file: Path) -> None:
+        file.write_text("[optics]\nsemi_minor_mm = 100\n", encoding="utf-8")
+        message = refusal(file, "capture_diameter_mm=200")
+        assert message.startswith(f"{file} with options: ")
+
+    @given(
+        st.floats(1, 5000),
+        st.tuples(st.floats(0.1, 1e4), st.floats(-1e4, 1e4), st.floats(-1e4, -0.1)),
+        st.floats(0.001, 1000),
+    )
+    def test_what_is_taken_fits(
+        self, semi_minor: float, camera: tuple[float, float, float], capture: float
+    ) -> None:
+        """Closed form: the ellipsoid comes to a - c of its focus."""
+        c = math.hypot(*camera) / 2
+        a = math.sqrt(semi_minor**2 + c**2)
+        options = {
+            "optics.semi_minor_mm": repr(semi_minor),
+            "optics.camera_mm": repr(list(camera)),
+            "optics.capture_diameter_mm": repr(capture),
+        }
+        if min(a - c, 2 * c) > capture / 2 * (1 + 1e-9):
+            optics = OpticsSpec(
+                semi_minor_mm=semi_minor, camera_mm=camera, capture_diameter_mm=capture
+            )
+            assert load_spec(None, options).optics == optics
+        elif min(a - c, 2 * c) < capture / 2 * (1 - 1e-9):
+            with pytest.raises(SpecError, match="capture sphere"):
+                load_spec(None, options)
+
+
+class TestOptions:
+    @pytest.mark.parametrize(
+        "option", ["optics.n=4", "n=4", " n = 4 ", "n=0x4", "optics.n=4 # small"]
+    )
+    def test_set_a_key(self, option: str) -> None:
+        assert load_spec(None, [option]).optics.n == 4
+
+    def test_go_over_the_file_and_the_later_over_the_earlier(self, file: Path) -> None:
+        file.write_text("[optics]\nn = 5\nsemi_minor_mm = 90\n", encoding="utf-8")
+        optics = load_spec(file, ["n=6", "n=7"]).optics
+        assert (optics.n, optics.semi_minor_mm) == (7, 90)
+
+    def test_take_bare_words_for_text(self) -> None:
+        spec = load_spec(None, ["radius_rule=flat", "name=my first", "step.pcurves=true"])
+        assert (spec.mirrors.radius_rule, spec.name, spec.step.pcurves) == (
+            "flat",
+            "my first",
+            True,
+        )
+
+    def test_end_of_a_key_must_be_the_only_one(self) -> None:
+        assert load_spec(None, ["seam_flange.bolts=3"]).shell.seam_flange.bolts == 3
+        message = refusal(None, "bolts=3")
+        assert "shell.foot_flange.bolts or shell.seam_flange.bolts" in message
+
+    def test_every_whole_key_is_known(self) -> None:
+        """Also when it is the end of another one."""
+        for key in KEYS:
+            assert key in refusal(None, f"{key}=[[]]")
+
+    @pytest.mark.parametrize("text", ["", "n", "=4", " =4"])
+    def test_without_key_or_value(self, text: str) -> None:
+        assert "not key=value" in refusal(None, text)
+
+    def test_that_are_sections(self) -> None:
+        assert "shell is a section: set one of shell.wall_mm" in refusal(None, "shell=3")
+
+    @pytest.mark.parametrize("value", ["4\nname = 'x'", "4]\n[x", "", "[" * 50_000])
+    def test_are_one_value(self, value: str) -> None:
+        assert refusal(None, f"n={value}").startswith("option: optics.n is ")
+
+    @given(st.text(max_size=40))
+    def test_any_text_is_a_spec_or_one_line(self, text: str) -> None:
+        try:
+            load_spec(None, [text])
+        except InputError as error:
+            assert str(error).isprintable()  # noqa: PT017
+
+
+class TestPrototype:
+    @pytest.mark.parametrize("value", ["0", "1001", "true", "1.0", "many", "[]", "-1"])
+    def test_number_of_balls(self, value: str) -> None:
+        message = refusal(None, f"prototype.k={value}")
+        assert "give a whole number from 1 to 1000, or auto" in message
+
+    def test_number_of_balls_may_be_found(self) -> None:
+        assert load_spec(None, ["prototype.k=auto"]).prototype.k == "auto"
+        assert load_spec(None, ["prototype.k=7"]).prototype.k == 7
+
+    @pytest.mark.parametrize("value", ["[]", "metric", "[1]", "[['metric']]"])
+    def test_catalogues_are_a_list_of_names(self, value: str) -> None:
+        assert 'give a list such as ["metric", "my.csv"]' in refusal(None, f"catalogues={value}")
+
+    @pytest.mark.parametrize("value", ["[]", "estimates", "[1]"])
+    def test_prices_are_a_list_of_names(self, value: str) -> None:
+        wanted = 'give a list such as ["my_prices.csv", "estimates"]'
+        assert wanted in refusal(None, f"prototype.prices={value}")
+
+    def test_grades_are_those_of_the_table(self) -> None:
+        assert "allowed is G3 or G5" in refusal(None, "grade=G11")
+        assert list(load_grades()) == list(get_args(GradeName))
+
+    def test_the_key_nearest_to_the_top_is_meant(self) -> None:
+        """Short names of the shell were in use before the prototype had keys."""
+        spec = load_spec(None, ["wall_mm=4", "base.relief_mm=0.5"])
+        assert spec.shell.wall_mm == 4
+        assert spec.prototype.base.relief_mm == 0.5
+        assert load_spec(None, ["magnet_gap_mm=0.4"]).prototype.base.magnet_gap_mm == 0.4

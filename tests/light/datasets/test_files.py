@@ -1,0 +1,347 @@
+"""What other programs read, read as their documentation says, by code of the tests' own."""
+
+import io
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from tbcad.core.optics.camera import Camera
+from tbcad.light.datasets.crops import MirrorId, read_crop
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
+from tbcad.light.simulate.scene.viewpoint import view_directions
+
+Document = dict[str, Any]
+
+
+def picture_of(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path))
+
+
+def seen_points(field: LightField, name: str, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the object that a mirror shows, and the colours it shows them in."""
+    crop = read_crop(field, MirrorId(name[0], int(name[1:]) - 1))
+    assert crop is not None
+    origin, direction = crop.rays
+    hits = cast_rays(scene, origin, direction)
+    hit = np.isfinite(hits.depth)
+    points = origin[hit] + hits.depth[hit, None] * direction[hit]
+    return points, crop.colour[crop.meets][hit]
+
+
+def opengl_pixels(document: Document, frame: Document, points: np.ndarray) -> np.ndarray:
+    """Where nerfstudio and instant-ngp see points: x right, y up, looking along -z, (n, 2).
+
+    In pixels from the picture's corner: the middle of the first pixel is (0.5, 0.5).
+    """
+    value = {**document, **frame}
+    local = np.c_[points, np.ones(len(points))] @ np.linalg.inv(frame["transform_matrix"]).T
+    x, y, z = local[:, 0], local[:, 1], local[:, 2]
+    assert (z < 0).all()
+    return np.stack(
+        [value["cx"] + value["fl_x"] * x / -z, value["cy"] - value["fl_y"] * y / -z], axis=1
+    )
+
+
+def ray_traced(scene: Scene, camera: Camera, shift: tuple[float, float]) -> np.ndarray:
+    """The mean of 2 x 2 rays a pixel, all of them shifted by parts of a pixel."""
+    total = np.zeros((camera.height_px, camera.width_px, 3))
+    for x in (-0.25, 0.25):
+        for y in (-0.25, 0.25):
+            direction = view_directions(camera, (x + shift[0], y + shift[1])).reshape(-1, 3)
+            start = np.broadcast_to(camera.pinhole, direction.shape)
+            total += cast_rays(scene, start, direction).colour.reshape(total.shape) / 4
+    return total
+
+
+def looked_up(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    size = np.array(picture.shape[1::-1])
+    column, row = np.clip(np.floor(pixels), 0, size - 1).astype(int).T
+    return np.asarray(picture[row, column])
+
+
+class TestNerfstudio:
+    def test_what_its_reader_asks_for(
+        self, transforms: Document, exported: dict[str, Path]
+    ) -> None:
+        """Keys by its documentation; with one mask every frame needs one."""
+        assert transforms["camera_model"] == "OPENCV"
+        assert transforms["orientation_override"] == "none"
+        assert all(transforms[name] == 0 for name in ("k1", "k2", "p1", "p2"))
+        folder = exported["nerfstudio"]
+        names = [frame["file_path"] for frame in transforms["frames"]]
+        assert names == sorted(set(names))
+        for frame in transforms["frames"]:
+            picture, mask = (picture_of(folder / frame[key]) for key in ("file_path", "mask_path"))
+            assert picture.shape == (transforms["h"], transforms["w"], 3)
+            assert mask.shape == picture.shape[:2]
+            assert set(np.unique(mask)) <= {0, 255}
+            assert not picture[mask == 0].any()
+            matrix = np.array(frame["transform_matrix"])
+            assert matrix[:3, :3].T @ matrix[:3, :3] == pytest.approx(np.eye(3), abs=1e-9)
+            assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
+            assert matrix[3].tolist() == [0, 0, 0, 1]
+
+    def test_known_points_appear_in_their_colours(
+        self, transforms: Document, exported: dict[str, Path], field: LightField, scene: Scene
+    ) -> None:
+        """By the test's own projection; the same with the picture flipped fails."""
+        errors, flipped = [], []
+        for frame in transforms["frames"][::9]:
+            name = Path(frame["file_path"]).stem
+            points, colours = seen_points(field, name, scene)
+            picture = picture_of(exported["nerfstudio"] / frame["file_path"])
+            pixels = opengl_pixels(transforms, frame, points)
+            off = np.abs(looked_up(picture, pixels).astype(int) - colours)
+            errors.append(np.median(off))
+            off = np.abs(looked_up(picture[:, ::-1], pixels).astype(int) - colours)
+            flipped.append(np.median(off))
+        assert np.median(errors) < 6
+        assert np.median(flipped) > 5 * np.median(errors)
+
+    def test_up_is_up(self, transforms: Document) -> None:
+        for frame in transforms["frames"]:
+            low, high = opengl_pixels(transforms, frame, np.array([[0, 0, -5.0], [0, 0, 5.0]]))
+            assert high[1] <= low[1] + 1e-6
+
+    def test_pictures_are_centred_to_a_part_of_a_pixel(
+        self, transforms: Document, exported: dict[str, Path], scene: Scene
+    ) -> None:
+        """Truth a quarter of a pixel aside, in any direction, resembles the pictures less."""
+        size = transforms["w"]
+        assert (transforms["cx"], transforms["cy"]) == (size / 2, transforms["h"] / 2)
+        shifts = ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25))
+        errors = []
+        for frame in transforms["frames"][::10]:
+            picture, mask = (
+                picture_of(exported["nerfstudio"] / frame[key]).astype(float)
+                for key in ("file_path", "mask_path")
+            )
+            matrix, focal = np.array(frame["transform_matrix"]), frame["fl_x"]
+            hfov = 2 * np.arctan(size / 2 / focal)
+            camera = Camera(matrix[:3, 3], -matrix[:3, 2], matrix[:3, 0], size, size, hfov)
+            errors.append(
+                [
+                    ((ray_traced(scene, camera, shift) - picture) ** 2)[mask > 0].mean()
+                    for shift in shifts
+                ]
+            )
+        centred, *aside = np.median(errors, axis=0)
+        assert centred < min(aside)
+
+    def test_seed_points_lie_on_the_object_or_in_it(
+        self, transforms: Document, exported: dict[str, Path], scene: Scene
+    ) -> None:
+        cloud = trimesh.load(exported["nerfstudio"] / transforms["ply_file_path"])
+        points, colours = np.asarray(cloud.vertices), np.asarray(cloud.colors)
+        assert len(points) > 1000
+        assert np.linalg.norm(points, axis=1).max() <= 30
+        mesh = trimesh.Trimesh(scene.subject.points, scene.subject.faces, process=False)
+        spots = mesh.sample(500, seed=1)
+        nearest = np.linalg.norm(spots[:, None] - points, axis=2).min(axis=1)
+        assert np.percentile(nearest, 95) < 2  # the object is covered
+        distance = np.linalg.norm(points[::7, None] - mesh.vertices, axis=2).min(axis=1)
+        tube = 6.0  # mm, more than the tube's thickness: rays of few pixels do not cut finer
+        assert np.percentile(distance, 90) < tube
+        assert np.ptp(colours[:, :3], axis=0).min() > 100
+
+
+class TestColmap:
+    def test_binary_and_text_are_the_same(self, exported: dict[str, Path]) -> None:
+        """Read by the layout of "Output Format" of COLMAP's documentation."""
+        model = exported["colmap"] / "sparse" / "0"
+        cameras, images = _binary_cameras(model), _binary_images(model)
+        lines = _lines(model / "cameras.txt")
+        assert len(lines) == len(cameras) > 0
+        for line in lines:
+            number, kind, *values = line.split()
+            assert kind == "PINHOLE"
+            assert [float(value) for value in values] == [*cameras[int(number)]]
+        lines = _lines(model / "images.txt")
+        assert lines[1::2] == [""] * len(images)
+        for line in lines[::2]:
+            number, *values, camera, name = line.split()
+            assert images[int(number)] == (*map(float, values), int(camera), name)
+        points = np.array([line.split() for line in _lines(model / "points3D.txt")], dtype=float)
+        assert points == pytest.approx(_binary_points(model))
+
+    def test_it_is_what_nerfstudio_gets(
+        self, exported: dict[str, Path], transforms: Document
+    ) -> None:
+        """World to camera with y down against camera to world with y up."""
+        model = exported["colmap"] / "sparse" / "0"
+        cameras, images = _binary_cameras(model), _binary_images(model)
+        for frame, image in zip(transforms["frames"], images.values(), strict=True):
+            *pose, camera, name = image
+            assert name == Path(frame["file_path"]).name
+            w, x, y, z, *shift = pose
+            turn = Rotation.from_quat([x, y, z, w]).as_matrix()
+            assert -turn.T @ shift == pytest.approx(np.array(frame["transform_matrix"])[:3, 3])
+            width, height, fx, fy, cx, cy = cameras[camera]
+            point = np.array([7.0, -4.0, 5.0])
+            local = turn @ point + shift
+            pixel = [cx + fx * local[0] / local[2], cy + fy * local[1] / local[2]]
+            assert pixel == pytest.approx(opengl_pixels(transforms, frame, point[None])[0])
+            assert (width, height) == (transforms["w"], transforms["h"])
+
+    def test_pictures_are_those_for_nerfstudio(self, exported: dict[str, Path]) -> None:
+        """COLMAP names the mask of a0001.png a0001.png.png."""
+        folders = [exported[name] for name in ("nerfstudio", "colmap")]
+        names = sorted(path.name for path in (folders[0] / "images").iterdir())
+        for name in names:
+            one, other = ((folder / "images" / name).read_bytes() for folder in folders)
+            assert one == other
+            mask = (folders[0] / "masks" / name).read_bytes()
+            assert mask == (folders[1] / "masks" / f"{name}.png").read_bytes()
+
+    @pytest.mark.clients
+    @pytest.mark.parametrize("suffix", ["bin", "txt"])
+    def test_pycolmap_reads_it(
+        self, exported: dict[str, Path], transforms: Document, tmp_path: Path, suffix: str
+    ) -> None:
+        pycolmap = pytest.importorskip("pycolmap")
+        for path in (exported["colmap"] / "sparse" / "0").glob(f"*.{suffix}"):
+            (tmp_path / path.name).write_bytes(path.read_bytes())
+        model = pycolmap.Reconstruction(tmp_path)
+        assert len(model.images) == len(model.cameras) == len(transforms["frames"])
+        assert len(model.points3D) == len(_lines(exported["colmap"] / "sparse/0/points3D.txt"))
+        frames = {Path(frame["file_path"]).name: frame for frame in transforms["frames"]}
+        points = np.array([[7.0, -4.0, 5.0], [-11.0, 3.0, -9.0]])
+        for image in model.images.values():
+            frame = frames[image.name]
+            centre = np.array(frame["transform_matrix"])[:3, 3]
+            assert image.projection_center() == pytest.approx(centre)
+            pixels = [image.project_point(point) for point in points]
+            assert np.array(pixels) == pytest.approx(opengl_pixels(transforms, frame, points))
+
+
+class TestRays:
+    def test_instant_ngp_gets_every_ray_as_captured(
+        self, exported: dict[str, Path], field: LightField
+    ) -> None:
+        folder = exported["ngp-rays"]
+        document = json.loads((folder / "transforms.json").read_text())
+        assert document["aabb"] == [[-30.0] * 3, [30.0] * 3]
+        rays = 0
+        for frame in document["frames"]:
+            path = folder / frame["file_path"]
+            crop = read_crop(field, MirrorId(path.stem[0], int(path.stem[1:]) - 1))
+            assert crop is not None
+            picture = picture_of(path)
+            assert picture.shape == (frame["h"], frame["w"], 3)
+            data = (path.parent / f"rays_{path.stem}.dat").read_bytes()
+            assert len(data) == 24 * frame["h"] * frame["w"]
+            table = np.frombuffer(data, "<f4").reshape(frame["h"], frame["w"], 6)
+            used = picture_of(path.parent / f"dynamic_mask_{path.stem}.png") == 0
+            assert np.array_equal(used[:, ::-1], crop.meets)
+            expected = np.concatenate([crop.origin, crop.direction], axis=2)[crop.meets]
+            assert np.array_equal(table[:, ::-1][crop.meets], expected.astype(np.float32))
+            assert np.array_equal(picture[:, ::-1][crop.meets], crop.colour[crop.meets])
+            length = np.linalg.norm(table[..., 3:], axis=2)
+            assert length == pytest.approx(np.ones_like(length), abs=1e-5)
+            rays += int(used.sum())
+        assert rays == sum(_meeting(field, frame) for frame in field.frames)
+
+    def test_its_poses_are_about_those_of_the_rays(self, exported: dict[str, Path]) -> None:
+        """A plain pinhole fits a raw crop but for a pixel or so; a flipped one not at all."""
+        folder = exported["ngp-rays"]
+        document = json.loads((folder / "transforms.json").read_text())
+        errors, flipped = [], []
+        for frame in document["frames"]:
+            path = folder / frame["file_path"]
+            table = np.fromfile(path.parent / f"rays_{path.stem}.dat", "<f4")
+            table = table.reshape(frame["h"], frame["w"], 6).astype(float)
+            used = picture_of(path.parent / f"dynamic_mask_{path.stem}.png") == 0
+            rows, columns = np.nonzero(used)
+            origin, way = np.split(table[used], 2, axis=1)
+            points = origin - (origin * way).sum(axis=1, keepdims=True) * way
+            pixels = opengl_pixels(document, frame, points)
+            for found, column in ((errors, columns), (flipped, frame["w"] - 1 - columns)):
+                off = pixels - np.stack([column + 0.5, rows + 0.5], axis=1)
+                found.append(np.sqrt((off**2).sum(axis=1).mean()))
+        assert np.median(errors) < 1
+        assert np.median(flipped) > 8 * np.median(errors)
+
+    def test_hdf5_has_the_same_arrays(self, exported: dict[str, Path]) -> None:
+        folder = exported["rays"]
+        with np.load(folder / "rays.npz") as table, h5py.File(folder / "rays.h5") as store:
+            assert set(store) == set(table.files)
+            for name in table.files:
+                stored = store[name].asstr()[:] if name == "name" else store[name][:]
+                assert np.array_equal(stored, table[name])
+                assert name == "name" or stored.dtype == table[name].dtype
+
+    def test_numpy_reads_all_rays(self, exported: dict[str, Path], field: LightField) -> None:
+        with np.load(exported["rays"] / "rays.npz", allow_pickle=False) as table:
+            arrays = {name: table[name] for name in table.files}
+        assert set(arrays) == {"origin", "direction", "colour", "camera", "name", "centre"}
+        assert len(arrays["origin"]) == sum(_meeting(field, frame) for frame in field.frames)
+        for k in (0, 17, len(arrays["name"]) - 1):
+            name = str(arrays["name"][k])
+            crop = read_crop(field, MirrorId(name[0], int(name[1:]) - 1))
+            assert crop is not None
+            mine = arrays["camera"] == k
+            assert np.array_equal(arrays["colour"][mine], crop.colour[crop.meets])
+            for key, expected in zip(("origin", "direction"), crop.rays, strict=True):
+                assert np.array_equal(arrays[key][mine], expected.astype(np.float32))
+            off = np.cross(crop.rays[0] - arrays["centre"][k], crop.rays[1])
+            assert np.linalg.norm(off, axis=1).max() < 3
+
+
+def _meeting(field: LightField, name: str) -> int:
+    """Number of rays of a frame that pass the origin by less than the sphere's radius."""
+    planes = field.frames[name].planes
+    on = planes["mirror"] > 0
+    origin, way = planes["origin"][on].astype(float), planes["direction"][on].astype(float)
+    return int((np.linalg.norm(np.cross(origin, way), axis=1) <= 30).sum())
+
+
+def _lines(path: Path) -> list[str]:
+    return [one for one in path.read_text("utf-8").split("\n")[:-1] if not one.startswith("#")]
+
+
+def _binary_cameras(model: Path) -> dict[int, tuple[float, ...]]:
+    stream = io.BytesIO((model / "cameras.bin").read_bytes())
+    (count,) = struct.unpack("<Q", stream.read(8))
+    found = {}
+    for _ in range(count):
+        number, kind, *size = struct.unpack("<iiQQ", stream.read(24))
+        assert kind == 1  # PINHOLE
+        found[number] = (*size, *struct.unpack("<4d", stream.read(32)))
+    assert not stream.read()
+    return found
+
+
+def _binary_images(model: Path) -> dict[int, tuple[Any, ...]]:
+    stream = io.BytesIO((model / "images.bin").read_bytes())
+    (count,) = struct.unpack("<Q", stream.read(8))
+    found = {}
+    for _ in range(count):
+        number, *pose, camera = struct.unpack("<i7di", stream.read(64))
+        name = b""
+        while (letter := stream.read(1)) != b"\0":
+            name += letter
+        assert struct.unpack("<Q", stream.read(8)) == (0,)
+        found[number] = (*pose, camera, name.decode())
+    assert not stream.read()
+    return found
+
+
+def _binary_points(model: Path) -> np.ndarray:
+    stream = io.BytesIO((model / "points3D.bin").read_bytes())
+    (count,) = struct.unpack("<Q", stream.read(8))
+    rows = []
+    for _ in range(count):
+        *row, track = struct.unpack("<Q3d3BdQ", stream.read(51))
+        assert track == 0
+        rows.append(row)
+    assert not stream.read()
+    return np.array(rows)

@@ -1,0 +1,165 @@
+"""The file of a field: what is written is read, and what is not whole is refused."""
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tbcad.errors import InputError
+from tbcad.light.reconstruction.field import Field, field_bytes, read_field, write_field
+from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.marching import GLOSSY, MATT
+
+
+def made(columns: int = MATT) -> Field:
+    rng = np.random.default_rng(3)
+    grid = Grid.about(rng.random((5,) * 3) < 0.1, 12.5)
+    values = rng.uniform(-1, 1, (len(grid), columns)).astype(np.float32)
+    return Field(grid, values, {"object": "knot", "seed": 3})
+
+
+WHOLE = field_bytes(made())
+
+
+@pytest.mark.parametrize("columns", [MATT, GLOSSY])
+def test_what_is_written_is_read(tmp_path: Path, columns: int) -> None:
+    given_field, path = made(columns), tmp_path / "field.npz"
+    write_field(path, given_field)
+    found = read_field(path)
+    assert (found.grid.n, found.grid.width_mm, found.facts) == (5, 12.5, given_field.facts)
+    assert np.array_equal(found.grid.place, given_field.grid.place)
+    assert np.array_equal(found.values, given_field.values)
+    assert found.order == (columns == GLOSSY)
+    assert field_bytes(found) == path.read_bytes()
+
+
+def test_a_field_of_nothing_is_written_and_read(tmp_path: Path) -> None:
+    empty = Field(Grid.about(np.zeros((4,) * 3, bool), 9.0), np.zeros((0, MATT), np.float32))
+    write_field(tmp_path / "field.npz", empty)
+    assert len(read_field(tmp_path / "field.npz").grid) == 0
+
+
+def test_density_is_positive_and_tends_to_its_number() -> None:
+    grid = Grid(2, 1.0, np.argwhere(np.ones((2, 2, 2), bool)).astype(np.uint16))
+    values = np.zeros((8, MATT), np.float32)
+    values[:3, 0] = [-3, 0, 50]
+    assert Field(grid, values).density()[:3] == pytest.approx(
+        [(-3 + np.sqrt(9.01)) / 2, 0.05, 50.00005], rel=1e-5
+    )
+
+
+def archive(**changes: object) -> bytes:
+    """The file with other arrays; None leaves one out."""
+    with np.load(io.BytesIO(WHOLE)) as store:
+        arrays = {**{name: store[name] for name in store.files}, **changes}
+    with io.BytesIO() as buffer:
+        np.savez(buffer, **{name: array for name, array in arrays.items() if array is not None})
+        return buffer.getvalue()
+
+
+def with_member(name: str, content: bytes) -> bytes:
+    """The file with other bytes in place of an array."""
+    with io.BytesIO() as buffer:
+        with zipfile.ZipFile(io.BytesIO(WHOLE)) as whole, zipfile.ZipFile(buffer, "w") as other:
+            for member in whole.namelist():
+                other.writestr(member, content if member == name else whole.read(member))
+        return buffer.getvalue()
+
+
+def huge_header() -> bytes:
+    """An array that claims 10^12 numbers in a few bytes."""
+    header = {"descr": "<f4", "fortran_order": False, "shape": (10**12,)}
+    with io.BytesIO() as buffer:
+        np.lib.format.write_array_header_1_0(buffer, header)
+        return buffer.getvalue()
+
+
+def single_array() -> bytes:
+    with io.BytesIO() as buffer:
+        np.save(buffer, np.zeros(3))
+        return buffer.getvalue()
+
+
+def bomb() -> bytes:
+    """A member that says it unpacks to 5 GB."""
+    content = bytearray(WHOLE)
+    at = content.index(b"PK\x01\x02") + 24
+    content[at : at + 4] = (0xFFFFFFF0).to_bytes(4, "little")
+    return bytes(content)
+
+
+PLACE = made().grid.place
+V = len(PLACE)
+DAMAGED = {
+    "empty": b"",
+    "text": b"no archive at all",
+    "a single array": single_array(),
+    "cut off": WHOLE[: len(WHOLE) // 2],
+    "without its last byte": WHOLE[:-1],
+    "another schema": archive(schema=np.array("tbcad-field/9")),
+    "no schema": archive(schema=None),
+    "no density": archive(density=None),
+    "NaN": archive(density=np.full(V, np.nan, np.float32)),
+    "infinite": archive(colour=np.full((V, 3), np.inf, np.float32)),
+    "beyond all densities": archive(density=np.full(V, -1e30, np.float32)),
+    "doubles": archive(colour=np.zeros((V, 3))),
+    "one density too few": archive(density=np.zeros(V - 1, np.float32)),
+    "nodes out of order": archive(node=PLACE[::-1]),
+    "a node twice": archive(node=np.repeat(PLACE[:1], V, axis=0)),
+    "a node outside": archive(node=PLACE + np.uint16(4)),
+    "signed nodes": archive(node=PLACE.astype(np.int64)),
+    "nodes without a number": archive(node=np.array(3, np.uint16)),
+    "nodes of two coordinates": archive(node=PLACE[:, :2]),
+    "one node along an edge": archive(nodes=np.array(1)),
+    "too many nodes": archive(nodes=np.array(10**6)),
+    "two numbers of nodes": archive(nodes=np.array([5, 5])),
+    "endless nodes": archive(nodes=np.array(np.inf)),
+    "a fraction of a node": archive(nodes=np.array(5.9)),
+    "no width": archive(capture_mm=np.array(0.0)),
+    "negative width": archive(capture_mm=np.array(-1.0)),
+    "endless width": archive(capture_mm=np.array(np.inf)),
+    "facts that are no JSON": archive(facts=np.array("{")),
+    "facts that are a list": archive(facts=np.array(json.dumps([1]))),
+    "slopes of too few": archive(slope=np.zeros((V, 3), np.float32)),
+    "pickled objects": archive(colour=np.array([{}] * V)),
+    "bytes in place of an array": with_member("density.npy", b"hello"),
+    "more than memory holds": with_member("density.npy", huge_header()),
+    "a bomb": bomb(),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGED)
+def test_damaged_files_are_refused_in_one_line(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "field.npz"
+    path.write_bytes(DAMAGED[kind])
+    with pytest.raises(InputError, match=r"field\.npz.*tbcad reconstruct") as refused:
+        read_field(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "field.npz"):
+        with pytest.raises(InputError, match="no such file"):
+            read_field(path)
+
+
+@settings(
+    max_examples=300,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(st.integers(0, len(WHOLE) - 1), st.integers(1, 255))
+def test_a_changed_byte_is_refused_or_does_not_matter(tmp_path: Path, at: int, by: int) -> None:
+    content = bytearray(WHOLE)
+    content[at] ^= by
+    path = tmp_path / "field.npz"
+    path.write_bytes(content)
+    try:
+        found = read_field(path)
+    except InputError:
+        return
+    assert field_bytes(found) == WHOLE

@@ -1,0 +1,122 @@
+"""Rays of a light field: where they enter the capture sphere, and what their pixels cover."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.surfaces import Surfaces
+from tbcad.errors import InputError
+from tbcad.light.reconstruction.rays import CapturedRays, captured_rays, entries
+from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
+from tests.ray_fields import RADIUS, Ball, lines, rays_of
+
+PINHOLES = np.array([[0.0, 3.0, 50.0], [40.0, -5.0, 20.0]])
+PITCH = 0.004  # of a pixel at unit distance
+SIDE = 20  # pixels of a mirror
+
+
+def frame(shift: int = 0) -> CameraFrame:
+    """Two virtual pinhole cameras side by side that look at the origin, in one picture."""
+    origin, direction = np.zeros((2, SIDE, 2 * SIDE, 3), np.float32)
+    mirror = np.zeros((SIDE, 2 * SIDE), np.uint16)
+    steps = (np.arange(SIDE) - (SIDE - 1) / 2) * PITCH
+    for k, pinhole in enumerate(PINHOLES):
+        forward, right, down = axes(k)
+        ways = forward + steps[None, :, None] * right + steps[:, None, None] * down
+        here = slice(k * SIDE, (k + 1) * SIDE)
+        direction[:, here] = ways / np.linalg.norm(ways, axis=2, keepdims=True)
+        origin[:, here] = pinhole
+        mirror[:, here] = k + 1
+    mirror[0, 0] = 0
+    colour = np.zeros((SIDE, 2 * SIDE, 3), np.uint8)
+    colour[..., 0] = np.arange(2 * SIDE) + shift
+    planes = {"colour": colour, "mirror": mirror, "origin": origin, "direction": direction}
+    camera = Camera(np.zeros(3), np.array([0, 0, 1.0]), np.array([1.0, 0, 0]), 2 * SIDE, SIDE, 0.5)
+    mirrors = Surfaces(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2))
+    return CameraFrame(camera, PINHOLES, mirrors, np.zeros((2, 4), np.int64), planes)
+
+
+def axes(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    forward = -PINHOLES[k] / np.linalg.norm(PINHOLES[k])
+    right = np.cross(forward, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    return forward, right, np.cross(forward, right)
+
+
+def captured(footprint: bool = False) -> CapturedRays:
+    return captured_rays(LightField({"a": frame(), "b": frame(100)}, 2 * RADIUS, {}), footprint)
+
+
+def test_rays_enter_the_sphere_in_closed_form() -> None:
+    points, direction = lines(500, 4)
+    origin = points - 7.5 * direction
+    entry, length = entries(origin, direction, RADIUS)
+    assert entry == pytest.approx(points, abs=1e-4)
+    assert length == pytest.approx(-2 * (points * direction).sum(axis=1), abs=1e-4)
+
+
+def test_rays_beside_and_away_from_the_sphere_miss_it() -> None:
+    origin = np.array([[0.0, 11, -20], [0, 0, 20], [0, 0, -20]])
+    _, length = entries(origin, np.tile([0.0, 0, 1], (3, 1)), RADIUS)
+    assert length == pytest.approx([0, 0, 2 * RADIUS])
+
+
+def test_a_ray_from_inside_goes_on_from_its_origin() -> None:
+    entry, length = entries(np.array([[0.0, 0, 4]]), np.array([[0.0, 0, 1]]), RADIUS)
+    assert entry == pytest.approx(np.array([[0, 0, 4.0]]))
+    assert length == pytest.approx([6.0])
+
+
+def test_each_pixel_of_a_mirror_is_a_ray_with_its_colour() -> None:
+    rays = captured()
+    assert len(rays) == 2 * (2 * SIDE * SIDE - 1)
+    assert np.array_equal(np.unique(rays.mirror), [0, 1, 2, 3])
+    pixel = np.flatnonzero(rays.mirror == 2)[0]
+    assert rays.colour[pixel] == pytest.approx([101 / 255, 0, 0])
+    away = rays.entry - PINHOLES[rays.mirror % 2]
+    assert np.cross(away, rays.direction) == pytest.approx(0, abs=1e-4)
+    assert np.linalg.norm(rays.entry, axis=1) == pytest.approx(RADIUS, abs=1e-4)
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_the_footprint_of_a_pinhole_is_its_step(k: int) -> None:
+    rays = captured(footprint=True)
+    middle = np.argmax(np.where(rays.mirror == k, rays.direction @ axes(k)[0], -1))
+    right, down = rays.footprint[middle, 2:]
+    _, along, across = axes(k)
+    assert right == pytest.approx(PITCH * along, abs=2e-5)
+    assert down == pytest.approx(PITCH * across, abs=2e-5)
+    distance = np.linalg.norm(PINHOLES[k]) - RADIUS
+    assert rays.footprint[middle, 0] == pytest.approx(distance * PITCH * along, abs=3e-3)
+    assert rays.footprint[middle, 1] == pytest.approx(distance * PITCH * across, abs=3e-3)
+
+
+def test_footprints_do_not_reach_into_other_mirrors() -> None:
+    rays = captured(footprint=True)
+    assert np.abs(rays.footprint[:, 2:]).max() < 1.1 * PITCH
+
+
+def test_without_footprint_a_pixel_is_a_single_ray() -> None:
+    assert np.array_equal(captured().footprint, np.zeros((1, 4, 3)))
+
+
+def test_light_fields_that_look_past_the_object_are_refused() -> None:
+    beside = frame()
+    beside.planes["origin"][...] += np.float32(1000)
+    with pytest.raises(InputError, match="capture sphere"):
+        captured_rays(LightField({"a": beside}, 2 * RADIUS, {}))
+
+
+@pytest.mark.parametrize(("offset", "noise"), [(0.0, 0.0), (0.0, 0.01), (0.08, 0.01)])
+def test_background_is_below_the_dark_level_and_the_object_above(
+    offset: float, noise: float
+) -> None:
+    rays = rays_of([Ball((1, 0, 0), 6, (0.5, 0.3, 0.2))], 20_000)
+    rng = np.random.default_rng(0)
+    seen = rays.colour.max(axis=1) > 0
+    colour = np.clip(rays.colour + offset + noise * rng.normal(size=(20_000, 3)), 0, 1)
+    dark = colour.max(axis=1) < replace(rays, colour=colour.astype(np.float32)).dark_level()
+    assert dark[~seen].mean() > 0.9
+    assert not dark[seen].any()

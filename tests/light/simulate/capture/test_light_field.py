@@ -1,0 +1,159 @@
+"""The light field's file: what is written is read, in parts too; other files are refused."""
+
+import gc
+from io import BytesIO
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.capture.light_field import PIXEL_ARRAYS, SCHEMA, SHOWN_PX, LightField
+from tbcad.light.simulate.capture.light_field_writer import create_light_field, write_camera
+from tbcad.light.simulate.capture.photograph import photograph
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import Reflector
+
+Cameras = tuple[Reflector, Reflector]
+
+
+def write_light_field(path: Path, cameras: Cameras, scene: Scene) -> Path:
+    with create_light_field(path, 60.0, {"object": "knot"}) as store:
+        for at in cameras:
+            write_camera(store, at, photograph(at.camera, exact_tracer(at), scene))
+    return path
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory, cameras: Cameras, knot: Scene) -> Path:
+    return write_light_field(tmp_path_factory.mktemp("field") / "lightfield.h5", cameras, knot)
+
+
+def test_round_trip(file: Path, cameras: Cameras, light_field: LightField) -> None:
+    with LightField.open(file) as source:
+        assert source.facts == {"object": "knot"}
+        assert source.capture_mm == 60.0
+        assert len(source) == len(light_field)
+        for at, frame in zip(cameras, source.frames.values(), strict=True):
+            memory = light_field.frames[at.camera_id]
+            for name in PIXEL_ARRAYS:
+                assert np.array_equal(frame.planes[name][:], memory.planes[name])
+            assert np.array_equal(frame.u, at.u)
+            assert np.array_equal(frame.boxes, at.boxes())
+            assert np.array_equal(frame.camera.pinhole, at.camera.pinhole)
+            assert frame.camera.hfov == at.camera.hfov
+            assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
+
+
+def test_reads_parts(file: Path, light_field: LightField) -> None:
+    with LightField.open(file.parent) as source:  # the folder will do
+        part = source.frames["b"].read(slice(50, 90), slice(100, 333))
+    for name, values in part.items():
+        assert np.array_equal(values, light_field.frames["b"].planes[name][50:90, 100:333])
+
+
+def test_boxes_hold_all_of_each_mirror(light_field: LightField) -> None:
+    for frame in light_field.frames.values():
+        rows, columns = np.nonzero(frame.planes["mirror"])
+        box = frame.boxes[frame.planes["mirror"][rows, columns].astype(int) - 1]
+        assert ((columns >= box[:, 0]) & (columns < box[:, 1])).all()
+        assert ((rows >= box[:, 2]) & (rows < box[:, 3])).all()
+
+
+def test_compressed_and_the_same_each_time(
+    file: Path, tmp_path: Path, cameras: Cameras, knot: Scene
+) -> None:
+    again = write_light_field(tmp_path / "again.h5", cameras, knot)
+    assert again.read_bytes() == file.read_bytes()
+    raw = sum(np.dtype(kind).itemsize * int(np.prod(last)) for last, kind in PIXEL_ARRAYS.values())
+    assert file.stat().st_size < 0.8 * 2 * 416 * 310 * raw
+
+
+@pytest.mark.parametrize(
+    ("change", "wrong"),
+    [
+        ("schema", "schema"),
+        ("no schema", "schema"),
+        ("no cameras", "without cameras"),
+        ("shape", "another shape"),
+        ("kind", "another shape or kind"),
+        ("missing", "damaged"),
+        ("facts", "damaged"),
+        ("boxes", "boxes"),
+        ("nan", "not finite"),
+        ("linked", "elsewhere"),
+        ("external", "elsewhere"),
+        ("cut", "no light field"),
+        ("text", "no light field"),
+    ],
+)
+def test_damaged_files_are_refused(file: Path, tmp_path: Path, change: str, wrong: str) -> None:
+    path = tmp_path / "changed.h5"
+    path.write_bytes(file.read_bytes())
+    if change in ("cut", "text"):
+        path.write_bytes(path.read_bytes()[:3000] if change == "cut" else b"hello")
+    else:
+        with h5py.File(path, "r+") as store:
+            _changed(store, change)
+    with pytest.raises(InputError, match=wrong) as error, LightField.open(path):
+        pass
+    assert "\n" not in str(error.value)
+
+
+def _changed(store: h5py.File, change: str) -> None:
+    group = store["a"]
+    if change == "schema":
+        store.attrs["schema"] = SCHEMA.replace("/1", "/2")
+    elif change == "no schema":
+        del store.attrs["schema"]
+    elif change == "no cameras":
+        del store["a"], store["b"]
+    elif change in ("shape", "kind"):
+        del group["mirror"]
+        kind = "u2" if change == "shape" else "f8"
+        group["mirror"] = np.zeros((310, 415 + (change == "kind")), dtype=kind)
+    elif change == "missing":
+        del group["direction"]
+    elif change == "facts":
+        store.attrs["facts"] = "{"
+    elif change == "boxes":
+        group["mirrors/boxes"][0] = [0, 417, 0, 5]
+    elif change == "nan":
+        group["mirrors/u"][0] = np.nan
+    elif change == "linked":
+        del group["colour"]
+        group["colour"] = h5py.ExternalLink("/etc/other.h5", "/colour")
+    else:
+        del group["colour"]
+        group.create_dataset(
+            "colour", (310, 416, 3), "u1", external=[("/etc/hostname", 0, 386_880)]
+        )
+
+
+def test_a_file_stays_open_while_it_is_used(file: Path, light_field: LightField) -> None:
+    frames = LightField.open(str(file)).frames
+    gc.collect()
+    part = frames["b"].read(slice(50, 60))["origin"]
+    assert np.array_equal(part, light_field.frames["b"].planes["origin"][50:60])
+    with LightField.open(file) as source:
+        kept = source.frames["a"]
+    with pytest.raises(InputError, match="the file is closed"):
+        kept.image()
+    source.close()
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="give a light field"), LightField.open(tmp_path):
+        pass
+
+
+def test_notebooks_show_both_photographs(light_field: LightField) -> None:
+    with Image.open(BytesIO(light_field._repr_png_())) as shown:
+        pixels = np.asarray(shown)
+    whole = np.concatenate([frame.image() for frame in light_field.frames.values()], axis=1)
+    step = -(-whole.shape[1] // SHOWN_PX)
+    assert pixels.shape[1] <= SHOWN_PX
+    np.testing.assert_array_equal(pixels, whole[::step, ::step])

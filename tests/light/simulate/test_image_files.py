@@ -1,0 +1,128 @@
+"""Pictures as files, whole or not at all, and how like they are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+from scipy.ndimage import gaussian_filter
+from skimage.metrics import structural_similarity
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.image_files import (
+    ANIMATED_SUFFIXES,
+    check_image_path,
+    difference,
+    side_by_side,
+    write_animation,
+    write_images,
+)
+from tbcad.light.simulate.views.viewpoints import (
+    equivalent_blur_px,
+    image_quality,
+    image_quality_map,
+)
+
+RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0, 0), (0, 0, 255)))
+
+
+def test_stills_are_read_back_and_repeat(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    files = [tmp_path / "one.png", tmp_path / "two.png"]
+    write_images({files[0]: noise, files[1]: noise})
+    assert np.array_equal(np.asarray(Image.open(files[0])), noise)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.png", "two.png"]
+
+
+@pytest.mark.parametrize("suffix", ANIMATED_SUFFIXES)
+def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
+    frames = [np.full((24, 32, 3), level, dtype=np.uint8) for level in (0, 80, 160, 240)]
+    file = tmp_path / f"film{suffix}"
+    write_animation(file, frames)
+    with Image.open(file) as film:
+        levels = [np.asarray(f.convert("RGB"))[0, 0, 0] for f in ImageSequence.Iterator(film)]
+    assert levels == [0, 80, 160, 240, 160, 80]
+
+
+def test_images_side_by_side() -> None:
+    sheet = side_by_side({"red": RED, "blue": BLUE})
+    assert (sheet[-1, 0] == [255, 0, 0]).all()
+    assert (sheet[-1, -1] == [0, 0, 255]).all()
+    assert sheet.shape[1] > 64
+
+
+def test_difference_has_no_sign() -> None:
+    assert (difference(RED, BLUE) == [255, 0, 255]).all()
+    assert np.array_equal(difference(RED, BLUE), difference(BLUE, RED))
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "folder.png"])
+def test_image_paths_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(InputError, match=name):
+        check_image_path(tmp_path / name)
+
+
+def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
+    old = tmp_path / "b.png"
+    write_images({old: RED})
+    before = old.read_bytes()
+    with pytest.raises((InputError, TypeError)):
+        write_images({old: BLUE, tmp_path / "c.png": np.zeros((3, 3, 7), dtype=np.uint8)})
+    assert old.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+@pytest.mark.parametrize("level", [0, 90])
+def test_pictures_of_nothing_are_not_compared(level: int) -> None:
+    even = np.full((24, 32, 3), level, dtype=np.uint8)
+    quality, about = image_quality_map(even, even)
+    assert np.isnan([quality.psnr_db, quality.ssim]).all()
+    assert np.isnan(about).all()
+    assert quality.words("true").startswith("nothing to compare")
+    assert image_quality(even, even + np.uint8(9)).psnr_db < 40
+
+
+def test_psnr_in_closed_form() -> None:
+    """An error of 10 everywhere: 10 log10(255^2 / 100)."""
+    grey = np.full((24, 32, 3), 100, dtype=np.uint8)
+    assert image_quality(grey, grey + np.uint8(10)).psnr_db == pytest.approx(28.1308, abs=1e-4)
+    assert image_quality(grey, grey + np.uint8(10)).ssim < 1
+
+
+@pytest.mark.parametrize("shape", [(11, 14, 3), (60, 90, 3)])
+def test_ssim_is_that_of_scikit_image(shape: tuple[int, int, int]) -> None:
+    """An implementation that shares no code, with the settings of SSIM's authors."""
+    rng = np.random.default_rng(3)
+    one = rng.integers(0, 256, shape, dtype=np.uint8)
+    other = np.clip(one + rng.normal(0, 12, shape), 0, 255).astype(np.uint8)
+    ssim, about = structural_similarity(
+        *(one, other),
+        channel_axis=2,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        full=True,
+    )
+    quality, ours = image_quality_map(one, other)
+    assert quality.ssim == pytest.approx(ssim, abs=1e-12)
+    assert ours == pytest.approx(about.mean(axis=2), abs=1e-12)
+
+
+def test_pictures_smaller_than_the_window_are_compared_whole() -> None:
+    small = np.zeros((4, 4, 3), np.uint8)
+    assert 0 < image_quality(small, small + np.uint8(9)).ssim < 1
+
+
+@pytest.mark.parametrize("sigma", [0.7, 6.0])
+def test_equivalent_blur_is_that_of_the_picture(sigma: float) -> None:
+    """With noise, too, which no blur explains."""
+    rng = np.random.default_rng(2)
+    sharp = gaussian_filter(rng.uniform(0, 255, (160, 200, 3)), (2.0, 2.0, 0))
+    sharp = (sharp - sharp.min()) / np.ptp(sharp) * 255
+    blurred = gaussian_filter(sharp, (sigma, sigma, 0))
+    noisy = np.clip(blurred + rng.normal(0, 3, blurred.shape), 0, 255)
+    for picture, tolerance in ((blurred, 0.03), (noisy, 0.05)):
+        found = equivalent_blur_px(sharp.astype(np.uint8), picture.astype(np.uint8))
+        assert found == pytest.approx(sigma, rel=tolerance)

@@ -1,0 +1,224 @@
+"""The server of views: it answers its own page, and refuses all else in plain words."""
+
+import itertools
+import socket
+import struct
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from http.client import HTTPConnection, HTTPResponse
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tbcad.errors import InputError
+from tbcad.light.depth.depth_map import depth_views
+from tbcad.light.simulate.views.refocus import ThinLens, refocus
+from tbcad.light.viewer.page import Query
+from tbcad.light.viewer.render import Renderer
+from tbcad.light.viewer.server import HOST, MAX_CONNECTIONS, ViewServer
+
+SMALL = "width=160&height=120"
+
+
+@pytest.fixture(scope="module")
+def server(renderer: Renderer) -> Iterator[ViewServer]:
+    with ViewServer(renderer, "a <knot>", Query(width=160, height=120)) as running:
+        thread = threading.Thread(target=running.serve_forever)
+        thread.start()
+        yield running
+        running.shutdown()
+        thread.join()
+
+
+def get(
+    server: ViewServer, path: str, host: str | None = None, method: str = "GET"
+) -> tuple[HTTPResponse, bytes]:
+    connection = HTTPConnection(HOST, server.server_port, timeout=600)
+    connection.putrequest(method, path, skip_host=True)
+    if host != "":
+        connection.putheader("Host", host or f"{HOST}:{server.server_port}")
+    connection.endheaders()
+    answer = connection.getresponse()
+    body = answer.read()
+    connection.close()
+    return answer, body
+
+
+def test_the_page_asks_nobody_else(server: ViewServer) -> None:
+    answer, body = get(server, f"/{server.token}/")
+    text = body.decode()
+    assert answer.status == 200
+    assert "<title>a &lt;knot&gt;: light field</title>" in text
+    assert "http" not in text.replace('http-equiv="Content-Security-Policy"', "")
+    assert "{{" not in text
+    assert "default-src 'none'" in str(answer.headers["Content-Security-Policy"])
+
+
+def test_a_view_is_that_of_the_library(server: ViewServer, renderer: Renderer) -> None:
+    answer, body = get(server, f"/{server.token}/view?azimuth=40&elevation=20&still=1&{SMALL}")
+    assert answer.status == 200
+    assert answer.headers["Content-Type"] == "image/jpeg"
+    query = Query(azimuth=40, elevation=20, width=160, height=120)
+    view = query.camera(renderer.capture_mm)
+    assert renderer.method == "depth"
+    image = depth_views(renderer.tiles).of(view)[0].image
+    shown = np.asarray(Image.open(BytesIO(body)))
+    assert shown.shape == image.shape
+    assert np.abs(shown.astype(float) - image).mean() < 3
+
+
+@pytest.mark.parametrize("host", ["example.com", "example.com:{port}", "{ip}", "{ip}:1", ""])
+def test_other_hosts_are_refused(server: ViewServer, host: str) -> None:
+    """A name of somebody else may point to this computer."""
+    named = host.format(port=server.server_port, ip=HOST)
+    answer, body = get(server, f"/{server.token}/", host=named)
+    assert answer.status == 403
+    assert b"<" not in body
+
+
+def test_this_computers_own_name_is_not_refused(server: ViewServer) -> None:
+    assert get(server, f"/{server.token}/", f"localhost:{server.server_port}")[0].status == 200
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/", "/view", "/wrong/", "/wrong/view", "/{token}", "/{token}/../etc/passwd",
+     "/{token}/view/x", "/{token}//view", "/{token}é/"],
+)  # fmt: skip
+def test_other_paths_are_refused(server: ViewServer, path: str) -> None:
+    named = path.format(token=server.token).encode().decode("latin-1")
+    connection = HTTPConnection(HOST, server.server_port, timeout=600)
+    connection._validate_path = lambda _: None  # type: ignore[attr-defined]
+    connection._encode_request = lambda request: request.encode("latin-1")  # type: ignore[attr-defined]
+    connection.request("GET", named)
+    answer = connection.getresponse()
+    assert answer.status == 404
+    assert answer.read() == b"not here\n"
+    connection.close()
+
+
+@pytest.mark.parametrize("query", ["azimuth=x", "elevation=91", "distance=1", "still=2", "a=1",
+                                   "width=99999", "aperture=-1", "focus=1e999"])  # fmt: skip
+def test_bad_values_are_refused_in_one_line(
+    server: ViewServer, query: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    answer, body = get(server, f"/{server.token}/view?{query}")
+    assert answer.status == 400
+    assert body.count(b"\n") == 1
+    assert b"Traceback" not in body
+    assert capfd.readouterr() == ("", "")
+
+
+def test_other_methods_are_refused(server: ViewServer) -> None:
+    assert get(server, f"/{server.token}/", method="POST")[0].status == 501
+
+
+def test_addresses_cannot_be_guessed(server: ViewServer, renderer: Renderer) -> None:
+    with ViewServer(renderer, "knot", Query()) as other:
+        assert other.token != server.token
+        assert len(other.token) > 20
+
+
+def test_a_port_that_is_taken_is_refused(server: ViewServer, renderer: Renderer) -> None:
+    with pytest.raises(InputError, match=f"port {server.server_port} cannot be used"):
+        ViewServer(renderer, "knot", Query(), server.server_port)
+
+
+def test_a_lens_at_rest_is_that_of_refocus_and_moving_it_is_smaller(renderer: Renderer) -> None:
+    query = Query(aperture=200, focus=10, width=160, height=120, still=1)
+    lens, view = ThinLens(200, 10), query.camera(renderer.capture_mm)
+    assert np.array_equal(renderer.picture(query), refocus(renderer.tiles, view, lens).image)
+    moving = Query(aperture=200, focus=10, width=160, height=120)
+    assert renderer.picture(moving).shape == (60, 80, 3)
+
+
+def raw(server: ViewServer, sent: bytes) -> socket.socket:
+    connection = socket.create_connection((HOST, server.server_port), timeout=600)
+    connection.sendall(sent)
+    return connection
+
+
+def head(server: ViewServer, path: str, *more: str) -> bytes:
+    host = f"Host: {HOST}:{server.server_port}"
+    return "\r\n".join([f"GET {path} HTTP/1.1", host, *more, "", ""]).encode()
+
+
+def reset(connection: socket.socket) -> None:
+    """Close a connection as a client does that crashes."""
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    connection.close()
+
+
+def everything(connection: socket.socket) -> bytes:
+    with connection, connection.makefile("rb") as file:
+        return file.read()
+
+
+def all_are_served(server: ViewServer) -> None:
+    """Wait until no connection is served any more: then all that could be printed is."""
+    for _ in range(MAX_CONNECTIONS):
+        assert server._free.acquire(timeout=600)
+    server._free.release(MAX_CONNECTIONS)
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [b"", b"GE", b"GET / HTTP/1.1\r\nHost: x\r\n", "page", "view", b"\0\xff\xfe" * 9 + b"\r\n\r\n"],
+)
+def test_a_client_that_resets_is_no_error(
+    server: ViewServer, sent: bytes | str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if isinstance(sent, str):
+        path = f"/{server.token}/" + (f"view?{SMALL}" if sent == "view" else "")
+        sent = head(server, path)
+    reset(raw(server, sent))
+    all_are_served(server)
+    assert capfd.readouterr() == ("", "")
+    assert get(server, f"/{server.token}/")[0].status == 200
+
+
+def test_a_client_that_takes_no_answer_is_let_go(
+    server: ViewServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tbcad.light.viewer.server.TIMEOUT_S", 0.2)
+    monkeypatch.setattr(server, "page", bytes(50_000_000))  # more than the system keeps
+    with raw(server, head(server, f"/{server.token}/")):
+        all_are_served(server)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_client_that_sends_a_byte_now_and_then_gains_no_time(
+    server: ViewServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = itertools.count(0.0, 7.0)  # seconds, asked at each read
+    monkeypatch.setattr("tbcad.light.viewer.server.monotonic", lambda: next(clock))
+    with raw(server, b"") as connection, suppress(ConnectionError):
+        for byte in itertools.repeat(b"G"):  # the time limit of the socket ends a test that fails
+            connection.sendall(byte)
+            time.sleep(0.001)
+    all_are_served(server)
+
+
+def test_a_client_that_has_sent_all_gets_its_answer(server: ViewServer) -> None:
+    connection = raw(server, head(server, f"/{server.token}/"))
+    connection.shutdown(socket.SHUT_WR)
+    assert everything(connection).startswith(b"HTTP/1.1 200")
+
+
+def test_what_follows_a_request_with_a_body_is_no_request(server: ViewServer) -> None:
+    body = head(server, f"/{server.token}/")
+    connection = raw(server, head(server, "/", f"Content-Length: {len(body)}") + body)
+    assert everything(connection).count(b"HTTP/1.1") == 1
+
+
+def test_more_connections_than_are_allowed_are_closed(server: ViewServer) -> None:
+    with ExitStack() as stack:
+        for _ in range(MAX_CONNECTIONS):
+            stack.enter_context(raw(server, b"GET"))
+        assert everything(raw(server, b"")) == b""
+    all_are_served(server)
+    assert get(server, f"/{server.token}/")[0].status == 200

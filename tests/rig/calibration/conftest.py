@@ -1,0 +1,43 @@
+"""A small prototype whose run is calibrated from simulated highlights."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate
+from tbcad.rig.calibration.detection.detection import Detection
+from tbcad.rig.calibration.study import designed_setup
+from tbcad.rig.machine.built import BuiltPrototype, random_build
+from tbcad.tolerancing.process.process import load_process, process_errors
+from tests.rig.calibration.machines import every_highlight
+
+ERRORS = process_errors(load_process("fdm"))
+FAULT = "LED 3 never lights: its highlights are not used"
+
+
+@pytest.fixture(scope="session")
+def export(export_folder: Path) -> ExportedDesign:
+    return read_export(export_folder)
+
+
+@pytest.fixture(scope="session")
+def setup(export: ExportedDesign) -> Setup:
+    return designed_setup(export)
+
+
+@pytest.fixture(scope="session")
+def built(setup: Setup) -> BuiltPrototype:
+    still = np.zeros(len(setup.plan.angle))
+    return random_build(setup.designed, setup.plan, ERRORS, seed=3, wind_up=still)
+
+
+@pytest.fixture(scope="session")
+def detection(built: BuiltPrototype) -> Detection:
+    return Detection(every_highlight(built.machine, 5), (), (FAULT,))
+
+
+@pytest.fixture(scope="session")
+def calibrated(setup: Setup, detection: Detection) -> MachineCalibration:
+    return calibrate(setup, detection, setup.prior(ERRORS))

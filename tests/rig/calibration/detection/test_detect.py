@@ -1,0 +1,281 @@
+"""Highlights of simulated photographs are found where they are; what is wrong is named."""
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tbcad.errors import InputError
+from tbcad.records.exposure import exposure_name
+from tbcad.rig.calibration.detection.detect import detect
+from tbcad.rig.calibration.detection.detection import Detection, Rejection, no_highlights
+from tbcad.rig.calibration.detection.expected import Room, expected_highlights
+from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
+from tbcad.rig.machine.machine import Highlights
+from tbcad.rig.runs.photographs import read_run
+from tbcad.rig.simulated_run.photographs import ImagingChain
+from tbcad.types import Floats
+from tests.simulated_runs import BRIGHT, Small, small_run
+
+TARGET_PX = 0.05
+STOPS = range(8, 48, 6)
+
+
+def detected(folder: Path, small: Small) -> Detection:
+    return detect(read_run(folder), small.prior)
+
+
+def errors(found: Highlights, small: Small) -> Floats:
+    return found.pixel - small.machine.highlights(found.frame, found.sphere, found.led)
+
+
+def reasons(found: Detection) -> Counter[Rejection]:
+    return Counter(one.reason for one in found.rejected)
+
+
+@pytest.fixture(scope="module")
+def whole(photographed: Path, small: Small) -> Detection:
+    return detected(photographed, small)
+
+
+def test_centroids_are_right(whole: Detection, small: Small) -> None:
+    off = errors(whole.highlights, small)
+    assert len(whole.highlights) > 150
+    assert np.sqrt((off**2).mean()) < TARGET_PX
+    # No wrong match: the farthest is a noisy one, not another spot.
+    assert np.hypot(*off.T).max() < 10 * TARGET_PX
+    assert not whole.faults
+
+
+def test_sigmas_are_those_of_the_errors(whole: Detection, small: Small) -> None:
+    share = errors(whole.highlights, small) / whole.highlights.sigma[:, None]
+    assert 0.5 < np.median(np.abs(share)) / 0.6745 < 1.5
+
+
+def test_every_highlight_is_used_or_rejected_once(whole: Detection, small: Small) -> None:
+    used = zip(whole.highlights.frame, whole.highlights.sphere, whole.highlights.led, strict=True)
+    every = [*used, *((one.frame, one.sphere, one.led) for one in whole.rejected)]
+    machine = small.machine
+    count = len(machine.angle) * len(machine.radius) * len(machine.leds)
+    assert len(every) == len(set(every)) == count
+
+
+def test_outside_is_what_the_truth_has_outside(whole: Detection, small: Small) -> None:
+    inside = expected_highlights(small.machine, 1.5).inside
+    assert reasons(whole)[Rejection.OUTSIDE] == pytest.approx((~inside).sum(), abs=3)
+
+
+def test_an_led_that_never_lights(write: Callable[[Small], Path], export_folder: Path) -> None:
+    dead = ImagingChain(led_light=(BRIGHT, BRIGHT, 0.0, BRIGHT))
+    small = small_run(export_folder, STOPS, chain=dead)
+    found = detected(write(small), small)
+    assert "LED 3 shines in no photograph" in " ".join(found.faults)
+    assert (found.highlights.led != 2).all()
+    assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
+
+
+def test_a_camera_that_moves_in_mid_run(
+    write: Callable[[Small], Path], export_folder: Path
+) -> None:
+    small = small_run(export_folder, STOPS)
+    folder = write(_moved(small, first=8, shift=np.array([1.2, -0.9])))
+    found = detected(folder, small)
+    line = next(line for line in found.faults if "camera moved" in line)
+    frames = small.run.frames
+    before, after = (exposure_name(frames[k], "")[:-1] for k in (7, 8))
+    assert f"between {before} and {after}" in line
+    assert float(line.split("by ")[1].split(" px")[0]) == pytest.approx(1.5, abs=0.3)
+    assert found.highlights.frame.max() == 7
+    assert reasons(found)[Rejection.MOVED] > 30
+    assert np.sqrt((errors(found.highlights, small) ** 2).mean()) < TARGET_PX
+
+
+def _moved(small: Small, first: int, shift: Floats) -> Small:
+    """The same run, whose picture shifts between two frames."""
+    whole = type(small.run)
+    machine = small.machine
+    aside = replace(machine.camera, principal=machine.camera.principal + shift)
+    built = replace(small.run.built, machine=replace(machine, camera=aside))
+    other = replace(small.run, built=built)
+
+    class Knocked(whole):
+        def frame_photographs(self, number: int, phases: tuple[str, ...]) -> dict[str, object]:
+            source = other if number >= first else small.run
+            return source.frame_photographs(number, phases)
+
+    run = Knocked(**{name: getattr(small.run, name) for name in whole.__dataclass_fields__})
+    return replace(small, run=run)
+
+
+def test_photographs_that_are_missing_or_damaged(copied: Path, small: Small) -> None:
+    photographs, frames = copied / "photographs", small.run.frames
+    lost, damaged = (exposure_name(frames[k], "led_2") for k in (2, 4))
+    (photographs / f"{lost}.json").unlink()
+    (photographs / f"{damaged}.png").write_bytes(b"no picture")
+    found = detected(copied, small)
+    assert all(any(name in line for line in found.faults) for name in (lost, damaged))
+    absent = {
+        (one.frame, one.led) for one in found.rejected if one.reason is Rejection.NO_PHOTOGRAPH
+    }
+    assert absent == {(2, 1), (4, 1)}
+    used = {*zip(found.highlights.frame.tolist(), found.highlights.led.tolist(), strict=True)}
+    assert not used & absent
+    assert (2, 0) in used
+
+
+def test_a_dark_photograph_that_is_missing(copied: Path, small: Small, whole: Detection) -> None:
+    name = exposure_name(small.run.frames[3], "dark")
+    (copied / "photographs" / f"{name}.json").unlink()
+    found = detected(copied, small)
+    assert f"{name} is not there: its frame goes on with that of another" in " ".join(found.faults)
+    # Hot pixels stay where they are, so nothing is lost.
+    assert (found.highlights.frame == 3).sum() == (whole.highlights.frame == 3).sum()
+
+
+def test_another_exposure_is_named_and_scaled(copied: Path, small: Small, whole: Detection) -> None:
+    name = exposure_name(small.run.frames[5], "led_1")
+    path = copied / "photographs" / f"{name}.json"
+    sidecar = json.loads(path.read_text())
+    path.write_text(json.dumps({**sidecar, "exposure_s": 0.5}))
+    found = detected(copied, small)
+    assert f"{name} and 0 more were exposed otherwise" in " ".join(found.faults)
+    # Its light is as before, so it now seems twice too bright.
+    mine = [one for one in found.rejected if (one.frame, one.led) == (5, 0)]
+    assert Rejection.MERGED in {one.reason for one in mine}
+
+
+@pytest.mark.parametrize(("seconds", "says"), [(2.0, "scaled"), (0.1, "too short")])
+def test_a_dark_photograph_of_another_exposure(
+    copied: Path, small: Small, whole: Detection, seconds: float, says: str
+) -> None:
+    frame = small.run.frames[3]
+    path = copied / "photographs" / f"{exposure_name(frame, 'dark')}.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "exposure_s": seconds}))
+    found = detected(copied, small)
+    (line,) = found.faults
+    name = exposure_name(frame, "led_1")
+    assert line.startswith(f"{name} was exposed for 1 s, its dark photograph for {seconds:g} s")
+    assert says in line
+    assert len(found.highlights) == pytest.approx(len(whole.highlights), abs=2)
+
+
+@pytest.mark.parametrize(
+    ("light", "says"),
+    [
+        (
+            100 * BRIGHT,
+            r"calibrate from: \d+ saturated: the light is saturated: photograph the LEDs",
+        ),
+        (BRIGHT / 1000, r"56 of 56 photographs by LEDs are black: most are too dark: see that"),
+    ],
+)
+def test_no_highlights_are_told_by_reason(
+    write: Callable[[Small], Path], export_folder: Path, light: float, says: str
+) -> None:
+    small = small_run(export_folder, STOPS, chain=ImagingChain(led_light=light))
+    with pytest.raises(InputError, match=says):
+        detected(write(small), small)
+
+
+def test_spots_that_are_no_highlights_of_this_machine(
+    copied: Path, small: Small, export_folder: Path
+) -> None:
+    """A camera that looks elsewhere: nothing is near its place."""
+    camera = small.machine.camera
+    away = replace(camera, principal=camera.principal + 10 * camera.width_px)
+    prior = replace(small.prior, mean=replace(small.prior.mean, camera=away))
+    with pytest.raises(
+        InputError, match=r"\d+ where no highlight is expected; .*: is this the run"
+    ):
+        detect(read_run(copied), prior)
+
+
+def test_light_larger_than_a_highlight() -> None:
+    image = np.zeros((200, 300, 3), np.uint8)
+    image[20:80, 20:80] = 255
+    image[120:180, 120:180] = 100
+    image[50:54, 200:204] = 200
+    spots, other = find_spots(image, None, 0, 0)
+    assert len(spots) == 1
+    assert other == Unmeasured(large=2, saturated=1)
+    flood = np.full((800, 800, 3), 200, np.uint8)
+    assert find_spots(flood, None, 0, 0)[1] == Unmeasured(flooded=1)
+    assert find_spots(0 * flood, None, 0, 0)[1] == Unmeasured(black=1)
+    error = str(no_highlights(spots, other + other + Unmeasured(flooded=3), 4))
+    assert "4 larger than a highlight, 2 of them saturated" in error
+    assert "most are full of light: darken the room" in error
+
+
+def test_another_size_is_a_fault(copied: Path, small: Small) -> None:
+    name = exposure_name(small.run.frames[5], "led_1")
+    path = copied / "photographs" / f"{name}.json"
+    sidecar = json.loads(path.read_text())
+    path.write_text(json.dumps({**sidecar, "width_px": 100}))
+    found = detected(copied, small)
+    assert any(name in line and "another size" in line for line in found.faults)
+
+
+def _painted(folder: Path, name: str, at: Floats, brightness: int, size: int = 2) -> None:
+    """Paint a square spot into a photograph."""
+    path = folder / "photographs" / f"{name}.png"
+    with Image.open(path) as image:
+        pixels = np.array(image)
+    x, y = np.rint(at).astype(int)
+    pixels[y : y + size, x : x + size] = brightness
+    Image.fromarray(pixels).save(path)
+    sidecar = path.with_suffix(".json")
+    record = json.loads(sidecar.read_text())
+    record["sha256"] = sha256(path.read_bytes()).hexdigest()
+    sidecar.write_text(json.dumps(record))
+
+
+def _first(found: Detection) -> tuple[int, int, int, Floats]:
+    """A highlight in the middle of the run."""
+    h = found.highlights
+    k = len(h) // 2
+    return int(h.frame[k]), int(h.sphere[k]), int(h.led[k]), h.pixel[k]
+
+
+@pytest.mark.parametrize(
+    ("aside", "brightness", "reason"),
+    [(7.0, 200, Rejection.DOUBLE), (2.0, 200, Rejection.MERGED), (0.0, 255, Rejection.SATURATED)],
+)
+def test_spots_that_are_no_highlights(
+    copied: Path, small: Small, whole: Detection, aside: float, brightness: int, reason: Rejection
+) -> None:
+    frame, sphere, led, place = _first(whole)
+    name = exposure_name(small.run.frames[frame], f"led_{led + 1}")
+    _painted(copied, name, place + np.array([aside, 0.0]), brightness)
+    found = detected(copied, small)
+    mine = [
+        one for one in found.rejected if (one.frame, one.sphere, one.led) == (frame, sphere, led)
+    ]
+    assert [one.reason for one in mine] == [reason]
+
+
+def test_a_hidden_highlight_is_not_taken_for_another(
+    write: Callable[[Small], Path], export_folder: Path
+) -> None:
+    small = small_run(export_folder, STOPS, subject_mm=36.0)
+    folder = write(small)
+    room = Room(radius=20.0, bottom=-19.0, top=23.0)
+    found = detect(read_run(folder), small.prior, room)
+    off = np.hypot(*errors(found.highlights, small).T)
+    assert reasons(found)[Rejection.HIDDEN] > 10
+    assert reasons(found)[Rejection.MISSING] == 0
+    assert off.max() < 10 * TARGET_PX
+    assert np.sqrt((off**2).mean() / 2) < TARGET_PX
+
+
+def test_a_run_without_leds(copied: Path, small: Small) -> None:
+    path = copied / "run.json"
+    record = json.loads(path.read_text())
+    path.write_text(json.dumps({**record, "phases": ["dark", "lit"]}))
+    with pytest.raises(InputError, match="has no photographs of single LEDs"):
+        detected(copied, small)

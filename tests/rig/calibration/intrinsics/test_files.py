@@ -1,0 +1,304 @@
+"""Lenses in the files of other programs, against what these programs say of them."""
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tbcad.core.optics.camera import Camera, without_distortion
+from tbcad.errors import InputError
+from tbcad.rig.calibration.intrinsics.files import read_lens
+from tbcad.rig.calibration.intrinsics.lens import CalibratedLens, opencv_text
+
+LENS = CalibratedLens(
+    focal=np.array([1058.3, 1057.9]),
+    principal=np.array([1040.25, 770.5]),
+    distortion=np.array([-0.05, 0.01, 1e-3, -5e-4, 1e-3]),
+    width_px=2080,
+    height_px=1552,
+)
+FOUR = "1058.3 1057.9 1040.75 771.0"
+MRCAL = """# mrcal camera model; comments may be anywhere
+{{
+    'lensmodel':  '{model}',
+    'extrinsics': [ 0., 0, 0, 0, 0, 0,],
+    'intrinsics': [ 1058.3, 1057.9, 1040.25, 770.5{more}],
+    'imagersize': [ 2080, 1552,],
+    'icam_intrinsics': 0,
+}}
+"""
+
+
+def _written(path: Path, extension: str) -> Path:
+    """By OpenCV itself, as its own program of calibration names the keys."""
+    file = path / f"camera.{extension}"
+    store = cv2.FileStorage(str(file), cv2.FileStorage_WRITE)
+    (fx, fy), (cx, cy) = LENS.focal, LENS.principal
+    store.write("image_width", 2080)
+    store.write("image_height", 1552)
+    store.write("camera_matrix", np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
+    store.write("distortion_coefficients", LENS.distortion[:, None])
+    store.release()
+    return file
+
+
+@pytest.mark.parametrize("extension", ["yml", "xml"])
+def test_opencv(tmp_path: Path, extension: str) -> None:
+    _same(read_lens(_written(tmp_path, extension)), LENS.distortion)
+
+
+def test_own_file_is_read_by_opencv_and_here(tmp_path: Path) -> None:
+    file = tmp_path / "camera.yml"
+    file.write_text(opencv_text(LENS, {"rms_px": 0.1}))
+    store = cv2.FileStorage(str(file), cv2.FileStorage_READ)
+    coefficients = store.getNode("distortion_coefficients").mat()
+    assert coefficients.ravel() == pytest.approx(LENS.distortion, abs=0)
+    _same(read_lens(file), LENS.distortion)
+
+
+def test_mrcal(tmp_path: Path) -> None:
+    file = tmp_path / "camera.cameramodel"
+    file.write_text(MRCAL.format(model="LENSMODEL_OPENCV4", more=", -0.05, 0.01, 1e-3, -5e-4"))
+    _same(read_lens(file), np.array([-0.05, 0.01, 1e-3, -5e-4, 0]))
+
+
+def test_colmap_counts_from_the_pixels_corner(tmp_path: Path) -> None:
+    file = tmp_path / "cameras.txt"
+    file.write_text(f"# Camera list\n1 OPENCV 2080 1552 {FOUR} -0.05 0.01 1e-3 -5e-4\n")
+    _same(read_lens(file), np.array([-0.05, 0.01, 1e-3, -5e-4, 0]))
+
+
+def _same(found: CalibratedLens, distortion: np.ndarray) -> None:
+    assert found.focal == pytest.approx(LENS.focal)
+    assert found.principal == pytest.approx(LENS.principal)
+    assert found.distortion == pytest.approx(distortion)
+    assert (found.width_px, found.height_px) == (2080, 1552)
+
+
+REFUSED: dict[str, tuple[str, str]] = {
+    "nothing": ("hello", "is no lens"),
+    "splines": (
+        MRCAL.format(model="LENSMODEL_SPLINED_STEREOGRAPHIC_order=3", more=""),
+        "SPLINED_STEREOGRAPHIC",
+    ),
+    "rational in mrcal": (
+        MRCAL.format(model="LENSMODEL_OPENCV8", more=", 0, 0, 0, 0, 0, .1, 0, 0"),
+        "mrcal-convert-lensmodel LENSMODEL_OPENCV5",
+    ),
+    "few in mrcal": (
+        MRCAL.format(model="LENSMODEL_OPENCV8", more=", 0, 0, 0, 0"),
+        "has 8 numbers",
+    ),
+    "overflow in mrcal": (
+        MRCAL.format(model="LENSMODEL_OPENCV4", more=f", {'9' * 400}, 0, 0, 0"),
+        "no finite number",
+    ),
+    "digits in mrcal": (
+        MRCAL.format(model="LENSMODEL_OPENCV4", more=f", {'9' * 5000}, 0, 0, 0"),
+        "no .cameramodel",
+    ),
+    "signs in mrcal": (
+        MRCAL.format(model="LENSMODEL_OPENCV4", more=", " + "-" * 100_000 + "1"),
+        "nested too deeply",
+    ),
+    "references": ("a: &a [1, 1]\nb: [*a, *a]\n", "references (*a)"),
+    "entities": ('<!DOCTYPE a [<!ENTITY a "b">]><a>&a;</a>', "document type"),
+    "deep list": ("camera_matrix: " + "[" * 100_000, "no YAML"),
+    "deep blocks": ("- " * 50_000, "nested too deeply"),
+    "deep elements": ("<a>" * 50_000 + "</a>" * 50_000, "nested too deeply"),
+    "lines": ("\n" * 100_000 + "1 PINHOLE", "is no lens"),
+    "twice": ("image_width: 1\nimage_width: 2\n", "image_width twice"),
+    "no size": (
+        "camera_matrix: [1, 0, 1, 0, 1, 1, 0, 0, 1]\nD: []\n",
+        "no size of its pictures",
+    ),
+    "broken": ("{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [", "no .cameramodel"),
+    "fisheye": (f"1 OPENCV_FISHEYE 2080 1552 {FOUR} 0 0 0 0\n", "OPENCV_FISHEYE"),
+    "two": (f"1 PINHOLE 2080 1552 {FOUR}\n2 PINHOLE 2080 1552 {FOUR}\n", "has 2 cameras"),
+    "few": ("1 PINHOLE 2080 1552 1058.3 1040 770\n", "has 4 parameters, found 3"),
+    "tiny": ("1 PINHOLE 2080 1552 3.5 3.5 1040 776\n", "do not fit a picture"),
+    "folded": ("1 RADIAL 2080 1552 1058.3 1040 776 -0.9 0\n", "folds the picture"),
+    "no matrix": ("%YAML:1.0\n---\nimage_width: 2080\n", "no camera_matrix"),
+    "skewed": (
+        opencv_text(LENS, {}).replace("[ 1058.3, 0.0,", "[ 1058.3, 5.0,"),
+        "skewed pixels",
+    ),
+    "fisheye in OpenCV": (opencv_text(LENS, {"fisheye_model": 1}), "lens model fisheye_model: 1"),
+    "damaged": ("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: [", "line 5: no YAML"),
+}
+ROS = """image_width: 2080
+image_height: 1552
+camera_name: fisheye_left
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [1058.3, 0., 1040.25, 0., 1057.9, 770.5, 0., 0., 1.]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [-0.05, 0.01, 1e-3, -5e-4, 1e-3]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [990., 0., 1030., 0., 0., 990., 760., 0., 0., 0., 1., 0.]
+"""
+ROS_MESSAGE = """height: 1552
+width: 2080
+distortion_model: rational_polynomial
+D: [-0.05, 0.01, 1e-3, -5e-4, 1e-3, 0, 0, 0]
+K: [1058.3, 0., 1040.25, 0., 1057.9, 770.5, 0., 0., 1.]
+binning_x: 0
+binning_y: 0
+roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: False}
+---
+"""
+KALIBR = """cam0:
+  camera_model: pinhole
+  distortion_coeffs: [-0.05, 0.01, 1e-3, -5e-4]
+  distortion_model: radtan
+  intrinsics: [1058.3, 1057.9, 1040.25, 770.5]
+  resolution: [2080, 1552]
+  rostopic: /omni/image_raw
+"""
+TUTORIAL = """camera_matrix: [[1058.3, 0, 1040.25], [0, 1057.9, 770.5], [0, 0, 1]]
+dist_coeff: [[-0.05, 0.01, 1e-3, -5e-4, 1e-3]]
+image_size: [2080, 1552]
+"""
+
+
+@pytest.mark.parametrize("text", [ROS, ROS_MESSAGE, KALIBR, TUTORIAL])
+def test_yaml_of_other_programs(tmp_path: Path, text: str) -> None:
+    k3 = 0 if text == KALIBR else 1e-3
+    _same(_read(tmp_path, text), np.array([-0.05, 0.01, 1e-3, -5e-4, k3]))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_encodings(tmp_path: Path, encoding: str, end: str) -> None:
+    file = tmp_path / "camera.yaml"
+    file.write_bytes(ROS.replace("\n", end).encode(encoding))
+    _same(read_lens(file), LENS.distortion)
+
+
+def test_json_of_opencv(tmp_path: Path) -> None:
+    _same(read_lens(_written(tmp_path, "json")), LENS.distortion)
+
+
+def _read(folder: Path, text: str) -> CalibratedLens:
+    file = folder / "camera.yaml"
+    file.write_text(text)
+    return read_lens(file)
+
+
+MODEL_KEYS = ("distortion_model", "camera_model", "Model", "lensType", "projection", "distortion")
+MODELS = ("equidistant", "FISHEYE", "omni", "fov", "thin_prism", "kannala_brandt4", "mei", "new")
+
+
+@pytest.mark.parametrize("key", MODEL_KEYS)
+@pytest.mark.parametrize("model", MODELS)
+def test_models_that_are_named_are_refused_whatever_the_key(
+    tmp_path: Path, key: str, model: str
+) -> None:
+    text = ROS.replace("distortion_model: plumb_bob", f"{key}: {model}")
+    with pytest.raises(InputError, match=f"lens model {key}: {model}: use a pinhole"):
+        _read(tmp_path, text)
+    assert _read(tmp_path, text.replace(model, "plumb_bob"))
+
+
+TAIL = {
+    "xi: 0.9": "lens model xi",
+    "xi: {rows: 1, cols: 1, data: [0.9]}": "lens model xi",
+    "is_fisheye: true": "lens model is_fisheye",
+    "fisheye: {a: 1}": "lens model fisheye",
+    "lens: {model: [pinhole, equi]}": "lens model model: equi",
+    "K: [1058.3, 0., 1040, 0., 1057.9, 770.5, 0., 0., 1.]": "2 cameras (camera_matrix, K)",
+    "right: {K: [1058.3, 0., 1040, 0., 1057.9, 770, 0., 0., 1.]}": "2 cameras",
+    "D: [0.1, 0, 0, 0]": "two lists of distortion",
+    "resolution: [1040, 776]": "no clear size",
+    "binning_x: 2": "binning_x",
+    "roi: {x_offset: 10}": "roi",
+    f"---\n{ROS}": "2 documents",
+}
+
+
+@pytest.mark.parametrize(("tail", "message"), TAIL.items())
+def test_lines_after_a_good_lens(tmp_path: Path, tail: str, message: str) -> None:
+    with pytest.raises(InputError, match=re.escape(message)):
+        _read(tmp_path, f"{ROS}{tail}\n")
+
+
+CHANGED = {
+    ("1058.3", "1e400"): "'1e400' is no finite number",
+    ("1058.3", "9" * 5000): "is no finite number",
+    ("1058.3", ".nan"): "'.nan' is no finite number",
+    ("1058.3", "-1058.3"): "must be above 0",
+    ("1057.9", "0"): "must be above 0",
+    ("1040.25", "2090"): "outside of a picture of 2080 x 1552",
+    ("2080", "2080.5"): "whole numbers",
+    ("2080", "1e9"): "whole numbers",
+    ("cols: 5", "cols: 4"): "not rows times cols",
+    ("cols: 5\n  data: [-0.05, ", "cols: 3\n  data: ["): "rows times cols",
+    ("cols: 5\n  data: [-0.05, 0.01, ", "cols: 3\n  data: ["): "3 coefficients",
+    ("1e-3]", "1e-3, 0.1, 0, 0]"): "rows times cols",
+    ("cols: 5\n  data: [", "cols: 8\n  data: [0, 0, 0, "): "(rational model)",
+    ("0., 0., 1.]\ndist", "0., 1., 1.]\ndist"): "fx 0 cx, 0 fy cy, 0 0 1",
+    ("distortion_coefficients", "warp"): "no distortion_coefficients",
+    ("plumb_bob", "''"): "names no model",
+    ("-0.05", "1e300"): "folds the picture",
+}
+
+
+@pytest.mark.parametrize(("change", "message"), CHANGED.items())
+def test_numbers_that_cannot_be(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    assert change[0] in ROS
+    with pytest.raises(InputError, match=re.escape(message)):
+        _read(tmp_path, ROS.replace(*change))
+
+
+def test_kalibr_must_name_its_models_and_one_camera(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="names no camera_model and distortion_model"):
+        _read(tmp_path, KALIBR.replace("  distortion_model: radtan\n", ""))
+    with pytest.raises(InputError, match=re.escape("2 cameras (cam0, cam1): which took")):
+        _read(tmp_path, KALIBR + KALIBR.replace("cam0", "cam1"))
+
+
+PIECES = (*ROS.split("\n"), *KALIBR.split("\n"), *MRCAL.split("\n"), "<a>", "</a>", "\x85", "&a *a")
+
+
+@given(
+    st.one_of(
+        st.binary(max_size=60),
+        st.text(max_size=60).map(lambda text: (ROS + text).encode("utf-8", "replace")),
+        st.lists(st.sampled_from(PIECES), max_size=12).map(lambda rows: "\n".join(rows).encode()),
+    )
+)
+def test_any_file_is_a_lens_or_a_message_of_one_line(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    file = tmp_path_factory.getbasetemp() / "lens"
+    file.write_bytes(content)
+    try:
+        read_lens(file)
+    except InputError as error:
+        assert str(error).isprintable()  # noqa: PT017
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED.values(), ids=REFUSED)
+def test_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "lens"
+    file.write_text(text)
+    with pytest.raises(InputError, match=re.escape(message)) as error:
+        read_lens(file)
+    assert "\n" not in str(error.value)
+
+
+def test_another_size_than_the_run() -> None:
+    forward, right = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
+    camera = without_distortion(Camera(np.zeros(3), forward, right, 1040, 776, 1.5))
+    with pytest.raises(InputError, match="2080 x 1552 pixels, the run's have 1040 x 776"):
+        LENS.on(camera)

@@ -1,0 +1,135 @@
+"""A small export with what a run reads, and a rig that answers as its machine."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.prototype import MotionSpec
+from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.drive.drive import Drive, load_drives
+from tbcad.prototype.drive.loads import BaseTorques, choose_drive
+from tbcad.prototype.drive.travel import home_angles
+from tbcad.prototype.electronics.outputs import lights, phases
+from tbcad.prototype.files import klipper
+from tbcad.prototype.files.gcode import gcode_program, write_program
+from tbcad.prototype.files.settings import settings, settings_lines, write_settings
+from tbcad.prototype.purchased.parts import load_parts
+from tests.exported_files import edit_json
+from tests.prototype_exports import write_export, write_stops
+from tests.rig.control.impatient import WAITS_S
+from tests.rig.control.rig import Rig, connected_rig, klipper_rig_of
+
+LEDS = 4
+WIND_UP_DEG = 0.1  # at every stop
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands in this process wait for the double as long as it needs, not as a board may."""
+    for name, seconds in WAITS_S.items():
+        monkeypatch.setattr(f"tbcad.rig.control.{name}", seconds)
+
+
+@pytest.fixture(scope="session")
+def layout(low_resolution_design: MirrorDesign) -> PrototypeLayout:
+    return prototype_layout(low_resolution_design.spec, low_resolution_design)
+
+
+@pytest.fixture(scope="session")
+def drive() -> Drive:
+    return choose_drive("nema17-belt", BaseTorques(450.0, 500.0, 1000.0), load_drives(load_parts()))
+
+
+def export(
+    folder: Path, design: MirrorDesign, layout: PrototypeLayout, drive: Drive, motion: MotionSpec
+) -> Path:
+    """What a run reads, by the export's own writers."""
+    write_export(folder, design, layout)
+    angles = np.degrees(layout.stops.angle).tolist()
+    write_stops(folder, angles, [WIND_UP_DEG] * len(angles))
+    write_program(folder / "rotation_plan.nc", gcode_program(layout, drive, motion, LEDS))
+    if motion.controller == "grblhal":
+        _write_klipper_files(folder, layout, drive, motion)
+    lines = settings_lines("settings", settings(drive, motion, home_angles(layout, motion)))
+    write_settings(folder / "grbl_settings.txt", lines)
+    lit = [{"name": one.name, "output": one.output} for one in phases(LEDS, motion)]
+    controller = {"firmware": motion.controller, "axis": motion.axis, "phases": lit}
+    edit_json(folder / "prototype.json", lambda value: value.update(controller=controller))
+    edit_json(folder / "design.json", lambda value: _quick(value, motion))
+    return folder
+
+
+def _write_klipper_files(
+    folder: Path, layout: PrototypeLayout, drive: Drive, motion: MotionSpec
+) -> None:
+    program = gcode_program(layout, drive, motion, LEDS)
+    lines = klipper.klipper_program(program, motion, home_angles(layout, motion))
+    write_program(folder / klipper.PROGRAM, [*lines])
+    config = klipper.klipper_config(drive, motion, lights(LEDS, motion))
+    write_program(folder / klipper.CONFIG, [*config])
+
+
+def _quick(design: dict, motion: MotionSpec) -> None:
+    design["spec"]["prototype"]["motion"] = json.loads(motion.model_dump_json()) | {"light_s": 0.0}
+
+
+@pytest.fixture(scope="session")
+def control_export(
+    tmp_path_factory: pytest.TempPathFactory,
+    low_resolution_design: MirrorDesign,
+    layout: PrototypeLayout,
+    drive: Drive,
+) -> Path:
+    folder = tmp_path_factory.mktemp("control")
+    return export(folder, low_resolution_design, layout, drive, MotionSpec())
+
+
+@pytest.fixture(scope="session")
+def plain_export(
+    tmp_path_factory: pytest.TempPathFactory,
+    low_resolution_design: MirrorDesign,
+    layout: PrototypeLayout,
+    drive: Drive,
+) -> Path:
+    """For GRBL 1.1, which has no outputs and does not home."""
+    folder = tmp_path_factory.mktemp("plain")
+    motion = MotionSpec(controller="grbl")
+    return export(folder, low_resolution_design, layout, drive, motion)
+
+
+@pytest.fixture(scope="session")
+def switch_deg(layout: PrototypeLayout) -> float:
+    return home_angles(layout, MotionSpec()).switch
+
+
+@pytest.fixture
+def rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
+    found = connected_rig(control_export, tmp_path, switch_deg)
+    yield found
+    found.controller.close()
+
+
+@pytest.fixture
+def plain_rig(plain_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
+    found = connected_rig(plain_export, tmp_path, switch_deg, "grbl", angle=0.0)
+    yield found
+    found.controller.close()
+
+
+@pytest.fixture
+def klipper_rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
+    found = klipper_rig_of(control_export, tmp_path, switch_deg)
+    yield found
+    found.controller.close()
+
+
+@pytest.fixture(params=["rig", "klipper_rig"])
+def either_rig(request: pytest.FixtureRequest) -> Rig:
+    """With grblHAL, and with Klipper."""
+    found = request.getfixturevalue(request.param)
+    assert isinstance(found, Rig)
+    return found

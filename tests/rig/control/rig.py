@@ -1,0 +1,164 @@
+"""A machine without hardware: a controller's double, and what stands before the camera."""
+
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from tbcad.rig.control.plan import read_settings
+from tests.rig.control.exposing_camera import SIZE
+from tests.rig.control.grbl_double import GrblDouble, Machine
+from tests.rig.control.klipper_double import KlipperDouble, printer_settings
+
+ROOT = Path(__file__).parents[3]
+PICTURE = "scene.jpg"
+PICTURE_BYTES = 16_384  # the virtual camera asks for a file's size once
+LIT = 255
+
+
+@lru_cache(maxsize=256)
+def scene(angle: float, lights: frozenset[int]) -> bytes:
+    """What is seen at a base angle, rounded to 0.1 degrees, under some lights: a JPEG file."""
+    pixels = np.zeros((SIZE[1], SIZE[0]), np.uint8)
+    pixels[:, : round(angle + 180)] = 40  # a bar for the angle
+    for light in lights:
+        pixels[30 * light : 30 * light + 20] = LIT
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "JPEG", quality=60)
+    data = file.getvalue()
+    assert len(data) < PICTURE_BYTES
+    return data + bytes(PICTURE_BYTES - len(data))
+
+
+def scene_of(machine: Machine) -> bytes:
+    return scene(round(machine.angle, 1), frozenset(machine.lights))
+
+
+def put(path: Path, data: bytes) -> None:
+    """Replace a file as a whole."""
+    partial = path.with_suffix(".part")
+    partial.write_bytes(data)
+    partial.replace(path)
+
+
+@dataclass
+class Rig:
+    """A controller, and a picture of what it shows.
+
+    Attributes:
+        controller: on a pseudo-terminal; or a port of loopback.
+        export: that describes the machine.
+        folder: for pictures and runs.
+    """
+
+    controller: Any
+    export: Path
+    folder: Path
+
+    @property
+    def picture(self) -> Path:
+        return self.folder / "view" / PICTURE
+
+    @property
+    def copying(self) -> str:
+        """--camera of a command that copies the picture."""
+        return f"command:cp {self.picture} {{output}}.jpg"
+
+    @property
+    def out(self) -> Path:
+        return self.folder / "run"
+
+    def words(self, *more: str, camera: str | None = None, stops: str | None = "1-2") -> list[str]:
+        """A command line of tbcad."""
+        return [
+            *("run", str(self.export), "--port", self.controller.port, "--out", str(self.out)),
+            *("--camera", camera or self.copying, "--yes", "--no-preflight", *more),
+            *(("--stops", stops) if stops else ()),
+        ]
+
+    def resume(self) -> list[str]:
+        """The command line that goes on."""
+        return self.words("--resume", stops=None)
+
+    def environment(self) -> dict[str, str]:
+        """Of a process that has the virtual camera and sees the picture by it."""
+        spec = find_spec("gphoto2")
+        assert spec is not None
+        assert spec.origin is not None
+        return os.environ | {
+            "IOLIBS": str(Path(spec.origin).parent / "libgphoto2" / "vusb"),
+            "VCAMERADIR": str(self.picture.parent),
+            "HOME": str(self.folder),  # the library keeps settings there
+        }
+
+    def start(
+        self,
+        words: list[str],
+        before: Sequence[str] = (),
+        module: str = "tests.rig.control.impatient",
+        terminal: int | None = None,
+    ) -> "subprocess.Popen[str]":
+        """A command in a process of its own, with the virtual camera; at a terminal, if given."""
+        return subprocess.Popen(
+            [*before, sys.executable, "-m", module, *words],
+            cwd=ROOT,
+            env=self.environment(),
+            stdin=subprocess.DEVNULL if terminal is None else terminal,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE if terminal is None else terminal,
+            encoding="utf-8",
+        )
+
+
+def connected_rig(
+    export: Path,
+    folder: Path,
+    switch_deg: float,
+    firmware: str = "grblhal",
+    angle: float = 3.7,
+    view: Callable[[Machine], bytes] = scene_of,
+) -> Rig:
+    """A rig whose controller shows the camera what its machine looks like."""
+    settings = read_settings(export / "grbl_settings.txt") | {3: 0.0, 11: 0.01}
+    see = _seen(folder, view)
+    return _started(
+        GrblDouble(settings, switch_deg, firmware, angle=angle, see=see), export, folder
+    )
+
+
+def klipper_rig_of(export: Path, folder: Path, switch_deg: float) -> Rig:
+    """A rig whose printer is configured as the build says."""
+    settings = printer_settings(export / "klipper.cfg")
+    return _started(
+        KlipperDouble(settings, switch_deg, see=_seen(folder, scene_of)), export, folder
+    )
+
+
+def _seen(folder: Path, view: Callable[[Machine], bytes]) -> Callable[[Machine], None]:
+    (folder / "view").mkdir()
+    return lambda machine: put(folder / "view" / PICTURE, view(machine))
+
+
+def _started(controller: Any, export: Path, folder: Path) -> Rig:
+    controller.see(controller.machine)
+    controller.start()
+    return Rig(controller, export, folder)
+
+
+def until(condition: Callable[[], bool], seconds: float = 600.0) -> None:
+    """Wait for something that a thread does."""
+    from time import monotonic, sleep
+
+    end = monotonic() + seconds
+    while not condition():
+        assert monotonic() < end
+        sleep(0.002)

@@ -1,0 +1,126 @@
+"""The controller's side of the protocol and ours, line by line."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tbcad.rig.control.grbl import SYNC, Grbl
+from tbcad.rig.control.machine import ControllerReset, MachineFault
+from tbcad.rig.control.port import SerialPort
+from tests.rig.control.grbl_double import PLANNER, GrblDouble
+from tests.rig.control.rig import until
+
+SETTINGS = {1: 255.0, 20: 0.0, 22: 1.0, 25: 360.0, 27: 2.0, 110: 900.0, 120: 50.0, 130: 200.0}
+
+
+@pytest.fixture
+def double() -> Iterator[GrblDouble]:
+    controller = GrblDouble(SETTINGS, switch_deg=-100.0)
+    controller.start()
+    yield controller
+    controller.close()
+
+
+@pytest.fixture
+def grbl(double: GrblDouble) -> Iterator[Grbl]:
+    port = SerialPort(double.port)
+    found = Grbl(port, lambda _: None)
+    found.connect()
+    yield found
+    port.close()
+
+
+@pytest.fixture
+def homed(grbl: Grbl) -> Grbl:
+    grbl.command("$H", silent_s=5)
+    grbl.command("G21 G90 G94 G54 (modes)")
+    grbl.command("G92 X-98")
+    return grbl
+
+
+def test_motions_wait_for_each_other(homed: Grbl, double: GrblDouble) -> None:
+    """More of them than the planner holds; the dwell is over when the last is."""
+    double.run_at(200.0)
+    for number in range(2 * PLANNER):
+        homed.command(f"G1 X{-90 + number} F900")
+    homed.command(SYNC, expected_s=2.0)
+    assert double.machine.angle == pytest.approx(-90 + 2 * PLANNER - 1)
+    assert double.overflows == 0
+    assert homed.status().state == "Idle"
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("G1 X1", "error:22: no feed is set"),
+        ("G2 X1 F1", "error:20: the command is not supported"),
+        ("M64 P9", "error:39: the value is out of range"),
+        ("$Q", r"error:3: the \$ command is not known"),
+    ],
+)
+def test_refused_lines(homed: Grbl, line: str, says: str) -> None:
+    with pytest.raises(MachineFault, match=says):
+        homed.command(line)
+
+
+def test_line_that_is_too_long_is_not_sent(homed: Grbl, double: GrblDouble) -> None:
+    with pytest.raises(MachineFault, match="longer than 79 characters"):
+        homed.command("G4 P" + "0" * 80)
+    assert double.lines[-1] == "G92 X-98"
+
+
+def test_soft_limit(homed: Grbl, double: GrblDouble) -> None:
+    homed.command("$20=1")
+    with pytest.raises(MachineFault, match="ALARM:2: the target is beyond the soft limits"):
+        homed.command("G1 X101 F900")
+    homed.forget()
+    status = homed.status_in_alarm()
+    assert status is not None
+    assert status.state == "Alarm"
+
+
+def test_hold_keeps_the_place(homed: Grbl, double: GrblDouble) -> None:
+    double.run_at(1.0)
+    homed.command("G1 X90 F900")
+    until(lambda: double.moving)
+    homed.hold()
+    homed.reset()
+    assert double.state == "Idle"
+    assert -98 < double.machine.angle < 0
+
+
+def test_leaving_check_mode_is_a_reset(homed: Grbl) -> None:
+    """Why a run never sends it: what G92 set is forgotten."""
+    homed.command("$C")
+    with pytest.raises(ControllerReset, match="began anew at '\\$C'"):
+        homed.command("$C")
+
+
+def test_rest_of_a_line_of_a_killed_program_is_forgotten(double: GrblDouble) -> None:
+    port = SerialPort(double.port)
+    port.write(b"G1 X-1")
+    port.close()
+    port = SerialPort(double.port)
+    again = Grbl(port, lambda _: None)
+    again.connect()
+    again.command("$H", silent_s=5)
+    assert double.lines == ["$H"]
+    port.close()
+
+
+def test_port_is_ours_alone(grbl: Grbl, double: GrblDouble) -> None:
+    from tbcad.errors import InputError
+
+    with pytest.raises(InputError, match="another program uses it"):
+        SerialPort(double.port)
+
+
+def test_line_stays_up_when_the_port_is_closed(double: GrblDouble) -> None:
+    """Else the next start would reset the board, and the motor would let the base go."""
+    termios = pytest.importorskip("termios")
+    with open(double.port, "rb", buffering=0) as line:
+        modes = termios.tcgetattr(line)
+        modes[2] |= termios.HUPCL
+        termios.tcsetattr(line, termios.TCSANOW, modes)
+        SerialPort(double.port).close()
+        assert not termios.tcgetattr(line)[2] & termios.HUPCL

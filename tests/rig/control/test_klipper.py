@@ -1,0 +1,233 @@
+"""A run with Klipper: what it sends, and what it does when Klipper or people interfere."""
+
+import re
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from tbcad.app.cli import run as tbcad
+from tbcad.rig.control.klipper.base import PIECE_S
+from tests.rig.control.rig import Rig, until
+from tests.rig.control.run_checks import check_every_photograph, events
+
+ALL = 24
+FAST = 2000.0
+
+
+@pytest.fixture(autouse=True)
+def never_let_fall(klipper_rig: Rig) -> Any:
+    """An emergency stop would let the base fall; an unknown command would be no error."""
+    yield
+    assert klipper_rig.controller.emergency_stops == 0
+    assert not klipper_rig.controller.unknown
+    assert not klipper_rig.controller.machine.lights
+
+
+def moves(rig: Rig) -> list[float]:
+    """Where motions after homing end."""
+    lines = [line for line in rig.controller.lines if "STOP_ON" not in line]
+    return [float(found[1]) for line in lines if (found := re.search(r"MOVE=(\S+)", line))]
+
+
+def test_what_klipper_is_sent(klipper_rig: Rig) -> None:
+    assert tbcad(klipper_rig.words("--phases", "dark,lit", "--runs", "a", stops="2,5")) == 0
+    lines = klipper_rig.controller.lines
+    begin = lines.index("MANUAL_STEPPER STEPPER=base ENABLE=1 SET_POSITION=0")
+    assert begin < lines.index("SET_PIN PIN=lamp VALUE=1")
+    assert lines.count("SET_PIN PIN=lamp VALUE=1") == 2
+    moved = [index for index, line in enumerate(lines) if "MOVE=" in line]
+    assert all(lines[index + 1] == "M400" for index in moved)
+    to = moves(klipper_rig)
+    up = to[: to.index(max(to)) + 1]
+    assert up[1:] == sorted(up[1:])  # from below, after the pull-off
+    assert klipper_rig.controller.machine.angle == pytest.approx(0, abs=0.01)
+    assert klipper_rig.controller.motor_on
+
+
+def test_motions_come_in_short_pieces(klipper_rig: Rig) -> None:
+    """At 15 degrees a second and 50 degrees/s^2 a piece is 18 degrees at most; homing at 6, 8.3."""
+    assert tbcad(klipper_rig.words("--phases", "dark", "--runs", "a", stops="1,30")) == 0
+    to = moves(klipper_rig)
+    assert max(abs(a - b) for a, b in pairwise(to)) <= 15 * (PIECE_S - 15 / 50) + 1e-3
+    search = re.findall(
+        r"MOVE=(\S+) SPEED=6 STOP_ON_ENDSTOP=2", "\n".join(klipper_rig.controller.lines)
+    )
+    assert max(float(a) - float(b) for a, b in pairwise(["0", *search])) <= 8.3
+
+
+def at_line(rig: Rig, line: str, what: str | None, act: Any = lambda: None) -> None:
+    """Let something happen once, when a line comes for the second time."""
+    seen: list[int] = []
+
+    def fault(number: int, text: str) -> str | None:
+        if text != line:
+            return None
+        seen.append(number)
+        if len(seen) == 2:
+            act()
+            return what
+        return None
+
+    rig.controller.fault = fault
+
+
+LED = "SET_PIN PIN=led_3 VALUE=1"
+
+
+@pytest.mark.parametrize(
+    ("what", "says", "look"),
+    [
+        (
+            "shutdown",
+            "stopped: Klipper is in state shutdown: Shutdown due to webhooks request",
+            "the base falls: hold the base by hand and put the zero pin in first",
+        ),
+        (
+            "disconnected",
+            "stopped: Klipper is in state disconnected",
+            "goes off when Klipper starts, and the base falls: hold the base by hand",
+        ),
+    ],
+)
+def test_klipper_stops(
+    klipper_rig: Rig, what: str, says: str, look: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at_line(klipper_rig, LED, what)
+    assert tbcad(klipper_rig.words()) == 1
+    out = capsys.readouterr().out
+    assert says in out
+    assert look in out
+    assert "LOOK AT THE MACHINE" in out
+    assert events(klipper_rig.out)[-1] == "stopped"
+    klipper_rig.controller.fault = lambda number, line: None
+    klipper_rig.controller.restart()
+    assert tbcad(klipper_rig.resume()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
+
+
+def test_refused_line(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """While an LED is on, which must not stay so."""
+    at_line(klipper_rig, "G4 P0", "error")
+    assert tbcad(klipper_rig.words()) == 1
+    out = capsys.readouterr().out
+    assert "stopped: Klipper refuses 'G4 P0': Timer too close" in out
+    assert not klipper_rig.controller.machine.lights
+    assert "LOOK AT THE MACHINE" not in out
+    assert tbcad(klipper_rig.resume()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
+
+
+@pytest.mark.parametrize("before", ["MOVE=", "G4 P0"])
+def test_shutdown_while_something_is_waited_for(
+    klipper_rig: Rig, before: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """M400 ends without an error then: nothing may be photographed after it."""
+    controller = klipper_rig.controller
+
+    def fault(number: int, line: str) -> str | None:
+        later = "SET_PIN PIN=lamp VALUE=1" in controller.lines
+        return "shutdown" if later and line == "M400" and before in controller.lines[-2] else None
+
+    controller.fault = fault
+    assert tbcad(klipper_rig.words()) == 1
+    assert "stopped: Klipper is in state shutdown" in capsys.readouterr().out
+    controller.fault = lambda number, line: None
+    controller.restart()
+    assert tbcad(klipper_rig.resume()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
+
+
+@pytest.mark.parametrize("act", ["let_go", "restart"])
+@pytest.mark.parametrize("line", [LED, "SET_PIN PIN=lamp VALUE=0"])
+def test_motor_that_was_let_go(
+    klipper_rig: Rig, act: str, line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By M84 or RESTART in another window: the next motion would switch it on again."""
+    at_line(klipper_rig, line, None, getattr(klipper_rig.controller, act))
+    assert tbcad(klipper_rig.words()) == 1
+    out = capsys.readouterr().out
+    assert "stopped: Klipper has let the motor go" in out
+    assert "LOOK AT THE MACHINE: Klipper has let the motor go" in out
+    assert "put the zero pin in first" in out
+    assert not moves_after(klipper_rig, line)
+    klipper_rig.controller.fault = lambda number, line: None
+    assert tbcad(klipper_rig.resume()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
+
+
+def moves_after(rig: Rig, line: str) -> list[str]:
+    lines = rig.controller.lines
+    last = len(lines) - lines[::-1].index(line)
+    return [one for one in lines[last:] if "MOVE=" in one]
+
+
+def test_connection_that_breaks_once(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    at_line(klipper_rig, "M400", "drop")
+    assert tbcad(klipper_rig.words()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
+    assert capsys.readouterr().err.count("once more") == 1
+
+
+@pytest.mark.parametrize("seen", [0, 1])
+def test_moonraker_that_begins_anew(
+    klipper_rig: Rig, seen: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It finds Klipper after it listens again, whichever connection tells of it first."""
+    controller = klipper_rig.controller
+
+    def restart() -> None:
+        controller.searching = 3
+        until(lambda: controller.searching <= 3 - seen)
+
+    at_line(klipper_rig, "M400", "drop", restart)
+    assert tbcad(klipper_rig.words("--phases", "dark")) == 0
+    assert controller.searching == 0
+
+
+def test_moonraker_that_goes(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    controller = klipper_rig.controller
+    at_line(klipper_rig, LED, "drop", lambda: setattr(controller, "away", True))
+    assert tbcad(klipper_rig.words()) == 1
+    out = capsys.readouterr().out
+    assert "stopped: Moonraker: " in out
+    assert "LOOK AT THE MACHINE: lights may be on: Moonraker: " in out
+    assert "before any supply is cut, hold the base by hand and put the zero pin in first" in out
+    controller.away = False
+    controller.fault = lambda number, line: None
+    assert tbcad(klipper_rig.resume()) == 0
+    check_every_photograph(klipper_rig.out, ALL)
+
+
+def test_other_programs_motion_is_waited_for(
+    klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tbcad.rig.control.klipper.host.LATE_S", -1000.0)
+    controller = klipper_rig.controller
+
+    def busy() -> None:
+        before = controller.asked
+        until(lambda: controller.asked > before + 2)
+
+    at_line(klipper_rig, "M400", None, busy)
+    assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
+    assert "does another program give it G-code?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "says"),
+    [
+        ("stuck_switch", True, "the pull-off did not release the switch"),
+        ("switch_deg", -1000.0, "the switch was not found within"),
+    ],
+)
+def test_homing_that_fails(
+    klipper_rig: Rig,
+    attribute: str,
+    value: object,
+    says: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    setattr(klipper_rig.controller, attribute, value)
+    assert tbcad(klipper_rig.words()) == 1
+    assert says in capsys.readouterr().out

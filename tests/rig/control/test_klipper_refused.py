@@ -1,0 +1,313 @@
+"""What a run with Klipper refuses before anything moves: one line, exit code 2, nothing written."""
+
+import json
+import socket
+from collections.abc import Iterator
+from dataclasses import astuple
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from threading import Thread
+
+import pytest
+
+from tbcad.app.cli import run as tbcad
+from tbcad.rig.control.klipper import files, moonraker
+from tests.rig.control.klipper_double import MOTOR
+from tests.rig.control.rig import Rig, until
+
+
+def refused(words: list[str], rig: Rig, capsys: pytest.CaptureFixture[str]) -> str:
+    assert tbcad(words) == 2
+    *_, line = capsys.readouterr().err.splitlines()
+    assert line.startswith("tbcad: ")
+    assert not rig.out.exists()
+    return line
+
+
+def words_to(rig: Rig, port: str) -> list[str]:
+    words = rig.words()
+    words[words.index("--port") + 1] = port
+    return words
+
+
+@pytest.mark.parametrize(
+    ("port", "says"),
+    [
+        ("http://printer", "for Klipper say moonraker:http://HOST"),
+        ("moonraker:", "allowed is moonraker:http://HOST"),
+        ("moonraker:printer:7125", "allowed is moonraker:http://HOST"),
+        ("moonraker:ftp://printer", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://printer:99999", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://printer:0", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://prin ter", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://printer\n", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://[::1", "allowed is moonraker:http://HOST"),
+        ("moonraker:http://user:secret@printer", "an API key goes into MOONRAKER_API_KEY"),
+        ("moonraker:http://printer/?token=1", "an API key goes into MOONRAKER_API_KEY"),
+        ("moonraker:http://" + "a" * 80, "there is no such host"),
+        ("moonraker:http://no-such-printer.invalid", "there is no such host"),
+    ],
+)
+def test_addresses(
+    klipper_rig: Rig, port: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert says in refused(words_to(klipper_rig, port), klipper_rig, capsys)
+
+
+def test_nothing_listens(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = f"moonraker:http://127.0.0.1:{server.getsockname()[1]}"
+    line = refused(words_to(klipper_rig, port), klipper_rig, capsys)
+    assert "nothing listens there: is this Moonraker? It listens at port 7125" in line
+
+
+class Other(BaseHTTPRequestHandler):
+    """A server that is not Moonraker."""
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+    def do_GET(self) -> None:
+        code, head, body = self.server.says  # type: ignore[attr-defined]
+        self.send_response(code)
+        for name, value in head.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+
+@pytest.fixture
+def other() -> Iterator[HTTPServer]:
+    server = HTTPServer(("127.0.0.1", 0), Other)
+    thread = Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+    thread.start()
+    yield server
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+@pytest.mark.parametrize(
+    ("code", "head", "body", "says"),
+    [
+        (200, {}, b"<html>", "the server answers 200 OK: is this Moonraker?"),
+        (404, {}, b"", "the server answers 404 Not Found: is this Moonraker?"),
+        (502, {}, b"<html>", "the server answers 502 Bad Gateway: is this Moonraker?"),
+        (200, {}, b'{"result": {"up": 1}}', "the server is not Moonraker"),
+        (200, {}, b"[" * 100_000, "the server answers 200 OK"),
+        (301, {"Location": "https://printer/"}, b"", "sends us to https://printer/: name that"),
+        (500, {}, b'{"error": {"message": "two\\nlines"}}', "two lines"),
+    ],
+)
+def test_server_that_is_not_moonraker(
+    klipper_rig: Rig,
+    other: HTTPServer,
+    code: int,
+    head: dict[str, str],
+    body: bytes,
+    says: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    other.says = code, head, body  # type: ignore[attr-defined]
+    port = f"moonraker:http://127.0.0.1:{other.server_port}"
+    assert says in refused(words_to(klipper_rig, port), klipper_rig, capsys)
+
+
+def test_http_that_is_said_to_be_https(
+    klipper_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = klipper_rig.controller.port.replace("http:", "https:")
+    line = refused(words_to(klipper_rig, port), klipper_rig, capsys)
+    assert "it does not speak https: say http://" in line
+
+
+def test_key(
+    klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    klipper_rig.controller.key = "1234"
+    line = refused(klipper_rig.words(), klipper_rig, capsys)
+    assert "does not let this computer in: set MOONRAKER_API_KEY" in line
+    monkeypatch.setenv("MOONRAKER_API_KEY", "one\ntwo")
+    assert "is no API key" in refused(klipper_rig.words(), klipper_rig, capsys)
+    monkeypatch.setenv("MOONRAKER_API_KEY", "1234")
+    assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
+
+
+@pytest.mark.parametrize(
+    ("state", "message", "says"),
+    [
+        (
+            "startup",
+            "\nPrinter is not ready\n",
+            "Klipper is in state startup: Printer is not ready",
+        ),
+        (
+            "error",
+            "Section 'x' is not valid\nmore",
+            "then mend what it says and say FIRMWARE_RESTART",
+        ),
+        ("shutdown", "Lost communication", "put the zero pin in first, then say FIRMWARE_RESTART"),
+        ("disconnected", "", "put the zero pin in first, then start the service klipper"),
+        ("unheard of", "", "put the zero pin in first"),
+    ],
+)
+def test_states(
+    klipper_rig: Rig, state: str, message: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    klipper_rig.controller.state, klipper_rig.controller.message = state, message
+    line = refused(klipper_rig.words(), klipper_rig, capsys)
+    assert says in line
+    assert f"Klipper is in state {state}" in line
+    assert not klipper_rig.controller.lines
+
+
+def test_klipper_that_never_started(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    klipper_rig.controller.state, klipper_rig.controller.started = "disconnected", False
+    line = refused(klipper_rig.words(), klipper_rig, capsys)
+    assert "Klipper is in state disconnected" in line
+
+
+def test_start_is_waited_for(klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = klipper_rig.controller
+    controller.state = "startup"
+    monkeypatch.setattr("tbcad.rig.control.klipper.host.STARTING_S", {"startup": 60.0})
+
+    def start() -> None:
+        until(lambda: controller.asked > 2)
+        controller.state = "ready"
+
+    Thread(target=start, daemon=True).start()
+    assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
+
+
+def test_printer_that_prints(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    klipper_rig.controller.print_state = "paused"
+    assert "the printer prints a file" in refused(klipper_rig.words(), klipper_rig, capsys)
+
+
+@pytest.mark.parametrize(
+    ("section", "option", "value", "says"),
+    [
+        (
+            MOTOR,
+            "rotation_distance",
+            40.0,
+            "rotation_distance of [manual_stepper base] is 40.0, not",
+        ),
+        (MOTOR, "gear_ratio", [[2.0, 1.0]], "gear_ratio of [manual_stepper base] is [[2.0, 1.0]]"),
+        (MOTOR, "gear_ratio", [], "gear_ratio of [manual_stepper base] is []"),
+        (MOTOR, "microsteps", 32, "microsteps of [manual_stepper base] is 32, not 16"),
+        (MOTOR, "accel", None, "accel of [manual_stepper base] is missing"),
+        (MOTOR, "endstop_pin", "^!PA1", "endstop_pin of [manual_stepper base] is '^!PA1', not ^"),
+        (MOTOR, "endstop_pin", "PA1", "endstop_pin of [manual_stepper base] is 'PA1', not ^"),
+        (MOTOR, "dir_pin", "FILL_IN", "dir_pin of [manual_stepper base] is 'FILL_IN'"),
+        (MOTOR, "dir_pin", None, "dir_pin of [manual_stepper base] is missing"),
+        ("printer", "kinematics", "corexy", "kinematics of [printer] is 'corexy', not none"),
+        ("output_pin led_4", None, None, "[output_pin led_4] is missing"),
+        ("idle_timeout", "timeout", 600.0, "idle_timeout"),
+    ],
+)
+def test_other_configuration(
+    klipper_rig: Rig,
+    section: str,
+    option: str | None,
+    value: object,
+    says: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    settings = klipper_rig.controller.settings
+    if option is None:
+        del settings[section]
+    elif value is None:
+        del settings[section][option]
+    else:
+        settings[section][option] = value
+    line = refused(klipper_rig.words(), klipper_rig, capsys)
+    assert says in line
+    assert "zero pin in first" in line
+    assert not klipper_rig.controller.lines
+
+
+@pytest.mark.parametrize(("option", "value"), [("enable_pin", "!PB3"), ("dir_pin", "! PB4")])
+def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig, option: str, value: str) -> None:
+    klipper_rig.controller.settings[MOTOR][option] = value
+    assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "status", "seconds"),
+    [
+        ({}, {}, 600.0),
+        ({"timeout": 300.0, "gcode": "\nm84\n"}, {}, 300.0),
+        ({"timeout": 300.0, "gcode": "M117 idle"}, {}, None),
+        ({"timeout": 1e7, "gcode": "\nM84\n"}, {}, None),
+        ({"timeout": 1e7, "gcode": "\nM84\n"}, {"idle_timeout": 60.0}, 60.0),
+    ],
+)
+def test_idle_printer(
+    settings: dict[str, object], status: dict[str, object], seconds: float | None
+) -> None:
+    """What is set, and what SET_IDLE_TIMEOUT changed since."""
+    assert files.idle_that_lets_go({"idle_timeout": settings}, status) == seconds
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found", "same"),
+    [
+        ("13.50:1", [[13.5, 1.0]], True),
+        ("80:16, 2:1", [[80.0, 16.0], [2.0, 1.0]], True),
+        ("80:16, 2:1", [[80.0, 16.0]], False),
+        ("false", False, True),
+        ("no", True, False),
+        ("\nM117\n  idle", "M117\nidle", True),
+        ("0.8", "0.80000001", True),
+        ("^FILL_IN", "^ PG6", True),
+        ("^FILL_IN", "^", False),
+        ("FILL_IN", "!^PG6", True),
+    ],
+)
+def test_same_values(wanted: str, found: object, same: bool) -> None:
+    assert list(files.differences({"a": {"b": wanted}}, {"a": {"b": found}})) == (
+        [] if same else [f"b of [a] is {found!r}, not {wanted}"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("http://[::1]", ("::1", 80, "", False)),
+        ("https://printer/", ("printer", 443, "", True)),
+        ("HTTP://Printer:7125/one/", ("printer", 7125, "/one", False)),
+    ],
+)
+def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None:
+    assert astuple(moonraker.read_address(text)) == address
+
+
+def test_settings_cannot_be_sent(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    line = refused(klipper_rig.words("--send-settings"), klipper_rig, capsys)
+    assert "leave --send-settings out" in line
+
+
+def test_build_for_plain_grbl(
+    plain_export: Path, klipper_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    klipper_rig.export = plain_export
+    line = refused(klipper_rig.words(), klipper_rig, capsys)
+    assert "rotation_plan_klipper.gcode is not there: build for grblHAL" in line
+
+
+def test_files_that_are_not_tbcads(
+    control_export: Path, tmp_path: Path, klipper_rig: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import shutil
+
+    klipper_rig.export = Path(shutil.copytree(control_export, tmp_path / "copy"))
+    program = klipper_rig.export / "rotation_plan_klipper.gcode"
+    program.write_text(program.read_text().replace("STOP_ON_ENDSTOP=1", "STOP_ON_ENDSTOP=-1"))
+    assert "does not home once" in refused(klipper_rig.words(), klipper_rig, capsys)
+    program.write_text((control_export / program.name).read_text())
+    (klipper_rig.export / "klipper.cfg").write_text("velocity: 3\n")
+    assert "is no configuration" in refused(klipper_rig.words(), klipper_rig, capsys)
+    assert json.loads((control_export / "prototype.json").read_text())

@@ -1,0 +1,151 @@
+"""The command against a controller's double, with a camera that sees what it shows."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tbcad.app.cli import run as tbcad
+from tbcad.rig.control.grbl import STATUS_S, Grbl
+from tbcad.rig.runs.photographs import read_run
+from tests.rig.control.grbl_double import Machine
+from tests.rig.control.rig import Rig, put, scene_of
+from tests.rig.control.run_checks import OUTPUTS, check_every_photograph, events
+
+ALL = 2 * 2 * len(OUTPUTS)
+
+
+def test_every_photograph_of_a_run(either_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    assert tbcad(either_rig.words()) == 0
+    check_every_photograph(either_rig.out, ALL)
+    assert events(either_rig.out) == ["started", *["taken"] * ALL, "finished"]
+    assert capsys.readouterr().out.startswith(f"COMPLETE: {ALL} of {ALL} photographs")
+
+
+def test_what_the_controller_is_sent(rig: Rig) -> None:
+    assert tbcad(rig.words("--phases", "dark,lit")) == 0
+    lines = rig.controller.lines
+    assert "$C" not in lines
+    assert lines.index("$H") < lines.index("M64 P0")
+    assert [line for line in lines if line in ("M64 P0", "M8")] == ["M64 P0"] * 4
+    assert rig.controller.overflows == 0
+    moves = [index for index, line in enumerate(lines) if line.startswith("G1 ")]
+    assert all(lines[index + 1].startswith("G4 P") for index in moves)
+    assert not rig.controller.machine.lights
+    assert rig.controller.machine.angle == pytest.approx(0, abs=0.01)
+
+
+def test_board_that_begins_anew_when_its_port_is_opened(rig: Rig) -> None:
+    rig.controller.boots = True
+    assert tbcad(rig.words("--phases", "dark", stops="1")) == 0
+    check_every_photograph(rig.out, 2)
+
+
+def test_status_is_asked_for_five_times_a_second_at_most(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tbcad.rig.control.grbl.STATUS_S", STATUS_S)  # as it is
+    ask, asked = Grbl._ask, list[float]()
+
+    def recorded(grbl: Grbl, *arguments: float) -> bool:
+        """By the driver's own clock: when a busy machine delivers a question tells nothing."""
+        if done := ask(grbl, *arguments):
+            asked.append(grbl._asked)
+        return done
+
+    monkeypatch.setattr(Grbl, "_ask", recorded)
+    assert tbcad(rig.words("--phases", "dark")) == 0
+    assert len(asked) > 5
+    assert min(b - a for a, b in pairwise(asked)) >= STATUS_S
+
+
+def test_stops_are_reached_from_below(rig: Rig) -> None:
+    assert tbcad(rig.words("--phases", "dark", "--runs", "b", stops="2,5")) == 0
+    angles = [float(line.split("X")[1].split()[0]) for line in _moves(rig)]
+    start, second, fifth, end = angles
+    assert start < second < fifth
+    assert end == 0
+    run = read_run(rig.out)
+    assert [(one.object_turn_deg, one.stop) for one in run.record.frames] == [(180, 2), (180, 5)]
+
+
+def _moves(rig: Rig) -> list[str]:
+    return [line for line in rig.controller.lines if line.startswith("G1 ")]
+
+
+def test_plain_grbl_photographs_the_lit_object_only(plain_rig: Rig) -> None:
+    assert tbcad(plain_rig.words()) == 0
+    run = read_run(plain_rig.out)
+    assert run.record.phases == ("lit",)
+    assert len(run.exposures) == 4
+    assert not any(re.match(r"\$H|M6[45]", line) for line in plain_rig.controller.lines)
+
+
+def test_folder_that_the_released_camera_fills(either_rig: Rig) -> None:
+    pictures = either_rig.folder / "pictures"
+    pictures.mkdir()
+    (pictures / "old.jpg").write_bytes(b"of another day")
+    numbers = iter(range(1000))
+    either_rig.controller.released = lambda machine: put(
+        pictures / f"DSC_{next(numbers):04d}.JPG", scene_of(machine)
+    )
+    words = either_rig.words("--phases", "dark,lit", camera=f"folder:{pictures}", stops="1")
+    assert tbcad(words) == 0
+    check_every_photograph(either_rig.out, 4)
+
+
+def test_release_that_brings_no_photograph(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """The first release is for the trial; the third and fourth are for the second photograph."""
+    pictures = rig.folder / "pictures"
+    pictures.mkdir()
+    numbers = iter(range(1, 1000))
+
+    def release(machine: Machine) -> None:
+        if (number := next(numbers)) not in (3, 4):
+            put(pictures / f"{number}.jpg", scene_of(machine))
+
+    rig.controller.released = release
+    camera = f"folder:{pictures}"
+    words = rig.words("--phases", "dark,led_1,lit", "--timeout", "1", camera=camera, stops="1")
+    assert tbcad(words) == 1
+    out = capsys.readouterr().out
+    assert f"missing: a_0001_led_1: no photograph came into {pictures} within 1 s" in out
+    assert set(read_run(rig.out).faults) == {"a_0001_led_1"}
+
+
+def test_operator_is_asked(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [word for word in rig.words("--phases", "dark", stops="1") if word != "--yes"]
+    assert tbcad(words) == 2
+    assert "say --yes" in capsys.readouterr().err
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    asked: list[str] = []
+
+    def confirm(text: str, **_: object) -> bool:
+        asked.append(text)
+        return len(asked) != 2
+
+    monkeypatch.setattr("typer.confirm", confirm)
+    assert tbcad(words) == 1
+    assert asked == [
+        "zero pin out, object straight: done?",
+        "turn the object by 180 degrees about z: done?",
+    ]
+    assert "stopped: the operator did not go on" in capsys.readouterr().out
+    assert tbcad([*words[:-2], "--resume"]) == 0
+    assert asked[-1] == "zero pin out, object turned by 180 degrees about z: done?"
+    check_every_photograph(rig.out, 2)
+
+
+def test_dry_run_needs_no_machine(
+    control_export: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert tbcad(["run", str(control_export), "--dry-run", "--out", str(out), "--stops", "3"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("12 photographs at 2 positions would be taken")
+    assert "dark, led_1, led_2, led_3, led_4, lit" in text
+    assert "1.8 MB of disk" in text
+    assert not out.exists()

@@ -1,0 +1,91 @@
+"""Photographs of a simulated run: the same by themselves, and right in place and light."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.light.simulate.prototype.ball_rays import camera_colours, trace_balls
+from tbcad.light.simulate.prototype.plan import read_plan
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.rig.calibration.detection.expected import expected_highlights
+from tbcad.rig.machine.photographed import machine_runs
+from tbcad.rig.simulated_run.led_light import DOME_MM, balls_of_frame
+from tbcad.rig.simulated_run.photographs import ImagingChain, object_light, phases_of
+from tbcad.rig.simulated_run.sensor import SimulatedSensor, pixel_directions
+from tests.simulated_runs import BRIGHT, Small, photograph_centroid, small_run
+
+STOPS = (20, 40)
+
+
+@pytest.fixture(scope="module")
+def small(export_folder: Path) -> Small:
+    return small_run(export_folder, STOPS)
+
+
+def test_a_photograph_does_not_depend_on_the_others(small: Small, export_folder: Path) -> None:
+    alone = small_run(export_folder, STOPS[1:])
+    number = [frame.stop for frame in small.run.frames].index(STOPS[1])
+    whole = small.run.frame_photographs(number, phases_of(4))
+    some = alone.run.frame_photographs(0, ("led_2", "lit"))
+    assert (whole["led_2"] == some["led_2"]).all()
+    assert (whole["lit"] == some["lit"]).all()
+
+
+def test_photographs_of_one_frame_have_noise_of_their_own(small: Small) -> None:
+    one, two = (small.run.frame_photographs(k, ("dark",))["dark"] for k in (0, 1))
+    assert (one != two).any()
+
+
+def test_highlights_are_where_the_machine_shows_them(export_folder: Path) -> None:
+    exact = ImagingChain(
+        SimulatedSensor(noise=0.0, grains=0, hot_share=0.0, bits=16), led_light=BRIGHT
+    )
+    run = small_run(export_folder, STOPS, chain=exact).run
+    images = run.frame_photographs(0, ("led_1", "led_2"))
+    expected = expected_highlights(run.built.machine, DOME_MM)
+    off = []
+    for k in np.flatnonzero((expected.frame == 0) & (expected.led < 2) & expected.inside):
+        place = (expected.pixel + expected.centroid)[k]
+        image = images[f"led_{expected.led[k] + 1}"].astype(float)
+        if image[int(place[1]), int(place[0])] > 5000:
+            light = np.maximum(image - np.median(image), 0)
+            off.append(np.hypot(*(photograph_centroid(light, place, 6) - place)))
+    assert len(off) > 3
+    # What is left of one cycle a pixel moves a centroid by up to a hundredth of a pixel.
+    assert max(off) < 0.03
+
+
+def test_the_lit_object_is_what_a_capture_traces(export_folder: Path) -> None:
+    small = small_run(export_folder, STOPS)
+    export = read_export(export_folder)
+    run, machine = small.run, small.machine
+    number = 3
+    assert run.frames[number].object_turn_deg == 180
+    directions = pixel_directions(machine.camera)[50:500:3]
+    mine = object_light(
+        machine.camera.pinhole, directions, balls_of_frame(run.built, number), run.scene, True
+    )
+    _, half = machine_runs(export, read_plan(export), machine, run.frames)
+    turned = np.array([-1.0, -1.0, 1.0])
+    flat = directions.reshape(-1, 3) * turned
+    stop = np.full(len(flat), run.frames[number].stop - 1)
+    theirs = camera_colours(run.scene, half.camera.pinhole, flat, trace_balls(half, flat, stop))
+    same = np.abs(mine.reshape(-1, 3) - theirs).max(axis=1) < 1
+    assert (theirs.max(axis=1) > 30).sum() > 300
+    assert same.mean() > 0.999
+
+
+def test_an_led_that_is_off_leaves_darkness(export_folder: Path) -> None:
+    dead = ImagingChain(
+        SimulatedSensor(noise=0.0, hot_share=0.0), led_light=(BRIGHT, 0.0, BRIGHT, BRIGHT)
+    )
+    images = small_run(export_folder, STOPS, chain=dead).run.frame_photographs(0, phases_of(4))
+    assert images["led_2"].max() == 0
+    assert images["led_1"].max() > 50
+
+
+def test_light_saturates(small: Small) -> None:
+    bright = replace(small.run, chain=ImagingChain(led_light=50.0))
+    assert bright.frame_photographs(0, ("led_1",))["led_1"].max() == 255

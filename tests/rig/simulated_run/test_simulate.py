@@ -1,0 +1,162 @@
+"""The folder of a simulated run, and what is refused."""
+
+import hashlib
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.prototype.plan import read_plan
+from tbcad.light.simulate.scene.exported import read_export
+from tbcad.options.machines import SimulateRunOptions
+from tbcad.rig.machine.record import TRUTH, read_machine
+from tbcad.rig.runs.photographs import read_photograph, read_run
+from tbcad.rig.simulated_run import simulate
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.prototype.draws import read_wind_up
+from tests.exported_files import contents
+from tests.prototype_records import printed_part, write_prototype
+from tests.simulated_runs import Small, fdm_errors, small_run
+
+PHASES = ("dark", "led_1", "lit")
+
+
+@pytest.fixture(scope="module")
+def small(export_folder: Path) -> Small:
+    return small_run(export_folder, (3, 6))
+
+
+def test_a_folder_that_is_read_back(small: Small, export_folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    steps: list[str] = []
+    simulate.write_run((small.run,), PHASES, export_folder, out, steps.append)
+    run = read_run(out)
+    assert not run.faults
+    assert run.record.frames == small.run.frames
+    assert len(run.exposures) == len(small.run.frames) * len(PHASES)
+    frame = run.record.frames[1]
+    exposure = run.exposure(frame, "led_1")
+    assert exposure is not None
+    image = read_photograph(run, exposure)
+    assert (image == small.run.frame_photographs(1, ("led_1",))["led_1"]).all()
+    truth, frames = read_machine(out / TRUTH)
+    assert frames == small.run.frames
+    assert truth.centre == pytest.approx(small.machine.centre, abs=0)
+    assert steps[-1] == "frame 4 of 4, 0 s left"
+    digest = hashlib.sha256((export_folder / "balls.csv").read_bytes()).hexdigest()
+    assert run.record.export_sha256["balls.csv"] == digest
+
+
+def test_the_same_bytes_with_any_number_of_threads(
+    small: Small, export_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for threads in (1, 3):
+        monkeypatch.setattr(simulate, "THREADS", threads)
+        out = tmp_path / str(threads)
+        simulate.write_run((small.run,), PHASES, export_folder, out, lambda _: None)
+    assert contents(tmp_path / "1") == contents(tmp_path / "3")
+
+
+def test_photographs_are_not_replaced(small: Small, export_folder: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "mine.txt"
+    kept.write_text("precious")
+    with pytest.raises(InputError, match="holds files, and photographs are not replaced"):
+        simulate.write_run((small.run,), PHASES, export_folder, tmp_path, lambda _: None)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_nothing_is_left_of_a_run_that_fails(
+    small: Small, export_folder: Path, tmp_path: Path
+) -> None:
+    def fail(_: str) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(InputError, match="No space left"):
+        simulate.write_run((small.run,), PHASES, export_folder, tmp_path / "run", fail)
+    assert not list(tmp_path.iterdir())
+
+
+options_of = partial(SimulateRunOptions, "exports")
+
+
+def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
+    export = read_export(export_with_wind_up)
+    subject = simulate.run_object(export, None)
+    options = options_of(seed=1, stops="2,3", phases="led_2,dark", perfect=True)
+    (run,), phases = simulate.prepare_run(export, fdm_errors(), subject, options)
+    assert phases == ("dark", "led_2")
+    assert [(f.object_turn_deg, f.stop) for f in run.frames] == [(0, 2), (0, 3), (180, 2), (180, 3)]
+    assert not run.built.machine.camera.distortion.any()
+    assert subject.radius <= export.spec.prototype.stage.object_diameter_mm / 2
+
+
+def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> None:
+    """A dark photograph for each exposure; sidecars say it; a bright LED takes a short one."""
+    export = read_export(export_with_wind_up)
+    subject = simulate.run_object(export, None)
+    usual = options_of(stops="20", phases="dark,led_1,lit")
+    bright = replace(usual, led_brightness=100.0, exposure_leds=0.01, exposure_lit="1/2")
+    folders = []
+    for name, options in (("usual", usual), ("bright", bright)):
+        runs, phases = simulate.prepare_run(export, fdm_errors(), subject, options)
+        folders.append(tmp_path / name)
+        simulate.write_run(runs, phases, export_with_wind_up, folders[-1], lambda _: None)
+    before, after = (read_run(folder) for folder in folders)
+    assert after.record.phases == ("dark", "led_1", "dark_lit", "lit")
+    times = {one.phase: one.exposure_s for one in after.exposures.values()}
+    assert times == {"dark": 0.01, "led_1": 0.01, "dark_lit": 0.5, "lit": 0.5}
+    images = [
+        read_photograph(run, run.exposures[name]).astype(int)
+        for run in (before, after)
+        for name in ("a_0020_led_1", "a_0020_lit")
+    ]
+    led, lit, same, darker = images
+    assert np.abs(led - same).max() < 20  # noise
+    assert led.max() > 50
+    assert darker.max() == pytest.approx(lit.max() / 2, rel=0.1)
+
+
+def test_seeds_make_different_builds(export_with_wind_up: Path) -> None:
+    export = read_export(export_with_wind_up)
+    subject = simulate.run_object(export, None)
+    one, two, again = (
+        simulate.prepare_run(export, fdm_errors(), subject, options_of(seed=seed, stops="1"))[0][0]
+        for seed in (1, 2, 1)
+    )
+    assert (one.built.machine.centre == again.built.machine.centre).all()
+    assert np.abs(one.built.machine.centre - two.built.machine.centre).max() > 0.01
+
+
+def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) -> None:
+    export = read_export(export_with_wind_up)
+    plan, subject = read_plan(export), simulate.run_object(export, None)
+    whole = Errors(wind_up=Error(mean=1.0))
+    (run,), _ = simulate.prepare_run(export, whole, subject, options_of())
+    wind_up = read_wind_up(export, plan)
+    assert wind_up.max() > 0
+    assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
+
+
+def test_the_stage_hides_leds_as_it_stands(tmp_path: Path) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((4.0, 6.0, 8.0))
+    axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    origin, middle = np.array([1.0, 2.0, 3.0]), np.array([30.0, -10.0, 5.0])
+    # A point x of the prototype is x @ axes + origin on the printer's bed.
+    box.vertices = (box.vertices + middle) @ axes + origin
+    box.export(tmp_path / "post.stl")
+    place = {"axes": axes.tolist(), "origin_mm": origin.tolist()}
+    write_prototype(tmp_path, parts=[printed_part("post", "stage", **place)])
+    stage = simulate.stage_scene(tmp_path)
+    way = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    hits = stage.run(
+        np.tile(middle + np.array([10.0, 0.0, 0.0]), (2, 1)).astype(np.float32),
+        way.astype(np.float32),
+        output=1,
+    )
+    assert hits["tfar"][0] == pytest.approx(8.0)  # ten less half of four
+    assert hits["primID"][1] < 0
