@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from tbcad.app.cli.app import app
-from tbcad.app.cli.compared_pictures import (
+from tbcad.app.cli.commands.compared_pictures import (
     check_pictures,
     has_object,
     scene_of,
@@ -15,7 +15,7 @@ from tbcad.app.cli.compared_pictures import (
     viewpoint_of,
     write_compared,
 )
-from tbcad.app.cli.view_files import ViewFiles, field_view, write_depth
+from tbcad.app.cli.commands.view_files import ViewFiles, field_view, write_depth
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.checks import check_is_capture

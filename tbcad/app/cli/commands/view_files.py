@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
-from tbcad.app.cli.compared_pictures import compared_files
+from tbcad.app.cli.commands.compared_pictures import compared_files
 from tbcad.errors import InputError
 
 if TYPE_CHECKING:

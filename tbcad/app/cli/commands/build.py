@@ -59,7 +59,7 @@ def build(
     with stages(number, silent=quiet) as screen:
         shown = options.on(screen)
         if dry_run:
-            from tbcad.app.cli.dry_run import show_overview
+            from tbcad.app.cli.commands.dry_run import show_overview
 
             spec = spec_for_process(plan, shown)
             return show_overview(spec, plan.parts, options.parts is None, output, screen)
