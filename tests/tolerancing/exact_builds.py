@@ -72,7 +72,7 @@ def traced_coverage(array: MirrorArray, draws: ShellDraws, k: int) -> np.ndarray
 
 
 def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What tbcad.core.optics.windows.limiting_sides does, with the halved mirrors known beforehand."""
+    """What core.optics.windows.limiting_sides does, with the halved mirrors known beforehand."""
     faces = cells.arcs.faces
     arc, which = np.nonzero(faces < cells.mirrors)
     mirror, other = faces[arc, which], faces[arc, 1 - which]

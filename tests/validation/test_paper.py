@@ -91,9 +91,9 @@ def test_equation_2_falls_short() -> None:
     """Exact coverage of eq. 2's radii: far from the 60 mm claimed.
 
     Measured before: 50.8 ... 64.3, median 53.6, 845 of 847 short. Exact here: 50.34 ... 66.22,
-    median 53.05, 845 short. tests/core/optics/test_trace.py confirms the lower figures by brute force;
-    the one per cent looks like the first measurement's sampling of the cells' edges. The largest
-    is the mirror (1, 0, 0), whose coverage the foot plane's place decides.
+    median 53.05, 845 short. tests/core/optics/test_trace.py confirms the lower figures by brute
+    force; the one per cent looks like the first measurement's sampling of the cells' edges. The
+    largest is the mirror (1, 0, 0), whose coverage the foot plane's place decides.
     """
     coverage = mirror_array("radius_rule=paper").coverage
     assert (coverage < 60).sum() == 845

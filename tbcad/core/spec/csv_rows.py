@@ -1,8 +1,8 @@
 """Tables that users write: CSV as spreadsheets save it, with errors that name line and column.
 
 Read are commas, semicolons, tabs or bars between the cells, columns in any order and case, decimal
-points or decimal commas, empty rows, comments and every encoding of `tbcad.core.spec.files`. What may
-mean two things is refused.
+points or decimal commas, empty rows, comments and every encoding of `tbcad.core.spec.files`. What
+may mean two things is refused.
 """
 
 import csv

@@ -137,7 +137,7 @@ def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws, axes: list[Floats]) ->
 
 
 def _entry(table: Floats, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
-    """Points where rays enter surfaces (s, m, 7), and normals: see tbcad.light.simulate.scene.rays."""
+    """Points where rays enter surfaces (s, m, 7), and normals: see light.simulate.scene.rays."""
     apex, normal, curvature = table[..., APEX], table[..., NORMAL], table[..., CURVATURE, None]
     offset = origin - apex
     c = dot(normal + curvature / 2 * offset, offset)

@@ -6,7 +6,7 @@ point x0 nearest to p's apex, with unit tangent e, unit n away from its middle a
     x(t) = x0 + (t e - k t^2 / 2 n) / w,    w = 1 + k^2 t^2 / 4,
 
 t being 2 / k times the tangent of half the angle. With f and g value and gradient at x0 of any
-third surface of curvature c (tbcad.core.optics.surfaces), its value at x(t) times w is the polynomial
+third surface of curvature c (core.optics.surfaces), its value at x(t) times w is the polynomial
 
     f + (g . e) t + (f k^2 / 4 - (g . n) k / 2 + c / 2) t^2,
 

@@ -1,9 +1,9 @@
 """Coverage of simulated prototypes: their balls within the windows that the software assumes.
 
 Every mirror has a window in the photograph of its stop, with a ball in it
-(tbcad.light.simulate.prototype.run). The windows keep their places in the picture, in pixels; base, balls
-and camera are off. So a camera error turns all rays of a build alike, and the other errors move the
-balls under the windows. In a calibrated build the software moves the windows along.
+(light.simulate.prototype.run). The windows keep their places in the picture, in pixels; base,
+balls and camera are off. So a camera error turns all rays of a build alike, and the other errors
+move the balls under the windows. In a calibrated build the software moves the windows along.
 
 Both runs are described in the frame of the prototype, with the object turned in the second.
 """

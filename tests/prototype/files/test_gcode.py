@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from tbcad_verify.prototype.gcode_machine import run_program
+from tbcad_verify.prototype.control.gcode_machine import run_program
 
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.errors import SpecError

@@ -25,26 +25,22 @@ from tbcad_verify.prototype import (
     assembly,
     bodies,
     camera_gauge_checks,
-    caps,
-    fastener_checks,
     flat_drawing,
-    gcode_checks,
-    homing_checks,
-    klipper_checks,
-    lamp_light,
     measured_parts,
     measured_prototype,
-    seats,
     stage_checks,
 )
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import Bodies
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.lamp_light import EdgedBodies
+from tbcad_verify.prototype.control import gcode_checks, homing_checks, klipper_checks
+from tbcad_verify.prototype.fits import caps, fastener_checks, seats
+from tbcad_verify.prototype.light import lamp_light
+from tbcad_verify.prototype.light.lamp_light import EdgedBodies
+from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
+from tbcad_verify.prototype.light.ray_transfer import ray_transfer
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
-from tbcad_verify.prototype.pinhole_cells import mirror_spheres
-from tbcad_verify.prototype.ray_transfer import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes

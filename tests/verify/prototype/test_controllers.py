@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tbcad_verify.prototype import homing_checks, klipper_checks
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.control import homing_checks, klipper_checks
 from tbcad_verify.record.export import read_export
 
 from tbcad.core.spec.prototype import MotionSpec

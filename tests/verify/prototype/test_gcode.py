@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.gcode_checks import homing, program_check
-from tbcad_verify.prototype.gcode_machine import run_program
+from tbcad_verify.prototype.control.gcode_checks import homing, program_check
+from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.record.export import read_export
 
 NAME = ("plan program", "rotation_plan.nc", "faults")

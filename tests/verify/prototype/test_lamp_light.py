@@ -5,7 +5,7 @@ from typing import cast
 import numpy as np
 import pytest
 from tbcad_verify.prototype.bodies import Bodies
-from tbcad_verify.prototype.lamp_light import FACET_MM, EdgedBodies
+from tbcad_verify.prototype.light.lamp_light import FACET_MM, EdgedBodies
 from tbcad_verify.types import Bools, Floats
 
 

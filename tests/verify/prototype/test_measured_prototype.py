@@ -15,17 +15,13 @@ from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.stl import parse
-from tbcad_verify.prototype import (
-    ball_views,
-    pinhole_cells,
-    plan_checks,
-    ray_transfer,
-    seats,
-    swing,
-)
+from tbcad_verify.prototype import swing
 from tbcad_verify.prototype.assembly import assembly_meshes
-from tbcad_verify.prototype.caps import measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.control import plan_checks
+from tbcad_verify.prototype.fits import seats
+from tbcad_verify.prototype.fits.caps import measure_cap
+from tbcad_verify.prototype.light import ball_views, pinhole_cells, ray_transfer
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
     distance_to_facets,

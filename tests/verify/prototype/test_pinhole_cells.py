@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tbcad_verify.prototype.pinhole_cells import (
+from tbcad_verify.prototype.light.pinhole_cells import (
     MAX_ANGLE,
     OUTLINE_DIRECTIONS,
     MirrorSpheres,

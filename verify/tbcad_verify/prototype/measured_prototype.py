@@ -17,10 +17,10 @@ from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_r
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import NOT_BODIES, OWN, turning
-from tbcad_verify.prototype.caps import MeasuredCap
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.fits.caps import MeasuredCap
+from tbcad_verify.prototype.fits.seats import MeasuredSeat
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
-from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats, Ints
 

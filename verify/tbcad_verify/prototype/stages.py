@@ -13,32 +13,30 @@ from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.prototype import (
     assembly,
-    ball_views,
     bodies,
     camera_gauge_checks,
     camera_mount_checks,
-    cap_checks,
-    caps,
-    darkness,
     drawing_checks,
     drive_checks,
-    fastener_checks,
-    holding_checks,
-    homing_checks,
     inventory,
-    key_access,
-    klipper_checks,
-    lamp_light,
-    plan_checks,
-    seats,
-    shroud_checks,
     stage_checks,
     swing,
 )
 from tbcad_verify.prototype import record_checks as records
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.ball_views import BallViews, ball_coverage
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.control import homing_checks, klipper_checks, plan_checks
+from tbcad_verify.prototype.fits import (
+    cap_checks,
+    caps,
+    fastener_checks,
+    holding_checks,
+    key_access,
+    seats,
+)
+from tbcad_verify.prototype.fits.seats import MeasuredSeat
+from tbcad_verify.prototype.light import ball_views, darkness, lamp_light, shroud_checks
+from tbcad_verify.prototype.light.ball_views import BallViews, ball_coverage
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
     joined_meshes,
@@ -47,7 +45,6 @@ from tbcad_verify.prototype.measured_parts import (
     stl_names,
 )
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, measure_prototype
-from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import KLIPPER, SETTINGS, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE

@@ -1,4 +1,4 @@
-"""Writing of light fields as HDF5 files (tbcad.light.simulate.capture.light_field), band by band."""
+"""Writing of light fields as HDF5 files (see `light_field`), band by band."""
 
 import json
 import zlib

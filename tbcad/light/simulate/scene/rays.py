@@ -170,7 +170,7 @@ def meets_sphere(origin: Floats, direction: Floats, radius: float) -> Bools:
 def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
     """Where a ray from the pinhole enters a mirror (11,), in lengths of its direction.
 
-    On the ray x = pinhole + t d the surface's f (tbcad.core.optics.surfaces) is k/2 d.d t^2 + g.d t + h;
+    On the ray x = pinhole + t d the surface's f (core.optics.surfaces) is k/2 d.d t^2 + g.d t + h;
     the ray enters at the smaller root, in the form that loses no digits and holds for planes.
     Infinite where it does not enter.
     """

@@ -6,7 +6,7 @@ Buehler and others, Unstructured Lumigraph Rendering, 2001, section 3). Each add
 about the point, weighted by a bell curve much narrower than they are: the pixels of several
 cameras lie between each other, and together they are finer than one of them.
 
-tests/light/simulate/views/test_blend.py compares with a search among all cameras and all of their pixels.
+Its tests compare with a search among all cameras and all of their pixels.
 """
 
 import numpy as np

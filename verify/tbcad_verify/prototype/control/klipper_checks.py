@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 from itertools import zip_longest
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.control.gcode_checks import homing
+from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.prototype.drive_checks import gear_of
-from tbcad_verify.prototype.gcode_checks import homing
-from tbcad_verify.prototype.gcode_machine import run_program
 from tbcad_verify.record.prototype import KLIPPER, KLIPPER_CONFIG
 from tbcad_verify.report.checks import Check, CheckName, at_most, require, short_list
 from tbcad_verify.step.solids_text import TextSolid

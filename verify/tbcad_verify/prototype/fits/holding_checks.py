@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.magnets import pull_of_pair, pull_on_ball
+from tbcad_verify.prototype.fits.magnets import pull_of_pair, pull_on_ball
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

@@ -9,10 +9,9 @@ import numpy as np
 from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.surfaces import Surfaces, nearest_on_rays, prepare_for_rays, reflect
 from tbcad_verify.mesh.vectors import dot, norm, unit
-from tbcad_verify.prototype.blocked_rays import blocked_rays
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
-from tbcad_verify.prototype.pinhole_cells import (
+from tbcad_verify.prototype.light.blocked_rays import blocked_rays
+from tbcad_verify.prototype.light.pinhole_cells import (
     INSIDE,
     OUTLINE_DIRECTIONS,
     TILE,
@@ -23,13 +22,14 @@ from tbcad_verify.prototype.pinhole_cells import (
     mirror_spheres,
     sampled_pixels,
 )
-from tbcad_verify.prototype.ray_transfer import (
+from tbcad_verify.prototype.light.ray_transfer import (
     RayTransfer,
     Reflecting,
     nearest_points,
     ray_transfer,
     rotated,
 )
+from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

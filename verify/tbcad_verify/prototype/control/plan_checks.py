@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.gcode_checks import program_check
+from tbcad_verify.prototype.control.gcode_checks import program_check
 from tbcad_verify.record.prototype import PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
     Check,

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.gcode_lines import LAMP
-from tbcad_verify.prototype.gcode_machine import Machine, Photograph, run_program
+from tbcad_verify.prototype.control.gcode_lines import LAMP
+from tbcad_verify.prototype.control.gcode_machine import Machine, Photograph, run_program
 from tbcad_verify.record.spec import MotionSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
 

@@ -13,9 +13,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.control.gcode_checks import PULL_OFF_DEG, homing
+from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
-from tbcad_verify.prototype.gcode_checks import PULL_OFF_DEG, homing
-from tbcad_verify.prototype.gcode_machine import run_program
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, require, short_list
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
 from tbcad_verify.types import Floats

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tbcad_verify.prototype.gcode_lines import Line, parse_program
+from tbcad_verify.prototype.control.gcode_lines import Line, parse_program
 from tbcad_verify.types import Floats
 
 

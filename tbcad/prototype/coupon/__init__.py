@@ -1,0 +1,1 @@
+"""A part printed first, to try seats and fits."""

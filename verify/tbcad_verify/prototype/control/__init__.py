@@ -1,0 +1,1 @@
+"""Programs and settings of the controllers, run and read."""

@@ -1,0 +1,1 @@
+"""Balls, caps, magnets and fasteners in their seats and holes."""

@@ -1,0 +1,1 @@
+"""Light of the lamps, and light that the balls reflect."""
