@@ -51,6 +51,13 @@ def wait_and_touch(begun: Path, late: Path) -> None:
     late.touch()
 
 
+def test_a_process_that_begins_while_all_are_ended_ends_too() -> None:
+    processes = Processes(1)
+    processes.kill()
+    with pytest.raises(ProcessEnded, match="SIGKILL"):
+        processes.call(end, "hang")
+
+
 def test_reports_results_and_errors() -> None:
     heard: list[str] = []
     with Processes(1) as processes:

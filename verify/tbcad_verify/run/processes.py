@@ -57,6 +57,7 @@ class Processes(ThreadPoolExecutor):
         self.seconds = seconds
         self._idle: list[_Process] = []
         self._all: list[_Process] = []
+        self._killed = False
 
     def submit(  # type: ignore[override]
         self,
@@ -110,10 +111,13 @@ class Processes(ThreadPoolExecutor):
     def _started(self) -> _Process:
         process = _Process()
         self._all.append(process)
+        if self._killed:  # meanwhile, by another thread that did not know of it
+            process.kill()
         return process
 
     def kill(self) -> None:
         """End all processes at once; calls that are not done fail."""
+        self._killed = True
         self.shutdown(wait=False, cancel_futures=True)
         for process in self._all:
             process.kill()
