@@ -99,9 +99,11 @@ class TestVersions:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         copied(tmp_path)
-        monkeypatch.setattr(schedule, "__file__", str(tmp_path / "tbcad" / "schedule.py"))
+        monkeypatch.setattr(
+            schedule, "__file__", str(tmp_path / "tbcad" / "common" / "schedule.py")
+        )
         assert schedule._code() == versions()["tbcad's code"]
-        with (tmp_path / "tbcad" / "optics" / "trace.py").open("a") as module:
+        with (tmp_path / "tbcad" / "errors.py").open("a") as module:
             module.write("\n")
         assert schedule._code() != versions()["tbcad's code"]
 
@@ -357,7 +359,7 @@ class TestRefused:
         (tmp_path / "none" / "tbcad" / "__init__.py").touch()
         cluster.start(1, {"PYTHONPATH": str(tmp_path / "none")})
         said = refusal(drawn_there(), [1], cluster.address)
-        assert "cannot use tbcad (No module named 'tbcad.common.schedule'): install tbcad " in said
+        assert "cannot use tbcad (No module named 'tbcad.common'): install tbcad " in said
 
     def test_a_unit_that_kills_its_workers(self, tmp_path: Path) -> None:
         cluster = Cluster(tmp_path, {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"})

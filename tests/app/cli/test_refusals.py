@@ -49,7 +49,7 @@ init . | is a folder
 init no/such/folder.toml | cannot be written
 init my.toml --from turtle | allowed is one of turtleback, afternoon-print
 init my.toml --json | --json is about --list
-optimize --candidates 3 | --candidates is 3, allowed is 80 to 100000
+optimize --candidates 3 | --candidates is '3', allowed is a whole number from 80 to 100000
 optimize --for beauty | --for is 'beauty', allowed is one of minimum
 optimize --set n=1 | optics.n
 optimize --max-size-mm -1 | --max-size-mm is -1, allowed is more than 0
@@ -61,8 +61,8 @@ tolerance RECORD --yield 2 | --yield 2
 tolerance RECORD --yield nan | --yield nan
 tolerance RECORD --builds 1 | --builds 1: allowed is 10 to
 tolerance RECORD --builds many | builds
-tolerance RECORD --seed -1 | --seed -1
-tolerance RECORD --calibrated-mrad -2 | --calibrated-mrad -2
+tolerance RECORD --seed -1 | --seed is '-1', allowed is a whole number from 0
+tolerance RECORD --calibrated-mrad -2 | --calibrated-mrad is '-2', allowed is a number from 0 to 100
 tolerance RECORD --set nonsense | 'nonsense' is not kind=value
 tolerance RECORD --set nonsense=3 | unknown key nonsense
 tolerance RECORD --set seat_um=-3 | seat_um
@@ -144,13 +144,13 @@ reconstruct BALL --mesh a.obj | a.obj: name a file that ends in .glb or .ply or 
 reconstruct BALL --mesh a.ply --mesh ./a.ply | is named twice
 reconstruct BALL --volume a.vdb | a.vdb: name a file that ends in .vti
 reconstruct BALL --preview a.jpg | a.jpg: name a file that ends in .png
-reconstruct BALL --nodes 8 | --nodes is 8, allowed is 16 to 512: change it
-reconstruct BALL --epochs 0 | --epochs is 0, allowed is 1 to 100: change it
-reconstruct BALL --rays 0 | --rays is 0, allowed is 1 to 64: change it
+reconstruct BALL --nodes 8 | --nodes is '8', allowed is a whole number from 16 to 512: change it
+reconstruct BALL --epochs 0 | --epochs is '0', allowed is a whole number from 1 to 100: change it
+reconstruct BALL --rays 0 | --rays is '0', allowed is a whole number from 1 to 64: change it
 reconstruct BALL --rays 12 | a pixel of this light field is a single ray: leave it out
 reconstruct BALL --blur 0.4 | --blur 0.4 is for several rays a pixel: add --rays 12
-reconstruct BALL --blur nan | --blur is nan, allowed is 0 to 5: change it
-reconstruct BALL --seed -1 | --seed is -1, allowed is 0 to
+reconstruct BALL --blur nan | --blur is 'nan', allowed is a number from 0 to 5: change it
+reconstruct BALL --seed -1 | --seed is '-1', allowed is a whole number from 0 to
 reconstruct BALL --frame 2 | --frame 2 is not in the sequence: allowed is 0 to 1
 reconstruct BALL --frame 0 --all-frames | --frame and --all-frames exclude each other
 reconstruct BALL --resume --force | --force and --resume exclude each other

@@ -11,6 +11,7 @@ from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.flange_holes import Flange, Hole, HoleLimits, flanges, hole_faults
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.casing import read_casing
+from tbcad_verify.step.part21 import StepTable
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 LIMITS = HoleLimits(size=1e-6, place=1e-3)
@@ -70,7 +71,8 @@ def test_dowels_are_next_to_the_ends(wanted: tuple[Flange, Flange]) -> None:
 def test_holes_of_a_build_are_where_they_belong(half: str) -> None:
     """The build divides exact ellipses by their own angle."""
     export = read_export(SAMPLE)
-    casing = read_casing((SAMPLE / f"shell_{half}.step").read_text(), frozenset(export.mirrors.ids))
+    table = StepTable((SAMPLE / f"shell_{half}.step").read_text())
+    casing = read_casing(table, frozenset(export.mirrors.ids))
     camera, beyond = export.cameras[half], casing.semi_axes[1] - export.semi_minor_mm
     assert hole_faults(casing.holes, flanges(export, camera, beyond), LIMITS) == []
     other = {"a": "b", "b": "a"}[half]
