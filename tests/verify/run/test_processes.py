@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -56,6 +57,20 @@ def test_a_process_that_begins_while_all_are_ended_ends_too() -> None:
     processes.kill()
     with pytest.raises(ProcessEnded, match="SIGKILL"):
         processes.call(end, "hang")
+
+
+def test_nothing_waits_for_a_time_limit(tmp_path: Path) -> None:
+    """An interrupt may come before anything can cancel it: it must not keep a program alive."""
+    mine, other = tmp_path / "mine", tmp_path / "other"
+    with Processes(1, 60) as processes:
+        done = processes.submit(meet, mine, other)
+        while not mine.exists():
+            time.sleep(0.01)
+        timers = [one for one in threading.enumerate() if isinstance(one, threading.Timer)]
+        assert timers
+        assert all(one.daemon for one in timers)
+        other.touch()
+        assert done.result()
 
 
 def test_reports_results_and_errors() -> None:

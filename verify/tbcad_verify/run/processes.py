@@ -170,9 +170,10 @@ class _Process:
             self._process.kill()
 
         timer = threading.Timer(seconds or 0.0, stop)
-        if seconds:
-            timer.start()
+        timer.daemon = True  # an interrupt as it starts leaves it behind: nothing waits for it
         try:
+            if seconds:
+                timer.start()
             kind, value = pickle.loads(_read(self._answers))
         except (EOFError, OSError):
             code = self._process.wait()
