@@ -29,8 +29,8 @@ def reached(at: Reflector, points: np.ndarray, mirror: int, ball: float) -> np.n
     return np.asarray(free.all(axis=1) & beyond.all(axis=1))
 
 
-def swept_coverage(at: Reflector, mirror: int, ball: float) -> float:
-    """Twice the minimum distance of the rays at the outline of what the ball reaches."""
+def swept(at: Reflector, mirror: int, ball: float) -> tuple[float, float]:
+    """Coverage, mm, and pixels, by the rays at the outline of what the ball reaches."""
     surfaces = at.cells.surfaces
     apex, normal = surfaces.apex[mirror], surfaces.normal[mirror]
     radius = 1 / surfaces.curvature[mirror]
@@ -49,7 +49,10 @@ def swept_coverage(at: Reflector, mirror: int, ball: float) -> float:
         low, high = np.where(good, angle, low), np.where(good, high, angle)
     points = point(low)
     rays = unit(reflect(points - at.camera.pinhole, unit(points - apex + radius * normal)))
-    return float(2 * norm(np.cross(points, rays)).min())
+    right, down, depth = ((points - at.camera.pinhole) @ at.camera.axes.T).T
+    x, y = right / depth, down / depth
+    area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 / at.camera.pixel_pitch**2
+    return float(2 * norm(np.cross(points, rays)).min()), float(area)
 
 
 @pytest.mark.parametrize("ball", [0.25, 1.0])
@@ -63,8 +66,9 @@ def test_coverage_is_that_of_a_ball_moved_over_twenty_mirrors(ball: float) -> No
     )
     whole = np.flatnonzero(~half.halved)
     for mirror in whole[:: len(whole) // 20]:
-        swept, exact = swept_coverage(at, int(mirror), ball), found.diameter[0, mirror]
-        assert -1e-6 < swept - exact < 0.02, mirror
+        coverage_mm, pixels = swept(at, int(mirror), ball)
+        assert -1e-6 < coverage_mm - found.diameter[0, mirror] < 0.02, mirror
+        assert pixels == pytest.approx(found.pixels[0, mirror], rel=2e-3), mirror
         assert found.crossings[0, mirror] % 2 == 1
 
 
