@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.common import schedule
+from tbcad.core.mirrors.array import design
 from tbcad.core.spec.design import EdgeKind, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
@@ -159,16 +160,22 @@ def edges_for_process(
 ) -> EdgeChoice:
     """The design whose least margins for a process and a yield leave most pixels (median).
 
-    Edges that the design names stay. Else pedestals are taken where they leave a per cent more than
-    valleys. Margins take pixels: where pedestals have too few even with the design's own margin,
-    none are searched for.
+    Edges that the design names stay; a process with a mandrel has valleys, as walls of pedestals
+    catch, and the mandrel is built too. Else pedestals are taken where they leave a per cent more
+    than valleys. Margins take pixels: where pedestals have too few even with the design's own
+    margin, none are searched for.
 
     Raises:
-        InputError: as `design_for_process`, with neither kind of edges.
+        InputError: as `design_for_process`, with neither kind of edges; or the mandrel's cutter is
+            larger than a mirror's radius.
     """
     check_margins_can_be_set(spec, wanted_yield)
-    if "edges" in spec.shell.model_fields_set:
+    if process.mandrel_cutter_mm is not None:
+        edges = spec.shell.edges if _names_edges(spec) else "valley"
+        spec = spec_with(spec, shell={"negative": True, "edges": edges})
+    if _names_edges(spec):
         made = design_for_process(spec, process, wanted_yield, progress)
+        _check_reach(made.spec, process)
         return EdgeChoice(made, seeing_pixels(made.spec), None)
     valley = _tried("valley", spec, process, wanted_yield, progress)
     pedestal = _too_few(spec, valley, progress) or _tried(
@@ -181,11 +188,31 @@ def edges_for_process(
     return EdgeChoice(best.made, best.pixels, other)
 
 
+def _names_edges(spec: Spec) -> bool:
+    return "edges" in spec.shell.model_fields_set
+
+
+def _check_reach(spec: Spec, process: Process) -> None:
+    """Refuse a cutter that does not fit into the mandrel's pockets, which have the mirrors' radii.
+
+    Raises:
+        InputError: it does not.
+    """
+    cutter = process.mandrel_cutter_mm or 0.0
+    smallest = 1 / design(spec).arrays[0].modelled_cells.surfaces.curvature.max()
+    if cutter >= smallest:
+        raise InputError(
+            f"process {process.name}: the mandrel's cutter has a radius of {cutter:g} mm, allowed "
+            f"is less than that of the smallest mirror, {smallest:.3g} mm: name a smaller one"
+        )
+
+
 def edges_text(choice: EdgeChoice) -> str:
     """The choice in words."""
-    chosen, other = choice.made.spec.shell.edges, choice.other
+    shell, other = choice.made.spec.shell, choice.other
+    chosen, negative = shell.edges, shell.negative
     if other is None:
-        return f"edges: {chosen}, as the design says"
+        return f"edges: {chosen}, as the design {'or the mandrel ' * negative}says"
     return (
         f"edges: {chosen}, with a median of {choice.pixels} pixels of a virtual camera; "
         f"{other.edges}: {_told(other)}"

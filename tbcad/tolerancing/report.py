@@ -19,7 +19,8 @@ from tbcad.tolerancing.montecarlo.builds import (
 )
 from tbcad.tolerancing.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
 from tbcad.tolerancing.plots import directions, in_words, panels, spread_dict, spread_sentence
-from tbcad.tolerancing.process.process import ErrorSpec, Process
+from tbcad.tolerancing.process.kinds import ErrorSpec
+from tbcad.tolerancing.process.process import Process
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"

@@ -4,13 +4,11 @@ docs/decisions/0007-how-tolerances-are-computed.md says what a figure means, and
 from a maker's tolerance.
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
@@ -24,139 +22,38 @@ from tbcad.core.spec.errors import (
 )
 from tbcad.core.spec.files import Table, read_toml, toml_value
 from tbcad.core.spec.prototype import GradeName
-from tbcad.core.spec.section import Section
+from tbcad.core.spec.section import Section, as_tuple
 from tbcad.prototype.balls.catalogue import load_grades
-from tbcad.tolerancing.montecarlo.error_kinds import Distribution, Error, Errors
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.process.chain import chained
+from tbcad.tolerancing.process.kinds import (
+    MICROMETRE,
+    Degrees,
+    ErrorSpec,
+    FilletMicrometres,
+    FilletRadius,
+    Micrometres,
+    Millimetres,
+    Milliradians,
+    Percent,
+    Permille,
+    RootMeanSquare,
+    SmoothMicrometres,
+)
 
 BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")
+CHAINS = ("nickel-diamond", "nickel-milled", "epoxy", "urethane", "segments", "inserts")
+EVERY = (*BUILT_IN, *CHAINS)
 DEFAULT_PROCESS = "sla"
 RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
-MICROMETRE = 1e-3  # mm
 BY_USER = "set by an option"
 SHARP = "Not stated: valleys are taken as sharp, a judgement that flatters milled shells"
-
-Source: TypeAlias = Annotated[str, Field(pattern=r"\S", max_length=600)]
 
 
 def _whole(value: object) -> object:
     if type(value) is not int:  # true and 1.0 equal 1, so Literal[1] would take them
         raise ValueError("allowed is the whole number 1: change it")
     return value
-
-
-class ErrorSpec(Section):
-    """One kind of error: common to all builds (mean), and different in each (magnitude)."""
-
-    unit: ClassVar[float] = 1.0
-
-    magnitude: float = Field(ge=0)
-    """Standard deviation if normal, half width if uniform."""
-    mean: float = 0.0
-    """Error common to all builds."""
-    distribution: Distribution = "normal"
-    """Of the error about its mean."""
-    source: Source
-    """Where the figures come from; says so where they are a judgement."""
-
-    @property
-    def error(self) -> Error:
-        """The same in mm, radians or as a share."""
-        return Error(self.unit * self.magnitude, self.unit * self.mean, self.distribution)
-
-
-class Micrometres(ErrorSpec):
-    """An error in micrometres."""
-
-    unit: ClassVar[float] = MICROMETRE
-    magnitude: float = Field(ge=0, le=10_000)
-    mean: float = Field(0.0, ge=-10_000, le=10_000)
-
-
-class SmoothMicrometres(Micrometres):
-    """An error in micrometres that neighbouring places of a part share."""
-
-    mean: float = Field(0.0, ge=0, le=0)
-    """None: it would move the whole part."""
-    distribution: Literal["normal"] = "normal"
-    """Always normal."""
-    length_mm: float = Field(ge=20, le=10_000)
-    """Correlation length: at this distance 61 % of the error is shared, at twice of it 14 %."""
-
-    @property
-    def error(self) -> Error:
-        """The same in mm."""
-        return replace(super().error, length=self.length_mm)
-
-
-class RootMeanSquare(Micrometres):
-    """A form error within each mirror, in micrometres."""
-
-    mean: float = Field(0.0, ge=0, le=0)
-    """None: it differs from mirror to mirror."""
-    distribution: Literal["normal"] = "normal"
-    """Always normal."""
-
-
-class FilletRadius(ErrorSpec):
-    """Radius of the fillets in the valleys between mirrors, in millimetres."""
-
-    magnitude: float = Field(ge=0, le=10)
-    """The radius: the same in all builds."""
-    mean: float = Field(0.0, ge=0, le=0)
-    """None: the radius is the magnitude."""
-    distribution: Literal["normal"] = "normal"
-    """Without a meaning here."""
-
-    @property
-    def error(self) -> Error:
-        """The same in mm."""
-        return Error(0.0, self.unit * self.magnitude)
-
-
-class FilletMicrometres(FilletRadius):
-    """Radius of the fillets in the valleys between mirrors, in micrometres."""
-
-    unit: ClassVar[float] = MICROMETRE
-    magnitude: float = Field(ge=0, le=10_000)
-
-
-class Millimetres(ErrorSpec):
-    """An error in millimetres."""
-
-    magnitude: float = Field(ge=0, le=100)
-    mean: float = Field(0.0, ge=-100, le=100)
-
-
-class Permille(ErrorSpec):
-    """An error as a share, in thousandths."""
-
-    unit: ClassVar[float] = 1e-3
-    magnitude: float = Field(ge=0, le=200)
-    mean: float = Field(0.0, ge=-200, le=200)
-
-
-class Percent(ErrorSpec):
-    """A share in hundredths."""
-
-    unit: ClassVar[float] = 1e-2
-    magnitude: float = Field(ge=0, le=200)
-    mean: float = Field(0.0, ge=0, le=200)
-
-
-class Milliradians(ErrorSpec):
-    """An error in milliradians."""
-
-    unit: ClassVar[float] = 1e-3
-    magnitude: float = Field(ge=0, le=500)
-    mean: float = Field(0.0, ge=-500, le=500)
-
-
-class Degrees(ErrorSpec):
-    """An error in degrees."""
-
-    unit: ClassVar[float] = math.radians(1)
-    magnitude: float = Field(ge=0, le=45)
-    mean: float = Field(0.0, ge=-45, le=45)
 
 
 class Process(Section):
@@ -168,6 +65,11 @@ class Process(Section):
     """The process in words."""
     schema_version: Annotated[Literal[1], BeforeValidator(_whole)] = Field(1, alias="schema")
     """Version of this table's keys."""
+    steps: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
+    """Steps of a chain, whose errors are added up; none: the figures are the process' own."""
+    mandrel_cutter_mm: float | None = Field(None, ge=0, le=100)
+    """Radius of the cutter of a mandrel, the shell's negative that the shell is taken from; none:
+    the shell itself is made."""
     sphere_centre_um: Micrometres
     """Each mirror's centre along each axis, by itself, without growth and warp of the shell."""
     sphere_radius_um: Micrometres
@@ -219,14 +121,15 @@ class Process(Section):
 def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
     """Return a built-in process, or one of a TOML file, with options "kind.key=value" on top.
 
-    A file may name a built-in process as `based_on`; each kind of error that it has replaces the
-    whole kind there, so that no figure keeps the source of another.
+    A file may name a built-in process as `based_on`, and `steps` that its shells go through; each
+    kind of error that it has replaces the whole kind there, so that no figure keeps the source of
+    another.
 
     Raises:
         SpecError: anything that cannot be read, is unknown, or is not allowed.
     """
-    name = f"built-in process {which}" if which in BUILT_IN else which
-    table = _built_in(which) if which in BUILT_IN else _own(Path(which))
+    name = f"built-in process {which}" if which in EVERY else which
+    table = _built_in(which) if which in EVERY else _own(Path(which))
     options = [_option(text) for text in overrides]
     for key, value in options:
         _put(table, key, value)
@@ -261,29 +164,36 @@ def ball_radius_error(grade: str) -> Error:
 
 def _built_in(name: str) -> Table:
     file = files("tbcad.tolerancing").joinpath("process", f"{name}.toml")
-    return read_toml(file, name, "process")
+    return _resolved(read_toml(file, name, "process"), name, name)
 
 
 def _own(path: Path) -> Table:
-    if not path.is_file():
-        if str(path) in RENAMED:
-            new = RENAMED[str(path)]
-            raise SpecError(f"process {path} is called {new}: write {new}")
-        close = get_close_matches(str(path).lower(), BUILT_IN, 1)
-        hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
-        raise SpecError(
-            f"process {short_text(str(path))} is neither built in ({', '.join(BUILT_IN)}) nor a "
-            f"file: {hint}"
-        )
-    table = read_toml(path, str(path), "process")
-    base = table.pop("based_on", None)
-    if base is None:
-        return table
-    if base not in BUILT_IN:
-        raise SpecError(
-            f"{path}: based_on is {short_text(base)}, allowed is {' or '.join(BUILT_IN)}: change it"
-        )
-    return {**_built_in(base), "name": path.stem, **table}
+    if path.is_file():
+        return _resolved(read_toml(path, str(path), "process"), path.stem, str(path))
+    if str(path) in RENAMED:
+        new = RENAMED[str(path)]
+        raise SpecError(f"process {path} is called {new}: write {new}")
+    close = get_close_matches(str(path).lower(), EVERY, 1)
+    hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
+    raise SpecError(
+        f"process {short_text(str(path))} is neither built in ({', '.join(EVERY)}) nor a "
+        f"file: {hint}"
+    )
+
+
+def _resolved(table: Table, name: str, where: str) -> Table:
+    """A file's table on top of what it is based on and of what its steps add up to."""
+    base, whole = table.pop("based_on", None), {}
+    if base is not None:
+        if base not in EVERY:
+            raise SpecError(
+                f"{where}: based_on is {short_text(base)}, allowed is {' or '.join(EVERY)}: "
+                "change it"
+            )
+        whole = {**_built_in(base), "name": name}
+    if "steps" in table:
+        whole |= chained(table.pop("steps"), table.pop("step", {}), where)
+    return {**whole, **table}
 
 
 def _option(text: str) -> tuple[str, object]:

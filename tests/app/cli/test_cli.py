@@ -61,7 +61,7 @@ def test_build_verifies_and_verify_agrees(
     shown = capsys.readouterr()
     assert code == 0, shown.out
     assert shown.out.startswith("PASS: ")
-    assert "As made (" in shown.out
+    assert "Can be made (" in shown.out
     assert len(shown.out.splitlines()) <= MAX_LINES
     assert "Traceback" not in shown.err
     verified = (out / "verify.json").read_bytes()

@@ -74,7 +74,7 @@ def test_pass_of_a_shell(shell_report: Report) -> None:
     assert {"coverage, spheres", "coverage, facets", "pixels blocked"} <= figures.keys()
     assert all(label in text for label in figures)
     assert f"{figures['coverage, spheres'].measured:.4g} >= 40 mm" in text
-    assert "As made: tbcad tolerance FOLDER" in text
+    assert "Can be made: tbcad tolerance FOLDER" in text
     assert " s; files, and every check in verify.json" in lines[-1]
 
 

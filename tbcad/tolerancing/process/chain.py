@@ -1,0 +1,126 @@
+"""Process chains: steps that each add errors to a shell, and the errors that they add up to."""
+
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from math import hypot, sqrt
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from tbcad.core.spec.errors import SpecError, short_text, validation_error
+from tbcad.core.spec.files import Table, read_toml
+from tbcad.core.spec.section import Section
+from tbcad.tolerancing.process.kinds import (
+    ErrorSpec,
+    FilletMicrometres,
+    FilletRadius,
+    Micrometres,
+    Millimetres,
+    Permille,
+    RootMeanSquare,
+    SmoothMicrometres,
+)
+
+STEPS_FILE = "steps.toml"
+CUTTER = "cutter_radius_mm"
+NOTHING = "No step adds to it"
+
+
+class Step(Section):
+    """One step of a chain: what it adds to a shell. Kinds that it has nothing of are left out."""
+
+    title: str = Field(pattern=r"\S", max_length=200)
+    """The step in words."""
+    mandrel: bool = False
+    """Whether what it makes is the negative, from which a later step takes the shell."""
+    sphere_centre_um: Micrometres | None = None
+    sphere_radius_um: Micrometres | None = None
+    warp_um: SmoothMicrometres | None = None
+    waviness_um: RootMeanSquare | None = None
+    groove_wall_um: Micrometres | None = None
+    scale_isotropic_permille: Permille | None = None
+    scale_axis_permille: Permille | None = None
+    coating_um: Micrometres | None = None
+    facets_mm: Millimetres | None = None
+    cutter_radius_mm: FilletRadius | None = None
+    ridge_rounding_um: FilletMicrometres | None = None
+
+
+def chained(names: object, own: object, where: str) -> Table:
+    """The kinds of error that steps add up to, as a process has them.
+
+    Errors of steps are independent: their variances add, and so do their means. Of fillets the
+    largest radius counts, of correlation lengths that of the largest warp. A cutter of the mandrel
+    leaves none, because its edges are ridges. Kinds that no step has are zero.
+
+    Args:
+        names: of the steps, in their order: built-in ones, or of own.
+        own: tables of steps by their names.
+        where: what messages name.
+
+    Raises:
+        SpecError: no list of names, an unknown step, or a table that is not allowed.
+    """
+    if not isinstance(names, list) or not names:
+        raise SpecError(
+            f"{where}: steps is {short_text(names)}, allowed is a list of names of steps"
+        )
+    tables = {**_built_in(), **(own if isinstance(own, dict) else {})}
+    steps = {name: _step(name, tables, where) for name in names}
+    mandrels = {name: step for name, step in steps.items() if step.mandrel}
+    whole: dict[str, Any] = {"steps": names, "mandrel_cutter_mm": _cutter(mandrels)}
+    for kind in sorted(Step.model_fields.keys() - {"title", "mandrel"}):
+        those = steps if kind != CUTTER else steps.keys() - mandrels.keys()
+        parts = {name: getattr(steps[name], kind) for name in names if name in those}
+        whole[kind] = _sum({name: part for name, part in parts.items() if part is not None}, kind)
+    return whole
+
+
+def _cutter(mandrels: dict[str, Step]) -> float | None:
+    """Radius of the largest cutter of a mandrel, mm, 0 if no step names one; None: no mandrel."""
+    radii = [step.cutter_radius_mm.magnitude for step in mandrels.values() if step.cutter_radius_mm]
+    return max(radii, default=0.0) if mandrels else None
+
+
+@cache
+def _built_in() -> Table:
+    file = files("tbcad.tolerancing").joinpath("process", STEPS_FILE)
+    return read_toml(file, STEPS_FILE, "process")
+
+
+def _step(name: object, tables: Table, where: str) -> Step:
+    if name not in tables:
+        close = get_close_matches(str(name), tables, 1)
+        hint = f"did you mean {close[0]}?" if close else f"write its table, [step.{name}]"
+        raise SpecError(
+            f"{where}: there is no step {short_text(name)}, allowed are {', '.join(tables)}: {hint}"
+        )
+    try:
+        return Step.model_validate(tables[str(name)])
+    except ValidationError as error:
+        raise validation_error(error, Step, f"{where}, step {name}", set()) from None
+
+
+def _sum(parts: dict[str, ErrorSpec], kind: str) -> Table:
+    """One kind of error of all steps that have it, as a table."""
+    if not parts:
+        return {"magnitude": 0, "source": NOTHING} | (
+            {"length_mm": 80} if kind == "warp_um" else {}
+        )
+    largest = max(parts.values(), key=lambda part: part.magnitude)
+    source = "; ".join(f"{name}: {part.source.strip()}" for name, part in parts.items())
+    if len(parts) == 1 or isinstance(largest, FilletRadius):
+        return {**largest.model_dump(), "source": source}
+    return {
+        **largest.model_dump(),
+        "magnitude": hypot(*map(_sigma, parts.values())),
+        "mean": sum(part.mean for part in parts.values()),
+        "distribution": "normal",
+        "source": source,
+    }
+
+
+def _sigma(part: ErrorSpec) -> float:
+    """Standard deviation, in the unit of the kind."""
+    return part.magnitude if part.distribution == "normal" else part.magnitude / sqrt(3)
