@@ -7,7 +7,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, estimate_yield, simulate
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
-from tbcad.tolerancing.process.process import EVERY, load_process, process_errors
+from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 from tbcad.types import Progress
 
 # As many as cost about 3 % of the processor time of a whole build.
@@ -25,7 +25,7 @@ def as_made(
     if not all((one.mirrors.curvature > 0).all() for one in cameras):
         return AsMade(reason="the mirrors are planar")
     models, yields = edge_models(cameras), []
-    for name in EVERY:
+    for name in BUILT_IN:
         detail(name)
         yields.append(_process_yield(models, name, capture_mm, coating_um))
     return AsMade(BUILDS, tuple(sorted(yields, key=lambda one: -one.coverage_mm)))

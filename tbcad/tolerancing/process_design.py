@@ -212,7 +212,8 @@ def edges_text(choice: EdgeChoice) -> str:
     shell, other = choice.made.spec.shell, choice.other
     chosen, negative = shell.edges, shell.negative
     if other is None:
-        return f"edges: {chosen}, as the design {'or the mandrel ' * negative}says"
+        reason = "with which a shell comes off its mandrel" if negative else "as the design says"
+        return f"edges: {chosen}, {reason}"
     return (
         f"edges: {chosen}, with a median of {choice.pixels} pixels of a virtual camera; "
         f"{other.edges}: {_told(other)}"

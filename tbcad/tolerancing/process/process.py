@@ -41,9 +41,10 @@ from tbcad.tolerancing.process.kinds import (
     SmoothMicrometres,
 )
 
-BUILT_IN = ("fdm", "sls", "sla", "cnc", "diamond")
-CHAINS = ("nickel-diamond", "nickel-milled", "epoxy", "urethane", "segments", "inserts")
-EVERY = (*BUILT_IN, *CHAINS)
+BUILT_IN = (
+    "fdm", "sls", "sla", "cnc", "diamond",
+    "nickel-diamond", "nickel-milled", "epoxy", "urethane", "segments", "inserts",
+)  # fmt: skip
 DEFAULT_PROCESS = "sla"
 RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
 BY_USER = "set by an option"
@@ -128,8 +129,8 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
     Raises:
         SpecError: anything that cannot be read, is unknown, or is not allowed.
     """
-    name = f"built-in process {which}" if which in EVERY else which
-    table = _built_in(which) if which in EVERY else _own(Path(which))
+    name = f"built-in process {which}" if which in BUILT_IN else which
+    table = _built_in(which) if which in BUILT_IN else _own(Path(which))
     options = [_option(text) for text in overrides]
     for key, value in options:
         _put(table, key, value)
@@ -173,10 +174,10 @@ def _own(path: Path) -> Table:
     if str(path) in RENAMED:
         new = RENAMED[str(path)]
         raise SpecError(f"process {path} is called {new}: write {new}")
-    close = get_close_matches(str(path).lower(), EVERY, 1)
+    close = get_close_matches(str(path).lower(), BUILT_IN, 1)
     hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
     raise SpecError(
-        f"process {short_text(str(path))} is neither built in ({', '.join(EVERY)}) nor a "
+        f"process {short_text(str(path))} is neither built in ({', '.join(BUILT_IN)}) nor a "
         f"file: {hint}"
     )
 
@@ -185,9 +186,9 @@ def _resolved(table: Table, name: str, where: str) -> Table:
     """A file's table on top of what it is based on and of what its steps add up to."""
     base, whole = table.pop("based_on", None), {}
     if base is not None:
-        if base not in EVERY:
+        if base not in BUILT_IN:
             raise SpecError(
-                f"{where}: based_on is {short_text(base)}, allowed is {' or '.join(EVERY)}: "
+                f"{where}: based_on is {short_text(base)}, allowed is {' or '.join(BUILT_IN)}: "
                 "change it"
             )
         whole = {**_built_in(base), "name": name}

@@ -13,6 +13,7 @@ import pytest
 from tbcad.core.spec.errors import SpecError, section_of
 from tbcad.core.spec.errors import dotted_fields as keys_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.process.chain import STEPS_FILE
 from tbcad.tolerancing.process.process import (
     BUILT_IN,
     BY_USER,
@@ -63,7 +64,7 @@ class TestBuiltIn:
     def test_are_all_files_there_are(self) -> None:
         there = files("tbcad.tolerancing").joinpath("process").iterdir()
         assert sorted(f"{name}.toml" for name in BUILT_IN) == sorted(
-            file.name for file in there if file.name.endswith(".toml")
+            file.name for file in there if file.name.endswith(".toml") and file.name != STEPS_FILE
         )
 
     @pytest.mark.parametrize("name", BUILT_IN)
@@ -72,7 +73,8 @@ class TestBuiltIn:
         assert process.name == name
         outside = re.compile(
             r"judgement|vendors|Formlabs|Apollo|ISO \d|Allied|Data sheets|Minebea|\.com"
-            r"|verification|STEP|The (same|shift)|Aluminium 0\.023|As sphere",
+            r"|verification|STEP|The (same|shift)|(Aluminium|steel|nickel) 0\.0|As sphere|as mill"
+            r"|as diamond-mill|makers|No step",
             re.IGNORECASE,
         )
         for kind in KINDS:
@@ -80,7 +82,7 @@ class TestBuiltIn:
 
     @pytest.mark.parametrize(
         ("name", "limit_mm"),
-        [("fdm", 0.2), ("sls", 0.3), ("sla", 0.1), ("cnc", 0.02), ("diamond", 0.005)],
+        [("fdm", 0.2), ("sls", 0.3), ("sla", 0.1), ("diamond", 0.005)],
     )
     def test_centres_follow_from_the_tolerance_of_short_lengths(
         self, name: str, limit_mm: float
@@ -142,10 +144,10 @@ class TestErrors:
         end = whole.index("[", start + 1)
         assert kind in refused(file, whole[:start] + whole[end:])
 
-    @pytest.mark.parametrize("name", BUILT_IN)
+    @pytest.mark.parametrize("name", ["fdm", "sls", "sla", "diamond"])
     def test_a_part_of_one_mirror_keeps_its_share_of_the_limit(self, name: str) -> None:
         """A quarter of the limit for its radius, as before neighbours shared errors (0007)."""
-        limit = {"fdm": 0.2, "sls": 0.3, "sla": 0.1, "cnc": 0.02, "diamond": 0.005}[name]
+        limit = {"fdm": 0.2, "sls": 0.3, "sla": 0.1, "diamond": 0.005}[name]
         radius = process_errors(load_process(name)).whole_radius
         assert radius.spread == pytest.approx(limit / 4, rel=0.01)
 
@@ -250,6 +252,69 @@ class TestOwnFile:
         assert refusal("slaa").endswith("did you mean sla?")
         assert refusal(str(tmp_path)).endswith("name one of these or check the path")
         assert "nor a file" in refusal("\0")
+
+
+class TestChains:
+    """Steps add up to one process."""
+
+    own = """
+based_on = "diamond"
+steps = ["cut", "diamond-mandrel", "swell", "coat"]
+[step.cut]
+title = "cut"
+warp_um = { magnitude = 3, length_mm = 90, source = "x" }
+coating_um = { magnitude = 3, mean = 2, source = "x" }
+cutter_radius_mm = { magnitude = 0.3, source = "x" }
+[step.swell]
+title = "swells"
+warp_um = { magnitude = 4, length_mm = 30, source = "y" }
+coating_um = { magnitude = 6, mean = 5, distribution = "uniform", source = "y" }
+ridge_rounding_um = { magnitude = 1, source = "y" }
+"""
+
+    def test_variances_and_means_add_and_the_largest_radius_counts(self, file: Path) -> None:
+        file.write_text(self.own, encoding="utf-8")
+        process = load_process(str(file))
+        mandrel = load_process("nickel-diamond")
+        assert process.name == "own"
+        assert process.warp_um.magnitude == pytest.approx(math.sqrt(9 + 16 + 1.73**2))
+        assert process.warp_um.length_mm == 30
+        assert process.coating_um.magnitude == pytest.approx(math.sqrt(9 + 12 + 0.02**2))
+        assert process.coating_um.mean == pytest.approx(7.1)
+        assert process.coating_um.source.startswith("cut: x; swell: y; coat: tungsten")
+        assert process.ridge_rounding_um == mandrel.ridge_rounding_um.model_copy(
+            update={"source": process.ridge_rounding_um.source}
+        )
+
+    def test_a_cutter_of_the_mandrel_leaves_no_fillet_but_must_fit_its_pockets(
+        self, file: Path
+    ) -> None:
+        file.write_text(self.own, encoding="utf-8")
+        process = load_process(str(file))
+        assert (process.cutter_radius_mm.magnitude, process.mandrel_cutter_mm) == (0.3, 0.5)
+        nickel = load_process("nickel-diamond")
+        assert (nickel.cutter_radius_mm.magnitude, nickel.mandrel_cutter_mm) == (0, 0.5)
+        assert load_process("cnc").mandrel_cutter_mm is None
+
+    def test_what_no_step_has_is_zero_whatever_it_rests_on(self) -> None:
+        inserts = load_process("inserts")
+        assert load_process("cnc").ridge_rounding_um.magnitude > 0
+        assert (inserts.ridge_rounding_um.magnitude, inserts.cutter_radius_mm.magnitude) == (0, 0)
+        assert inserts.camera_shift_um == load_process("cnc").camera_shift_um
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            ('steps = "mill"', "steps is 'mill', allowed is a list of names of steps"),
+            ('steps = ["mil"]', "there is no step 'mil', allowed are mill, "),
+            ('steps = ["x"]\n[step.x]\nseat_um = {}', "step x: title is missing"),
+            ('steps = ["x"]\nstep = 3', "there is no step 'x'"),
+            ("step = 3", "unknown key step: did you mean steps?"),
+        ],
+    )
+    def test_others_are_refused_in_one_line(self, file: Path, text: str, said: str) -> None:
+        file.write_text(f'based_on = "cnc"\n{text}', encoding="utf-8")
+        assert said in refusal(str(file))
 
 
 class TestOptions:
