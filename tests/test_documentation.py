@@ -225,8 +225,6 @@ def smaller(shown: Command) -> list[str]:
     more = next((more for name, more in SMALLER.items() if words[: len(name)] == name), [])
     if words[0] == "build" and "--dry-run" not in words and "exit" not in shown.comment:
         more = [*more, "--no-verify"]
-    # Its margins are those of 847 mirrors.
-    more = [*more, "--set", "mirrors.own_margins_mm=[]"] if "turtleback-cnc" in words else more
     return [*words, *more, *(PICTURES if words[0] in ("view", "refocus") else [])]
 
 
