@@ -130,8 +130,7 @@ def _walls(ids: tuple[str, ...], cells: Cells) -> tuple[dict[str, Floats], ...]:
 def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
     """Write table and STEP file of one half, read the tolerances back, and name both files.
 
-    Raises:
-        InputError: the export has no such solid, or it is not that of its mirrors.
+    InputError if the export has no such solid, or it is not that of its mirrors.
     """
     table, step = f"inspection_{half.name[-1]}.csv", f"{half.name}_tolerances.step"
     write_table(folder / table, half.columns, half.rows())

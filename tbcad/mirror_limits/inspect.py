@@ -33,8 +33,7 @@ def inspect(
 ) -> dict[str, Any]:
     """Write the limits of every mirror, for a wanted yield, into a folder, and return the record.
 
-    Raises:
-        InputError: the shell leaves no deviation, or its solids are not those of its record.
+    InputError if the shell leaves no deviation, or its solids are not those of its record.
     """
     progress("sensitivities")
     found, limits = found_limits(export, wanted)

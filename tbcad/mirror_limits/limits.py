@@ -15,17 +15,11 @@ PLACES = np.array([3, 4, 5, 3])  # decimals of limits: a nanometre, or what turn
 
 @dataclass(frozen=True)
 class MirrorLimits:
-    """Limits of all mirrors, a's first: offset (um), tilt (mrad), radius (mm), walls (um) if any.
+    """Limits of all mirrors, a first: offset (um), tilt (mrad), radius (mm), walls (um) if any."""
 
-    Attributes:
-        each: a mirror may be off by this, whatever the others do within theirs, (2 m, kinds).
-        sigma: standard deviations with which the wanted share of shells is good, (2 m, kinds).
-        seat_um: by which each half may sit wrong, also with all mirrors at their limits.
-    """
-
-    each: Floats
-    sigma: Floats
-    seat_um: float
+    each: Floats  # a mirror may be off by this, whatever others do within theirs, (2 m, kinds)
+    sigma: Floats  # standard deviations with which the wanted share is good, (2 m, kinds)
+    seat_um: float  # by which each half may sit wrong, also with all mirrors at their limits
 
     def within(self, steps: Floats, found: Sensitivities) -> "MirrorLimits":
         """The same, no limit more than its part of the deviation whose loss is known."""
@@ -39,10 +33,8 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Mirr
     Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
     mirror of a virtual camera the same limit; a mirror keeps the smallest limit that its virtual
     cameras ask for. Sums are linear for `each`, and of squares for `sigma`, with which the wanted
-    share of the pairs of shells is good.
-
-    Raises:
-        InputError: a virtual camera sees less than the target as designed.
+    share of the pairs of shells is good. InputError if a virtual camera sees too little as
+    designed.
     """
     margin = found.coverage - target_mm
     if margin.min() <= 0:

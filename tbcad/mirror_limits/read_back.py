@@ -26,10 +26,7 @@ def check_read_back(
     """Compare all zones and radii in a file with what they should be.
 
     Centres of the mirrors' spheres are by id, mm; walls of pedestals by their faces' names, point
-    (mm) and normal, (6,).
-
-    Raises:
-        StepError: one is missing, doubled, or not as given: a fault of tbcad.
+    (mm) and normal, (6,). StepError if one is missing, doubled, or not as given: a fault of tbcad.
     """
     read = read_tolerances(path)
     flat = sorted(one.value for one in read if one.kind == "flatness")

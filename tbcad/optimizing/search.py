@@ -64,10 +64,8 @@ def search(spec: Spec, asked: OptimizeOptions, store: Path | None = None) -> Sea
     """Search a better place of camera and ellipsoid.
 
     The store, a file of judgements (JSON lines), is read when it exists, and written after every
-    generation, so that a search that was stopped goes on.
-
-    Raises:
-        InputError: the first design cannot be made; the store is of another design.
+    generation, so that a search that was stopped goes on. InputError if the first design cannot be
+    made, or the store is of another design.
     """
     judged = read_store(store, _key(spec, asked)) if store else {}
     judge = partial(_judge, spec, asked, judged, store)

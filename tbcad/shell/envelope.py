@@ -67,11 +67,7 @@ class Envelope:
 
 
 def closing_envelope(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Envelope:
-    """Back, flanges and holes round camera a's cells.
-
-    Raises:
-        SpecError: when holes or flanges do not fit.
-    """
+    """Back, flanges and holes round camera a's cells; SpecError where they do not fit."""
     foot = float(cells.surfaces.apex[cells.foot, 2])
     deepest = enclosing_offset(ellipsoid, _arc_points(cells))
     back = Spheroid(ellipsoid, wall_offset(ellipsoid, deepest, shell.wall_mm))
@@ -92,11 +88,7 @@ def _arc_points(cells: Cells) -> Floats:
 
 
 def _flanged(shell: ShellSpec, back: Spheroid, foot: float) -> Envelope:
-    """The envelope; x and z are where the flanges' far faces are.
-
-    Raises:
-        ValueError: when the flanges' far faces miss the back.
-    """
+    """The envelope; ValueError if the flanges' far faces, at x and z, miss the back."""
     seam_flange, foot_flange = shell.seam_flange, shell.foot_flange
     x, z = seam_flange.thickness_mm, foot + foot_flange.thickness_mm
 

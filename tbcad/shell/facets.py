@@ -35,10 +35,7 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
 
     It is that of the outline's points, or, where these do not all see it, the point that is
     farthest inside all lines along the outline: a cell may have a side that bends inward, at the
-    foot.
-
-    Raises:
-        SpecError: when no point of a cell sees its whole outline.
+    foot. SpecError if no point of a cell sees its whole outline.
     """
     every, cell, edge = np.arange(len(mirrors)), outlines.cell, outlines.points
     middle = mirrors.projected(every, means(edge, cell))
@@ -60,14 +57,7 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
 
 
 def _deepest_step(start: Floats, axes: Floats, point: Floats, inward: Floats) -> Floats:
-    """Step (3,) along axes (2, 3) to where the smallest distance inside all lines is largest.
-
-    Args:
-        start: mm, (3,).
-        axes: of the plane, unit vectors (2, 3).
-        point: on each line, mm, (b, 3).
-        inward: unit vectors across the lines, (b, 3).
-    """
+    """Step (3,) in a plane to where the smallest distance inside all lines is largest."""
     # Unknowns: both steps and the smallest distance, which is to be largest.
     table = np.column_stack([-inward @ axes.T, np.ones(len(point))])
     solution = linprog([0, 0, -1], A_ub=table, b_ub=dot(inward, start - point), bounds=(None, None))
@@ -86,13 +76,7 @@ class Facets:
 
 
 def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
-    """Facets of all cells within the mesh tolerances.
-
-    Args:
-        spec: design with the mesh tolerances.
-        cells: camera a's, of the modelled surfaces.
-        distance: from each mirror to the object, mm, (m,).
-    """
+    """Facets of camera a's cells within the tolerances; distances (m,) to the object, mm."""
     outlines = cell_outlines(cells, segment_counts(spec, cells, distance))
     if np.all(cells.surfaces.curvature == 0):
         return _planar(outlines)

@@ -46,16 +46,9 @@ def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: Mirr
 def write_shell_solids(
     design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
 ) -> None:
-    """Write both shells as STEP into a folder.
+    """Write both shells as STEP into a folder; the envelope closes camera a's half.
 
-    Args:
-        design: the mirrors.
-        envelope: that closes camera a's half.
-        folder: to write into.
-        progress: called with each stage.
-
-    Raises:
-        InvalidSolidError: when the kernel finds a solid invalid.
+    InvalidSolidError if the kernel finds a solid invalid.
     """
     # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the
     # design is symmetrical about y = 0.
@@ -88,11 +81,7 @@ def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> 
 
 
 def shell_envelope(design: MirrorDesign) -> Envelope:
-    """What closes camera a's half: back, flanges, holes.
-
-    Raises:
-        SpecError: when flanges or holes do not fit.
-    """
+    """What closes camera a's half: back, flanges, holes; SpecError where these do not fit."""
     array = design.arrays[0]
     return closing_envelope(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
@@ -102,9 +91,8 @@ def camera_solid(
 ) -> Solid:
     """Solid of one camera's half, face by face; without an envelope it is worked out.
 
-    Raises:
-        SpecError: when flanges or holes do not fit.
-        InvalidSolidError: when the kernel finds camera a's invalid; b's is its mirror image.
+    SpecError if flanges or holes do not fit, InvalidSolidError if the kernel finds camera a's
+    invalid; b's is its mirror image.
     """
     name, maker = shell_record(array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
@@ -150,11 +138,7 @@ def shell_properties(
 
 
 def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:
-    """Mesh of camera a's half; the envelope is worked out when it is not given.
-
-    Raises:
-        SpecError: when flanges or holes do not fit.
-    """
+    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given."""
     array = design.arrays[0]
     envelope = envelope or shell_envelope(design)
     return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)

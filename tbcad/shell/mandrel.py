@@ -49,11 +49,7 @@ class Draft:
 
 
 def draft_of(cells: Cells) -> Draft:
-    """The pull with the largest draft; where walls catch whatever it is, the mirrors' best pull.
-
-    Args:
-        cells: of the modelled surfaces.
-    """
+    """The pull with the largest draft; where walls catch whatever it is, the mirrors' best pull."""
     mirrors = _mirror_normals(cells)
     every = np.concatenate([mirrors, _wall_normals(cells)])
     pull = best_pull(every)
@@ -117,11 +113,7 @@ class Mandrel:
 
 
 def mandrel_of(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Mandrel:
-    """Holes and draft of the negative of camera a's half.
-
-    Raises:
-        SpecError: when there is no room for the holes; it says which would fit.
-    """
+    """Holes and draft of camera a's negative; SpecError, with what fits, if there is no room."""
     holes = _inset_holes(shell, cells, ellipsoid)
     if holes is None:
         raise SpecError(_no_room(shell, cells, ellipsoid))

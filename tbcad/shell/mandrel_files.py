@@ -29,14 +29,7 @@ DRAFT_DIGITS = 6
 
 
 def mandrel_mesh(spec: Spec, cells: Cells, mandrel: Mandrel, distance: Floats) -> Mesh:
-    """Mesh of the negative of camera a's half; its mirrors' facets are those of `shell_mesh`.
-
-    Args:
-        spec: design with the mesh tolerances.
-        cells: camera a's cells of the modelled surfaces.
-        mandrel: what closes them.
-        distance: from each mirror to the object, mm, (m,).
-    """
+    """Mesh of the negative of camera a's half; its mirrors' facets are those of `shell_mesh`."""
     builder, outlines = front_facets(spec, cells, distance)
     builder.triangles = [triangles[:, ::-1] for triangles in builder.triangles]
     seam, foot = (
@@ -96,25 +89,15 @@ def _plane_with_holes(
 
 
 def design_mandrel(design: MirrorDesign) -> Mandrel:
-    """What closes camera a's mirrors to a negative.
-
-    Raises:
-        SpecError: when there is no room for its holes.
-    """
+    """What closes camera a's mirrors to a negative; SpecError if there is no room for its holes."""
     array = design.arrays[0]
     return mandrel_of(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
 def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None:
-    """Write both negatives as STEP, STL and 3MF into a folder.
+    """Write both negatives as STEP, STL and 3MF into a folder; the mandrel is camera a's.
 
-    Args:
-        design: the mirrors.
-        mandrel: of camera a.
-        folder: to write into.
-
-    Raises:
-        InvalidSolidError: when the kernel finds a solid invalid.
+    InvalidSolidError if the kernel finds a solid invalid.
     """
     mesh = camera_a_mandrel_mesh(design, mandrel)
     for array in design.arrays:
@@ -130,9 +113,7 @@ def mandrel_solid(
 ) -> Solid:
     """Solid of one camera's negative, face by face; without a mandrel it is worked out.
 
-    Raises:
-        SpecError: when there is no room for its holes.
-        InvalidSolidError: when the kernel finds camera a's invalid; b's is its mirror image.
+    Errors are those of `camera_solid`.
     """
     name, maker = mandrel_files(array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
@@ -146,11 +127,7 @@ def mandrel_solid(
 
 
 def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:
-    """Mesh of camera a's negative; the mandrel is worked out when it is not given.
-
-    Raises:
-        SpecError: when there is no room for its holes.
-    """
+    """Mesh of camera a's negative; the mandrel is worked out (or SpecError) where not given."""
     array = design.arrays[0]
     mandrel = mandrel or design_mandrel(design)
     return mandrel_mesh(design.spec, array.modelled_cells, mandrel, array.apex_distance)

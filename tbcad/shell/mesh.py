@@ -44,14 +44,7 @@ def wall_facets(cells: PedestalCells, outlines: CellOutlines) -> Ints:
 
 
 def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:
-    """Mesh of camera a's half.
-
-    Args:
-        spec: design with the mesh tolerances.
-        cells: camera a's cells of the modelled surfaces.
-        envelope: what closes them.
-        distance: from each mirror to the object, mm, (m,).
-    """
+    """Mesh of camera a's half within tolerances; distances of mirrors to the object (m,), mm."""
     builder, outlines = front_facets(spec, cells, distance)
     _add_casing(builder, cells, outlines, envelope)
     return builder.mesh()
@@ -137,13 +130,9 @@ class MeshBuilder:
         return near, far
 
     def plane(self, view: list[int], ring: Ints, holes: list[Ints], away: bool = False) -> None:
-        """A planar face with holes.
+        """A planar face with holes; away: it looks away from the view.
 
-        Args:
-            view: the two coordinates in which the outer ring turns left and the holes right.
-            ring: vertices round the face.
-            holes: vertices round each hole.
-            away: whether the face looks away from that view.
+        In the two coordinates of the view the outer ring turns left and the holes right.
         """
         rings = [ring, *holes]
         polygons = [self.points[ring][:, view] for ring in rings]

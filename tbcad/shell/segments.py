@@ -42,15 +42,10 @@ def strip_points(
 ) -> Floats:
     """Points (b, 3), one for each place of the outlines, on the strips' inner sides.
 
-    They are square to the outline, but for places about segments so short that the strip would
-    fold there: these have points toward the cell's middle, which never fold. Such points skew
-    the facets on their outline, which costs rays their aim on long segments and not on short ones.
-
-    Args:
-        outlines: of m cells, b places.
-        middle: middle of each cell, mm, (m, 3).
-        outside: unit normals at the places, away from the light, (b, 3).
-        cell_width: of the strip in each cell, mm, (m,).
+    They are square to the outline, but for places about segments so short that the strip would fold
+    there: these have points toward the cell's middle (m, 3), which never fold. Such points skew the
+    facets on their outline, which costs rays their aim on long segments and not on short ones. Unit
+    normals outside (b, 3) are away from the light; strips have a width in each cell, mm, (m,).
     """
     cell, edge = outlines.cell, outlines.points
     to_middle = middle[cell] - edge
@@ -102,15 +97,10 @@ def _cramped(outlines: CellOutlines, strip: Floats, middle: Floats, outside: Flo
 
 
 def segment_counts(spec: Spec, cells: Cells, distance: Floats) -> Ints:
-    """Segments of each arc (e,), for the mirror that needs more of the two.
+    """Segments of each arc (e,), for the mirror that needs more; distances to the object (m,), mm.
 
     A first number follows from the rays' shift along the outline's image; where traced rays show
     that it is too small, segments are shortened.
-
-    Args:
-        spec: design with the mesh tolerances.
-        cells: camera a's, of the modelled surfaces.
-        distance: from each mirror to the object, mm, (m,).
     """
     counts = _by_shift(spec, cells, distance)
     # A ray's error at a segment's end is proportional to the segment's length.
@@ -138,12 +128,7 @@ def _by_shift(spec: Spec, cells: Cells, distance: Floats) -> Ints:
 
 
 def _excess(spec: Spec, cells: Cells, counts: Ints) -> Floats:
-    """By how much rays off the segments' ends miss more than they may: a factor for each arc, (e,).
-
-    Light at an angle shifts across the outline's image too, most of all off long mirrors far from
-    the camera. A facet's normal is the sphere's at the middle of its segment. What a mirror sees
-    beyond the target is nothing that facets could cost.
-    """
+    """By how much more than they may rays off the segments' ends miss: factors of arcs, (e,)."""
     mirror, arc = limiting_sides(cells)
     side, k = rows_and_columns(counts[arc])
     mirror, arc = mirror[side], arc[side]

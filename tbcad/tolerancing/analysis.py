@@ -65,29 +65,19 @@ class ProcessOption:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Result of an analysis.
-
-    Attributes:
-        target: minimum coverage of a good build, mm.
-        cameras: camera a and b as designed.
-        edge_models: the same for the fast model.
-        single_errors: effect of each kind of error by itself, the largest loss first.
-        process_options: every built-in process, or this one alone.
-        margin: that this process needs; None where it was not searched for.
-        prototype: None where the export has none.
-    """
+    """Result of an analysis."""
 
     process: Process
     options: ToleranceOptions
-    target: float
-    cameras: tuple[Reflector, Reflector]
-    edge_models: EdgeModels
+    target: float  # minimum coverage of a good build, mm
+    cameras: tuple[Reflector, Reflector]  # camera a and b as designed
+    edge_models: EdgeModels  # the same for the fast model
     result: ShellResult
-    single_errors: tuple[SingleErrorEffect, ...]
-    process_options: tuple[ProcessOption, ...]
-    margin: Margin | None
+    single_errors: tuple[SingleErrorEffect, ...]  # each kind by itself, the largest loss first
+    process_options: tuple[ProcessOption, ...]  # every built-in process, or this one alone
+    margin: Margin | None  # that this process needs; None where it was not searched for
     sharpness: Sharpness
-    prototype: PrototypeResult | None
+    prototype: PrototypeResult | None  # None where the export has none
 
     def __repr__(self) -> str:
         builds = len(self.result.worst)
@@ -106,8 +96,7 @@ def analyse(
 ) -> Analysis:
     """Simulate many builds of an export by a process, and find what limits their yield.
 
-    Raises:
-        InputError: mirrors are planar, or the scheduler cannot be reached.
+    InputError if mirrors are planar, or the scheduler cannot be reached.
     """
     _refuse_planar(export)
     errors = process_errors(process, export.spec.mirrors.coating_um)

@@ -76,9 +76,7 @@ def own_margins(
     """Margins with which the wanted share of builds is good, none below the spec's margin_mm.
 
     One margin for all mirrors, even (mm), is tried first; the spec's radii must follow rule traced.
-
-    Returns:
-        None where no try was enough: margins too large, or mirrors that cannot be made.
+    None where no try was enough: margins too large, or mirrors that cannot be made.
     """
     designs = designs or solved_designs()
     target, best = spec.optics.capture_diameter_mm, None
@@ -127,7 +125,6 @@ def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
     """The least margins m + k s with which the wanted share of the builds is good, mm, (m,).
 
     The builds are the first half of those in the losses; m and s are those of the other half.
-
     Mirrors that are each other's image in y = 0 have the same margin, those of both cameras too:
     their losses are pooled. Mirrors that cover enough whatever their margin need none.
     """
@@ -143,11 +140,7 @@ def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
 
 
 def _mean_and_sigma(loss: Floats) -> tuple[Floats, Floats]:
-    """Mean and root mean square deviation upwards of losses (..., m), mm, (m,) each.
-
-    Losses are skew, each the largest of several edges: what is below the mean says little of those
-    that make a build bad.
-    """
+    """Mean and rms deviation upwards of skew losses (..., m), mm, (m,) each."""
     every = loss.reshape(-1, loss.shape[-1])
     mean = every.mean(axis=0)
     above = np.sqrt((np.maximum(every - mean, 0) ** 2).mean(axis=0))

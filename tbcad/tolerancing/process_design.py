@@ -52,10 +52,8 @@ def design_for_process(
     """The same design but for the least margins with which a process reaches a yield.
 
     No mirror gets less than the spec's margin_mm. Margins of single mirrors are taken where they
-    are smaller on average than one for all.
-
-    Raises:
-        InputError: no margin is enough, or the radii do not follow a target.
+    are smaller on average than one for all. InputError if no margin is enough, or radii follow no
+    target.
     """
     check_margins_can_be_set(spec, wanted_yield)
     spec = spec_with(spec, mirrors={"own_margins_mm": ()})
@@ -161,10 +159,7 @@ def edges_for_process(
 
     Edges that the design names stay. Else pedestals are taken where they leave a per cent more than
     valleys. Margins take pixels: where pedestals have too few even with the design's own margin,
-    none are searched for.
-
-    Raises:
-        InputError: as `design_for_process`, with neither kind of edges.
+    none are searched for. InputError as of `design_for_process`, with neither kind of edges.
     """
     check_margins_can_be_set(spec, wanted_yield)
     if "edges" in spec.shell.model_fields_set:

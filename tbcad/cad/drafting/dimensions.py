@@ -138,13 +138,9 @@ def labels(
     lines: Sequence[tuple[Point, Point]] = (),
     taken: Sequence[Box] = (),
 ) -> Iterator[Simple]:
-    """A label beside each circle, clear of all circles and other labels where there is room.
+    """A label beside each circle on paper, clear of all circles and other texts if there is room.
 
-    Args:
-        circles: on paper.
-        texts: one a circle.
-        lines: that labels should not lie on, by their ends.
-        taken: other texts on paper.
+    Nor does it lie on lines, given by their ends.
     """
     boxes = [*map(_round, circles), *taken]
     ends = np.array(lines).reshape(-1, 2, 2)
@@ -194,13 +190,10 @@ def _meet(one: Box, other: Box) -> bool:
 def ruler_across(
     levels: Sequence[tuple[float, str]], zero: float, edge: float, row: float
 ) -> Iterator[Dimension]:
-    """Running dimensions below an edge: a text for each x, turned, in a row (ISO 129-1).
+    """Running dimensions below an edge (y): a turned text for each x on paper, in rows (ISO 129-1).
 
-    Args:
-        levels: x on paper and text.
-        zero: x on paper of the datum.
-        edge: y where extension lines begin.
-        row: y of the row of texts; they go down from it.
+    Extension lines begin at the edge, texts go down from the row (y); zero is the datum's x on
+    paper.
     """
     places = spread([x for x, _ in levels], RULER_MM)
     for (x, text), place in zip(levels, places, strict=True):

@@ -35,16 +35,10 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_json(path: Path, model: type[Model], schema: str | None, missing: str) -> Model:
-    """The JSON object in a file.
+    """The JSON object in a file, which must fit a model and name a schema (None: it names none).
 
-    Args:
-        path: the file.
-        model: that the object must fit.
-        schema: that the object must name; None: it names none.
-        missing: what to do if there is no such file, for the error.
-
-    Raises:
-        InputError: the file is missing, too large, not JSON, of another schema, or does not fit.
+    InputError if the file is missing (the error says what to do), too large, not JSON, or does not
+    fit.
     """
     text = _text(path, missing)
     try:
@@ -63,11 +57,7 @@ def read_json(path: Path, model: type[Model], schema: str | None, missing: str) 
 
 
 def parse_json(text: str | bytes) -> Any:
-    """The value of a JSON text with finite numbers, each key once, and whole characters.
-
-    Raises:
-        ValueError: it is no such text.
-    """
+    """The value of a JSON text with finite numbers, keys once, whole characters; or ValueError."""
     try:
         value = json.loads(
             text,
@@ -107,15 +97,10 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def read_csv(path: Path, model: type[Model], missing: str) -> list[Model]:
-    """The rows of a CSV file with a header line.
+    """The rows of a CSV file with a header line, each of which must fit a model.
 
-    Args:
-        path: the file.
-        model: that every row must fit.
-        missing: what to do if there is no such file, for the error.
-
-    Raises:
-        InputError: the file is missing, too large, not CSV, or a row does not fit.
+    InputError if the file is missing (the error says what to do), too large, not CSV, or does not
+    fit.
     """
     text = _text(path, missing)
     try:

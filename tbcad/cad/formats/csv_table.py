@@ -9,11 +9,7 @@ Row = dict[str, Cell]
 
 
 def write_table(path: Path, columns: tuple[str, ...], rows: Iterable[Row]) -> None:
-    """Write rows under a header line; a cell that is None is left empty.
-
-    Raises:
-        ValueError: when a row has a key that is no column.
-    """
+    """Write rows under a header line, None as an empty cell; ValueError if a key is no column."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns, lineterminator="\n")
         writer.writeheader()

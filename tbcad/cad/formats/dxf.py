@@ -79,10 +79,7 @@ def add_dimension(entity: Dimension, space: "BaseLayout") -> "BlockLayout":
 
 
 def dimension_text(entity: Dimension) -> str:
-    """Its text, with <> where a program that measures writes the same number.
-
-    Programs write the sign of a diameter by themselves.
-    """
+    """Its text, with <> where a program that measures writes the number, or a diameter's sign."""
     if f"{entity.measured:.{_digits(entity.size)}f}" != entity.size:
         return entity.form.replace(MEASURED, entity.size)
     is_diameter = entity.kind is Measured.DIAMETER

@@ -45,25 +45,14 @@ def _widths() -> dict[str, float]:
 
 
 def text_width(text: str, height: float) -> float:
-    """Width of a text in mm, for a height of its capital letters in mm.
-
-    Raises:
-        KeyError: a character that drawings have not.
-    """
+    """Width of a text by the height of its capitals, mm; KeyError if drawings lack a character."""
     return sum(_widths()[character] for character in text) / EM * height / CAPITAL
 
 
 def write_pdf(
     path: Path, title: str, size: tuple[float, float], entities: Iterable[Entity]
 ) -> None:
-    """Write one page.
-
-    Args:
-        path: to write.
-        title: of the document.
-        size: of the page, mm.
-        entities: in mm from the page's lower left corner.
-    """
+    """Write one page of a size (mm) with a title; entities are in mm from its lower left corner."""
     scale = _number(POINTS_PER_MM)
     drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, simple(entities))])
     box = " ".join(_number(side * POINTS_PER_MM) for side in size)

@@ -29,14 +29,7 @@ FACET = np.dtype([("corners", "u1"), ("vertex", "<i4", 3)])
 
 
 def mesh_ply(points: Floats, normals: Floats, faces: Ints, colours: Floats | None = None) -> bytes:
-    """The file of triangles.
-
-    Args:
-        points: (v, 3).
-        normals: at the points, unit vectors, (v, 3).
-        faces: (f, 3).
-        colours: at the points, 0 to 1, (v, 3).
-    """
+    """The file of triangles (f, 3) over points, unit normals, colours from 0 to 1, (v, 3) each."""
     given = [points, normals] if colours is None else [points, normals, colours]
     names = [*"xyz", "nx", "ny", "nz", "red", "green", "blue"][: 3 * len(given)]
     lines = (

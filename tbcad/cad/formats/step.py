@@ -57,15 +57,7 @@ def incomplete(path: Path) -> OSError:
 
 
 def check_complete(path: Path, mark: bytes) -> None:
-    """Check that a file is there and ends as its format demands.
-
-    Args:
-        path: of the file.
-        mark: that is among its last bytes.
-
-    Raises:
-        OSError: it is missing or cut.
-    """
+    """Raise OSError unless a file is there with a mark, such as END, among its last bytes."""
     if not path.is_file():
         raise incomplete(path)
     with path.open("rb") as file:
@@ -83,16 +75,10 @@ def write_step(
 ) -> None:
     """Write one solid as AP214 in millimetres.
 
-    Args:
-        path: file to write.
-        solid: with the names of its faces, which become the names of the advanced faces; its
-            volume, area and centroid go along as validation properties.
-        pcurves: write curves in the surfaces' parameters too; readers make their own.
-        known: the solid's properties; None: they are worked out.
-
-    Raises:
-        StepError: when the kernel fails.
-        OSError: when the file cannot be written in full.
+    The names of its faces become those of the advanced faces; volume, area and centroid, worked out
+    where they are not known, go along as validation properties. With pcurves curves in the
+    surfaces' parameters are written too; readers make their own. StepError if the kernel fails,
+    OSError if the file cannot be written in full.
     """
     with kernel_settings(pcurves):
         _write(path, solid, known or properties(solid.shape))
@@ -196,11 +182,7 @@ def write_header(writer: STEPControl_Writer, name: str) -> None:
 
 @kernel_settings()
 def read_named_solid(path: Path) -> Solid:
-    """Read a file of one solid.
-
-    Raises:
-        InputError: it cannot be read, or is not one solid.
-    """
+    """Read a file of one solid; InputError if it cannot be read, or is not one."""
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() != 1:
         raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")

@@ -37,10 +37,7 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     """Write groups of bodies as one AP214 assembly in millimetres, all solids in their places.
 
     The kernel writes colours in the order of addresses in memory, so they are written here.
-
-    Raises:
-        StepError: when the kernel fails.
-        OSError: when the file cannot be written in full.
+    StepError if the kernel fails, OSError if the file cannot be written in full.
     """
     document = _document(name, groups)
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)

@@ -78,9 +78,7 @@ class FaceTolerances:
 def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
     """Write a solid with named faces and its tolerances as AP242 in millimetres.
 
-    Raises:
-        StepError: when the kernel fails.
-        OSError: when the file cannot be written in full.
+    StepError if the kernel fails, OSError if the file cannot be written in full.
     """
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetDimTolMode(True)
@@ -169,10 +167,7 @@ def _sequence(*labels: TDF_Label) -> TDF_LabelSequence:
 
 
 def _notes(text: str, notes: Mapping[str, str]) -> str:
-    """Entities of notes on the product.
-
-    Source: CAx-IF, Recommended Practices for User Defined Attributes.
-    """
+    """Entities of notes on the product (CAx-IF, Recommended Practices, User Defined Attributes)."""
     number = max(map(int, re.findall(r"^#(\d+) ?=", text, re.MULTILINE))) + 1
     product = _entity(r"^(#\d+) = PRODUCT_DEFINITION\(", text)
     context = _entity(r"ADVANCED_BREP_SHAPE_REPRESENTATION\('[^']*',\([^)]*\),(#\d+)\)", text)
@@ -211,11 +206,7 @@ class ReadTolerance:
 
 
 def read_tolerances(path: Path) -> list[ReadTolerance]:
-    """All tolerances and dimensions of a file, as the kernel reads them.
-
-    Raises:
-        StepError: it cannot be read.
-    """
+    """All tolerances and dimensions of a file, as the kernel reads them; StepError if it cannot."""
     document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     reader = STEPCAFControl_Reader()

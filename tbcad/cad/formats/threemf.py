@@ -14,10 +14,7 @@ DECIMALS = 6
 
 
 def write_3mf(path: Path, name: str, mesh: Mesh) -> None:
-    """Write one named object.
-
-    Raises:
-        OSError: when the file cannot be written in full.
+    """Write one named object; OSError if the file cannot be written in full.
 
     The library makes up identifiers, which would differ each time; they are derived from the name.
     """

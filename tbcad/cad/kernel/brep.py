@@ -183,13 +183,10 @@ class Maker:
         return wire
 
     def face(self, surface: Geom_Surface, rings: Sequence[Ring], natural: bool) -> TopoDS_Face:
-        """Face on a surface.
+        """Face on a surface on which all edges lie.
 
-        Args:
-            surface: on which all edges lie.
-            rings: edges round the face, counter-clockwise seen from outside the solid (camera
-                a's coordinates), the outer ring first.
-            natural: whether the surface's natural normal points out of the solid.
+        Rings run counter-clockwise seen from outside the solid (camera a's coordinates), the outer
+        ring first; natural: whether the surface's natural normal points out of the solid.
         """
         face = TopoDS_Face()
         self.builder.MakeFace(face, surface, TOLERANCE)
@@ -249,18 +246,10 @@ class _Circle:
 def hole_faces(
     maker: Maker, centre: Floats, direction: Floats, radius: Floats, x: Floats, y: Floats
 ) -> tuple[list[Ring], list[Ring], list[TopoDS_Face]]:
-    """Holes whose direction is x cross y.
+    """Holes from centres (k, 3) on, with radii (k,), mm; their direction x cross y has their depth.
 
-    Args:
-        maker: of kernel shapes.
-        centre: where they begin, mm, (k, 3).
-        direction: into the material, length their depth, mm, (3,).
-        radius: mm, (k,).
-        x: unit vector across.
-        y: unit vector across.
-
-    Returns:
-        Inner rings of the face where they begin, those where they end, and the cylinders.
+    x and y are unit vectors across. Inner rings of the face where they begin, those where they end,
+    and the cylinders.
     """
     sizes = list(zip(centre, radius, strict=True))
     near = [_circle(maker, start, x, y, radius) for start, radius in sizes]

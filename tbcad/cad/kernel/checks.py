@@ -28,16 +28,9 @@ def checked(
 ) -> tuple[TopoDS_Solid, Mesh, SolidProperties]:
     """The one solid without cavities that a shape must be, its mesh and its properties.
 
-    Args:
-        name: for errors.
-        shape: to be checked.
-        expected: its volume by booleans of meshes, mm^3.
-        contacts: middles of the pads, mm, (p, 3).
-        radius: of the pads, mm, (p,).
-        mesh_mm: largest distance of the mesh from the surface.
-
-    Raises:
-        InvalidSolidError: when it is something else.
+    Its volume (mm^3) must be that expected by booleans of meshes; pads are whole discs of radii
+    (p,) about contacts (p, 3), mm; the mesh is within mesh_mm of the surface. Else
+    InvalidSolidError.
     """
     solid = without_cavities(one_solid(name, without_slack(shape)))
     mesh = closed_mesh(name, solid, mesh_mm)
@@ -61,8 +54,7 @@ def without_slack(shape: TopoDS_Shape) -> TopoDS_Shape:
 def closed_mesh(name: str, shape: TopoDS_Shape, tolerance: float) -> Mesh:
     """The mesh of a solid as it is exported, no farther than a tolerance (mm) from the surface.
 
-    Raises:
-        InvalidSolidError: when it is not closed: a face may be valid and yet have no mesh.
+    InvalidSolidError if it is not closed: a face may be valid and yet have no mesh.
     """
     mesh = welded(meshed(shape, tolerance))
     check_mesh(name, mesh)
@@ -70,11 +62,7 @@ def closed_mesh(name: str, shape: TopoDS_Shape, tolerance: float) -> Mesh:
 
 
 def check_mesh(name: str, mesh: Mesh) -> None:
-    """Refuse a mesh that is not closed: faces that share an edge may end some nanometres apart.
-
-    Raises:
-        InvalidSolidError: as said.
-    """
+    """InvalidSolidError if a mesh is not closed: faces may end nanometres from a shared edge."""
     ends = mesh.triangles, np.roll(mesh.triangles, -1, axis=1)
     # One number for an edge, which is sorted far faster than two.
     edges = np.minimum(*ends) * len(mesh.vertices) + np.maximum(*ends)
@@ -84,23 +72,16 @@ def check_mesh(name: str, mesh: Mesh) -> None:
 
 
 def check_volume(name: str, actual: float, expected: float, error: float = VOLUME_ERROR) -> None:
-    """Refuse a volume (mm^3) that is not what booleans of meshes give, within a share of it.
+    """InvalidSolidError if a volume (mm^3) is not, within a share, what booleans of meshes give.
 
     A boolean of the kernel can lose bodies so that its result passes for valid.
-
-    Raises:
-        InvalidSolidError: as said.
     """
     if abs(actual - expected) > error * expected:
         raise InvalidSolidError(f"{name}: the kernel made {actual:.0f} mm^3 of {expected:.0f}")
 
 
 def check_pads(name: str, shape: TopoDS_Shape, contacts: Floats, radius: Floats) -> None:
-    """Refuse a shape whose pads are not whole discs about the contacts (p, 3), radii (p,).
-
-    Raises:
-        InvalidSolidError: as said.
-    """
+    """InvalidSolidError if pads are not whole discs about the contacts (p, 3), radii (p,)."""
     # Faces in other planes hold no pad, and to integrate them takes most of the time.
     centre, area = plane_faces(shape, contacts, NEAR_MM)
     near = norm(contacts[:, None] - centre) <= NEAR_MM

@@ -102,10 +102,7 @@ def _beyond(one: RoundFace) -> tuple[Floats, Floats]:
 
 
 def _inside(mesh: Mesh, points: Floats) -> Bools:
-    """Whether points are inside a closed mesh: it goes once round them.
-
-    By the solid angles of its triangles (van Oosterom and Strackee, 1983).
-    """
+    """Whether points are inside a closed mesh, by solid angles (van Oosterom, Strackee, 1983)."""
     inside = []
     for point in points:
         corner = mesh.vertices[mesh.triangles] - point

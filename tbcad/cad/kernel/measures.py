@@ -97,10 +97,7 @@ def plane_faces(
 ) -> tuple[Floats, Floats]:
     """Centres (f, 3) and areas (f,) of plane faces of a shape, mm and mm^2.
 
-    Args:
-        shape: of any kind.
-        through: points (p, 3), mm: only faces whose planes pass one of them; None: all faces.
-        near: within which distance planes pass it, mm.
+    Only of those whose planes pass near (mm) one of the points (p, 3), if there are any.
     """
     centre, area = [], []
     for face in faces(shape):

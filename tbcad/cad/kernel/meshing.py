@@ -101,10 +101,8 @@ def as_manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
 def meshed(shape: TopoDS_Shape, tolerance: float, angle: float = ANGLE) -> Mesh:
     """Mesh by the kernel's mesher; corners that faces share are one, degenerate facets dropped.
 
-    Args:
-        shape: a solid; its own facets are left alone.
-        tolerance: largest distance of facets from the surface, mm.
-        angle: largest turn of the surface along a facet's edge, radians.
+    Facets are within a tolerance (mm) of the surface, and turn by at most an angle (radians) along
+    an edge. A solid's own facets are left alone.
     """
     copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
     BRepMesh_IncrementalMesh(copy, tolerance, False, angle, False)

@@ -22,8 +22,7 @@ def as_part(label: str, shape: TopoDS_Shape) -> Part:
 def as_workplane(part: Part) -> "Workplane":
     """Return a part as a cadquery workplane that is tagged with its label; both share the geometry.
 
-    Raises:
-        InputError: cadquery is not installed.
+    InputError if cadquery is not installed.
     """
     try:
         from cadquery import Shape, Workplane

@@ -260,8 +260,7 @@ def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape
 def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
     """The one closed solid that a shape must be.
 
-    Raises:
-        InvalidSolidError: when it is several, or the kernel's check finds it invalid.
+    InvalidSolidError if it is several, or the kernel's check finds it invalid.
     """
     bodies = solids(shape)
     if len(bodies) != 1:

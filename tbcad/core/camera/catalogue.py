@@ -67,8 +67,7 @@ class RectilinearLens:
 def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
     """Cameras of the list that comes with tbcad, then those of a user's.
 
-    Raises:
-        InputError: a list cannot be read; it names the line and column.
+    InputError if a list cannot be read; it names the line and column.
     """
     return [
         _camera(where, row)
@@ -77,11 +76,7 @@ def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
 
 
 def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
-    """Lenses of the list that comes with tbcad, then those of a user's.
-
-    Raises:
-        InputError: a list cannot be read; it names the line and column.
-    """
+    """Lenses of the list that comes with tbcad, then a user's; errors as of `load_cameras`."""
     return [
         _lens(where, row) for where, row in _rows("lenses.csv", user_list, LENS_COLUMNS, LENS_SIZES)
     ]

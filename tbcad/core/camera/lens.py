@@ -70,10 +70,9 @@ def _open(lens: Lens, over: DepthRange) -> float:
 def aperture_stop(lens: Lens, over: DepthRange, pupil: float) -> dict[str, float]:
     """What a pupil (mm) does to a range.
 
-    Returns:
-        pupil_mm and f_number; diameters of the blur circle at both ends of the range and of the
-        Airy disc on the lens's axis, and the root of the sum of their squares, in pixels; light
-        relative to the lens wide open, and light lost in photographic stops (factors of two).
+    Diameters of the blur circle at both ends of the range and of the Airy disc on the axis, and the
+    root of the sum of their squares, in pixels; light relative to the lens wide open, and light
+    lost in photographic stops (factors of two).
     """
     blur = pupil * lens.image * over.spread / 2 / lens.pixel
     airy = AIRY_FACTOR * lens.wavelength * lens.image / pupil / lens.pixel

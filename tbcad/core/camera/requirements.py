@@ -40,15 +40,11 @@ def image_distances(
 ) -> tuple[Floats, Floats]:
     """Distances of the tangential and the sagittal image behind convex mirrors, mm, each (...).
 
-    Coddington's equations for a mirror of curvature k = 1 / r, with distances counted from the
-    mirror, the object's before it and the image's behind it:
+    Coddington's equations for a mirror of curvature k = 1 / r (0 for planes), with distances s
+    counted from the mirror, the object's before it and the image's behind it, and an incidence i
+    (radians):
 
         1/t = 1/s + 2 k / cos i        1/s' = 1/s + 2 k cos i
-
-    Args:
-        curvature: 1/mm, 0 for planes, (...).
-        incidence: radians, (...).
-        distance: of the object s, mm, (...).
     """
     cosine = np.cos(incidence)
     tangential: Floats = 1 / (1 / distance + 2 * curvature / cosine)
@@ -102,12 +98,7 @@ class CameraRequirements:
 
 
 def camera_requirements(array: MirrorArray, radius: float) -> CameraRequirements:
-    """Requirements of camera a's array; camera b's are the same.
-
-    Args:
-        array: the camera and its mirrors.
-        radius: of the capture sphere, mm.
-    """
+    """Requirements of camera a's array, or b's, for a capture sphere of this radius, mm."""
     view, depth = array.camera, virtual_images(array, radius).depth
     across, down = _half_sizes(array)
     over = DepthRange(float(depth.min()), float(depth.max()))
@@ -144,13 +135,8 @@ def _half_sizes(array: MirrorArray) -> tuple[float, float]:
 def exposure_seconds(f_number: float, magnification: float, lux: float, iso: float) -> float:
     """Time of exposure for a mid-grey object seen by reflection in the mirrors, s.
 
-    t = pi K N'^2 / (E S rho R), with the working F-number N' = N (1 + magnification).
-
-    Args:
-        f_number: as engraved on the lens.
-        magnification: image distance over focal length, less 1.
-        lux: illuminance on the object.
-        iso: speed of the sensor.
+    t = pi K N'^2 / (E S rho R), with N' = N (1 + magnification) for the F-number N as engraved; E
+    in lux on the object. The magnification is image distance over focal length, less 1.
     """
     working = f_number * (1 + magnification)
     light = lux * iso * OBJECT_REFLECTANCE * MIRROR_REFLECTANCE

@@ -124,13 +124,7 @@ def _faults(needed: CameraRequirements, one: Candidate, image: float) -> Iterato
 
 
 def write_camera_sheet(folder: Path, array: MirrorArray, radius: float) -> None:
-    """Write camera.json: the requirements, and cameras with lenses of the built-in lists.
-
-    Args:
-        folder: of the export.
-        array: camera a and its mirrors.
-        radius: of the capture sphere, mm.
-    """
+    """Write camera.json: camera a's requirements, cameras with lenses of the built-in lists."""
     needed = camera_requirements(array, radius)
     best = best_lenses(needed, load_cameras(), load_lenses())
     text = json.dumps(sheet_record(needed, best), indent=1) + "\n"

@@ -109,11 +109,7 @@ class Spheroid:
         return Spheroid(self.ellipsoid, self.offset + offset)
 
     def section(self, normal: Floats, height: float) -> Ellipse:
-        """Ellipse in the plane normal . x = height.
-
-        Raises:
-            ValueError: when the plane misses the spheroid.
-        """
+        """Ellipse in the plane normal . x = height; ValueError where that misses the spheroid."""
         matrix = self.from_sphere
         # The plane in the space where the spheroid is the unit sphere.
         scaled = matrix @ normal
@@ -132,11 +128,7 @@ class Spheroid:
         return Ellipse(self.centre + distance * matrix @ axis, major, minor)
 
     def crossing(self, x: float, z: float) -> Floats:
-        """The two points (2, 3) at given x and z, mm, lower y first.
-
-        Raises:
-            ValueError: when there are none.
-        """
+        """The two points (2, 3) at given x and z, mm, lower y first; ValueError if none."""
         to_sphere = np.linalg.inv(self.from_sphere)
         base = to_sphere @ (np.array([x, 0.0, z]) - self.centre)
         step = to_sphere @ np.array([0.0, 1.0, 0.0])

@@ -96,14 +96,10 @@ def revolved_along(profile: Floats, start: Floats, along: Floats) -> Revolved:
 
 
 def slot(middle: Floats, along: Floats, travel: float, radius: float, depth: Floats) -> Primitive:
-    """A slot in which a screw can be moved.
+    """A slot in which a screw can be moved, from the middle of its near face by its depth (3,), mm.
 
-    Args:
-        middle: of the slot's near face, mm, (3,).
-        along: unit vector of the travel, (3,).
-        travel: length by which a screw can be moved, mm; zero or less makes a plain hole.
-        radius: of the slot's ends, mm.
-        depth: vector from the near face to the far one, mm, (3,).
+    It has ends of a radius; the travel (mm) is along a unit vector, and zero or less makes a plain
+    hole.
     """
     if travel <= 0:
         return cylinder_between(middle, middle + depth, radius)

@@ -41,18 +41,12 @@ def spheres(centre: Floats, radius: Floats) -> RoundCones:
 def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
     """Angles within which balls that rotate about the axis meet round cones, radians, (m, k).
 
-    Args:
-        centre: of the balls, along the axis and out from it, mm, (k, 2).
-        radius: of the balls, mm, (k,).
-        cones: in the half-plane from which the angle counts, (m,).
+    Centres of balls (k, 2) are along the axis and out from it, mm; cones (m,) lie in the half-plane
+    from which the angle counts. It is 0 where they never meet, pi where they meet at every angle.
 
-    Returns:
-        0 where they never meet, pi where they meet at every angle.
-
-    At angle t the ball meets the sphere at share s of the hull when
-    |C|^2 + |c|^2 - 2 C_along c_along - 2 C_out c_out cos t <= (r(s) + radius)^2, so when cos t is
-    at least a quadratic in s over a linear one, whose minimum is at an end or where its
-    derivative is zero.
+    At angle t the ball meets the sphere at share s of the hull when |C|^2 + |c|^2 - 2 C_along
+    c_along - 2 C_out c_out cos t <= (r(s) + radius)^2, so when cos t is at least a quadratic in s
+    over a linear one, whose minimum is at an end or where its derivative is zero.
     """
     over, under = _quadratic(centre, radius, cones), _linear(centre, cones)
     with np.errstate(over="ignore"):  # next to the axis the ratio may be infinite

@@ -39,8 +39,7 @@ STEPS_PER_MM = 10  # of the sizes tried
 def check_clearance(spec: Spec, array: LitMirrors, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
-    Raises:
-        SpecError: with the mirror, and sizes with which the light passes the object.
+    SpecError names the mirror, and sizes with which the light passes the object.
     """
     radius = spec.optics.capture_diameter_mm / 2
     distance, mirror = _passage(spec.optics, array)

@@ -53,9 +53,7 @@ class RadiusProblem:
     ) -> Cells:
         """Cells for curvatures (m,) and aims (m,), from the given triangulation or the first.
 
-        Raises:
-            NotRegularError: the mirrors bound no proper cells.
-            SpecError: the grooves leave nothing of a mirror.
+        NotRegularError if mirrors bound no proper cells, SpecError if grooves leave nothing of one.
         """
         mirrors = self.mirrors.with_curvature(curvature)
         mirrors = mirrors if aim is None else aimed(mirrors, self.pinhole, aim)
@@ -116,10 +114,8 @@ def solve_radii(
     """Cells of the mirrors with radii by a rule, and their coverage diameters (m,), mm.
 
     Rules are "traced" (exact rays), "paper" (eqs. 1 and 2 of the paper; nearly flat where those
-    give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.).
-
-    Raises:
-        SpecError: when the mirrors do not close to one array, or rule traced finds no radii.
+    give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.). SpecError if the
+    mirrors do not close to one array, or rule traced finds no radii.
     """
     try:
         if rule == "traced":

@@ -53,9 +53,8 @@ def seam_gaps(cells: Cells, pinhole: Floats, radius: float) -> Floats:
 def cut_images(cells: Cells, pinhole: Floats) -> tuple[Ints, Floats, Floats]:
     """Images of the cuts of camera a's mirrors, in the plane through the origin.
 
-    Returns:
-        The mirror of each arc on a cut, (e,), x and place along the seam of its image, mm,
-        (e, SAMPLES) each.
+    The mirror of each arc on a cut, (e,), x and place along the seam of its image, mm, (e,
+    SAMPLES).
     """
     mirror, arc = cell_sides(cells)
     cut = cells.halved[mirror] & (cells.arcs.faces[arc] == cells.seam).any(axis=1)

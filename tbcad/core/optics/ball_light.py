@@ -57,13 +57,8 @@ def used_outlines(poses: BallPoses, radius: Floats, pinhole: float, capture: flo
     """Outline on each ball of the part that shows the capture sphere, mm, (k, OUTLINE_POINTS, 3).
 
     Outside the outline rays from the camera miss the sphere. The tilt of the ball's surface at
-    which they touch it is found by bisection, in OUTLINE_POINTS directions about the apex.
-
-    Args:
-        poses: of the balls, (k,).
-        radius: of the balls, mm, (k,).
-        pinhole: distance of the pinhole along the axis, mm.
-        capture: radius of the capture sphere, mm.
+    which they touch it is found by bisection, in OUTLINE_POINTS directions about the apex. The
+    pinhole is given by its distance along the axis, capture is the sphere's radius, mm.
     """
     camera, circle = np.array([pinhole, 0.0, 0.0]), unit_circle(even_angles(OUTLINE_POINTS))
     tangent = _tangents(poses.normal, circle)
@@ -86,13 +81,7 @@ def _touching_tilts(
 ) -> Floats:
     """Tilts (k, s) of balls at which rays from the camera touch the capture sphere, radians.
 
-    Args:
-        apex: of the balls, mm, (k, 3).
-        normal: there, (k, 3).
-        tangent: unit vectors toward which the normals tilt, (k, s, 3).
-        radius: of the balls, mm, (k,).
-        camera: its pinhole, mm, (3,).
-        capture: radius of the capture sphere, mm.
+    Apices (k, 3) have normals that tilt toward unit vectors (k, s, 3); lengths in mm.
     """
     result, pinhole = np.empty(tangent.shape[:2]), vector(camera)
     for k in range(len(apex)):
@@ -121,13 +110,8 @@ def _hits_sphere(point: Vector, normal: Vector, camera: Vector, capture: float) 
 def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
     """Hulls that hold all light of each ball: capture sphere to ball, ball to pinhole, (k,).
 
-    The part in use lies in the ball about the middle of its outline, so every ray lies in the hull
-    of that ball and the capture sphere, or of that ball and the pinhole.
-
-    Args:
-        outline: on the balls, mm, (k, s, 3).
-        pinhole: distance along the axis, mm.
-        capture: radius of the capture sphere, mm.
+    The part in use, with outlines (k, s, 3), lies in the ball about the outline's middle, so every
+    ray lies in the hull of that ball and the capture sphere, or of that ball and the pinhole.
     """
     middle = (outline.min(axis=1) + outline.max(axis=1)) / 2
     radius = norm(outline - middle[:, None]).max(axis=1) / np.cos(np.pi / outline.shape[1])
@@ -140,13 +124,9 @@ def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundC
 
 
 def pixel_counts(camera: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
-    """Number of pixels inside outlines (m, s, 3) at azimuths (m,), exact, (m,).
+    """Number of pixels inside outlines at azimuths (m,), radians, exact, (m,).
 
-    Args:
-        camera: that sees them.
-        frame: rows of the ellipsoid's frame, (3, 3).
-        outline: at azimuth zero, mm, (m, s, 3).
-        azimuth: radians, (m,).
+    Outlines (m, s, 3), mm, are at azimuth zero in the ellipsoid's frame, rows (3, 3).
     """
     ray = rotated_about_x(outline, azimuth[:, None]) @ frame - camera.pinhole
     across = ray @ camera.axes[:2].T

@@ -80,16 +80,10 @@ def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> f
 def fitted_camera(
     pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float
 ) -> Camera:
-    """The camera whose orientation leaves the widest margin round points (k, 3) in its frame.
+    """The camera whose orientation leaves the widest margin round points (k, 3), mm, in its frame.
 
     The rows lie across the plane of the ellipsoid's axis and z, along which the array is widest.
-
-    Args:
-        pinhole: mm, (3,).
-        points: that must be in the frame, mm, (k, 3).
-        width_px: columns.
-        height_px: rows.
-        hfov: angle of view across the columns, radians.
+    The angle of view hfov (radians) is across the columns.
     """
     rays = unit(points - pinhole)
     middle = unit(rays.mean(axis=0))

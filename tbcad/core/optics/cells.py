@@ -70,9 +70,8 @@ class Cells:
     def rings(self) -> tuple[Ints, Ints]:
         """Sides of each mirror's cell, counter-clockwise from outside.
 
-        Returns:
-            Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell
-            follows it from start to end, 2 a + 1 where it goes back along it.
+        Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell follows
+        it from start to end, 2 a + 1 where it goes back along it.
         """
         return rings_of(self.triangles, self.mirrors, self.arcs.side_of_half_edge)
 
@@ -114,12 +113,10 @@ class Arcs:
 
 
 def rings_of(triangles: Ints, mirrors: int, side_of_half_edge: Ints) -> tuple[Ints, Ints]:
-    """Sides round each mirror's cell, as `Cells.rings` has them.
+    """Sides round each of m mirrors' cells, as `Cells.rings` has them.
 
-    Args:
-        triangles: the three faces at each corner, counter-clockwise from outside, (t, 3).
-        mirrors: number of mirrors m, the first of the faces.
-        side_of_half_edge: side for each directed edge of the triangles, -1 for none, (3 t,).
+    Triangles (t, 3) are counter-clockwise from outside, the mirrors being the first faces; each
+    directed edge of them has a side, -1 for none, (3 t,).
     """
     ends, twin = half_edges(triangles)
     _, first = np.unique(ends[:, 0], return_index=True)
@@ -176,14 +173,9 @@ def _curves(
 def plane_sections(
     surfaces: Surfaces, p: Ints, plane: Floats, start: Floats, end: Floats
 ) -> tuple[Floats, Floats]:
-    """Control polygon (e, 3, 3) and weight (e,) of arcs in which planes cut surfaces.
+    """Control polygon (e, 3, 3) and weight (e,) of arcs in which planes cut surfaces p (e,).
 
-    Args:
-        surfaces: spheres or planes.
-        p: index of the surface, (e,).
-        plane: unit normal of the plane, (e, 3).
-        start: of the arc, on both, mm, (e, 3).
-        end: of the arc, on both, mm, (e, 3).
+    Planes have unit normals (e, 3); arcs start and end on both, mm, (e, 3).
     """
     chord = end - start
     half = norm(chord) / 2
@@ -199,14 +191,10 @@ def plane_sections(
 
 
 def cells_of(surfaces: Surfaces, triangles: Ints) -> Cells:
-    """Cells of m mirrors between the seam and the foot plane.
+    """Cells of m mirrors between seam and foot; surfaces are the mirrors, then the two planes.
 
-    Args:
-        surfaces: the m mirrors, then the two planes.
-        triangles: a dual triangulation that is right or nearly so, (t, 3).
-
-    Raises:
-        NotRegularError: when the mirrors bound no proper cells.
+    The dual triangulation (t, 3) is right or nearly so; NotRegularError if there are no proper
+    cells.
     """
     return Cells(surfaces, *flip_until_regular(surfaces, triangles))
 

@@ -14,14 +14,10 @@ NEIGHBOURS = 19
 def half_angles(ellipsoid: Ellipsoid, u: Floats, all_u: Floats) -> Floats:
     """Half angle theta_0 of each flat mirror's field of view, radians, (m,) (the paper's figure 3).
 
-    It is that of the largest cone, at the virtual camera about its direction to the origin, that
-    fits in the mirror's polygon. The polygon is cut out by the tangent planes at all directions; a
-    plane that does not bound it never gives the smallest angle, so the nearest ones suffice.
-
-    Args:
-        ellipsoid: the camera's ellipsoid.
-        u: directions of the mirrors, (m, 3).
-        all_u: directions of all tangent planes, (k, 3); contains u.
+    It is that of the largest cone, at the virtual camera about its direction u to the origin, that
+    fits in the mirror's polygon. The polygon is cut out by the tangent planes at all directions (k,
+    3), u included; a plane that does not bound it never gives the smallest angle, so the nearest
+    ones suffice.
     """
     near: Ints = np.asarray(cKDTree(all_u).query(u, k=min(NEIGHBOURS, len(all_u)))[1])
     apex, normal = ellipsoid.apices(all_u), ellipsoid.normals(all_u)
@@ -46,11 +42,7 @@ def required_angles(
 ) -> Floats:
     """Half angle theta_1 = atan((R - l) / rho) that sees the capture sphere, radians, (m,) (eq. 1).
 
-    Args:
-        ellipsoid: the camera's ellipsoid.
-        u: directions of the mirrors, (m, 3).
-        half_width: l of the flat mirrors, mm, (m,).
-        sphere_radius: R of the capture sphere, mm.
+    Directions u (m, 3), half widths l of flat mirrors (m,) and the sphere's radius R in mm.
     """
     return np.arctan2(sphere_radius - half_width, ellipsoid.radial_distance(u))
 

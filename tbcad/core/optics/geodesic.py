@@ -80,8 +80,7 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
 def geodesic(n: int) -> tuple[Floats, Ints]:
     """Geodesic polyhedron of frequency n, the paper's edge separation frequency.
 
-    Returns:
-        Unit vectors to the vertices (10 n^2 + 2, 3), and outward triangles over them (20 n^2, 3).
+    Unit vectors to the vertices (10 n^2 + 2, 3), and outward triangles over them (20 n^2, 3).
     """
     vertices, faces = icosahedron()
     for factor in prime_factors(n):

@@ -23,20 +23,12 @@ ROUNDS = 2
 
 
 def closest_passage(cells: Cells, pinhole: Floats, capture: float) -> tuple[float, int]:
-    """Smallest distance from the origin at which light passes between camera and mirrors, mm.
+    """Smallest distance (mm) from the origin at which light passes, and its mirror.
 
-    Light is in use where its mirror shows the capture sphere. If it passes closer than the sphere's
-    radius, the object stands in it. In the picture a mirror's part in use does not contain the
-    origin, so what passes closest is at the edge of that part: where rays graze the capture sphere,
-    or at the edge of the cell.
-
-    Args:
-        cells: of one camera's mirrors, whose apices show the origin.
-        pinhole: of the camera, mm, (3,).
-        capture: radius of the capture sphere, mm.
-
-    Returns:
-        The distance, and the mirror.
+    Light is in use where its mirror shows the capture sphere of a radius (mm). If it passes closer,
+    the object stands in it. Apices show the origin, and in the picture a mirror's part in use does
+    not contain it, so what passes closest is at the edge of that part: where rays graze the capture
+    sphere, or at the edge of the cell.
     """
     mirror, arc = cell_sides(cells)
 
@@ -75,10 +67,7 @@ def _minima(cells: Cells, arc: Ints, function: Callable[[Floats], Floats]) -> Fl
 def _last_in_use(
     cells: Cells, mirror: Ints, edge: Floats, pinhole: Floats, capture: float
 ) -> Floats:
-    """Points (..., 3) on mirrors (...) where the light in use ends toward an edge.
-
-    They are searched for from the apex, where a mirror shows the origin.
-    """
+    """Points (..., 3) on mirrors (...) where light in use ends from the apex toward an edge."""
     apex = cells.surfaces.apex[mirror]
     low, high = np.zeros(mirror.shape), np.ones(mirror.shape)
     for _ in range(BISECTIONS):

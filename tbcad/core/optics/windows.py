@@ -44,10 +44,6 @@ def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
     It is twice the smallest distance from the origin of all rays camera -> edge of the cell ->
     reflected. The virtual camera sees the whole capture sphere of the paper's section 3 when its
     coverage diameter is at least that of the sphere.
-
-    Args:
-        cells: of one camera's m mirrors.
-        pinhole: of the camera, mm, (3,).
     """
     mirror, arc = limiting_sides(cells)
 
@@ -62,12 +58,9 @@ def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
 
 
 def samples_about_minima(function: Callable[[Floats], Floats], curves: int, rounds: int) -> Floats:
-    """Values (k, SAMPLES) about the minimum on [0, 1] of each of k curves.
+    """Values (k, SAMPLES) about the minimum on [0, 1] of a function of parameters (k, SAMPLES).
 
-    Args:
-        function: takes parameters (k, SAMPLES), one row a curve, and returns the values there.
-        curves: number of curves, k.
-        rounds: each samples evenly between the neighbours of the last round's smallest sample.
+    Each round samples evenly between the neighbours of the last round's smallest sample.
     """
     low, high = np.zeros(curves), np.ones(curves)
     row = np.arange(curves)
@@ -138,18 +131,9 @@ class Windows:
         """Coverage diameter (m,) of one ball for each mirror within its rotated window, mm.
 
         It is twice the smallest distance from the origin of all rays through the window's edge
-        after the ball. Whether the ball shows the origin inside the window is a question to
-        `contains`.
-
-        Args:
-            centre: centres of the balls, mm, (m, 3).
-            radius: of the balls, mm, (m,).
-            axis: unit vectors that the windows are rotated about, (m, 3).
-            angle: radians, (m,).
-            pinhole: of the camera that sees the balls, mm, (3,); by default the windows' own.
-
-        Returns:
-            Infinite for mirrors without sides.
+        after the ball, infinite without sides. Whether the ball shows the origin inside the window
+        is a question to `contains`. Windows are turned about unit axes (m, 3) by angles (m,); the
+        camera that sees the balls is at the windows' own pinhole unless another is given.
         """
         pinholes = np.stack([self.pinhole, self.pinhole if pinhole is None else pinhole])
         balls = np.column_stack([centre, radius, axis, np.cos(angle), np.sin(angle)])

@@ -41,9 +41,7 @@ def read_rows(
     """Yield each row that is not empty, with its place as text for error messages.
 
     Numbers are yielded with decimal points; columns beside the named ones are refused, or left out.
-
-    Raises:
-        SpecError: when the file cannot be read or is not such a table; it names the line.
+    SpecError names the line if the file cannot be read or is not such a table.
     """
     lines = read_text(file, name, "list").split("\n")
     said = SAID.fullmatch(lines[0])

@@ -42,12 +42,9 @@ def read_toml(file: Path | Traversable, name: str, kind: str) -> Table:
 
 
 def read_text(file: Path | Traversable, name: str, kind: str, max_bytes: int = MAX_BYTES) -> str:
-    """Return a text without byte order mark, its lines ended by line feeds alone.
+    """Return a text without byte order mark, its lines ended by line feeds alone; or SpecError.
 
     It is UTF-8, or UTF-16 or UTF-32 with a byte order mark; lines end as on any system.
-
-    Raises:
-        SpecError: it cannot be read.
     """
     if isinstance(file, Path) and file.exists() and not file.is_file():
         raise SpecError(f"{name}: not a file: name a {kind} file")

@@ -102,13 +102,9 @@ def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     """The surfaces of s builds before their shells are scaled and moved, (s, m + 2 + r + w, 7).
 
     They end with the foot plane at each of the r mirrors near it (NeighbourPairs.footed) and the w
-    walls.
-
-    A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
-    thicker coating moves too. Their tilt is not an error of its own kind.
-
-    Raises:
-        InputError: an error is larger than a mirror's radius.
+    walls. A radius too large by d moves the apex out by d; this also holds for planar mirrors,
+    which a thicker coating moves too. Their tilt is not an error of its own kind. InputError if an
+    error is larger than a mirror's radius.
     """
     m, footed = len(edge_model), edge_model.pairs.footed
     rows = np.append(np.arange(m + 2), np.full(len(footed), m + 1))

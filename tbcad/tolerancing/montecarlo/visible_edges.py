@@ -46,15 +46,10 @@ START, TANGENT, OUTWARD, BEND, EDGE_COLUMNS = 0, 3, 6, 9, 10
 def visible_spans(
     surfaces: Floats, faces: Ints, edge: Floats, reach: float, spans: Floats, spare: Floats
 ) -> int:
-    """Fill in the parts of an edge that faces leave visible, and return their number.
+    """Fill in the parts of an edge (`find_edge`) that faces leave visible, and return their number.
 
-    Args:
-        surfaces: apex, normal, curvature of all faces, (f, 7).
-        faces: numbers of those that may cut the edge.
-        edge: see `find_edge`.
-        reach: maximum distance of the edge's points from x0.
-        spans: the parameters where each part begins and ends, (INTERVALS, 2).
-        spare: of the same shape, for intermediate results.
+    Surfaces are apex, normal, curvature of all faces, (f, 7); parts are parameters of their begin
+    and end, (INTERVALS, 2), spare of the same shape; the reach is from x0, mm.
     """
     spans[0, 1] = _end_parameter(reach, edge[BEND])
     spans[0, 0], count = -spans[0, 1], 1

@@ -105,9 +105,8 @@ class WarpMap:
     def moved(self, numbers: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Displacements of the mirrors of one build by random numbers (K, 3), mm.
 
-        Returns:
-            Of the centres (m, 3), by which radii grow (m,), of the foot plane at each mirror along
-            its normal (m,), and factors of the two terms of astigmatism (m, 2), mm.
+        Of the centres (m, 3), by which radii grow (m,), of the foot plane at each mirror along its
+        normal (m,), and factors of the two terms of astigmatism (m, 2), mm.
         """
         points = field_values(self.basis, numbers).reshape(3, *self.normal.shape[:2])
         along = np.einsum("xmq,mqx->mq", points, self.normal)

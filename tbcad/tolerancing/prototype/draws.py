@@ -88,10 +88,8 @@ def _shapes(k: int, t: int) -> dict[str, Shape]:
 def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
     """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
 
-    Motor and belt yield to the base's weight: see tbcad.prototype.drive.loads.
-
-    Raises:
-        InputError: the file is missing, malformed, or of another plan.
+    Motor and belt yield to the base's weight: see tbcad.prototype.drive.loads. InputError if the
+    file is missing, malformed, or of another plan.
     """
     path = export.folder / StopRow.FILE
     rows = StopRow.read(export.folder)

@@ -186,11 +186,7 @@ def _lens(model: PrototypeWindows, tilt: Floats, focal: float) -> Floats:
 
 
 def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
-    """The same with windows that the software has moved to the actual balls.
-
-    It knows the camera then, and turns every window about the pinhole, until the middle of the
-    window shows the centre of the object.
-    """
+    """The same with windows moved to the actual balls, whose middles show the object's centre."""
     run = model.runs[half]
     lens = model.axes @ _shortest_rotations(unit(run.middle @ model.axes), pose.highlight)
     return replace(pose, lens=lens)
@@ -237,10 +233,7 @@ def _coverage(run: RunWindows, pose: RunPose) -> Floats:
 
 
 def _middle_rays(run: RunWindows, pose: RunPose) -> tuple[Floats, Floats]:
-    """Points on the balls and unit directions after them of the windows' middle rays, (m, 3) each.
-
-    NaN where there is no ball.
-    """
+    """Points on balls and unit directions after them of windows' middle rays, (m, 3), or NaN."""
     ray = unit((run.middle[:, None] @ pose.lens)[:, 0])
     to_centre = pose.centre - pose.pinhole
     along = dot(ray, to_centre)

@@ -20,10 +20,8 @@ def raw_picture(data: bytes, name: str) -> Picture:
 
     The black level is 0 and the white level 65535. No white balance (an automatic one differs
     between photographs), no colour matrix, no automatic brightness, no turn by the orientation;
-    colours between the pixels of the mosaic by linear interpolation.
-
-    Raises:
-        InputError: LibRaw cannot read it, or rawpy is not installed.
+    colours between the pixels of the mosaic by linear interpolation. InputError if LibRaw cannot
+    read it, or rawpy is not installed.
     """
     rawpy = import_of_machine("rawpy", name)
     try:

@@ -26,8 +26,7 @@ _REC_709, _ALIKE = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06), 0.011
 def exr_picture(path: Path) -> NDArray[np.float32]:
     """Light (h, w, 3), or grey (h, w), of the display window; black where there are no data.
 
-    Raises:
-        InputError: it is damaged, or is no flat picture of R, G and B, or Y.
+    InputError if it is damaged, or no flat picture of R, G and B, or Y.
     """
     words = [sys.executable, "-m", "tbcad.cad.formats.images.openexr", str(path)]
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, check=False)

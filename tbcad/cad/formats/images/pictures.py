@@ -50,11 +50,8 @@ _JPEG_SCAN, _JPEG_END = 0xDA, b"\xff\xd9"
 def read_picture(path: Path) -> Picture:
     """The picture in a file: (h, w) or (h, w, 3) of uint8, uint16 or float32.
 
-    Args:
-        path: PNG, TIFF, JPEG, WebP, BMP, GIF, or a camera's raw file.
-
-    Raises:
-        InputError: it cannot be read, or not exactly as grey or RGB.
+    PNG, TIFF, JPEG, WebP, BMP, GIF, or a camera's raw file; InputError if it cannot be read exactly
+    as grey or RGB.
     """
     try:
         data = path.read_bytes()

@@ -21,11 +21,7 @@ def damaged(name: str, error: Exception | str) -> InputError:
 
 
 def check_pixels(name: str, width: int, height: int) -> None:
-    """Refuse a picture without pixels, or with more than any camera has.
-
-    Raises:
-        InputError: it is one.
-    """
+    """Refuse (InputError) a picture without pixels, or with more than any camera has."""
     if not 0 < width * height <= MOST_PIXELS:
         raise InputError(
             f"{name} says that it has {width} x {height} pixels, allowed are {MOST_PIXELS}: "
@@ -34,16 +30,10 @@ def check_pixels(name: str, width: int, height: int) -> None:
 
 
 def without_alpha(pixels: NDArray[Any], opaque: float, name: str, ignore: bool) -> NDArray[Any]:
-    """Pixels (h, w, 2) or (h, w, 4) without their last channel.
+    """Pixels (h, w, 2) or (h, w, 4), grey or red, green, blue, without their last, the opacity.
 
-    Args:
-        pixels: grey or red, green, blue, then opacity.
-        opaque: what the last channel must have everywhere.
-        name: of the picture, for the error.
-        ignore: whether the last channel may have anything.
-
-    Raises:
-        InputError: there are transparent pixels: what is seen there is not in the picture.
+    InputError if it is not opaque everywhere, unless that is ignored: what is seen there is not in
+    the picture.
     """
     if not ignore and (pixels[..., -1] != opaque).any():
         raise transparent(name)
@@ -56,11 +46,7 @@ def transparent(name: str) -> InputError:
 
 
 def as_light(pixels: NDArray[Any], name: str) -> NDArray[np.float32]:
-    """Floating-point pixels as light.
-
-    Raises:
-        InputError: some are negative, infinite or no numbers.
-    """
+    """Floating-point pixels as light; InputError if some are negative, infinite or no numbers."""
     with np.errstate(over="ignore"):
         light = pixels.astype(np.float32)
     if not np.isfinite(light).all() or (light < 0).any():
@@ -71,11 +57,7 @@ def as_light(pixels: NDArray[Any], name: str) -> NDArray[np.float32]:
 
 
 def import_of_machine(module: str, name: str) -> Any:
-    """A library of the extra `machine`, which a picture of this name needs.
-
-    Raises:
-        InputError: it is not installed.
-    """
+    """A library of the extra `machine`, which a picture of this name needs; or InputError."""
     from importlib import import_module
 
     try:

@@ -25,29 +25,20 @@ _RESOLUTION = re.compile(rb"([-+])([XY]) +(\d{1,9}) +([-+])([XY]) +(\d{1,9})\n")
 
 @dataclass(frozen=True)
 class _Header:
-    """What stands before the pixels.
+    """What stands before the pixels."""
 
-    Attributes:
-        xyz: whether they are CIE XYZ rather than red, green, blue.
-        scale: factor of red, green, blue, (3,).
-        major, minor: axis along which scanlines follow each other, and along one: "+X", "-Y" ...
-        shape: scanlines, pixels in each.
-        start: of the pixels, in bytes.
-    """
-
-    xyz: bool
-    scale: Floats
-    major: str
-    minor: str
-    shape: tuple[int, int]
-    start: int
+    xyz: bool  # whether they are CIE XYZ rather than red, green, blue
+    scale: Floats  # factor of red, green, blue, (3,)
+    major: str  # axis along which scanlines follow each other: "+X", "-Y" ...
+    minor: str  # axis along one
+    shape: tuple[int, int]  # scanlines, pixels in each
+    start: int  # of the pixels, in bytes
 
 
 def hdr_picture(data: bytes, name: str) -> Floats:
     """Red, green and blue (h, w, 3), linear, before EXPOSURE and COLORCORR; the top row first.
 
-    Raises:
-        InputError: it ends early, is damaged, or has other primaries.
+    InputError if it ends early, is damaged, or has other primaries.
     """
     header = _header(data, name)
     try:
@@ -117,12 +108,7 @@ def _numbers(text: str, key: str, name: str) -> Floats:
 
 
 def _scanlines(data: bytes, at: int, lines: int, width: int) -> Iterator[Bytes]:
-    """Bytes (w, 4) of each scanline.
-
-    Raises:
-        IndexError: the data end early.
-        ValueError: they are damaged.
-    """
+    """Bytes (w, 4) of each scanline; IndexError where data end early, ValueError where damaged."""
     for _ in range(lines):
         if width in RUN_WIDTHS and data[at : at + 2] == b"\2\2" and data[at + 2] < 128:
             if int.from_bytes(data[at + 2 : at + 4], "big") != width:

@@ -108,18 +108,10 @@ def cell_pairs(cells: Cells) -> CellPairs:
 def pedestal_layout(
     flat: Cells, mirrors: Surfaces, pairs: CellPairs, corner: Ints, pinhole: Floats, groove: float
 ) -> PedestalLayout:
-    """Corners and borders for grooves seen from a pinhole.
+    """Corners and borders for grooves of a width (mm) seen from a pinhole, between m mirrors.
 
-    Args:
-        flat: cells of planar mirrors with the same apices.
-        mirrors: m of them.
-        pairs: of the cells.
-        corner: that each triangle's corner becomes, of c corners, (t,).
-        pinhole: of the camera, mm, (3,).
-        groove: width of the grooves, mm.
-
-    Raises:
-        NotRegularError: there is no mirror above the end of a groove.
+    The flat cells are those of planar mirrors with the same apices, the corner (t,) is what each
+    triangle's becomes. NotRegularError if there is no mirror above the end of a groove.
     """
     between = corner[pairs.triangles]
     pair = np.flatnonzero(between[:, 0] != between[:, 1])
@@ -142,10 +134,7 @@ def pedestal_layout(
 
 
 def _sag(flat: Cells, mirrors: Surfaces, corner: Ints, point: Floats, down: Floats) -> Floats:
-    """Distance (c,) down from the planar mirrors' corners to the lowest of the mirrors there.
-
-    Not finite where the line down misses a mirror's sphere.
-    """
+    """Distance (c,) from planar mirrors' corners down to the lowest mirror; or not finite."""
     triangle, column = np.nonzero(flat.triangles < flat.mirrors)
     mirror, at = flat.triangles[triangle, column], corner[triangle]
     value, slope = (
@@ -167,10 +156,7 @@ def _bounding_normals(cells: Cells, faces: Ints) -> Floats:
 
 
 def _joined_points(cells: Cells, corner: Ints) -> tuple[Floats, Ints]:
-    """Mean points of joined corners (c, 3), and the bounding plane each lies on, -1 for none.
-
-    A corner on both planes counts as on the second.
-    """
+    """Mean points of joined corners (c, 3), and the last bounding plane they lie on, or -1."""
     count = np.bincount(corner)[:, None]
     top = np.column_stack([np.bincount(corner, column) for column in cells.corners.T]) / count
     plane = np.full(len(top), -1)

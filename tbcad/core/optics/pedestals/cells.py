@@ -59,23 +59,17 @@ class PedestalCells(Cells):
     def with_mirrors(self, mirrors: Surfaces) -> "PedestalCells":
         """Other mirrors (m of them) on the same pedestals: borders and grooves stay.
 
-        Raises:
-            NotRegularError: a mirror lies below the bottom of its grooves.
+        NotRegularError if a mirror lies below the bottom of its grooves.
         """
         bounding = self.surfaces.subset(slice(self.mirrors, self.mirrors + PLANES))
         return _cells(self.layout, mirrors.joined(bounding))
 
 
 def pedestal_cells(plan: PedestalPlan, mirrors: Surfaces) -> PedestalCells:
-    """Cells of mirrors on pedestals.
+    """Cells of m mirrors on pedestals, by the plan for mirrors with these apices.
 
-    Args:
-        plan: of pedestals for mirrors with these apices.
-        mirrors: m of them.
-
-    Raises:
-        NotRegularError: the grooves leave no outline of a mirror, or a pedestal sticks out beyond
-            a bounding plane.
+    NotRegularError if the grooves leave no outline of a mirror, or a pedestal sticks out beyond a
+    bounding plane.
     """
     layout = plan.layout_for(mirrors)
     cells = _cells(layout, layout.with_planes(mirrors))
@@ -130,11 +124,7 @@ class _Assembly:
         """All edges, and four sides for each side of a cell: those of its wall, if it has one.
 
         First come the sides themselves, then the walls' upright edges, then the grooves' bottoms.
-
-        Args:
-            surfaces: with the walls.
-            beyond: face across each side: its wall or a bounding plane, (q,).
-            has_wall: which sides have one, (q,).
+        Beyond each side lies its wall or a bounding plane, (q,).
         """
         sides, q = self.sides, len(self.sides.cell)
         before = np.empty(q, dtype=np.int64)

@@ -33,14 +33,9 @@ class Sides:
 
 
 def outline_sides(layout: PedestalLayout, surfaces: Surfaces) -> Sides:
-    """Sides of the cells of mirrors on pedestals.
+    """Sides of the cells of mirrors on pedestals; surfaces are m mirrors, then the two planes.
 
-    Args:
-        layout: where the pedestals stand.
-        surfaces: of the m mirrors, then the two bounding planes.
-
-    Raises:
-        NotRegularError: a mirror lies below the end of a groove.
+    NotRegularError if a mirror lies below the end of a groove.
     """
     cells, corners, borders = layout.flat, layout.corners, layout.borders
     side = np.full(3 * len(cells.triangles), -1)
