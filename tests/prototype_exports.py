@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.formats.csv_table import write_table
+from tbcad.cad.formats.checked_files import write_table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
 from tbcad.light.simulate.prototype.plan import Plan

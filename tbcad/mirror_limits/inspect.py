@@ -8,8 +8,14 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.mirror_limits.files import halves, write_half, write_record
-from tbcad.mirror_limits.limits import MirrorLimits, mirror_limits, whole_margin_steps
-from tbcad.mirror_limits.sensitivity import Deviation, Sensitivities, sensitivities
+from tbcad.mirror_limits.sensitivity import (
+    Deviation,
+    MirrorLimits,
+    Sensitivities,
+    mirror_limits,
+    sensitivities,
+    whole_margin_steps,
+)
 from tbcad.tolerancing.montecarlo.coverage import coverage
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
 from tbcad.types import Progress

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.cad.formats.toml import toml_text
+from tbcad.cad.formats.checked_files import toml_text
 from tbcad.common.results.plots import PlotPanel, Series, plot_file
 from tbcad.common.results.tables import Table, csv_text
 from tbcad.core.spec.design import Spec

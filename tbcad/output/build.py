@@ -19,9 +19,15 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
-from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
+from tbcad.shell.files import (
+    design_mandrel,
+    mandrel_record,
+    shell_envelope,
+    write_mandrels,
+    write_shell_meshes,
+    write_shell_solids,
+)
 from tbcad.shell.mandrel import Mandrel
-from tbcad.shell.mandrel_files import design_mandrel, mandrel_record, write_mandrels
 from tbcad.types import Progress
 
 

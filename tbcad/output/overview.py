@@ -17,8 +17,7 @@ from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.files.bom_csv import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.prices import Prices, load_prices
-from tbcad.shell.files import camera_a_mesh
-from tbcad.shell.mandrel_files import design_mandrel
+from tbcad.shell.files import camera_a_mesh, design_mandrel
 from tbcad.types import Progress
 
 # Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a

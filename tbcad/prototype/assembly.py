@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tbcad.cad.kernel.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
+from tbcad.cad.formats.assembly import Colour, ColouredSolid, SolidGroup, display_mesh
 from tbcad.cad.kernel.solids import pyramid, sphere
 from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.arrangement import PrototypeModel

@@ -16,8 +16,13 @@ from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.shell.cell_outlines import CellOutlines, cell_outlines
-from tbcad.shell.segments import segment_counts, strip_points, strip_widths
+from tbcad.shell.cell_outlines import (
+    CellOutlines,
+    cell_outlines,
+    segment_counts,
+    strip_points,
+    strip_widths,
+)
 from tbcad.types import Bools, Floats, Ints
 
 # The search is in a plane, so what it finds on a sphere is looked for again from there.

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from tbcad.core.geometry.conics import Spheroid
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid, Spheroid
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.cells import Cells

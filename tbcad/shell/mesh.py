@@ -10,9 +10,8 @@ from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.spec.design import Spec
-from tbcad.shell.casing_edges import ARC_ENDS, boundary_chain, casing_lines, outline
 from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
-from tbcad.shell.envelope import Envelope, Holes
+from tbcad.shell.envelope import ARC_ENDS, Envelope, Holes, boundary_chain, casing_lines, outline
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.types import Floats, Ints
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.common.results.tables import Record, Table
 from tbcad.common.schedule import run_units
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.pixel_counts import (

@@ -7,15 +7,18 @@ import numpy as np
 from tbcad.common.results.plots import PlotPanel, Series
 from tbcad.common.results.study import Figure, Study
 from tbcad.common.results.tables import Record, Table
-from tbcad.core.camera.lens import (
+from tbcad.core.camera.requirements import (
+    FANS,
+    PLACES,
     DepthRange,
     Lens,
+    VirtualImages,
     aperture_stop,
     aperture_stops,
     focal_length,
     lens_for,
+    virtual_images,
 )
-from tbcad.core.camera.requirements import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.studies.paper import claimed, claims, with_lens_of_table_i

@@ -13,15 +13,16 @@ from tbcad.tolerancing.margin import (
     STEP_MM,
     SeeingPixels,
     margin,
+    own_margins,
     seeing_pixels,
     solved_designs,
     with_margin,
+    with_own_margins,
 )
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.sharpness import view_ssims
-from tbcad.tolerancing.own_margins import own_margins, with_own_margins
 from tbcad.tolerancing.process.process import Process, process_errors
 from tbcad.types import Floats, Progress
 

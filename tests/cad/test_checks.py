@@ -11,8 +11,7 @@ from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Solid
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.checks import without_slack
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import properties, without_slack
 from tbcad.cad.kernel.solids import cylinder, edges, one_solid
 from tests.step_read_back import check_read_back
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.kernel.measures import (
+from tbcad.cad.kernel.checks import (
     SolidProperties,
     face_integrals,
     mean_corner,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.meshing import (
     SIDES,
     as_manifold,

@@ -6,7 +6,7 @@ from OCP.BRep import BRep_Builder
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.measures import mean_corner, volume
+from tbcad.cad.kernel.checks import mean_corner, volume
 from tbcad.cad.kernel.solids import (
     common,
     cut,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.solids import cylinder, fused
 from tbcad.common.background import at_once, background_processes
 from tbcad.core.spec.errors import SpecError

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.features import RoundFace, distance

@@ -15,7 +15,7 @@ from tbcad.cad.formats.step_tolerances import read_tolerances
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
-from tbcad.mirror_limits.read_back import check_read_back
+from tbcad.mirror_limits.files import check_read_back
 from tbcad.shell.files import shell_envelope, write_shell_solids
 from tests.helpers import read_step, volume
 

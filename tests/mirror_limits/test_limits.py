@@ -12,11 +12,12 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.mirror_limits.inspect import minimum_at_limits
-from tbcad.mirror_limits.limits import MirrorLimits, mirror_limits
 from tbcad.mirror_limits.sensitivity import (
     Deviation,
+    MirrorLimits,
     Sensitivities,
     independent_classes,
+    mirror_limits,
     sensitivities,
     tilt_axes,
     touching,

@@ -11,9 +11,8 @@ from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate.capture.pixel_counts import Sensor
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
-from tbcad.optimizing import views
-from tbcad.optimizing.candidate import MachineLimits, evaluate, place_of
-from tbcad.optimizing.views import mean_ssim
+from tbcad.optimizing import candidate
+from tbcad.optimizing.candidate import MachineLimits, evaluate, mean_ssim, place_of
 from tbcad.studies.ssim import ssim
 
 SPEC = load_spec(None, ["n=4", "width_px=208", "height_px=155"])
@@ -21,9 +20,9 @@ SPEC = load_spec(None, ["n=4", "width_px=208", "height_px=155"])
 
 @pytest.fixture(autouse=True)
 def few_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(views, "ELEVATIONS_DEG", (15.0,))
-    monkeypatch.setattr(views, "AZIMUTHS", 2)
-    views._truth.cache_clear()
+    monkeypatch.setattr(candidate, "ELEVATIONS_DEG", (15.0,))
+    monkeypatch.setattr(candidate, "AZIMUTHS", 2)
+    candidate._truth.cache_clear()
 
 
 def test_it_is_the_figure_of_the_study() -> None:
@@ -39,8 +38,8 @@ def test_it_is_the_figure_of_the_study() -> None:
 
 def test_the_viewpoints_are_those_of_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    assert vars(views)["ELEVATIONS_DEG"] is ELEVATIONS_DEG
-    assert (views.AZIMUTHS, views.DISTANCE_MM) == (4, 640.0)
+    assert vars(candidate)["ELEVATIONS_DEG"] is ELEVATIONS_DEG
+    assert (candidate.AZIMUTHS, candidate.DISTANCE_MM) == (4, 640.0)
 
 
 @pytest.mark.parametrize(("size_mm", "measured"), [(300.0, True), (200.0, False)])
@@ -53,7 +52,7 @@ def test_views_are_compared_within_the_limits_only(size_mm: float, measured: boo
 
 def test_by_a_coarse_field_it_is_the_figure_of_that_study(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(picture, "QUICK", Settings(levels=(Level(24, 1),), batch=3000))
-    monkeypatch.setattr(views, "AZIMUTHS", 1)
+    monkeypatch.setattr(candidate, "AZIMUTHS", 1)
     viewpoints = viewpoints_around((15.0,), 1, 640.0)
     fixed = SPEC.model_copy(update={"camera": SPEC.camera.model_copy(update={"hfov_deg": 89.0})})
     study = ssim(fixed, built_in_object(60.0), (Sensor(208, 155),), viewpoints, BY_FIELD)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.kernel.measures import volume as solid_volume
+from tbcad.cad.kernel.checks import volume as solid_volume
 from tbcad.core.geometry.primitives import enclosing_triangles, volume
 from tbcad.prototype.fasteners import (
     PITCH_MM,

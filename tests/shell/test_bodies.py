@@ -6,10 +6,15 @@ import pytest
 import trimesh
 from OCP.BRepCheck import BRepCheck_Analyzer
 
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import properties
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.shell.files import camera_a_mesh, camera_solid, shell_properties
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, mandrel_solid
+from tbcad.shell.files import (
+    camera_a_mandrel_mesh,
+    camera_a_mesh,
+    camera_solid,
+    mandrel_solid,
+    shell_properties,
+)
 from tests.helpers import volume
 from tests.mirror_arrays import mirror_design
 from tests.pedestal_designs import OPTIONS

@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import properties
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.mirrors.record import COLUMNS
 from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_a_mesh, camera_solid
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, mandrel_solid
+from tbcad.shell.files import camera_a_mandrel_mesh, camera_a_mesh, camera_solid, mandrel_solid
 from tests.exported_files import read_csv
 from tests.helpers import check_step, read_mesh, read_step
 from tests.mirror_arrays import mirror_design

@@ -8,9 +8,14 @@ from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.errors import SpecError
-from tbcad.shell.files import camera_a_mesh, camera_solid
+from tbcad.shell.files import (
+    camera_a_mandrel_mesh,
+    camera_a_mesh,
+    camera_solid,
+    design_mandrel,
+    mandrel_solid,
+)
 from tbcad.shell.mandrel import Mandrel, best_pull, distances, draft_of
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, design_mandrel, mandrel_solid
 from tbcad.shell.mesh import front_facets
 from tests.helpers import area, bounds
 from tests.mirror_arrays import mirror_design

@@ -17,7 +17,7 @@ from tbcad_verify.shell.optics import OpticalSetup, set_up
 from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
 from tbcad_verify.shell.recover import recover
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.optics import windows

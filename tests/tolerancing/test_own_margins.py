@@ -12,18 +12,20 @@ from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.tolerancing.margin import STEP_MM, solved_designs, with_margin
-from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
-from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
-from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.own_margins import (
+from tbcad.tolerancing.margin import (
     FLIP_Y,
+    STEP_MM,
     MirrorLosses,
     mirror_losses,
     needed_margins,
     own_margins,
+    solved_designs,
+    with_margin,
     with_own_margins,
 )
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.process.process import load_process, process_errors
 
 TARGET = 60.0

@@ -12,10 +12,9 @@ from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing import process_design as process_module
-from tbcad.tolerancing.margin import pixels_of_cameras
+from tbcad.tolerancing.margin import OwnMargins, pixels_of_cameras
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
-from tbcad.tolerancing.own_margins import OwnMargins
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.tolerancing.process_design import (
     ProcessDesign,

@@ -6,10 +6,10 @@ Where an exact figure differs from one measured first, the test states both.
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions
-from tbcad.core.optics import flat
+from tbcad.core.mirrors.radii import half_angles
 from tbcad.studies.paper import claimed
 from tests.mirror_arrays import mirror_array
 
@@ -38,7 +38,7 @@ def test_flat_capture_diameter(n: int) -> None:
     """
     paper_mm = claimed(f"flat_capture_n{n}")
     half_a, every = camera_a(n)
-    theta0 = flat.half_angles(ELLIPSOID, half_a, every)
+    theta0 = half_angles(ELLIPSOID, half_a, every)
     diameter = 2 * ELLIPSOID.camera_distance * np.sin(theta0.min())
     assert diameter == pytest.approx(paper_mm, rel=0.05)
 

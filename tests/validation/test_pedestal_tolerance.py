@@ -14,8 +14,7 @@ from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.manifest import write_manifest
-from tbcad.tolerancing.as_made import as_made
-from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, as_made, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of

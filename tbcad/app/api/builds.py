@@ -193,13 +193,13 @@ def _build_files(plan: Plan, options: BuildOptions) -> Build:
 
 def _load_libraries() -> None:
     """Load what the background process works with."""
-    import tbcad.tolerancing.as_made  # noqa: F401
+    import tbcad.tolerancing.montecarlo.builds  # noqa: F401
 
 
 def _as_made(mirrors: MirrorDesign) -> AsMade:
     """Simulate a few builds of a design by every built-in process."""
     from tbcad.light.simulate.scene.reflector import reflectors
-    from tbcad.tolerancing.as_made import as_made
+    from tbcad.tolerancing.montecarlo.builds import as_made
 
     spec = mirrors.spec
     target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
@@ -215,7 +215,7 @@ def as_made(
         Their yields; None where no shell was built, or its record cannot be read.
     """
     from tbcad.light.simulate.scene.exported import read_export
-    from tbcad.tolerancing.as_made import as_made as simulated
+    from tbcad.tolerancing.montecarlo.builds import as_made as simulated
 
     folder = Path(exports)
     if not (folder / "shell_a.stl").is_file():

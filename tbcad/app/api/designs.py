@@ -108,6 +108,6 @@ def to_cadquery(part: Part) -> Workplane:
     Raises:
         InputError: cadquery is not installed.
     """
-    from tbcad.cad.kernel.part import as_workplane
+    from tbcad.cad.kernel.solids import as_workplane
 
     return as_workplane(part)

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tbcad.cad.formats.toml import toml_text
+from tbcad.cad.formats.checked_files import toml_text
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import allowed_text, section_of
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from tbcad.app.reference.keys import Key, KeySection, key_sections
-from tbcad.cad.formats.toml import toml_text
-from tbcad.core.spec.files import Table, read_text, read_toml
+from tbcad.cad.formats.checked_files import toml_text
+from tbcad.core.spec.csv_rows import Table, read_text, read_toml
 from tbcad.core.spec.load import PAPER, shipped_designs
 
 WIDTH = 100

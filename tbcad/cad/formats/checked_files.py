@@ -1,10 +1,10 @@
-"""JSON and CSV files of an export, checked against pydantic models before they are used."""
+"""JSON and CSV files of an export, checked against pydantic models; tables and TOML written."""
 
 import csv
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -23,15 +23,15 @@ MAX_BYTES = 200_000_000  # n = 60 takes 12 million
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
+Model = TypeVar("Model", bound=BaseModel)
+Cell = str | int | float | None
+Row = dict[str, Cell]
 
 
 class Record(BaseModel):
     """A JSON object or a CSV row; keys that the model does not name are ignored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
-
-
-Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_json(path: Path, model: type[Model], schema: str | None, missing: str) -> Model:
@@ -140,3 +140,21 @@ def _text(path: Path, missing: str) -> str:
         return path.read_text(encoding="utf-8")
     except (ValueError, OSError) as error:
         raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+
+
+def write_table(path: Path, columns: tuple[str, ...], rows: Iterable[Row]) -> None:
+    """Write rows under a header line, None as an empty cell; ValueError if a key is no column."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def toml_text(value: object) -> str:
+    """A value as TOML, whose lists are tuples here."""
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(toml_text, value)) + "]"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    return str(value).lower() if isinstance(value, bool) else repr(value)

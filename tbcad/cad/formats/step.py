@@ -32,7 +32,7 @@ from OCP.Transfer import Transfer_FinderProcess
 from scipy.spatial import cKDTree
 
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.measures import SolidProperties, properties
+from tbcad.cad.kernel.checks import SolidProperties, properties
 from tbcad.cad.kernel.solids import faces
 from tbcad.errors import InputError
 from tbcad.types import Floats, Ints

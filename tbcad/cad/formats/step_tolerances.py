@@ -40,6 +40,7 @@ from OCP.XCAFDoc import (
 )
 from OCP.XSControl import XSControl_WorkSession
 
+from tbcad.cad.formats.assembly import END
 from tbcad.cad.formats.step import END as STEP_END
 from tbcad.cad.formats.step import (
     StepError,
@@ -48,7 +49,6 @@ from tbcad.cad.formats.step import (
     kernel_settings,
     write_header,
 )
-from tbcad.cad.formats.step_assembly import END
 from tbcad.cad.kernel.brep import Solid
 
 Triple: TypeAlias = tuple[float, float, float]

@@ -6,6 +6,7 @@ Booleans take lists: one general fuse of many bodies is faster than one after th
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import TYPE_CHECKING
 
 import numpy as np
 from OCP.BinTools import BinTools
@@ -60,7 +61,12 @@ from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.core.geometry.vectors import unit
+from tbcad.errors import InputError
 from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from build123d import Part
+    from cadquery import Workplane
 
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
 # With the kernel's own 1e-7 a fuse of many bodies loses some of them now and then, silently.
@@ -276,3 +282,25 @@ def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:
     Bodies that touch can close in a crumb of air between them, which no printer could empty.
     """
     return BRepBuilderAPI_MakeSolid(BRepClass3d.OuterShell_s(solid)).Solid()
+
+
+def as_part(label: str, shape: TopoDS_Shape) -> "Part":
+    """Return a solid of the kernel as a build123d part with a label; both share the geometry."""
+    from build123d import Part, Solid  # takes a second, and nothing else here needs it
+
+    part = Part([Solid(shape)])
+    part.label = label
+    return part
+
+
+def as_workplane(part: "Part") -> "Workplane":
+    """Return a part as a cadquery workplane that is tagged with its label; both share the geometry.
+
+    InputError if cadquery is not installed.
+    """
+    try:
+        from cadquery import Shape, Workplane
+    except ImportError:
+        raise InputError("cadquery is not installed: pip install 'tbcad[cadquery]'") from None
+    shapes = [Shape.cast(solid.wrapped) for solid in part.solids()]
+    return Workplane().newObject(shapes).tag(part.label or "part")

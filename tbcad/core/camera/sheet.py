@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.core.camera.catalogue import CameraBody, RectilinearLens, load_cameras, load_lenses
-from tbcad.core.camera.lens import aperture_stop, lens_for
 from tbcad.core.camera.requirements import (
     WIDE_OPEN,
     CameraRequirements,
+    aperture_stop,
     camera_requirements,
     exposure_seconds,
+    lens_for,
 )
 from tbcad.core.mirrors.array import MirrorArray
 

@@ -4,11 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.clearance import check_clearance
-from tbcad.core.mirrors.radii import RadiusProblem, solve_radii
-from tbcad.core.optics import flat
+from tbcad.core.mirrors.radii import (
+    RadiusProblem,
+    half_angles,
+    half_widths,
+    paper_curvatures,
+    required_angles,
+    solve_radii,
+)
 from tbcad.core.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
 from tbcad.core.optics.cells import Cells, cell_areas, cells_of
 from tbcad.core.optics.geodesic import geodesic, stretched
@@ -145,14 +151,14 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
     every, faces = numbered_directions(optics.n, optics.stretch)
     u = every[_in_half_a(every)]
-    theta0 = flat.half_angles(ellipsoid, u, every)
-    half_width = flat.half_widths(ellipsoid, u, theta0)
-    theta1 = flat.required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
+    theta0 = half_angles(ellipsoid, u, every)
+    half_width = half_widths(ellipsoid, u, theta0)
+    theta1 = required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
     problem = RadiusProblem(
         mirrors=Surfaces(
             ellipsoid.apices(u),
             ellipsoid.normals(u),
-            flat.paper_curvatures(theta0, theta1, half_width),
+            paper_curvatures(theta0, theta1, half_width),
         ),
         planes=_bounding_planes(u, half_width),
         triangles=bounded_triangulation(faces, every, _in_half_a(every)),

@@ -11,7 +11,7 @@ from math import cos, radians, sin, sqrt
 import numpy as np
 
 from tbcad.common.compiled import compiled_loop
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.loop_vectors import (
     Vector,
     dot,

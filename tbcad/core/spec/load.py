@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from tbcad.core.spec.csv_rows import Table, read_toml, toml_value
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import (
     SpecError,
@@ -19,7 +20,6 @@ from tbcad.core.spec.errors import (
     unknown_key,
     validation_error,
 )
-from tbcad.core.spec.files import Table, read_toml, toml_value
 
 PAPER = "turtleback"  # equal to the defaults of all keys
 LIKENESS = 0.8

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.colmap import SparseModel
-from tbcad.cad.formats.csv_table import Row, write_table
 from tbcad.errors import InputError
 from tbcad.light.datasets.crops import chosen_mirrors
 from tbcad.light.datasets.machine_scene import write_machine_scene

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from tbcad.cad.formats.ply import mesh_ply
+from tbcad.cad.formats.mesh_files import mesh_ply
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.geodesic import triangle_grid

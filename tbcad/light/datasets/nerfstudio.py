@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.formats.ply import points_ply
+from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.light.datasets.pictures import Pictures
 from tbcad.light.datasets.pinholes import pinhole_of
 from tbcad.light.datasets.seed_points import SeedPoints

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from PIL import Image
 
-from tbcad.cad.formats.ply import points_ply
+from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.common.compiled import compiled_loop
 from tbcad.common.picture_bytes import png_bytes
 from tbcad.core.optics.camera import Camera

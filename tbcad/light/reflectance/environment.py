@@ -7,10 +7,8 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tbcad.cad.formats.images import openexr, radiance
-from tbcad.cad.formats.images.openexr import exr_picture
-from tbcad.cad.formats.images.pictures import picture_of
-from tbcad.cad.formats.images.radiance import hdr_picture
+from tbcad.cad.formats.light_pictures import EXR_SIGNATURE, HDR_SIGNATURE, exr_picture, hdr_picture
+from tbcad.cad.formats.pictures import picture_of
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.point_lights import PointLights
@@ -212,9 +210,9 @@ def read_light(path: Path) -> Floats:
         raise InputError(f"{path}: no such file; {GIVE}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}: {GIVE}") from None
-    if data.startswith(radiance.SIGNATURE):
+    if data.startswith(HDR_SIGNATURE):
         return hdr_picture(data, str(path))
-    light = exr_picture(path) if data.startswith(openexr.SIGNATURE) else picture_of(data, str(path))
+    light = exr_picture(path) if data.startswith(EXR_SIGNATURE) else picture_of(data, str(path))
     if light.dtype != np.float32:
         raise InputError(f"{path} has whole numbers, which clip what is bright: {GIVE}")
     grey = light[..., None] if light.ndim == 2 else light

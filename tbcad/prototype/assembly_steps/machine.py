@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.csv_rows import read_rows
 from tbcad.errors import InputError
 from tbcad.prototype.electronics import wiring

@@ -6,8 +6,7 @@ In the cap's own frame the centre of its body is the origin and its axis, away f
 import numpy as np
 from OCP.TopoDS import TopoDS_Face
 
-from tbcad.cad.kernel.checks import closed_mesh
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import closed_mesh, properties
 from tbcad.cad.kernel.solids import moved, one_solid, revolved
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_pocket, cap_spigot, flat_depth

@@ -10,9 +10,8 @@ from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.checks import COARSE_MM, checked
+from tbcad.cad.kernel.checks import COARSE_MM, SolidProperties, checked
 from tbcad.cad.kernel.glyphs import fitting_height, relief
-from tbcad.cad.kernel.measures import SolidProperties
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import as_manifold, moved_mesh, volume_by_meshes
 from tbcad.cad.kernel.solids import (
@@ -25,7 +24,7 @@ from tbcad.cad.kernel.solids import (
     revolved_polygon,
 )
 from tbcad.core.geometry.rotations import unit_circle
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base import seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs

@@ -15,8 +15,8 @@ from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
 from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.base.joints import Cut, CutPlane, Joint, in_region, plan_joint
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian

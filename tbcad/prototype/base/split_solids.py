@@ -6,14 +6,13 @@ All is built in the carrier's own frame: z the axis, x azimuth zero.
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.kernel.checks import checked
+from tbcad.cad.kernel.checks import SolidProperties, checked
 from tbcad.cad.kernel.glyphs import fitting_height, relief
-from tbcad.cad.kernel.measures import SolidProperties
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import volume_by_cut_mesh
 from tbcad.cad.kernel.solids import common, cut, cylinder, polygon, prism, revolved_polygon
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import (
     ACCESS_MM,

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.kernel.checks import check_pads, closed_mesh
+from tbcad.cad.kernel.checks import check_pads, closed_mesh, properties
 from tbcad.cad.kernel.glyphs import ROWS, relief, text_width
-from tbcad.cad.kernel.measures import properties
 from tbcad.cad.kernel.solids import fused, moved, one_solid, polygon, prism
 from tbcad.core.geometry.primitives import rectangle
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats

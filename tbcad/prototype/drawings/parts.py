@@ -29,7 +29,7 @@ from tbcad.cad.drafting.sheet import (
     sheet_frame,
     table,
 )
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec, StageSpec

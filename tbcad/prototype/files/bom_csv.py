@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive

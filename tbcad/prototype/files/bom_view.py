@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.csv_rows import read_rows
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError

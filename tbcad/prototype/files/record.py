@@ -3,7 +3,7 @@
 import numpy as np
 
 from tbcad.cad.drafting.sheet import Sheet
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel

@@ -7,7 +7,7 @@ base plate is drilled and tapped.
 
 import numpy as np
 
-from tbcad.cad.formats.csv_table import Cell, Row
+from tbcad.cad.formats.checked_files import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.loads import DriveLoads

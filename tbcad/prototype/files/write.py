@@ -3,14 +3,11 @@
 from pathlib import Path
 
 from tbcad.cad.drafting.sheet import Sheet
-from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.assembly import mesh_groups, write_assembly, write_glb
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.dxf import write_dxf
-from tbcad.cad.formats.glb import write_glb
+from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
-from tbcad.cad.formats.step_assembly import write_assembly
-from tbcad.cad.formats.stl import write_stl
-from tbcad.cad.formats.threemf import write_3mf
-from tbcad.cad.kernel.assembly import mesh_groups
 from tbcad.cad.kernel.brep import Solid
 from tbcad.common.background import Submit, at_once
 from tbcad.core.mirrors.array import MirrorDesign

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tbcad.core.geometry.vectors import unit
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.types import Floats
 
 # Parts are measured by coarse meshes whose facets may lie this far inside of them.

@@ -9,8 +9,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from tbcad.cad.kernel.checks import check_volume, closed_mesh
-from tbcad.cad.kernel.measures import SolidProperties, properties, volume
+from tbcad.cad.kernel.checks import SolidProperties, check_volume, closed_mesh, properties, volume
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import primitive_mesh, volume_by_meshes, without_degenerate
 from tbcad.cad.kernel.solids import (
@@ -29,8 +28,8 @@ from tbcad.cad.kernel.solids import (
 )
 from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.printing.bed import fitting_orientation, min_bed, size_text
 from tbcad.types import Floats
 

@@ -5,7 +5,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.prototype.files.bom_view import PartsList
 
 HEADS = ("No.", "Qty", "Part", "What it is", "Material", "Mass, g", "Print, h", "Price", "From")

@@ -9,9 +9,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 
-from tbcad.cad.formats.csv_table import Row, write_table
-from tbcad.cad.formats.step_assembly import write_assembly
-from tbcad.cad.kernel.assembly import ColouredSolid, SolidGroup
+from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.kernel.solids import common, one_solid, sphere
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan, read_plan
 from tbcad.light.simulate.scene.exported import ExportedDesign

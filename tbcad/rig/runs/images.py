@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.cad.formats.images.pictures import Picture, picture_of, read_picture
+from tbcad.cad.formats.pictures import Picture, picture_of, read_picture
 from tbcad.errors import InputError
 
 Image16: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.cad.formats.checked_files import parse_json
-from tbcad.cad.formats.images.pictures import PICTURE_SUFFIXES
+from tbcad.cad.formats.pictures import PICTURE_SUFFIXES
 from tbcad.errors import InputError
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, exposure_name
 from tbcad.records.run import JOURNAL, RECORD, RunRecord, read_record

@@ -9,7 +9,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.led_dome import disc_images, dome_samples
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import (

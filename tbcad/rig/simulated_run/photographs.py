@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from tbcad.common.compiled import compiled
-from tbcad.core.optics.pedestals.walls import NO_WALLS, GrooveWalls
+from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.light.simulate.capture.photograph import row_bands
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.light.simulate.prototype.plan import HALF_TURN

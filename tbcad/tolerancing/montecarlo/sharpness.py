@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.core.mirrors.array import design
 from tbcad.core.optics.camera import Camera
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory

@@ -14,7 +14,7 @@ import numpy as np
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.vectors import dot, perpendicular_axes
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.tolerancing.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
 from tbcad.types import Floats, Ints
 

@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, ValidationError
 
+from tbcad.core.spec.csv_rows import Table, read_toml, toml_value
 from tbcad.core.spec.errors import (
     SpecError,
     dotted_fields,
@@ -22,7 +23,6 @@ from tbcad.core.spec.errors import (
     unknown_key,
     validation_error,
 )
-from tbcad.core.spec.files import Table, read_toml, toml_value
 from tbcad.core.spec.prototype import GradeName
 from tbcad.core.spec.section import Section
 from tbcad.prototype.balls.catalogue import load_grades

@@ -11,7 +11,7 @@ from tbcad_verify.report.summary import MAX_LINES
 from tbcad.common.screen import WIDTH
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.tolerancing.as_made import as_made
+from tbcad.tolerancing.montecarlo.builds import as_made
 
 README = Path(__file__).parents[3] / "README.md"
 

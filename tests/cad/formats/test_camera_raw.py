@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.images.pictures import picture_of, read_picture
+from tbcad.cad.formats.pictures import picture_of, read_picture
 from tbcad.errors import InputError
 from tbcad.rig.control.cameras.image_facts import image_facts
 from tests.raw_photographs import dng

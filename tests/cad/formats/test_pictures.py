@@ -12,7 +12,7 @@ import pytest
 import tifffile
 from PIL import Image
 
-from tbcad.cad.formats.images.pictures import decoded, picture_of, read_picture, visible_files
+from tbcad.cad.formats.pictures import decoded, picture_of, read_picture, visible_files
 from tbcad.errors import InputError
 
 RANDOM = np.random.default_rng(5)

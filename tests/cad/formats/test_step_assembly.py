@@ -10,8 +10,7 @@ from OCP.Interface import Interface_Static
 from OCP.TDocStd import TDocStd_Document
 
 from tbcad.cad.formats import step_assembly
-from tbcad.cad.formats.step_assembly import write_assembly
-from tbcad.cad.kernel.assembly import ColouredSolid, SolidGroup
+from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
 from tbcad.cad.kernel.solids import sphere
 
 GREY, CLEAR = (0.5, 0.5, 0.5, 1.0), (0.1, 0.2, 0.3, 0.4)

@@ -8,7 +8,7 @@ import pytest
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.formats.step_mirror import NoMirrorImageError, mirrored_step
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import properties
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.shell.files import camera_solid
 from tests.helpers import read_step

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.cad.kernel.mesh import Mesh
 
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from tbcad_verify.mesh.threemf import _corners
 
-from tbcad.cad.formats.threemf import write_3mf
+from tbcad.cad.formats.mesh_files import write_3mf
 from tbcad.cad.kernel.mesh import Mesh
 
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from tbcad.cad.formats.toml import toml_text
+from tbcad.cad.formats.checked_files import toml_text
 
 
 @pytest.mark.parametrize("value", [1, 2.5, True, 'a "b" \\', (1.0, (2.0, -3.0)), ("a", "b"), ()])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tbcad.core.camera.lens import (
+from tbcad.core.camera.requirements import (
     DepthRange,
     Lens,
     aperture_stop,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tbcad.core.camera.lens import DepthRange
 from tbcad.core.camera.requirements import (
+    DepthRange,
     camera_requirements,
     exposure_seconds,
     image_distances,

@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from tbcad.core.geometry.conics import Spheroid, enclosing_offset, wall_offset
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid, Spheroid, enclosing_offset, wall_offset
 from tbcad.core.geometry.vectors import norm, unit
 
 ELLIPSOID = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.geodesic import geodesic
 

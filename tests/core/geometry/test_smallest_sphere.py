@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.smallest_sphere import smallest_sphere
+from tbcad.core.geometry.round_cones import smallest_sphere
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tbcad.core.mirrors.array import design
-from tbcad.core.optics.object_light import closest_passage
+from tbcad.core.mirrors.clearance import closest_passage
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 

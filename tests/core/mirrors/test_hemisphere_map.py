@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tbcad
-from tbcad.core.mirrors.hemisphere_map import SIZE_PX, equal_area, hemisphere_map
+from tbcad.core.mirrors.record import SIZE_PX, equal_area, hemisphere_map
 
 
 def test_areas_are_equal() -> None:

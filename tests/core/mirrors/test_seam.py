@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from tbcad.core.mirrors.array import MirrorArray, design
-from tbcad.core.mirrors.seam import aimed, cut_positions, seam_gaps
 from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.optics.windows import aimed, cut_positions, seam_gaps
 from tbcad.core.spec.load import load_spec
 
 

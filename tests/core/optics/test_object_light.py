@@ -5,7 +5,7 @@ import pytest
 
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.optics.object_light import closest_passage, passing_distances
+from tbcad.core.mirrors.clearance import closest_passage, passing_distances
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.spec.load import load_spec
 from tests.mirror_arrays import mirror_array

@@ -13,10 +13,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from tbcad.core.spec.design import FootFlangeSpec, Spec
+from tbcad.core.spec.design import FootFlangeSpec, PrinterSpec, Spec
 from tbcad.core.spec.errors import SpecError, allowed_text, dotted_fields, nearest_key, section_of
 from tbcad.core.spec.load import load_spec, spec_dict
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import GradeName
 from tbcad.core.spec.sizes import OpticsSpec
 from tbcad.errors import InputError

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tbcad.app.cli import run
-from tbcad.cad.formats.csv_table import write_table
+from tbcad.cad.formats.checked_files import write_table
 from tbcad.errors import InputError
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_magnets, cap_pocket, cap_spigot

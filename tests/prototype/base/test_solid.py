@@ -11,16 +11,15 @@ from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_SphericalSurface
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.checks import check_pads, check_volume
+from tbcad.cad.kernel.checks import check_pads, check_volume, plane_faces, properties, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height, loops, relief
-from tbcad.cad.kernel.measures import plane_faces, properties, volume
 from tbcad.cad.kernel.meshing import volume_by_meshes
 from tbcad.cad.kernel.solids import cut, cylinder, faces, fused, one_solid
 from tbcad.core.geometry.vectors import dot, norm
 from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import seat_solids

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.joints import flange_profile

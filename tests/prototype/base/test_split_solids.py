@@ -10,12 +10,12 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.checks import plane_faces, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height
-from tbcad.cad.kernel.measures import plane_faces, volume
 from tbcad.cad.kernel.meshing import volume_by_meshes
 from tbcad.cad.kernel.solids import solids
 from tbcad.core.geometry.vectors import norm
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import SCREW_MM

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.solids import faces, polyhedron, revolved_polygon
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import BaseSpec

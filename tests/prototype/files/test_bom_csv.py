@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.csv_table import write_table
+from tbcad.cad.formats.checked_files import write_table
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout

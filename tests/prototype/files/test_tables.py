@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tbcad.cad.formats.csv_table import write_table
+from tbcad.cad.formats.checked_files import write_table
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import properties
 from tbcad.cad.kernel.solids import faces, fused, one_solid
 from tbcad.core.geometry.primitives import Slot, slot_parts, volume
 from tbcad.core.geometry.vectors import unit

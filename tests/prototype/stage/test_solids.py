@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.printing.placing import PlacedSolid, placed_component

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tbcad.core.mirrors.record import write_record
-from tbcad.core.optics.pedestals.walls import NO_WALLS
+from tbcad.core.optics.pedestals.cells import NO_WALLS
 from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.prototype.ball_rays import BallHits, ball_hits
 from tbcad.light.simulate.prototype.merge import merge_plan, merged_pixels

@@ -14,20 +14,18 @@ from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.form import (
-    TERMS,
-    mean_square_slope,
-    monomials,
-    ray_spread,
-    term_polynomials,
-    term_shares,
-)
-from tbcad.tolerancing.montecarlo.form_samples import (
     FORM_COLUMNS,
     HEIGHT,
     PER_MM,
+    TERMS,
     form_numbers,
     height,
+    mean_square_slope,
+    monomials,
+    ray_spread,
     slope,
+    term_polynomials,
+    term_shares,
 )
 from tests.tolerancing.exact_fields import wavy_coverage
 from tests.tolerancing.montecarlo.every_edge import every_edge

@@ -25,14 +25,13 @@ from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.step.mandrel_checks import mandrel_comparisons, mandrel_step_checks
 from tbcad_verify.step.step_file import read_step_files
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_a_mesh
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh
+from tbcad.shell.files import camera_a_mandrel_mesh, camera_a_mesh
 from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 
 SETTINGS = ["n=4", "shell.negative=true", "width_px=200", "height_px=150"]

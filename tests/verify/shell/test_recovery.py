@@ -15,7 +15,7 @@ from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec

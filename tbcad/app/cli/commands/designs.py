@@ -68,7 +68,7 @@ def init(
 
 def _about_designs() -> dict[str, str]:
     """The designs that come with tbcad, with the first paragraph that each says of itself."""
-    from tbcad.core.spec.files import read_text
+    from tbcad.core.spec.csv_rows import read_text
     from tbcad.core.spec.load import shipped_designs
 
     about = {}

@@ -18,9 +18,9 @@ from tbcad.core.optics.pedestals.borders import (
     CellPairs,
     PedestalLayout,
     cell_pairs,
+    outline_sides,
     pedestal_layout,
 )
-from tbcad.core.optics.pedestals.sides import outline_sides
 from tbcad.core.optics.power_diagram import (
     PLANES,
     NotRegularError,

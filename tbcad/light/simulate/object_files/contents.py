@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.cad.formats.images.pictures import Picture, picture_of
+from tbcad.cad.formats.pictures import Picture, picture_of
 from tbcad.common.srgb import srgb
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.types import Bytes, Floats, Ints

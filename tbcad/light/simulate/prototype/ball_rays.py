@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.common.compiled import compiled
 from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.camera import LensCamera
-from tbcad.core.optics.pedestals.walls import NO_WALLS, GrooveWalls
+from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.core.optics.reflection import reflect
 from tbcad.light.simulate.capture.photograph import Samples, sample_shifts, to_bytes
 from tbcad.light.simulate.prototype.run import PrototypeRun

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from tbcad.core.geometry.smallest_sphere import smallest_sphere
+from tbcad.core.geometry.round_cones import smallest_sphere
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import (

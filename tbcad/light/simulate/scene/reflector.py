@@ -7,8 +7,7 @@ import numpy as np
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.cells import Cells
-from tbcad.core.optics.pedestals.cells import PedestalCells
-from tbcad.core.optics.pedestals.walls import GrooveWalls, groove_walls
+from tbcad.core.optics.pedestals.cells import GrooveWalls, PedestalCells, groove_walls
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 

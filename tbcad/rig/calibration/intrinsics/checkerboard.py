@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.cad.formats.images.pictures import visible_files
+from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
 from tbcad.rig.calibration.intrinsics.boards import (
     MIN_CORNERS,

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import yaml
 
-from tbcad.core.spec.files import read_text
+from tbcad.core.spec.csv_rows import read_text
 from tbcad.errors import InputError
 from tbcad.rig.calibration.intrinsics.camera_tree import Tree, camera_lens
 from tbcad.rig.calibration.intrinsics.lens import USABLE, CalibratedLens, lens_of

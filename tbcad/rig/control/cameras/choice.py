@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
 
-from tbcad.cad.formats.images.pictures import visible_files
+from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
 from tbcad.records.exposure import PhaseTimes
 from tbcad.rig.control.cameras.camera import RunCamera, Shot

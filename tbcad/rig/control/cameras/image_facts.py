@@ -13,9 +13,8 @@ from typing import Any
 
 from PIL import Image
 
-from tbcad.cad.formats.images.camera_raw import RAW_SUFFIXES
-from tbcad.cad.formats.images.pictures import PICTURE_SUFFIXES
-from tbcad.cad.formats.images.tiff_pictures import TIFF_SIGNATURES
+from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, RAW_SUFFIXES
+from tbcad.cad.formats.pixels import TIFF_SIGNATURES
 from tbcad.errors import InputError
 from tbcad.records.exposure import Setting
 from tbcad.rig.control.machine import CameraFault

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.light.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
 from tbcad.light.simulate.scene.exported import ExportedDesign

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from tbcad.cad.formats.threemf import write_3mf
+from tbcad.cad.formats.mesh_files import write_3mf
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.threemf import read_3mf

@@ -1,8 +1,15 @@
-"""prototype.step: all parts in one tree of named, coloured solids; the same bytes each time."""
+"""Named, coloured solids in groups, as prototype.step (one tree) and prototype.glb (to look at).
+
+Both have the same bytes each time; glTF demands metres and y up.
+"""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
+import numpy as np
+import trimesh
 from OCP.BRep import BRep_Builder
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Writer
@@ -14,10 +21,13 @@ from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape, TopoDS_Solid
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from OCP.XSControl import XSControl_WorkSession
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 from tbcad.cad.formats.step import END as STEP_END
 from tbcad.cad.formats.step import (
@@ -27,9 +37,76 @@ from tbcad.cad.formats.step import (
     kernel_settings,
     write_header,
 )
-from tbcad.cad.kernel.assembly import Colour, ColouredSolid, SolidGroup
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.meshing import meshed
+from tbcad.cad.kernel.solids import moved, solids
+from tbcad.common.srgb import srgb_light
+from tbcad.types import Floats
 
+Colour: TypeAlias = tuple[float, float, float, float]
+"""Red, green, blue (sRGB) and opacity, from 0 to 1."""
+
+
+# Of meshes that are only looked at.
+DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25
 END = "ENDSEC;\nEND-ISO-10303-21;"
+# Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
+UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
+METAL, ROUGH = 0.1, 0.6
+
+
+@dataclass(frozen=True)
+class ColouredSolid:
+    """One solid."""
+
+    name: str  # unique in the assembly
+    shape: TopoDS_Solid  # in its place, the base at angle zero
+    colour: Colour  # red, green, blue (sRGB) and opacity, from 0 to 1
+    mesh: Mesh | None = None  # of the shape; None where none is known
+
+    def copy(self, name: str, axes: Floats, origin: Floats) -> "ColouredSolid":
+        """One like it under another name, moved: axes are what x, y and z become, as rows."""
+        mesh = self.mesh and Mesh(self.mesh.vertices @ axes + origin, self.mesh.triangles)
+        return ColouredSolid(name, solids(moved(self.shape, axes, origin))[0], self.colour, mesh)
+
+
+@dataclass(frozen=True)
+class SolidGroup:
+    """Bodies that belong together."""
+
+    name: str
+    bodies: tuple[ColouredSolid, ...]
+
+
+@dataclass(frozen=True)
+class ColouredMesh:
+    """What is seen of one solid: name and colour as of `ColouredSolid`."""
+
+    name: str
+    mesh: Mesh
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class MeshGroup:
+    """Meshes that belong together."""
+
+    name: str
+    bodies: tuple[ColouredMesh, ...]
+
+
+def mesh_groups(groups: Sequence[SolidGroup]) -> list[MeshGroup]:
+    """What is seen of groups of solids, without shapes of the kernel."""
+    return [MeshGroup(group.name, tuple(map(_drawn, group.bodies))) for group in groups]
+
+
+def _drawn(body: ColouredSolid) -> ColouredMesh:
+    return ColouredMesh(body.name, body.mesh or display_mesh(body.shape), body.colour)
+
+
+def display_mesh(shape: TopoDS_Solid) -> Mesh:
+    """A coarse mesh, to be looked at."""
+    return meshed(shape, DISPLAY_MM, DISPLAY_ANGLE)
 
 
 @kernel_settings()
@@ -145,3 +222,35 @@ def _style(first: int, item: int, colour: Colour) -> Iterator[str]:
             f"#{first + 7},{properties});"
         )
         yield f"#{first + 9}=SURFACE_STYLE_TRANSPARENT({1 - float(opaque):.6f});"
+
+
+def write_glb(path: Path, name: str, groups: Sequence[MeshGroup]) -> None:
+    """Write groups of meshes as a binary glTF 2.0 file, a node for each group and each mesh."""
+    scene = trimesh.Scene(base_frame="world")
+    scene.graph.update(name, "world", matrix=UPRIGHT)
+    for group in groups:
+        scene.graph.update(group.name, name, matrix=np.eye(4))
+        for body in group.bodies:
+            scene.add_geometry(
+                _drawn_in_glb(body),
+                node_name=body.name,
+                geom_name=body.name,
+                parent_node_name=group.name,
+            )
+    # Without normals viewers must shade each facet flat (glTF 2.0, 3.7.2.1), as it is.
+    path.write_bytes(export_glb(scene, include_normals=False))
+
+
+def _drawn_in_glb(body: ColouredMesh) -> trimesh.Trimesh:
+    drawn = trimesh.Trimesh(body.mesh.vertices, body.mesh.triangles, process=False)
+    drawn.visual = TextureVisuals(
+        material=PBRMaterial(
+            name=body.name,
+            # light, not its code (glTF 2.0, 3.9.2)
+            baseColorFactor=[*srgb_light(np.array(body.colour[:3])), body.colour[3]],
+            metallicFactor=METAL,
+            roughnessFactor=ROUGH,
+            alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",
+        )
+    )
+    return drawn

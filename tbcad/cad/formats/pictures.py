@@ -15,24 +15,28 @@ from typing import Any
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from tbcad.cad.formats.images.camera_raw import RAW_SUFFIXES, raw_picture
-from tbcad.cad.formats.images.pixels import (
+from tbcad.cad.formats.pixels import (
     GIVE,
+    TIFF_SIGNATURES,
     Picture,
     as_light,
+    check_pixels,
     damaged,
     import_of_machine,
+    tiff_picture,
     transparent,
     without_alpha,
 )
-from tbcad.cad.formats.images.tiff_pictures import TIFF_SIGNATURES, tiff_picture
 from tbcad.errors import InputError
 
+RAW_SUFFIXES = (
+    *(".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dcr", ".dng", ".erf", ".iiq", ".kdc", ".mef"),
+    *(".mos", ".mrw", ".nef", ".nrw", ".orf", ".pef", ".raf", ".raw", ".rw2", ".rwl", ".sr2"),
+    *(".srf", ".srw", ".x3f"),
+)
 __all__ = ["PICTURE_SUFFIXES", "Picture", "decoded", "picture_of", "read_picture", "visible_files"]
-
 PICTURE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", *RAW_SUFFIXES)
 """Files that are looked for in a folder of photographs."""
-
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF")  # beside TIFF and raw files
 _AS_THEY_ARE = ("L", "RGB", "I;16", "I;16B", "I;16L", "I;16N")
 _WITH_ALPHA = {"LA": "LA", "La": "LA", "RGBA": "RGBA", "RGBa": "RGBA", "P": "RGBA", "PA": "RGBA"}
@@ -45,6 +49,42 @@ _REFUSED = {
 }
 _PNG, _PNG_DEPTH, _PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # places of its header's bytes
 _JPEG_SCAN, _JPEG_END = 0xDA, b"\xff\xd9"
+
+
+def raw_picture(data: bytes, name: str) -> Picture:
+    """Light in the camera's own colours, (h, w, 3) or (h, w), uint16, proportional to light.
+
+    The black level is 0 and the white level 65535. No white balance (an automatic one differs
+    between photographs), no colour matrix, no automatic brightness, no turn by the orientation;
+    colours between the pixels of the mosaic by linear interpolation. InputError if LibRaw cannot
+    read it, or rawpy is not installed.
+    """
+    rawpy = import_of_machine("rawpy", name)
+    try:
+        with rawpy.imread(BytesIO(data)) as raw:
+            check_pixels(name, raw.sizes.width, raw.sizes.height)
+            pixels = raw.postprocess(_linear(rawpy))
+    except rawpy.LibRawError as error:
+        reason = error.args[0] if error.args else ""
+        words = reason.decode("ascii", "replace") if isinstance(reason, bytes) else reason
+        raise InputError(
+            f"{name} is damaged, or of a camera that LibRaw does not know: {words}: save it as DNG "
+            "or as TIFF of 16 bits"
+        ) from None
+    return np.asarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels)
+
+
+def _linear(rawpy: Any) -> Any:
+    return rawpy.Params(
+        demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
+        user_wb=[1.0, 1.0, 1.0, 1.0],
+        output_color=rawpy.ColorSpace.raw,
+        output_bps=16,
+        gamma=(1, 1),
+        no_auto_bright=True,
+        adjust_maximum_thr=0.0,  # else the white level follows the brightest pixel
+        user_flip=0,
+    )
 
 
 def read_picture(path: Path) -> Picture:
