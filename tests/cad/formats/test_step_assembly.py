@@ -9,7 +9,7 @@ from cadquery.occ_impl.assembly import toCAF
 from OCP.Interface import Interface_Static
 from OCP.TDocStd import TDocStd_Document
 
-from tbcad.cad.formats import step_assembly
+from tbcad.cad.formats import assembly
 from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
 from tbcad.cad.kernel.solids import sphere
 
@@ -40,7 +40,7 @@ def by_cadquery(name: str, groups: tuple[SolidGroup, ...]) -> TDocStd_Document:
 def test_the_same_bytes_as_by_cadquery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     groups = SolidGroup("balls", balls()), SolidGroup("views", (view(),))
     write_assembly(tmp_path / "ours.step", "prototype", groups)
-    monkeypatch.setattr(step_assembly, "_document", by_cadquery)
+    monkeypatch.setattr(assembly, "_document", by_cadquery)
     write_assembly(tmp_path / "theirs.step", "prototype", groups)
     assert (tmp_path / "ours.step").read_bytes() == (tmp_path / "theirs.step").read_bytes()
 
