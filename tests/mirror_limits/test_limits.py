@@ -63,13 +63,6 @@ def test_an_offset_moves_the_apex_along_the_normal(small_design: MirrorDesign) -
     assert built[:, CURVATURE] == pytest.approx(designed[:, CURVATURE], rel=1e-12)
 
 
-def test_a_radius_leaves_the_apex_in_its_place(small_design: MirrorDesign) -> None:
-    m = len(small_design.arrays[0])
-    designed, built = moved(small_design, radius=np.full((1, m), 0.2))
-    assert built[:, APEX] == pytest.approx(designed[:, APEX], abs=1e-12)
-    assert 1 / built[:, CURVATURE] == pytest.approx(1 / designed[:, CURVATURE] + 0.2, rel=1e-12)
-
-
 def test_a_tilt_turns_the_normal_at_the_apex(small_design: MirrorDesign) -> None:
     """The sphere's normal at the designed apex: (apex - centre) / r, in the light's direction."""
     m = len(small_design.arrays[0])

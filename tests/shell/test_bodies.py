@@ -26,7 +26,7 @@ VOLUME_ERROR = {"shell": 3e-4, "mandrel": 3e-5}
 EVERY_BODY = pytest.mark.parametrize(
     ("body", "edges"), list(product(SOLID_OF, ("valley", "pedestal")))
 )
-MORE = [["n=13"], ["n=9", "radius_rule=paper"]]
+MORE = [["n=6", "radius_rule=paper"]]
 HOLES = ["n=3", "shell.seam_flange.dowels=0", "shell.foot_flange.bolts=12"]
 
 

@@ -2,7 +2,6 @@
 
 import math
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,11 +26,6 @@ def test_half_the_size() -> None:
     assert (prototype.post_diameter_mm, prototype.camera_diameter_mm) == (10, 40)
     assert (prototype.stage.disc_mm, prototype.stage.leds_mm) == (12, ())
     assert prototype.frame.floor_mm == -180
-
-
-def test_few_mirrors_have_wider_limits_of_direction() -> None:
-    limits = load_spec(None, ["n=3"]).prototype
-    assert limits.auto_direction_max_deg == pytest.approx(math.degrees(math.atan(2)) / 3, abs=0.05)
 
 
 def test_what_the_user_sets_stays() -> None:
