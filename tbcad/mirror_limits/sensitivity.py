@@ -88,9 +88,7 @@ class Sensitivities:
 
     camera: Ints  # number of the virtual camera, (k,)
     mirror: Ints  # number of the mirror, a's first, (k,)
-    # by each kind of deviation that there is, in the worse sense: offset (mm/um), tilt (mm/mrad),
-    # radius (mm/mm), and of pedestals the walls (mm/um), (k, kinds)
-    loss: Floats
+    loss: Floats  # of each kind, the worse way: mm/um, mm/mrad, mm/mm, mm/um, (k, kinds)
     seat: Floats  # lost when both halves sit wrong by a micrometre, mm/um, (v,)
     coverage: Floats  # of each virtual camera as designed, mm, (v,)
 

@@ -200,9 +200,8 @@ def virtual_camera_pixels(array: MirrorArray, spec: Spec) -> tuple[Floats, Ints]
 def size_of(array: MirrorArray) -> float:
     """Longest side of the box round all mirrors' apices and both pinholes, mm."""
     apex = array.apex_distance[:, None] * array.u
-    points = np.abs(np.vstack([apex, array.camera.pinhole])[:, 0]).max()
-    rest = np.vstack([apex, array.camera.pinhole])[:, 1:]
-    return float(max(2 * points, *np.ptp(rest, axis=0)))
+    points = np.vstack([apex, array.camera.pinhole])
+    return float(max(2 * np.abs(points[:, 0]).max(), *np.ptp(points[:, 1:], axis=0)))
 
 
 def store_bytes(key: str, judged: dict[Place, DesignCandidate]) -> bytes:

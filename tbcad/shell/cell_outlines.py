@@ -15,17 +15,12 @@ from tbcad.core.optics.windows import limiting_sides, minima_by_mirror
 from tbcad.core.spec.design import Spec
 from tbcad.types import Bools, Floats, Ints
 
-# A corner's inner point is at most this many strip widths away, where arcs meet at a sharp angle.
-MAX_MITRE = 4.0
-# Share of the distance from outline to middle that the strip takes at most.
-MAX_STRIP_SHARE = 0.1
-# A segment's inner side is at least this share of it: mitres may be longer than a short segment.
-MIN_INNER_SHARE = 0.5
+MAX_MITRE = 4.0  # strip widths that a corner's inner point is away at most, at sharp angles
+MAX_STRIP_SHARE = 0.1  # share of the distance from outline to middle that the strip takes at most
+MIN_INNER_SHARE = 0.5  # of a segment, of its inner side: mitres may be longer than a short segment
 MIN_SEGMENTS = 3
-# Rays off the ends of a segment may cost its mirror this many ray errors of coverage's radius.
-END_RAY_ERRORS = 2.0
-# Start, middle and end of a segment.
-PLACES = np.array([[0.0], [0.5], [1.0]])
+END_RAY_ERRORS = 2.0  # that rays off a segment's ends may cost its mirror of coverage's radius
+PLACES = np.array([[0.0], [0.5], [1.0]])  # start, middle and end of a segment
 
 
 @dataclass(frozen=True)

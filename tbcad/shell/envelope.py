@@ -29,12 +29,9 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints
 
 X, _, Z = np.eye(3)
-# The foot flange reaches past the ends of the seam flange, which stands on it, by this much.
-STEP_MM = 1.0
-# Points on each arc that are looked at for the deepest valley.
-VALLEY_SAMPLES = 5
-# Distance of a point that only says on which side an arc lies.
-FAR_MM = 1e6
+STEP_MM = 1.0  # that the foot flange reaches past the ends of the seam flange on it
+VALLEY_SAMPLES = 5  # points on each arc that are looked at for the deepest valley
+FAR_MM = 1e6  # distance of a point that only says on which side an arc lies
 MAX_WIDENINGS = 100
 Chain = list[tuple[int, bool]]
 """Arcs that follow each other, and whether each runs forward."""

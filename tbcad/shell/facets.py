@@ -25,8 +25,7 @@ from tbcad.shell.cell_outlines import (
 )
 from tbcad.types import Bools, Floats, Ints
 
-# The search is in a plane, so what it finds on a sphere is looked for again from there.
-ROUNDS = 3
+ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked for again from there
 
 
 def means(points: Floats, cell: Ints) -> Floats:
@@ -164,11 +163,10 @@ class _RingMesh:
         return self.mirrors.projected(cell, middle + share * (self.strip[place] - middle))
 
     def _quads(self, k: int, outer: _Ring, kept: Bools, inner: _Ring, points: Floats) -> list[Ints]:
-        """Two triangles for each quad.
+        """Two triangles for each quad; beyond the strip the shorter diagonal avoids obtuse angles.
 
-        In the strip the one on the outline has its right angle at the end of its segment, or at
-        the start where the end is a corner of the cell; further inside the shorter diagonal keeps
-        angles from growing obtuse.
+        In the strip the right angle on the outline is at the segment's end, or its start at a
+        corner.
         """
         a, b = outer.vertex[kept], outer.vertex[outer.following][kept]
         c, d = inner.vertex[inner.following], inner.vertex

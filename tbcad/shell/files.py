@@ -22,9 +22,8 @@ from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.core.mirrors.record import mandrel_files, shell_record
-from tbcad.core.optics.cell_moments import cell_moments
-from tbcad.core.optics.cells import Cells
+from tbcad.core.mirrors.record import part_files
+from tbcad.core.optics.cells import Cells, cell_moments
 from tbcad.core.optics.pedestals.cells import PedestalCells, wall_moments
 from tbcad.core.spec.design import Spec
 from tbcad.records.design import MandrelRecord
@@ -42,7 +41,7 @@ def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -
     """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half."""
     mesh = camera_a_mesh(design, envelope)
     for array in design.arrays:
-        write_half_mesh(folder, shell_record(array), mesh, array)
+        write_half_mesh(folder, part_files("shell", array), mesh, array)
 
 
 def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: MirrorArray) -> None:
@@ -55,15 +54,12 @@ def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: Mirr
 def write_shell_solids(
     design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
 ) -> None:
-    """Write both shells as STEP into a folder; the envelope closes camera a's half.
-
-    InvalidSolidError if the kernel finds a solid invalid.
-    """
+    """Write both shells as STEP; the envelope closes camera a's half; or InvalidSolidError."""
     # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the
     # design is symmetrical about y = 0.
     known, symmetric = None, design.spec.optics.camera_mm[1] == 0
     for array in design.arrays:
-        files = shell_record(array)
+        files = part_files("shell", array)
         if known and symmetric and not design.spec.step.pcurves:
             progress(f"{files['name']}: files")
             _write_mirrored(folder, design.arrays[0], array)
@@ -81,7 +77,7 @@ def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> 
     Readers find in both the same figures to the last digit, which the kernel's own file of the
     mirrored solid would not give: it cuts numbers that are long, and a minus sign is a character.
     """
-    one, other = shell_record(original), shell_record(array)
+    one, other = part_files("shell", original), part_files("shell", array)
     names = [wall_names(some.ids, original.modelled_cells) for some in (original, array)]
     renamed = {one["name"]: other["name"], **dict(zip(original.ids, array.ids, strict=True))}
     renamed |= dict(zip(*names, strict=True))
@@ -103,7 +99,7 @@ def camera_solid(
     SpecError if flanges or holes do not fit, InvalidSolidError if the kernel finds camera a's
     invalid; b's is its mirror image.
     """
-    name, maker = shell_record(array)["name"], Maker(mirrored=array.camera_id == "b")
+    name, maker = part_files("shell", array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
     mirrors = front_edges(maker, cells)
     casing = casing_faces(mirrors, envelope or shell_envelope(design))
@@ -220,13 +216,10 @@ def design_mandrel(design: MirrorDesign) -> Mandrel:
 
 
 def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None:
-    """Write both negatives as STEP, STL and 3MF into a folder; the mandrel is camera a's.
-
-    InvalidSolidError if the kernel finds a solid invalid.
-    """
+    """Write both negatives, the mandrel being a's, as STEP, STL and 3MF; or InvalidSolidError."""
     mesh = camera_a_mandrel_mesh(design, mandrel)
     for array in design.arrays:
-        files = mandrel_files(array)
+        files = part_files("mandrel", array)
         write_half_mesh(folder, files, mesh, array)
         solid = mandrel_solid(design, array, mandrel)
         known = shell_properties(solid, array, negative=True)
@@ -236,11 +229,8 @@ def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None
 def mandrel_solid(
     design: MirrorDesign, array: MirrorArray, mandrel: Mandrel | None = None
 ) -> Solid:
-    """Solid of one camera's negative, face by face; without a mandrel it is worked out.
-
-    Errors are those of `camera_solid`.
-    """
-    name, maker = mandrel_files(array)["name"], Maker(mirrored=array.camera_id == "b")
+    """Solid of one camera's negative, face by face; errors and the mandrel as of `camera_solid`."""
+    name, maker = part_files("mandrel", array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
     front = front_edges(maker, cells)
     closing = closing_faces(front, mandrel or design_mandrel(design))
@@ -263,4 +253,6 @@ def mandrel_record(array: MirrorArray, mandrel: Mandrel) -> MandrelRecord:
     draft = mandrel.draft
     pull = draft.pull * FLIP_X if array.camera_id == "b" else draft.pull
     degrees = round(float(np.degrees(draft.angle)), DRAFT_DIGITS)
-    return MandrelRecord(**mandrel_files(array), pull=(pull + 0.0).tolist(), draft_deg=degrees)
+    return MandrelRecord(
+        **part_files("mandrel", array), pull=(pull + 0.0).tolist(), draft_deg=degrees
+    )

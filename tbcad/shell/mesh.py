@@ -16,8 +16,7 @@ from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.types import Floats, Ints
 
 MIN_HOLE_SEGMENTS = 24
-# Rounding noise of 1e-15 mm on the joining faces is no geometry: they are flat to the last bit.
-ROUNDED_DIGITS = 12
+ROUNDED_DIGITS = 12  # joining faces are flat to the last bit: noise of 1e-15 mm is no geometry
 X, Y, Z = np.eye(3)
 # Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
 FROM_X, FROM_Z = [1, 2], [0, 1]

@@ -47,10 +47,8 @@ from tbcad.tolerancing.stages import (
 )
 from tbcad.types import Floats
 
-# Simulated builds in each step of a search; the process itself has as many as asked for.
-SEARCH_BUILDS = 100
-# Builds whose pictures are simulated.
-PHOTOGRAPHED_BUILDS = 2
+SEARCH_BUILDS = 100  # in each step of a search; the process itself has as many as asked for
+PHOTOGRAPHED_BUILDS = 2  # builds whose pictures are simulated
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,11 @@ def analyse(
 
     InputError if mirrors are planar, or the scheduler cannot be reached.
     """
-    _refuse_planar(export)
+    if not (export.reflectors[0].mirrors.curvature > 0).all():
+        raise InputError(
+            f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
+            "with --radius-rule traced"
+        )
     errors = process_errors(process, export.spec.mirrors.coating_um)
     simulator = _Simulator(export, options, edge_models(export.reflectors))
     options.progress(builds_stage(options.builds, process.name))
@@ -128,14 +130,6 @@ def analyse(
         process, options, export.capture_mm, export.reflectors, simulator.edge_models, result,
         single_errors, process_options, own_margin, sharp, prototype,
     )  # fmt: skip
-
-
-def _refuse_planar(export: ExportedDesign) -> None:
-    if not (export.reflectors[0].mirrors.curvature > 0).all():
-        raise InputError(
-            f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
-            "with --radius-rule traced"
-        )
 
 
 @dataclass(frozen=True)

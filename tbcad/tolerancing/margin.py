@@ -40,10 +40,8 @@ Of s builds the first half is judged; means and deviations are those of the othe
 had set both would seem to be good more often than others are.
 """
 MAX_ROUNDS = 5
-# Deviation below which a loss counts as known, mm: rounding.
-KNOWN_MM = 1e-6
-# A mirror that covers more than this beyond its target has the largest radius allowed.
-FREE_MM = 1e-3
+KNOWN_MM = 1e-6  # deviation below which a loss counts as known, mm: rounding
+FREE_MM = 1e-3  # a mirror that covers so much beyond its target has the largest radius allowed
 FLIP_Y = np.array([1.0, -1.0, 1.0])
 
 
@@ -145,12 +143,8 @@ class MirrorLosses:
     """Coverage that the m mirrors of both halves lose in s builds."""
 
     loss: Floats  # of mirror i of camera a, then of camera b, mm, (s, 2, m)
-    # loss up to which the design covers enough whatever its margins, because a mirror is nearly
-    # flat, mm; minus infinity for all others, (m,)
-    spare: Floats
-    # number of the mirror at the same place on the other side of y = 0, its own where the design
-    # has no such symmetry, (m,)
-    partner: Ints
+    spare: Floats  # loss that a nearly flat mirror may have, mm; others -inf, (m,)
+    partner: Ints  # the mirror's image in y = 0, itself without such symmetry, (m,)
 
     @property
     def nearly_flat(self) -> Bools:

@@ -12,8 +12,7 @@ from tbcad.tolerancing.montecarlo.edge_model import EdgeModel
 from tbcad.tolerancing.montecarlo.form import ray_spread
 from tbcad.types import Floats
 
-# Share of the builds whose coverage lies below what the map shows.
-LOW_SHARE = 0.05
+LOW_SHARE = 0.05  # share of the builds whose coverage lies below what the map shows
 MICROMETRE = 1e-3  # mm
 
 

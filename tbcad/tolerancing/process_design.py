@@ -135,12 +135,8 @@ class TriedEdges:
     """A design with one kind of edges, for a process."""
 
     edges: EdgeKind
-    # with the margins that the process needs; None where there are none, or where even without them
-    # too few pixels are left
-    made: ProcessDesign | None
-    # of a virtual camera of it, or of the most that any margins leave; None where there is no
-    # design
-    pixels: SeeingPixels | None
+    made: ProcessDesign | None  # with the margins needed; None: none, or too few pixels
+    pixels: SeeingPixels | None  # of it, or the most that margins leave; None: no design
     error: InputError | None = None  # why there is no design, or None
 
 

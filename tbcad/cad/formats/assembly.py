@@ -11,7 +11,6 @@ from typing import TypeAlias
 import numpy as np
 import trimesh
 from OCP.BRep import BRep_Builder
-from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
@@ -22,19 +21,17 @@ from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape, TopoDS_Solid
-from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from OCP.XSControl import XSControl_WorkSession
 from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from tbcad.cad.formats.step import END as STEP_END
 from tbcad.cad.formats.step import (
     StepError,
-    check_complete,
-    incomplete,
+    finish,
     kernel_settings,
+    new_document,
     write_header,
 )
 from tbcad.cad.kernel.mesh import Mesh
@@ -47,9 +44,7 @@ Colour: TypeAlias = tuple[float, float, float, float]
 """Red, green, blue (sRGB) and opacity, from 0 to 1."""
 
 
-# Of meshes that are only looked at.
-DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25
-END = "ENDSEC;\nEND-ISO-10303-21;"
+DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25  # of meshes that are only looked at
 # Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
 UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
 METAL, ROUGH = 0.1, 0.6
@@ -126,20 +121,12 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     _number_occurrences(step_writer)
     write_header(step_writer, name)
     colours = _colours(step_writer, [body for group in groups for body in group.bodies])
-    if writer.Write(str(path)) != IFSelect_RetDone:
-        raise incomplete(path)
-    check_complete(path, STEP_END)
-    text, end, rest = path.read_text(encoding="ascii").rpartition(END)
-    path.write_text(text + colours + end + rest, encoding="ascii")
+    finish(path, writer, lambda _: colours)
 
 
 def _document(name: str, groups: Sequence[SolidGroup]) -> TDocStd_Document:
-    """The tree of named solids as the kernel's document.
-
-    As cadquery's `Assembly` has it; cadquery takes longer to load than the tree to be made.
-    """
-    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    """The tree of named solids as cadquery's `Assembly` has it, which takes longer to load."""
+    document = new_document()
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     tool.SetAutoNaming_s(False)
     top = _named(tool.NewShape(), name)
@@ -178,10 +165,7 @@ def _number_occurrences(writer: STEPControl_Writer) -> None:
 
 
 def _colours(writer: STEPControl_Writer, bodies: Sequence[ColouredSolid]) -> str:
-    """Text of the styled items of all bodies.
-
-    Source: CAx-IF, Recommended Practices for Model Styling and Organization, section 4.
-    """
+    """Styled items of all bodies (CAx-IF, Recommended Practices for Model Styling, section 4)."""
     styles, model = STEPConstruct_Styles(writer.WS()), writer.Model()
     # The binding's model.Number finds nothing; the same entity is the same object here, though.
     entities = [model.Value(k) for k in range(1, model.NbEntities() + 1)]

@@ -19,8 +19,7 @@ from tbcad.types import Bytes, Floats, Ints
 
 HEADER = bytes(80)
 FACET = np.dtype([("numbers", "<f4", 12), ("attributes", "<u2")])
-# A triangle of less area than half of this, mm^2, has no direction.
-NO_AREA = 1e-13
+NO_AREA = 1e-13  # a triangle of less area than half of this, mm^2, has no direction
 DECIMALS = 6
 PLY_VERTEX = np.dtype([("place", "<f4", 3), ("colour", "u1", 3)])
 PLY_PROPERTIES = (
@@ -96,10 +95,7 @@ def _written(wrapper: Any, writer: Any) -> bytes:
 
 
 def _set_geometry(wrapper: Any, part: Any, mesh: Mesh) -> None:
-    """Hand the mesh over as it is in memory.
-
-    The library's own method makes an object of each vertex and triangle first.
-    """
+    """Hand the mesh over as it is: the library's own method makes an object of each facet first."""
     vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float32)
     triangles = np.ascontiguousarray(mesh.triangles, dtype=np.uint32)
     call = wrapper.lib.lib3mf_meshobject_setgeometry

@@ -1,7 +1,7 @@
 """STEP: the exact solid, its faces named, the same bytes for the same design."""
 
 import errno
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -25,10 +25,12 @@ from OCP.STEPControl import (
 )
 from OCP.StepGeom import StepGeom_Plane, StepGeom_SphericalSurface
 from OCP.StepShape import StepShape_AdvancedFace, StepShape_ManifoldSolidBrep
-from OCP.TCollection import TCollection_HAsciiString
+from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
+from OCP.XCAFApp import XCAFApp_Application
 from scipy.spatial import cKDTree
 
 from tbcad.cad.kernel.brep import Solid
@@ -41,8 +43,7 @@ TAIL_BYTES = 64  # of a file, in which its last mark must be
 SURFACE_CURVES = "write.surfacecurve.mode"
 _SETTINGS = RLock()
 END = b"END-ISO-10303-21;"  # of every STEP file
-# A fixed time stamp: the file's bytes then depend on the design alone.
-TIME_STAMP = "2022-11-01T00:00:00"
+TIME_STAMP = "2022-11-01T00:00:00"  # fixed: the file's bytes depend on the design alone
 Place: TypeAlias = tuple[float, ...]
 """Kind, location (mm) and axis of a surface."""
 PLANE, SPHERE = 1.0, 2.0
@@ -168,6 +169,22 @@ def _name_product(writer: STEPControl_Writer, name: str) -> None:
         if not unnamed:  # both are among the first of ten thousands
             return
     raise StepError(f"the kernel wrote no product or no solid of {name}")
+
+
+def new_document() -> TDocStd_Document:
+    """An empty document of the kernel."""
+    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
+    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    return document
+
+
+def finish(path: Path, writer: STEPControl_Writer, entities: Callable[[str], str]) -> None:
+    """Write a file, and at its end what entities are for its text; OSError if not in full."""
+    if writer.Write(str(path)) != IFSelect_RetDone:
+        raise incomplete(path)
+    check_complete(path, END)
+    text, end, rest = path.read_text(encoding="ascii").rpartition("ENDSEC;\nEND-ISO-10303-21;")
+    path.write_text(text + entities(text) + end + rest, encoding="ascii")
 
 
 def write_header(writer: STEPControl_Writer, name: str) -> None:

@@ -67,8 +67,7 @@ def properties(shape: TopoDS_Shape) -> SolidProperties:
 class FaceIntegrals:
     """Integrals over faces, by which they add up to those of a solid."""
 
-    # any point near the faces, mm, (3,): the nearer, the less errors of the kernel count
-    origin: Floats
+    origin: Floats  # any point near the faces, mm, (3,): errors grow with its distance
     volume: float  # between the origin and the faces, mm^3
     volume_moment: Floats  # of the distance from the origin over that volume, mm^4, (3,)
     area: float  # mm^2

@@ -26,8 +26,7 @@ from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.types import Floats, Ints
 
 SIDES = 48
-# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
-ANGLE = 0.2
+ANGLE = 0.2  # facets of cylinders and cones: no coarser than a turn of this angle (radians)
 # The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
 MERGE_MM = 2e-5
 

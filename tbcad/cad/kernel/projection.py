@@ -75,8 +75,9 @@ def project(shape: TopoDS_Shape, axes: Floats, *, hidden: bool = True) -> Projec
     algorithm.Update()
     algorithm.Hide()
     drawn = HLRBRep_HLRToShape(algorithm)
-    front = _curves((drawn.VCompound(), drawn.OutLineVCompound()))
-    behind = _curves((drawn.HCompound(), drawn.OutLineHCompound())) if hidden else ()
+    front = _unique(_of_shapes((drawn.VCompound(), drawn.OutLineVCompound())))
+    other = (drawn.HCompound(), drawn.OutLineHCompound()) if hidden else ()
+    behind = _unique(_of_shapes(other))
     return Projection(front, tuple(one for one in behind if one not in set(front)))
 
 
@@ -86,10 +87,6 @@ def section(shape: TopoDS_Shape, axes: Floats, level: float) -> tuple[Curve, ...
     tool = BRepAlgoAPI_Section(shape, gp_Pln(gp_Pnt(*(level * axes[2]).tolist()), normal), False)
     tool.Build()
     return _unique(_flat(edge, axes) for edge in edges(tool.Shape()))
-
-
-def _curves(shapes: Iterable[TopoDS_Shape | None]) -> tuple[Curve, ...]:
-    return _unique(_of_shapes(shapes))
 
 
 def _of_shapes(shapes: Iterable[TopoDS_Shape | None]) -> Iterator[Curve | None]:

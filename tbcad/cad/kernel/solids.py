@@ -69,8 +69,7 @@ if TYPE_CHECKING:
     from cadquery import Workplane
 
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
-# With the kernel's own 1e-7 a fuse of many bodies loses some of them now and then, silently.
-SAME_MM = 1e-6
+SAME_MM = 1e-6  # with the kernel's own 1e-7 a fuse of many bodies loses some of them silently
 
 
 def polygon(points: Floats) -> TopoDS_Face:
@@ -264,10 +263,7 @@ def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape
 
 
 def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
-    """The one closed solid that a shape must be.
-
-    InvalidSolidError if it is several, or the kernel's check finds it invalid.
-    """
+    """The one closed, valid solid that a shape must be; else InvalidSolidError."""
     bodies = solids(shape)
     if len(bodies) != 1:
         raise InvalidSolidError(f"{name}: {len(bodies)} solids where one should be")
@@ -277,10 +273,7 @@ def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
 
 
 def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:
-    """The solid within the outermost faces.
-
-    Bodies that touch can close in a crumb of air between them, which no printer could empty.
-    """
+    """The solid within the outermost faces: no printer could empty crumbs of air between bodies."""
     return BRepBuilderAPI_MakeSolid(BRepClass3d.OuterShell_s(solid)).Solid()
 
 
@@ -294,10 +287,7 @@ def as_part(label: str, shape: TopoDS_Shape) -> "Part":
 
 
 def as_workplane(part: "Part") -> "Workplane":
-    """Return a part as a cadquery workplane that is tagged with its label; both share the geometry.
-
-    InputError if cadquery is not installed.
-    """
+    """A part as a cadquery workplane, tagged with its label; InputError without cadquery."""
     try:
         from cadquery import Shape, Workplane
     except ImportError:

@@ -124,9 +124,7 @@ class VirtualImages:
     array: MirrorArray  # the camera and its mirrors
     to_mirror: Floats  # from camera to apex, mm, (m,)
     incidence: Floats  # at the apex, radians, (m,)
-    # from camera to the image of the sphere's nearest point, centre and farthest point, by the
-    # tangential and by the sagittal fan, mm, (m, 3, 2)
-    distance: Floats
+    distance: Floats  # to images of nearest, centre, farthest by both fans, mm, (m, 3, 2)
     depth: Floats  # the same along the camera's optical axis, mm, (m, 3, 2)
 
 
@@ -168,9 +166,7 @@ class CameraRequirements:
     vfov_deg: float  # angle of view down
     width_px: int  # pixels across it, at least
     height_px: int  # pixels down it, at least
-    # depth, from the entrance pupil along the optical axis, of the nearest virtual image of the
-    # capture sphere
-    near_mm: float
+    near_mm: float  # from the pupil along the axis to the nearest virtual image
     far_mm: float  # depth of the farthest
     focus_mm: float  # depth to focus on, where the blur at both ends is the same
     pupil_mm: float  # diameter of the entrance pupil with the least blur at both ends

@@ -148,25 +148,21 @@ def sheet_record(needed: CameraRequirements, found: Iterable[Candidate]) -> dict
         "schema": SCHEMA,
         "requirements": _rounded(asdict(needed)),
         "exposure": {"illuminance_lux": LUX, "iso": ISO},
-        "candidates": [
-            {
-                "camera": one.camera.name,
-                "lens": one.lens.name,
-                **_rounded(
-                    {
-                        "focal_mm": one.focal_mm,
-                        "pixels_across": one.pixels_across,
-                        "f_number": one.f_number,
-                        "blur_px": one.total_px,
-                        "close_up_dpt": one.close_up_dpt,
-                        "exposure_s": _exposure(one),
-                    }
-                ),
-                "faults": list(one.faults),
-            }
-            for one in found
-        ],
+        "candidates": [_candidate_record(one) for one in found],
     }
+
+
+def _candidate_record(one: Candidate) -> dict[str, Any]:
+    figures = {
+        "focal_mm": one.focal_mm,
+        "pixels_across": one.pixels_across,
+        "f_number": one.f_number,
+        "blur_px": one.total_px,
+        "close_up_dpt": one.close_up_dpt,
+        "exposure_s": _exposure(one),
+    }
+    named = {"camera": one.camera.name, "lens": one.lens.name}
+    return {**named, **_rounded(figures), "faults": list(one.faults)}
 
 
 def sheet_lines(needed: CameraRequirements, found: Sequence[Candidate]) -> list[str]:

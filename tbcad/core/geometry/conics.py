@@ -195,10 +195,7 @@ class Spheroid:
 
 
 def enclosing_offset(ellipsoid: Ellipsoid, points: Floats) -> float:
-    """Smallest offset of a spheroid that encloses all points (k, 3), mm.
-
-    Newton's method on the offset of the spheroid through each point.
-    """
+    """Smallest offset of a spheroid that encloses all points (k, 3), mm, by Newton's method."""
     from_centre = points - ellipsoid.pinhole / 2
     along = from_centre @ ellipsoid.axis
     across = np.sqrt(np.maximum(dot(from_centre, from_centre) - along**2, 0))

@@ -25,8 +25,7 @@ from tbcad.core.spec.design import FIT, MAX_HFOV, CameraSpec, MirrorsSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints, Progress
 
-# Directions that differ by less than rounding have equal heights or azimuths.
-DIRECTION_DIGITS = 9
+DIRECTION_DIGITS = 9  # directions that differ by less than rounding have equal heights or azimuths
 HFOV_DIGITS = 12
 UNSTRETCHED = (1.0, 1.0)
 

@@ -25,10 +25,8 @@ from tbcad.types import Floats, Ints
 # Light in use ends at a share of the way from the apex to the edge of the cell, found to 2^-16 of
 # it: micrometres on a cell of a hand's width.
 BISECTIONS = 16
-# After two rounds the samples are a 32nd of the side apart; a parabola does the rest.
-ROUNDS = 2
-# Sizes are tried until one clears: the first that is computed mostly does.
-TRIES = 5
+ROUNDS = 2  # after two rounds the samples are a 32nd of the side apart; a parabola does the rest
+TRIES = 5  # sizes are tried until one clears: the first that is computed mostly does
 STEPS_PER_MM = 10  # of the sizes tried
 
 

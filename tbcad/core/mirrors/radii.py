@@ -23,16 +23,13 @@ from tbcad.types import Floats, Ints, Progress
 
 # A geodesic vertex has at most six neighbours; it and two rings of them bound every flat mirror.
 NEIGHBOURS = 19
-# A hundredth of a millimetre would do; verification's figures are steadier with an exact design.
-CONVERGED_MM = 1e-4
+CONVERGED_MM = 1e-4  # 1e-2 would do; verification's figures are steadier with an exact design
 MAX_ITERATIONS = 400
 MAX_STALLED = 40  # of them in which the least error so far does not fall
 # Designs that settle need none; each costs as much as a step, and further ones have never helped.
 MAX_HALVINGS = 4
-# How often a groove that is too wide is halved in search of one that is not.
-GROOVE_HALVINGS = 5
-# Mirrors that an error names at most.
-NAMED_MIRRORS = 5
+GROOVE_HALVINGS = 5  # how often a groove that is too wide is halved in search of one that is not
+NAMED_MIRRORS = 5  # mirrors that an error names at most
 
 
 def half_angles(ellipsoid: Ellipsoid, u: Floats, all_u: Floats) -> Floats:
@@ -84,16 +81,14 @@ def paper_curvatures(theta0: Floats, theta1: Floats, half_width: Floats) -> Floa
 class RadiusProblem:
     """What a radius rule starts from: poses, bounding planes and a first dual triangulation."""
 
-    # surfaces with the curvatures of eq. 2, zero or less where flat is enough, (m,).
-    mirrors: Surfaces
+    mirrors: Surfaces  # curved by eq. 2, zero or less where flat is enough, (m,)
     planes: Surfaces  # the seam and the foot plane
     triangles: Ints  # dual triangulation, (t, 3)
     pinhole: Floats  # of the camera, mm, (3,)
     min_curvature: Floats  # smallest curvature a sphere may have, 1/mm, (m,)
     diameter: float  # of the capture sphere, mm
     margin: Floats  # that the rule traced adds to it for each mirror, mm, (m,)
-    # width of the grooves between mirrors on pedestals, mm; None: neighbouring spheres meet
-    groove: float | None = None
+    groove: float | None = None  # width between pedestals, mm; None: neighbouring spheres meet
 
     @property
     def target(self) -> Floats:
@@ -186,9 +181,9 @@ def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
     """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
 
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
-    curvature is scaled by target / coverage, all together, until none is off; the mirrors that the
-    seam halves are aimed farther beyond it by what they miss. Where a step goes so far that spheres
-    no longer meet it is halved: flat mirrors always close.
+    curvature is scaled by target / coverage until none is off; halved mirrors are aimed farther
+    beyond the seam by what they miss. A step with which spheres no longer meet is halved: flat
+    mirrors close.
     """
     curvature, lowest = problem.paper_curvature, problem.min_curvature
     aim = np.zeros(len(curvature))

@@ -66,7 +66,7 @@ def design_record(
         coating_mm=spec.mirrors.coating_um / 1000,
         foot_z_mm=a.foot,
         cameras=(_camera(a), _camera(b)),
-        parts=tuple(ShellFiles(**shell_record(one)) for one in (a, b) if shells),
+        parts=tuple(ShellFiles(**part_files("shell", one)) for one in (a, b) if shells),
         mandrels=tuple(mandrels),
         mirrors=MirrorRow.FILE,
     )
@@ -85,17 +85,8 @@ def _camera(array: MirrorArray) -> CameraRecord:
     )
 
 
-def shell_record(array: MirrorArray) -> dict[str, Any]:
-    """Name, camera and files of one shell."""
-    return _part_files("shell", array)
-
-
-def mandrel_files(array: MirrorArray) -> dict[str, Any]:
-    """Name, camera and files of one shell's negative."""
-    return _part_files("mandrel", array)
-
-
-def _part_files(part: str, array: MirrorArray) -> dict[str, Any]:
+def part_files(part: str, array: MirrorArray) -> dict[str, Any]:
+    """Name, camera and files of one half's "shell", or of its negative, the "mandrel"."""
     name = f"{part}_{array.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
     return {"name": name, "camera": array.camera_id, **files}

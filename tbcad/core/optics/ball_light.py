@@ -29,8 +29,7 @@ from tbcad.core.geometry.vectors import unit as unit_vectors
 from tbcad.core.optics.camera import Camera
 from tbcad.types import Floats
 
-# Points of an outline: it is so smooth that its area by Fourier series is exact to 10^-6.
-OUTLINE_POINTS = 24
+OUTLINE_POINTS = 24  # so smooth that the area by Fourier series is exact to 10^-6
 # A tilt of the mirror turns the ray by twice as much, or less across the plane of incidence, so
 # no ray at this tilt meets the capture sphere.
 MAX_TILT = radians(70)
@@ -79,10 +78,7 @@ def _tangents(normal: Floats, circle: Floats) -> Floats:
 def _touching_tilts(
     apex: Floats, normal: Floats, tangent: Floats, radius: Floats, camera: Floats, capture: float
 ) -> Floats:
-    """Tilts (k, s) of balls at which rays from the camera touch the capture sphere, radians.
-
-    Apices (k, 3) have normals that tilt toward unit vectors (k, s, 3); lengths in mm.
-    """
+    """Tilts (k, s) toward unit vectors (k, s, 3) at which camera rays touch the sphere, radians."""
     result, pinhole = np.empty(tangent.shape[:2]), vector(camera)
     for k in range(len(apex)):
         top, up = vector(apex[k]), vector(normal[k])

@@ -8,8 +8,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.types import Floats, Ints
 
-# Directions closer than this to a symmetry plane lie on it; splitting leaves errors of 1e-16.
-ON_PLANE = 1e-12
+ON_PLANE = 1e-12  # directions this close to a symmetry plane lie on it; splitting errs by 1e-16
 
 
 def icosahedron() -> tuple[Floats, Ints]:

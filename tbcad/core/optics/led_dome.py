@@ -28,8 +28,7 @@ class DomeImages:
     place: Floats  # column and row of the dome's centre, (n, 2)
     direction: Floats  # unit vectors from the pinhole in which it appears, (n, 3)
     centroid: Floats  # of the lit part's image, from there, pixels, (n, 2)
-    # mean square of the lit part's image about its centroid, square pixels, (n, 2, 2)
-    spread: Floats
+    spread: Floats  # mean square of that image about its centroid, square pixels, (n, 2, 2)
     area: Floats  # of the lit part's image, square pixels, (n,)
 
 

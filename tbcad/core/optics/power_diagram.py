@@ -12,18 +12,14 @@ from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# The seam and the foot plane bound the array; they follow the mirrors.
-PLANES = 2
+PLANES = 2  # the seam and the foot plane bound the array; they follow the mirrors
 # An edge is flipped when a corner lies deeper than this inside the mirror across it. It only keeps
 # rounding from flipping an edge to and fro; arcs this short are merged later.
 FLIP_DEPTH_MM = 1e-9
-# Flips end within some ten rounds; a search that runs on is going in circles.
-MAX_ROUNDS = 200
+MAX_ROUNDS = 200  # flips end within some ten rounds; a search that runs on is going in circles
 MAX_STEPS = 64
-# Rounding in the test of all corners against all mirrors.
-ROUNDING_MM = 1e-7
-# Pairs of point and surface that are tested at a time: bounds the memory.
-MAX_PAIRS = 4_000_000
+ROUNDING_MM = 1e-7  # rounding in the test of all corners against all mirrors
+MAX_PAIRS = 4_000_000  # pairs of point and surface that are tested at a time: bounds the memory
 
 
 class NotRegularError(ArithmeticError):
@@ -96,10 +92,7 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
 
 
 def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:
-    """Radical planes g . x + h = 0 of surfaces p and q (k,), curvature of p >= that of q.
-
-    They contain all points that the two surfaces have in common.
-    """
+    """Planes g . x + h = 0 of equal power of p and q (k,), p's curvature no less than q's."""
     kp, kq = surfaces.curvature[p], surfaces.curvature[q]
     ratio = np.divide(kq, kp, out=np.zeros_like(kp), where=kp > 0)
     g, h = surfaces.gradient_at_origin, surfaces.value_at_origin

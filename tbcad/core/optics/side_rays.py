@@ -21,8 +21,7 @@ from tbcad.core.geometry.loop_vectors import (
 )
 from tbcad.types import Floats, Ints
 
-# Columns of a mirror.
-APEX, NORMAL, CURVATURE = 0, 3, 6
+APEX, NORMAL, CURVATURE = 0, 3, 6  # columns of a mirror
 # Columns of a ball in a window: its centre, its radius, and the axis that the window is turned
 # about, with cosine and sine of the angle.
 CENTRE, RADIUS, AXIS, COSINE, SINE = 0, 3, 4, 7, 8

@@ -19,18 +19,14 @@ from tbcad.core.optics.side_rays import misses_of_balls, misses_of_mirrors
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# Samples of each arc: first over all of it, then between the neighbours of the smallest one.
-SAMPLES = 9
-# After three rounds the samples are a 128th of the arc apart; a parabola does the rest.
-ROUNDS = 3
+SAMPLES = 9  # of each arc: over all of it, then between the neighbours of the smallest
+ROUNDS = 3  # after three rounds the samples are a 128th of the arc apart; a parabola does the rest
 # After four rounds the samples are a 512th of the side apart, and the smallest miss distance is
 # right to a micrometre.
 WINDOW_ROUNDS = 4
 X = np.array([1.0, 0.0, 0.0])
-# Of each arc of the cut: the image is less than a micrometre off the chords between them.
-CUT_SAMPLES = 65
-# Rounding: the image of the cut through a planar mirror is the plane x = 0 itself.
-ROUNDING_MM = 1e-9
+CUT_SAMPLES = 65  # of an arc of the cut: the image is less than 1 um off the chords between them
+ROUNDING_MM = 1e-9  # the image of the cut through a planar mirror is the plane x = 0 itself
 
 
 def cell_sides(cells: Cells) -> tuple[Ints, Ints]:

@@ -23,15 +23,12 @@ from tbcad.types import Floats, Ints, Progress
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-# Builds in one unit of work: few enough that all workers end together.
-BUILDS_PER_BATCH = 10
-# Probability that the true yield lies in the reported interval.
-CONFIDENCE = 0.95
+BUILDS_PER_BATCH = 10  # builds in one unit of work: few enough that all workers end together
+CONFIDENCE = 0.95  # probability that the true yield lies in the reported interval
 AnyResult = TypeVar("AnyResult", bound="DataclassInstance")
 Case: TypeAlias = Callable[[range], AnyResult]
 RunBatches: TypeAlias = Callable[[Any, Sequence[range]], list[Any]]
-# As many as cost about 3 % of the processor time of a whole build.
-BUILDS = 50
+BUILDS = 50  # as many as cost about 3 % of the processor time of a whole build
 SEED = 1
 
 
@@ -123,8 +120,7 @@ class MonteCarloCase(ShellCase):
 class CoverageCase(ShellCase):
     """The same builds as MonteCarloCase's, but only what their virtual cameras cover."""
 
-    # only the minimum of each build is exact, the others are not below it; in less time
-    worst_only: bool = False
+    worst_only: bool = False  # exact minima of builds only, the others no lower; faster
 
     def __call__(self, builds: range) -> CameraCoverage:
         """Result of the builds of these numbers."""

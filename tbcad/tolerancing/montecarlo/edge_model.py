@@ -16,6 +16,7 @@ from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.shell.cell_outlines import rows_and_columns
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.form import (
@@ -39,8 +40,7 @@ PairArrays: TypeAlias = tuple[Ints, Ints, Ints, Floats]
 # No symmetry plane of a design contains this direction, so no corner lies on a screen's axis; for
 # mirrors on the seam it points away from the seam, where both halves' outlines are open.
 ASYMMETRIC = np.array([1.0, 0.1234, 0.0567])
-# Columns of a table of surfaces.
-APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6
+APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6  # columns of a table of surfaces
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,7 @@ class NeighbourPairs:
     offset: Ints  # where the faces of each pair begin in `face`, (e + 1,)
     face: Ints  # mirrors and planes, in the order of their distance from both of the pair
     reach: Floats  # maximum distance of the edge's points from its middle, mm, (e,)
-    # mirrors whose pairs have a foot plane of their own, (r,): faces m + 2 onwards. The walls of
-    # pedestals come after them.
-    footed: Ints
+    footed: Ints  # mirrors with a foot plane of their own, (r,): faces m + 2 onwards, then walls
 
     @property
     def arrays(self) -> PairArrays:
@@ -85,19 +83,13 @@ def _pairs_with_walls(cells: PedestalCells) -> NeighbourPairs:
     mirror, plane = cells.arcs.faces[sides // 2].T
     plane = np.where(plane < m + PLANES, plane, plane + np.count_nonzero(plane == m + 1))
     count = np.diff(offsets)[mirror]
-    of_pair, place = rows_and_places(count)
+    of_pair, place = rows_and_columns(count)
     side = offsets[mirror][of_pair] + place
     others = side != of_pair
     offset = np.concatenate([[0], np.cumsum(count - 1)])
     reach_mm = REACH * cell_radii(cells)[mirror]
     pair, face = np.column_stack([mirror, plane]), plane[side[others]]
     return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
-
-
-def rows_and_places(count: Ints) -> tuple[Ints, Ints]:
-    """Row of each entry of a table with some entries a row (r,), and its place in the row."""
-    row = np.repeat(np.arange(len(count)), count)
-    return row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _with_own_feet(pairs: NeighbourPairs, m: int) -> NeighbourPairs:
@@ -136,7 +128,7 @@ def _adjacency(cells: Cells) -> csr_array:
 def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, pair: Ints) -> tuple[Ints, Ints]:
     """Where the faces of each pair (e, 2) begin, (e + 1,), and the faces: see NeighbourPairs."""
     first, second = pair.T
-    of_pair, place = rows_and_places(np.diff(nearby.indptr)[first])
+    of_pair, place = rows_and_columns(np.diff(nearby.indptr)[first])
     face = nearby.indices[nearby.indptr[first][of_pair] + place].astype(np.int64)
     other = (face != first[of_pair]) & (face != second[of_pair])
     of_pair, face = of_pair[other], face[other]
@@ -155,12 +147,9 @@ class EdgeModel:
     table: Floats  # apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7)
     pairs: NeighbourPairs  # which of them may share an edge
     halved: Bools  # mirrors that the seam halves, (m,)
-    # two axes and the normal of a plane through the object for each mirror, (m, 3, 3); the normal
-    # is the direction u
-    screen: Floats
+    screen: Floats  # axes and normal u of a plane through the object each, (m, 3, 3)
     cell_radius: Floats  # distance of each mirror's farthest corner from its apex, mm, (m,)
-    # that end mirrors on pedestals, w of them; none where neighbouring spheres meet
-    walls: GrooveWalls
+    walls: GrooveWalls  # w of pedestals; none where neighbouring spheres meet
 
     def __len__(self) -> int:
         return len(self.halved)

@@ -41,8 +41,7 @@ from tbcad.tolerancing.montecarlo.visible_edges import APEX, CURVATURE, NORMAL
 from tbcad.types import Floats
 
 ORDERS = (2, 3, 4)
-# A surface's waviness falls with its frequency; judgement: by half in variance from order to order.
-VARIANCE_RATIO = 0.5
+VARIANCE_RATIO = 0.5  # from order to order of waviness, which falls with frequency: a judgement
 DEGREE = ORDERS[-1]
 # Powers of x and y, in the order of the columns of a polynomial.
 MONOMIALS = tuple((d - j, j) for d in range(DEGREE + 1) for j in range(d + 1))
@@ -54,8 +53,7 @@ ASTIGMATISM = tuple(k for k, (n, m) in enumerate(TERMS) if (n, abs(m)) == (2, 2)
 # the axes of x and y, and what one millimetre is in the polynomial's unit.
 HEIGHT, FIRST, SECOND, PER_MM, FORM_COLUMNS = 0, 15, 18, 21, 22
 Form: TypeAlias = tuple[float, ...]
-# Surfaces that meet at a smaller angle than the root of this have no edge that could be found.
-SMALLEST_SINE_SQUARED = 1e-4
+SMALLEST_SINE_SQUARED = 1e-4  # surfaces that meet at a smaller angle have no edge to be found
 
 
 def term_shares() -> Floats:

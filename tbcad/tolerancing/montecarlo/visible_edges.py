@@ -31,13 +31,10 @@ from tbcad.core.geometry.loop_vectors import (
 )
 from tbcad.types import Floats, Ints
 
-# Maximum number of visible intervals of one edge.
-INTERVALS = 16
-# Value of a surface, as a share of its largest term, beyond which rounding cannot change its sign.
-CERTAIN = 1e-9
+INTERVALS = 16  # maximum number of visible intervals of one edge
+CERTAIN = 1e-9  # share of a value's largest term, beyond which rounding cannot change its sign
 
-# Columns of a table of surfaces.
-APEX, NORMAL, CURVATURE = 0, 3, 6
+APEX, NORMAL, CURVATURE = 0, 3, 6  # columns of a table of surfaces
 # Columns of an edge: point x0, unit vectors e and n, curvature.
 START, TANGENT, OUTWARD, BEND, EDGE_COLUMNS = 0, 3, 6, 9, 10
 

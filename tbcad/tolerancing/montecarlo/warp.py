@@ -18,12 +18,9 @@ from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.tolerancing.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
 from tbcad.types import Floats, Ints
 
-# Share of the variance that a field may lack at any point: 0.1 % of its standard deviation.
-MISSING_VARIANCE = 1e-6
-# Digits of a variance by which points are compared, so that rounding does not choose among equals.
-COMPARED_DIGITS = 9
-# Points of a mirror that are followed, besides its apex: on a circle at a share of its radius.
-RING_POINTS = 6
+MISSING_VARIANCE = 1e-6  # that a field may lack at any point: 0.1 % of its standard deviation
+COMPARED_DIGITS = 9  # of variances, so that rounding does not choose among equal points
+RING_POINTS = 6  # of a mirror that are followed on a circle, besides its apex
 RING_SHARE = 0.8
 
 
@@ -84,9 +81,7 @@ class WarpMap:
     """What K random numbers for each axis do to the m mirrors of one half."""
 
     basis: Floats  # of the field at q points of each mirror, the apex first, (K, m q)
-    # centre and radius of the sphere, and astigmatism, from the points' displacements along their
-    # normals, (m, 6, q)
-    fit: Floats
+    fit: Floats  # sphere and astigmatism from displacements along the normals, (m, 6, q)
     normal: Floats  # there, (m, q, 3)
     foot_basis: Floats  # of the field where each mirror is nearest to the foot plane, (m, K)
     foot_normal: Floats  # unit normal of the foot plane, (3,)

@@ -14,8 +14,7 @@ from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats
 
-# Random streams of a build begin here, beyond those of its shells.
-FIRST_STREAM = 1000
+FIRST_STREAM = 1000  # random streams of a build begin here, beyond those of its shells
 
 
 @dataclass(frozen=True)
@@ -29,12 +28,9 @@ class PrototypeDraws:
     radius: Floats  # by which balls are too large, mm, (s, k)
     seat: Floats  # of the balls' centres on the base, mm, (s, k, 3)
     cap_tilt: Floats  # of caps about two axes across their own, radians, (s, k, 2)
-    # of the base at each stop of each run, with its turn under gravity, radians, (s, 2, t)
-    angle: Floats
+    angle: Floats  # of the base at stops of both runs, with gravity, radians, (s, 2, t)
     runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
-    # of the axis about azimuth zero and across it, both through the object's centre, radians, (s,
-    # 2)
-    tilt: Floats
+    tilt: Floats  # of the axis about azimuth zero and across, at the object, radians, (s, 2)
     camera_shift: Floats  # of the pinhole, mm, (s, 3)
     camera_tilt: Floats  # rotation vectors about the pinhole, radians, (s, 3)
     focal: Floats  # focal length over the designed one, (s,)

@@ -43,13 +43,11 @@ class RunWindows:
 
     ball: Ints  # number of the ball in each window, (m,)
     stop: Ints  # number of its stop, (m,)
-    # unit directions along the sides of all windows, mirror after mirror, (e, SIDE_SAMPLES, 3)
-    side: Floats
+    side: Floats  # unit directions along the sides of all windows, (e, SIDE_SAMPLES, 3)
     coarse: Floats  # see tbcad.tolerancing.prototype.rays.coarse_directions
     first: Ints  # number of each mirror's first side, (m + 1,)
     middle: Floats  # unit directions of the mirrors' apices, (m, 3)
-    # directions from there to the outline, away from the seam where it halves, (m, 3)
-    outward: Floats
+    outward: Floats  # directions from there to the outline, away from the seam, (m, 3)
     halved: Bools  # mirrors that the seam halves, (m,)
 
 
@@ -146,9 +144,7 @@ class RunPose:
     """Actual camera and balls of one run of one build, in the prototype's frame."""
 
     pinhole: Floats  # mm, (3,)
-    # matrices that turn directions in the designed camera, as rows, into those of the window's
-    # pixels, (m, 3, 3)
-    lens: Floats
+    lens: Floats  # turn directions in the designed camera, as rows, into actual ones, (m, 3, 3)
     centre: Floats  # of the ball in each window, mm, (m, 3)
     radius: Floats  # of each, mm, (m,)
     highlight: Floats  # unit directions in which they show the object's centre, (m, 3)

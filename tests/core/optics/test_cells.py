@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.optics.cell_moments import cell_moments
-from tbcad.core.optics.cells import Cells, cell_areas, cells_of
+from tbcad.core.optics.cells import Cells, cell_areas, cell_moments, cells_of
 from tbcad.core.optics.power_diagram import bounded_triangulation, lowest_value
 from tbcad.core.optics.surfaces import Surfaces, planes
 from tbcad.core.spec.errors import SpecError

@@ -21,16 +21,14 @@ from tbcad.types import Bools, Floats, Ints
 # Depth of a groove below the lowest mirror at its corners, in widths of the groove: walls lean by 1
 # in 8 or little more, so the groove drains, and a mirror that is off moves its edge little.
 DEPTH_WIDTHS = 4.0
-# Corners on a bounding plane lie within rounding of it.
-ON_PLANE_MM = 1e-9
+ON_PLANE_MM = 1e-9  # corners on a bounding plane lie within rounding of it
 
 
 @dataclass(frozen=True)
 class CellPairs:
     """All pairs of a cell and a neighbour, or a bounding plane, over e of them."""
 
-    # the cell that has their border counter-clockwise (from outside), and the other face, (e, 2)
-    faces: Ints
+    faces: Ints  # the cell that has the border counter-clockwise (outside), the other, (e, 2)
     triangles: Ints  # at the start and the end of the border, (e, 2)
     half_edges: Ints  # of the triangles, that of the first face and its twin, (e, 2)
 
@@ -40,11 +38,8 @@ class Corners:
     """Corners c of the borders; those of very short borders are joined."""
 
     flat: Floats  # where planar mirrors meet, mm, (c, 3)
-    # above the corner of a groove's bottom, on the lowest of the mirrors there, mm, (c, 3)
-    top: Floats
-    # the corner of the groove's bottom, mm, (c, 3); where no groove ends, the corner of the mirror
-    # there
-    bottom: Floats
+    top: Floats  # above a groove's bottom, on the lowest mirror there, mm, (c, 3)
+    bottom: Floats  # of the groove, mm, (c, 3); the mirror's where no groove ends
 
 
 @dataclass(frozen=True)
@@ -52,13 +47,9 @@ class Borders:
     """Borders between two cells, or a cell and a bounding plane, over k of them."""
 
     pair: Ints  # index of the pair of cells, (k,)
-    # the cell that has the border counter-clockwise (from outside) from start to end, and the other
-    # face, (k, 2)
-    faces: Ints
+    faces: Ints  # the cell that has it counter-clockwise (outside), and the other, (k, 2)
     ends: Ints  # corners at which it starts and ends, (k, 2)
-    # for either face, the unit normal into its cell of the plane that ends it, (k, 2, 3); zero for
-    # a bounding plane
-    normal: Floats
+    normal: Floats  # of the planes that end both cells, inward, (k, 2, 3); zero for bounds
 
     def between_mirrors(self, mirrors: int) -> Bools:
         """Which borders (k,) lie between two of the mirrors."""
@@ -219,10 +210,7 @@ def _walls(
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides of all mirrors on pedestals, one cell after another, q of them.
-
-    They run counter-clockwise, seen from outside.
-    """
+    """Sides of all mirrors on pedestals, q of them, cell after cell, counter-clockwise outside."""
 
     offsets: Ints  # where each cell's sides start, (m + 1,)
     cell: Ints  # (q,)
@@ -232,16 +220,11 @@ class Sides:
     corner: Ints  # at which each side starts, (q,)
     normal: Floats  # of the plane that ends the cell, into the cell, (q, 3)
     point: Floats  # where the side starts on the mirror, mm, (q, 3)
-    # along the border, mm, on the mirror or between the bottoms of the grooves at its ends,
-    # whichever is shorter, (q,)
-    length: Floats
+    length: Floats  # on the mirror or between the grooves' bottoms, the shorter, mm, (q,)
 
 
 def outline_sides(layout: PedestalLayout, surfaces: Surfaces) -> Sides:
-    """Sides of the cells of mirrors on pedestals; surfaces are m mirrors, then the two planes.
-
-    NotRegularError if a mirror lies below the end of a groove.
-    """
+    """Sides of m mirrors, then two planes; NotRegularError if one lies below a groove's end."""
     cells, corners, borders = layout.flat, layout.corners, layout.borders
     side = np.full(3 * len(cells.triangles), -1)
     side[layout.pairs.half_edges[borders.pair]] = np.arange(2 * len(borders.pair)).reshape(-1, 2)

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from tbcad.core.geometry.vectors import FLIP_X, dot
-from tbcad.core.optics.cell_moments import arc_steps
-from tbcad.core.optics.cells import Arcs, Cells, plane_sections
+from tbcad.core.optics.cells import Arcs, Cells, arc_steps, plane_sections
 from tbcad.core.optics.pedestals.borders import ON_PLANE_MM, PedestalLayout, Sides, outline_sides
 from tbcad.core.optics.pedestals.plan import PedestalPlan, planned
 from tbcad.core.optics.power_diagram import PLANES, NotRegularError
@@ -168,9 +167,7 @@ class GrooveWalls:
     """Walls of one half, w of them, mirror after mirror; none where neighbouring spheres meet."""
 
     mirror: Ints  # that each ends, (w,)
-    # the middle of that mirror's edge at the wall, the unit normal into the mirror's cell, and a
-    # curvature of 0, (w, 7)
-    table: Floats
+    table: Floats  # middle of that mirror's edge, normal into its cell, curvature 0, (w, 7)
 
     @classmethod
     def of_planes(cls, mirror: Ints, point: Floats, normal: Floats) -> "GrooveWalls":
@@ -200,10 +197,7 @@ class GrooveWalls:
         return np.searchsorted(self.mirror, np.arange(mirrors + 1))
 
     def of_mirrors(self, mirrors: int) -> tuple[Ints, Floats]:
-        """Where the walls of each of m mirrors begin, (m + 1,), and all points and normals, (w, 6).
-
-        As compiled loops take them.
-        """
+        """For loops: where the walls of m mirrors begin, (m + 1,), points and normals, (w, 6)."""
         return self.first_of_mirrors(mirrors), np.ascontiguousarray(self.table[:, :6])
 
     def joined(self, other: "GrooveWalls") -> "GrooveWalls":

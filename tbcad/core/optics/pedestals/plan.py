@@ -31,8 +31,7 @@ from tbcad.core.optics.power_diagram import (
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# Each round joins some corners or moves some away from a plane.
-MAX_ROUNDS = 100
+MAX_ROUNDS = 100  # each round joins some corners or moves some away from a plane
 MIN_SIDES = 3
 # Sides of planar mirrors that are shorter than so many grooves vanish. At bounding planes, where
 # sides change with a mirror's height, the limit is higher by this share of the mirrors' pitch.
@@ -162,10 +161,7 @@ class PedestalPlan:
 
     @property
     def corner(self) -> Ints:
-        """Numbers of corners, one for each triangle (t,); joined ones share theirs.
-
-        NotRegularError if that leaves a mirror fewer than three sides.
-        """
+        """Corner of each triangle (t,), joined or not; NotRegularError if a mirror has too few."""
         count, mirrors = len(self.flat.triangles), self.flat.mirrors
         joined = self.pairs.triangles[self.short]
         graph = coo_array((np.ones(len(joined)), joined.T), shape=(count, count))
