@@ -6,6 +6,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.meshing import (
+    SIDES,
     as_manifold,
     meshed,
     primitive_mesh,
@@ -18,7 +19,6 @@ from tbcad.core.geometry.primitives import (
     Primitive,
     Prism,
     Revolved,
-    Slot,
     rectangle,
     revolved_along,
 )
@@ -44,12 +44,6 @@ def test_volumes_are_those_of_closed_forms(body: Primitive) -> None:
     assert primitive_mesh(body).volume() == pytest.approx(
         closed_volume(body), rel=1e-8
     )  # sections are rounded to 1e-8 mm
-
-
-def test_volume_of_a_slot() -> None:
-    """The corners of its rods are a little beyond its flat sides."""
-    slot = Slot(START, 3 * unit(np.cross(TILTED, START)), 2.0, 7 * TILTED)
-    assert primitive_mesh(slot).volume() == pytest.approx(closed_volume(slot), rel=1e-5)
 
 
 ORIGIN, UP = np.zeros(3), np.array([0.0, 0.0, 1.0])
@@ -88,3 +82,11 @@ def test_volume_below_a_plane(pin: TopoDS_Shape) -> None:
     planes = np.array([[0.0, 0.0, 1.0, 4.0]])
     below = volume_by_cut_mesh(pin, planes, [], 0.001)
     assert below == pytest.approx(36 * np.pi, rel=1e-3)
+
+
+def test_a_rod_is_in_its_place() -> None:
+    corners = primitive_mesh(PRIMITIVES["rod"]).to_mesh64().vert_properties[:, :3] - START
+    along = corners @ TILTED
+    assert np.sort(along) == pytest.approx(np.repeat([0.0, 7.0], SIDES))
+    radii = np.linalg.norm(corners - along[:, None] * TILTED, axis=1)
+    assert radii == pytest.approx(2.0, rel=2e-3)

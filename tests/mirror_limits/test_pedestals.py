@@ -39,7 +39,7 @@ def face_plane(face: TopoDS_Face) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def made() -> MirrorDesign:
-    return pedestal_design("n=4")
+    return pedestal_design("n=6")
 
 
 @pytest.fixture(scope="module")

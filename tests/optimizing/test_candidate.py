@@ -68,13 +68,6 @@ def test_a_candidate_is_the_design_of_its_place() -> None:
     assert one.reason == ""
 
 
-def test_what_cannot_be_made_says_why() -> None:
-    one = evaluate(load_spec(None, FEW_PIXELS), None, (10.0, -10.0, 1.0, 1.0, 1.0))
-    assert one.figures is None
-    assert one.reason
-    assert "\n" not in one.reason
-
-
 def test_the_first_place_is_within_the_bounds() -> None:
     spec = load_spec(None)
     for size in (10.0, 276.0, 900.0):
@@ -94,12 +87,12 @@ def test_other_keys_stay() -> None:
 @pytest.fixture(autouse=True)
 def few_views(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(candidate, "ELEVATIONS_DEG", (15.0,))
-    monkeypatch.setattr(candidate, "AZIMUTHS", 2)
+    monkeypatch.setattr(candidate, "AZIMUTHS", 1)
     candidate._truth.cache_clear()
 
 
 def test_it_is_the_figure_of_the_study() -> None:
-    viewpoints = viewpoints_around((15.0,), 2, 640.0)
+    viewpoints = viewpoints_around((15.0,), 1, 640.0)
     fixed = SPEC.model_copy(
         update={"camera": SPEC.camera.model_copy(update={"hfov_deg": 89.0})}
     )  # as the study has it for the paper's optics

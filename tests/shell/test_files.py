@@ -33,18 +33,6 @@ def exported(mirrors: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) ->
     return folder
 
 
-def test_all_files_are_there(exported: Path) -> None:
-    kinds = ("step", "stl", "3mf")
-    shells = [f"{body}_{camera}.{kind}" for body in SOLID_OF for camera in "ab" for kind in kinds]
-    assert {p.name for p in exported.iterdir()} == {
-        "camera.json",
-        "design.json",
-        "mirrors.csv",
-        "manifest.json",
-        *shells,
-    }
-
-
 @BODIES
 @pytest.mark.parametrize("which", [0, 1])
 def test_step_round_trip(exported: Path, mirrors: MirrorDesign, body: str, which: int) -> None:

@@ -9,13 +9,10 @@ from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.errors import SpecError
 from tbcad.shell.files import (
-    camera_a_mandrel_mesh,
-    camera_a_mesh,
     design_mandrel,
     mandrel_solid,
 )
 from tbcad.shell.mandrel import Mandrel, best_pull, distances, draft_of
-from tbcad.shell.mesh import front_facets
 from tests.helpers import bounds
 from tests.mirror_arrays import mirror_design
 
@@ -24,25 +21,6 @@ EDGES = ["valley", "pedestal"]
 
 def made(edges: str, *options: str) -> MirrorDesign:
     return mirror_design(f"shell.edges={edges}", "shell.negative=true", *options)
-
-
-@pytest.mark.parametrize("edges", EDGES)
-def test_facets_are_the_shells_turned(edges: str) -> None:
-    """Corner by corner: all of the shell's mirrors and walls, and nothing else of it."""
-    mirrors = made(edges, "n=4")
-    array = mirrors.arrays[0]
-    builder, _ = front_facets(mirrors.spec, array.modelled_cells, array.apex_distance)
-    shell, mandrel = camera_a_mesh(mirrors), camera_a_mandrel_mesh(mirrors)
-    own = {facet(mandrel.vertices[one[::-1]]) for one in mandrel.triangles}
-    shared = own & {facet(shell.vertices[one]) for one in shell.triangles}
-    assert len(shared) == sum(map(len, builder.triangles))
-
-
-def facet(corners: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The corners in their order, the least first."""
-    points = [tuple(one) for one in corners.tolist()]
-    first = points.index(min(points))
-    return tuple(points[first:] + points[:first])
 
 
 @pytest.mark.parametrize("edges", EDGES)

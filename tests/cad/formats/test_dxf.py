@@ -72,7 +72,7 @@ def test_the_bytes_do_not_depend_on_hashes(tmp_path: Path) -> None:
         "import sys; from pathlib import Path; from tbcad.cad.formats.dxf import write_dxf;"
         "write_dxf(Path(sys.argv[1]), [])"
     )
-    for seed in ("0", "1", "2", "3"):
+    for seed in ("0", "1"):
         file = tmp_path / f"{seed}.dxf"
         variables = {**os.environ, "PYTHONHASHSEED": seed}
         subprocess.run([sys.executable, "-c", code, str(file)], env=variables, check=True)

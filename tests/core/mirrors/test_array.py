@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 import tbcad
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, numbered_directions
-from tbcad.core.mirrors.record import SIZE_PX, hemisphere_map
 from tbcad.core.spec.errors import SpecError
 from tests.mirror_arrays import mirror_array
 
@@ -164,22 +163,6 @@ def check_any_geometry(n: int, x: float, y: float, z: float, b: float, capture: 
         return
     assert array.coverage.min() > capture + 0.6 - 0.01
     assert (array.area > 0).all()
-
-
-def test_it_has_all_mirrors_in_their_places() -> None:
-    design = tbcad.design(n=3)
-    dots = ET.fromstring(hemisphere_map(design.arrays)).findall(
-        "{http://www.w3.org/2000/svg}circle"
-    )
-    u = np.concatenate([array.u for array in design.arrays])
-    assert len(dots) == len(u)
-    x, y = np.array([[float(dot.attrib[key]) for key in ("cx", "cy")] for dot in dots]).T
-    assert ((x - SIZE_PX / 2) * u[:, 0] >= 0).all()
-    assert ((SIZE_PX / 2 - y) * u[:, 1] >= 0).all()
-    radius = np.concatenate([array.mirrors.radius for array in design.arrays])
-    colours = [dot.attrib["fill"] for dot in dots]
-    assert colours[radius.argmin()] == "#440154"
-    assert colours[radius.argmax()] == "#fde725"
 
 
 @pytest.mark.parametrize("settings", [(), ("radius_rule=flat", "name=plane")])

@@ -2,7 +2,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tbcad.core.spec.csv_rows import Row, positive_number, read_rows
@@ -37,11 +37,6 @@ def test_what_spreadsheets_write(tmp_path: Path, text: str) -> None:
     for encoding, end in product(encodings, ends):
         rows = read(tmp_path, text.replace("\n", end).encode(encoding))
         assert [row for _, row in rows] == ROWS, (encoding, end)
-
-
-def test_numbers_of_three_decimals_by_those_of_others(tmp_path: Path) -> None:
-    rows = read(tmp_path, b"part;mass_g\na;1,588\nb;0,25\n")
-    assert [row["mass_g"] for _, row in rows] == ["1.588", "0.25"]
 
 
 def test_other_columns_where_they_are_allowed(tmp_path: Path) -> None:
@@ -90,6 +85,7 @@ def test_numbers_out_of_range(text: str) -> None:
         positive_number("here", {"m": text}, "m", 100)
 
 
+@settings(max_examples=40)
 @given(text=st.text(max_size=80) | st.text('0123456789,.;\t"#\n -e', max_size=80))
 def test_any_file_is_a_table_or_a_message_of_one_line(
     tmp_path_factory: pytest.TempPathFactory, text: str

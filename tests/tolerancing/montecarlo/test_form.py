@@ -25,7 +25,7 @@ from tbcad.tolerancing.montecarlo.form import (
     term_polynomials,
     term_shares,
 )
-from tests.tolerancing.exact_fields import wavy_coverage
+from tests.tolerancing.exact_builds import wavy_coverage
 from tests.tolerancing.montecarlo.every_edge import every_edge
 
 WAVY = Errors(waviness=Error(0.002), sphere_centre=Error(0.004))

@@ -33,7 +33,7 @@ from tbcad.tolerancing.montecarlo.warp import (
     pivots,
     smooth_field,
 )
-from tests.tolerancing.exact_fields import displaced_coverage
+from tests.tolerancing.exact_builds import displaced_coverage
 
 SLA = Errors(warp=Error(0.0346, length=50.0))
 CNC = Errors(warp=Error(0.0067, length=80.0))

@@ -259,12 +259,3 @@ class TestMonteCarlo:
         for field in fields(PrototypeResult):
             expected = getattr(whole, field.name)[17:]
             assert (getattr(later, field.name) == expected).all()
-
-
-def test_windows_left_in_their_places_see_less(
-    small_design: MirrorDesign, plan: Plan, model: PrototypeWindows
-) -> None:
-    """Balls then stand aside of their windows' middles though nothing is off."""
-    fixed = prototype_model(reflectors(small_design), replace(plan, moved=False), model.wind_up)
-    apart, together = (coverage_of(one, draws_of(one, 1)) for one in (fixed, model))
-    assert np.median(apart) < np.median(together) - 10

@@ -14,7 +14,7 @@ from tbcad.core.optics.reflection import reflect
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tests.mirror_arrays import mirror_array
-from tests.pedestal_designs import GROOVE, pedestal_design, pedestals
+from tests.pedestal_designs import pedestal_design, pedestals
 
 CAPTURE_RADIUS = 30.3  # with the margin
 EVEN = Path(__file__).parents[4] / "designs" / "turtleback-even.toml"
@@ -45,32 +45,6 @@ def test_every_edge_lies_on_both_its_faces_and_the_surface_is_one_piece(n: int, 
         assert np.abs(cells.surfaces.value(face[:, None], points)).max() < 1e-9
     corners = len(np.unique([cells.arcs.start, cells.arcs.end]))
     assert corners - len(cells.arcs) + cells.mirrors + len(cells.walls) == 1
-
-
-def test_rings_of_walls_close_on_their_plane(cells: PedestalCells) -> None:
-    arc, back = cells.wall_rings // 2, cells.wall_rings % 2
-    ends = np.stack([cells.arcs.start, cells.arcs.end], axis=1)
-    start, end = ends[arc, back], ends[arc, 1 - back]
-    np.testing.assert_array_equal(end, np.roll(start, -1, axis=1))
-    face = cells.mirrors + PLANES + np.arange(len(cells.walls))
-    np.testing.assert_array_equal(
-        np.where(back == 0, cells.arcs.left[arc], cells.arcs.right[arc]),
-        np.broadcast_to(face[:, None], arc.shape),
-    )
-    # Walls face the neighbour across the groove.
-    apex = cells.surfaces.apex
-    toward = apex[cells.walls[:, 1]] - apex[cells.walls[:, 0]]
-    assert (dot(toward, cells.surfaces.normal[face]) > 0).all()
-
-
-def test_a_groove_has_about_its_width_at_its_narrowest(cells: PedestalCells) -> None:
-    """Distances of the mirrors' corners from the wall on the other side of the groove."""
-    walls = {tuple(pair): k for k, pair in enumerate(cells.walls.tolist())}
-    across = [walls[j, i] for i, j in cells.walls.tolist()]
-    points = cells.corners[cells.arcs.start[cells.wall_rings[:, [0, 1]] // 2]]
-    face = cells.mirrors + PLANES + np.array(across)
-    width = dot(points - cells.surfaces.apex[face][:, None], cells.surfaces.normal[face][:, None])
-    assert 0.9 * GROOVE < width.min() < 1.1 * GROOVE
 
 
 def test_bottoms_of_grooves_part_the_picture_without_gaps(
