@@ -97,7 +97,8 @@ class _Assembly:
 
     def cells(self) -> PedestalCells:
         """All faces and edges."""
-        sides, across = self.sides, self._across
+        sides = self.sides
+        across = self.layout.borders.faces[sides.border, 1 - sides.back]
         has_wall = across < len(self.surfaces) - PLANES
         wall = np.flatnonzero(has_wall)
         start = self.layout.corners.bottom[sides.corner[wall]]
@@ -116,11 +117,6 @@ class _Assembly:
             wall_rings[wall],
         )
 
-    @property
-    def _across(self) -> Ints:
-        """The face across each side, (q,)."""
-        return np.asarray(self.layout.borders.faces[self.sides.border, 1 - self.sides.back])
-
     def _edges(self, surfaces: Surfaces, beyond: Ints, has_wall: Bools) -> tuple[Arcs, Ints]:
         """All edges, and four sides for each side of a cell: those of its wall, if it has one.
 
@@ -131,7 +127,9 @@ class _Assembly:
         before = np.empty(q, dtype=np.int64)
         before[sides.following] = np.arange(q)
         upright = np.flatnonzero(has_wall | has_wall[before])
-        forward, backward = self._both_sides(has_wall)
+        # The sides on the two walls of each groove, the one that follows its border first.
+        order = np.lexsort((sides.back[has_wall], sides.border[has_wall]))
+        forward, backward = np.flatnonzero(has_wall)[order].reshape(-1, 2).T
         bottom = q + sides.corner
         left = np.concatenate([sides.cell, beyond[upright], beyond[forward]])
         right = np.concatenate([beyond, beyond[before[upright]], beyond[backward]])
@@ -145,12 +143,6 @@ class _Assembly:
         along[backward] = along[forward] + 1
         rings = [2 * np.arange(q) + 1, 2 * down, along, 2 * down[sides.following] + 1]
         return arcs, np.column_stack(rings)
-
-    def _both_sides(self, has_wall: Bools) -> tuple[Ints, Ints]:
-        """The sides on the two walls of each groove, the one that follows its border first."""
-        back, border = self.sides.back[has_wall], self.sides.border[has_wall]
-        side, order = np.flatnonzero(has_wall), np.lexsort((back, border))
-        return side[order][0::2], side[order][1::2]
 
     def _curves(self, surfaces: Surfaces, start: Ints, end: Ints) -> tuple[Floats, Floats]:
         """Control polygons and weights: arcs on the mirrors first, the others straight."""
