@@ -62,14 +62,6 @@ def test_facets_are_as_near_to_a_sphere_as_asked(tolerance: float) -> None:
     assert 5.0 - norm(middle).min() <= tolerance
 
 
-def test_each_edge_has_two_facets(pin: TopoDS_Shape) -> None:
-    triangles = meshed(pin, 0.1).triangles
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    directed, counts = np.unique(edges, axis=0, return_counts=True)
-    assert (counts == 1).all()
-    assert np.array_equal(directed, np.unique(edges[:, ::-1], axis=0))
-
-
 def test_volume_of_a_union_less_tools_agrees_with_the_kernel(pin: TopoDS_Shape) -> None:
     bodies, tools = [pin, sphere(10 * UP, 5.0)], [cylinder(-UP, UP, 1.0, 20.0)]
     by_meshes = volume_by_meshes(

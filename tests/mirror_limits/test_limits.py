@@ -151,3 +151,10 @@ def test_margins_are_never_overdrawn(seed: int) -> None:
 def test_a_design_without_margin_is_refused(found: Sensitivities) -> None:
     with pytest.raises(InputError, match=r"sees 60.* as designed, of 61 mm .*margin_mm"):
         mirror_limits(found, 61.0, 0.99)
+
+
+def test_a_radius_leaves_the_apex_in_its_place(small_design: MirrorDesign) -> None:
+    m = len(small_design.arrays[0])
+    designed, built = moved(small_design, radius=np.full((1, m), 0.2))
+    assert built[:, APEX] == pytest.approx(designed[:, APEX], abs=1e-12)
+    assert 1 / built[:, CURVATURE] == pytest.approx(1 / designed[:, CURVATURE] + 0.2, rel=1e-12)

@@ -155,3 +155,11 @@ class TestNoRoom:
 
     def test_or_says_that_the_wall_is_thick(self) -> None:
         assert "make shell.wall_mm smaller" in self.refused("shell.wall_mm=50")
+
+
+def test_holes_do_not_meet() -> None:
+    mandrel = design_mandrel(made("valley", "n=4"))
+    seam, foot = mandrel.seam_holes, mandrel.foot_holes
+    assert foot.centre[:, 0].min() - foot.radius.max() >= seam.direction[0] + 3 - 1e-9
+    assert seam.centre[:, 2].min() - seam.radius.max() >= mandrel.foot + 3 - 1e-9
+    assert np.array_equal(seam.direction, [8.6, 0, 0])

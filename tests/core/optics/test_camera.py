@@ -86,3 +86,12 @@ def test_slope_of_vignetting_is_that_of_its_logarithm() -> None:
         )
         slope = (there - back) / 0.02
         assert vignetting_slope(camera, pixels)[:, axis] == pytest.approx(slope, rel=1e-6, abs=1e-9)
+
+
+def test_mirrored_camera_sees_the_mirrored_array_alike(paper_array: MirrorArray) -> None:
+    flipped = paper_array.cells.corners * [-1, 1, 1]
+    camera = paper_array.camera
+    assert camera.mirrored().fill(flipped) == pytest.approx(camera.fill(paper_array.cells.corners))
+    assert np.linalg.det(
+        [camera.right, np.cross(camera.forward, camera.right), camera.forward]
+    ) == pytest.approx(1)
