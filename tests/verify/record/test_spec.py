@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from tbcad_verify.record.spec import Spec
 
 from tbcad.core.spec.design import Spec as DesignSpec
+from tests.verify.corpus.broken_records import JSON, design
 from tests.verify.corpus.mutation import refused
-from tests.verify.corpus.record_changes import JSON, design
 
 LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minItems", "maxItems")
 # Chosen by a build, so that an export has numbers; checked in words instead of ranges by tbcad.
