@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tbcad_verify.mesh.lines import (
+from tbcad_verify.mesh.vectors import (
     crossings,
     distances_to_segments,
+    dot,
     nearest_on_lines,
+    norm,
     rotation_angles,
+    unit,
 )
-from tbcad_verify.mesh.vectors import dot, norm, unit
 
 RNG = np.random.default_rng(8)
 

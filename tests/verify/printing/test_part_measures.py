@@ -8,8 +8,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tbcad_verify.printing.part_measures import PartMeasures
-from tbcad_verify.printing.walls import thin_area
+from tbcad_verify.printing.part_measures import PartMeasures, thin_area
 from tbcad_verify.report.checks import Unknown
 
 from tests.verify.printing.printing_meshes import (

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.printing.assessment import assess, print_check, to_row
+from tbcad_verify.printing.orientations import best_rotation, silhouette
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import overhang_area, place, pose_text
 from tbcad_verify.printing.profile import Profile, load
-from tbcad_verify.printing.rotating_callipers import best_rotation, silhouette
 
 from tests.verify.printing.printing_meshes import (
     box,

@@ -12,7 +12,7 @@ from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.rays import build_scene
 from tbcad_verify.mesh.surfaces import ReflectedRays, prepare_for_rays
 from tbcad_verify.record.poses import VirtualCameras
-from tbcad_verify.shell import coverage, seam
+from tbcad_verify.shell import coverage
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.outline import (
     SAMPLES,
@@ -288,7 +288,7 @@ def brute_force_gaps(cells: Cells, radius: float) -> dict[str, float]:
         at = x - ((x @ m["u"]) / (r @ m["u"]))[:, None] * r
         s = at @ np.cross(m["u"], [1.0, 0, 0])
         order = np.argsort(s)
-        height = np.linspace(-radius, radius, seam.STEPS)
+        height = np.linspace(-radius, radius, coverage.STEPS)
         curve = np.interp(height, s[order], at[order, 0])
         # Camera a looks at x > curve, camera b, its mirror image, at x < -curve.
         chord = np.sqrt(radius**2 - height**2)

@@ -13,7 +13,7 @@ from tbcad_verify import verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.mesh.surfaces import distance_before_mirror, miss_distances
 from tbcad_verify.report.checks import Check
-from tbcad_verify.shell import coverage, image_rim, light, pixels
+from tbcad_verify.shell import coverage, light, pixels
 from tbcad_verify.shell.optics import OpticalSetup
 
 from tests.exported_files import edit_json
@@ -178,7 +178,7 @@ def test_the_paths_to_the_zenith_mirror_limit_the_object(tmp_path: Path) -> None
     zenith = np.flatnonzero(optical_setup.u[2] > 1 - 1e-12)[:1]
     start = optical_setup.export.mirrors.columns("px", 3)[:, zenith] + 0.3
     seen = optical_setup.seen(camera)
-    small = image_rim.rim_rays(seen, zenith, start, optical_setup.u[:, zenith], np.array([1e-3]))
+    small = pixels.rim_rays(seen, zenith, start, optical_setup.u[:, zenith], np.array([1e-3]))
     way = distance_before_mirror(seen, small.direction, small.lines.reach)
     assert 2 * way.mean() == pytest.approx(62.0, abs=0.05)
 
@@ -197,7 +197,7 @@ def test_ring_grazes_the_capture_sphere(optical_setup: OpticalSetup) -> None:
     ring = pixels._ring(optical_setup, camera, None)
     assert ring.error.max() < 1e-6
     np.testing.assert_allclose(miss_distances(ring.lines), optical_setup.radius, atol=1e-6)
-    assert np.bincount(ring.mirror).max() == image_rim.AZIMUTHS
+    assert np.bincount(ring.mirror).max() == pixels.AZIMUTHS
 
 
 def test_a_narrow_camera_cuts_mirrors_off(export_folder: Path) -> None:
@@ -218,7 +218,7 @@ def test_margins_by_hand(optical_setup: OpticalSetup) -> None:
     camera = optical_setup.cameras[0]
     corner = camera.forward + camera.right * np.tan(camera.hfov / 2)
     d = np.stack([camera.forward, corner, -camera.forward], axis=1)
-    found = image_rim.margins(camera, d)
+    found = pixels.margins(camera, d)
     assert found[0] == pytest.approx(camera.height / 2)
     assert found[1] == pytest.approx(0, abs=1e-9)
     assert found[2] == -np.inf

@@ -8,7 +8,6 @@ import numpy as np
 
 from tbcad_verify.as_built.machine import AsBuilt
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.lines import nearest_on_lines
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
     ReflectedRays,
@@ -16,7 +15,7 @@ from tbcad_verify.mesh.surfaces import (
     prepare_for_rays,
     reflect,
 )
-from tbcad_verify.mesh.vectors import cross, dot, norm, unit
+from tbcad_verify.mesh.vectors import cross, dot, nearest_on_lines, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage
 from tbcad_verify.prototype.light.pinhole_cells import MirrorSpheres, cell_outlines

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.lines import nearest_on_lines
-from tbcad_verify.mesh.vectors import dot, norm, take
+from tbcad_verify.mesh.vectors import dot, nearest_on_lines, norm, take
 from tbcad_verify.types import Floats
 
 

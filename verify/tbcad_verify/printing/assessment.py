@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.printing.part_measures import PartMeasures
+from tbcad_verify.printing.part_measures import PartMeasures, thin_area
 from tbcad_verify.printing.placement import SLACK_MM, BedPlacement, place, pose_text
 from tbcad_verify.printing.profile import Profile
-from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative
 from tbcad_verify.types import Floats
 

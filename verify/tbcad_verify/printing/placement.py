@@ -10,10 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.printing.orientations import HullView
+from tbcad_verify.printing.orientations import HullView, best_rotation
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.profile import Profile
-from tbcad_verify.printing.rotating_callipers import best_rotation
 from tbcad_verify.types import Floats
 
 SLACK_MM = 1e-3  # below any machine's precision, and the error of float32

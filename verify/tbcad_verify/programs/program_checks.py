@@ -7,16 +7,17 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 
-from tbcad_verify.programs import admesh, freecad, gmsh, prusa
 from tbcad_verify.programs.answers import skipped
+from tbcad_verify.programs.mesh_programs import ADMESH, PRUSA_3MF, PRUSA_SLICES, PRUSA_STL
 from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, sandbox
+from tbcad_verify.programs.step_programs import FREECAD, GMSH
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
 from tbcad_verify.run.child import Limits
 from tbcad_verify.types import Progress
 
 PROCESSES = 2
-QUERIES = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
+QUERIES = (FREECAD, GMSH, PRUSA_STL, PRUSA_3MF, PRUSA_SLICES, ADMESH)
 
 
 def check_with_programs(

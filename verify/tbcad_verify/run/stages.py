@@ -25,7 +25,7 @@ from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require, unknown
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
-from tbcad_verify.shell import coverage, mirrors_found, pixels
+from tbcad_verify.shell import coverage, match, pixels
 from tbcad_verify.shell.integrity import (
     MANIFEST,
     manifest_checks,
@@ -33,9 +33,8 @@ from tbcad_verify.shell.integrity import (
     record_checks,
 )
 from tbcad_verify.shell.mandrel import mandrel_results
-from tbcad_verify.shell.measured_shell import ShellPart, measure_shells
+from tbcad_verify.shell.measured_shell import ShellPart, flipped_measures, measure_shells
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
-from tbcad_verify.shell.mirror_image import flipped_measures
 from tbcad_verify.shell.optics import OpticalSetup, set_up
 
 SHELL_STAGES = (
@@ -252,7 +251,7 @@ def _trace_shells(
 
     sink(Results(stages=[SETUP]))
     setup, no_setup = attempt(lambda: _set_up(export, shells, first))
-    report(mirrors_found.CHECKS, lambda: mirrors_found.checks(require(setup, no_setup), files))
+    report(match.CHECKS, lambda: match.checks(require(setup, no_setup), files))
     casing = guarded(casing_names(export), lambda: casing_checks(require(setup, no_setup), holes))
     sink(Results(checks=casing))
     sink(Results(stages=[COVERAGE]))

@@ -12,8 +12,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import MassProperties
-from tbcad_verify.mesh.mesh import Topology
+from tbcad_verify.mesh.mesh import MassProperties, Topology
 from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.files import digest, listing
 from tbcad_verify.record.joining_planes import ends_check, has_joining_planes

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.holes import RoundHoles, round_holes
-from tbcad_verify.mesh.mass import mass_properties
-from tbcad_verify.mesh.mesh import Mesh, examine_topology, mesh_from_facets
+from tbcad_verify.mesh.mesh import Mesh, examine_topology, mass_properties, mesh_from_facets
 from tbcad_verify.mesh.rays import build_scene, first_hits
 from tbcad_verify.mesh.segments import Edges, count_folds, measure_edges, rounding
 from tbcad_verify.mesh.stl import Facets

@@ -14,7 +14,7 @@ from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match, owners
-from tbcad_verify.shell.mirror_image import is_image_of_camera
+from tbcad_verify.shell.measured_shell import is_image_of_camera
 from tbcad_verify.shell.recover import Recovery, join_recoveries
 from tbcad_verify.types import Floats, Ints
 

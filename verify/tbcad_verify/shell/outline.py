@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.fits import SurfaceFits
-from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
@@ -22,7 +21,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect,
     reflect_directions,
 )
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
 from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell.recover import Recovery, follows_fit
 from tbcad_verify.types import Bools, Floats, Ints

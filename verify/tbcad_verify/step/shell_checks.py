@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.flange_holes import HoleLimits, flanges, hole_faults
 from tbcad_verify.record.radius_rule import RULE, rule_check
