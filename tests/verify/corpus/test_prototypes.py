@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from tbcad_verify import main
 from tbcad_verify.shell.integrity import is_paper
-from tests.verify.corpus.trial import attempt
 
 from tests.verify.corpus.broken_prototypes import GOOD, PROTOTYPES
 from tests.verify.corpus.copies import change, copy, load
-from tests.verify.corpus.mutation import Mutation
+from tests.verify.corpus.mutation import Mutation, attempt
 
 pytestmark = pytest.mark.corpus
 

@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 from rich.console import Console
 from tbcad_verify import main
-from tbcad_verify.programs.answers import skipped
+from tbcad_verify.programs.program_query import skipped
 from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.report.checks import Check
-from tbcad_verify.report.key_figures import KEY_FIGURES, LABEL_WIDTH, key_figures
 from tbcad_verify.report.methods import (
     AS_BUILT,
     ELSE,
     EXPORT,
+    KEY_FIGURES,
+    LABEL_WIDTH,
     UNKNOWN,
+    key_figures,
     methods,
     remedy,
     remedy_by_name,

@@ -18,11 +18,10 @@ from tbcad_verify.shell.measured_shell import (
     FLIP,
     ShellPart,
     flipped_measures,
-    is_image_of_camera,
     is_mirror_image,
     measure_shells,
 )
-from tbcad_verify.shell.optics import OpticalSetup, set_up
+from tbcad_verify.shell.optics import OpticalSetup, is_image_of_camera, set_up
 
 from tests.verify.synthetic_export import Cells
 

@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 from tbcad_verify.mesh.holes import round_holes
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.segments import Edges, count_folds, creases, measure_edges, rounding
-from tbcad_verify.shell.match import checks
+from tbcad_verify.shell.mirrors_found import checks
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.shell.recover import recover
 

@@ -9,13 +9,15 @@ import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step import part21
-from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.solids_text import (
+    Casing,
     RoundFace,
     distance_to_line,
     holes,
+    read_casing,
     read_solids,
+    wall,
 )
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"

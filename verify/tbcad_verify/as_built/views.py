@@ -82,11 +82,7 @@ def half_views(
 ) -> HalfViews:
     """Trace the outlines of all windows of a run whose stops were measured.
 
-    Args:
-        context: the record.
-        machine: where camera and base are.
-        half: the run.
-        centre: (3, K) of the balls with the base at angle zero, mm.
+    `centre`: (3, K) of the balls with the base at angle zero, mm.
     """
     known = np.flatnonzero(half.frame >= 0)
     views = HalfViews(*(np.full(len(half.ids), np.nan) for _ in range(3)))

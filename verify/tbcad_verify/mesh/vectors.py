@@ -86,11 +86,9 @@ def nearest_on_lines(
 ) -> Floats:
     """(3, N) the points of lines point + t direction that are nearest to the origin.
 
-    Args:
-        point: (3, N) or (3, 1).
-        direction: (3, N) of any length.
-        first: smallest t, (N,) or one for all.
-        last: largest t.
+    `point`: (3, N) or (3, 1).
+    `direction`: (3, N) of any length.
+    `first`: smallest t, (N,) or one for all.
     """
     t = -dot(point, direction) / dot(direction, direction)
     return np.asarray(point + np.clip(t, first, last) * direction)

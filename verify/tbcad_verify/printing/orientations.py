@@ -125,11 +125,9 @@ def best_rotation(
     The smallest of the enclosing rectangles that fit; if none of those with a side along an edge
     fits, the rotation with the smallest excess over width or depth, whichever is larger.
 
-    Args:
-        seen: from above.
-        width: of the rectangle along x, mm.
-        depth: along y, mm.
-        slack: by how much the sides may be exceeded, mm.
+    `width`: of the rectangle along x, mm.
+    `depth`: along y, mm.
+    `slack`: by how much the sides may be exceeded, mm.
 
     Returns:
         Angle from 0 to below pi, counter-clockwise, and (2,) extent along x and y, mm.

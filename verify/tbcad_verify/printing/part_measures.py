@@ -80,12 +80,9 @@ def measure(
 ) -> PartMeasures:
     """Measure a mesh.
 
-    Args:
-        mesh: a part's; figures of one that is not closed mean little, as its `status` says.
-        status: of manifold3d.
-        mass: the mesh's mass properties.
-        edges: of the mesh, if they are measured.
-        scene: of the mesh, if there is one.
+    `mesh`: a part's; figures of one that is not closed mean little, as its `status` says.
+    `edges`: of the mesh, if they are measured.
+    `scene`: of the mesh, if there is one.
 
     Raises:
         Unknown: all points lie in a plane: there is nothing to measure.
@@ -140,13 +137,7 @@ class ThicknessRays:
 
 
 def wall_thickness(mesh: Mesh, edges: Edges, scene: RayScene) -> WallThickness:
-    """Measure thickness from every facet, and from the bottom of every groove.
-
-    Args:
-        mesh: a closed solid, outward.
-        edges: of the mesh.
-        scene: of the mesh.
-    """
+    """Measure thickness from every facet, and from the bottom of every groove."""
     longest = longest_sides(mesh)
     # Twice the area over the longest side is the smallest height; both ends of it are rounded.
     sound = norm(mesh.area) * SOUND_RAD > 2 * rounding(mesh) * longest

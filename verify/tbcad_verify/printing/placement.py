@@ -110,11 +110,8 @@ def _overhangs(measures: PartMeasures, poses: list[Pose], profile: Profile) -> l
 def overhang_area(mesh: Mesh, double: Floats, down: Floats, lean_rad: float) -> float:
     """Area of facets that lean more than allowed and do not lie on the bed, mm^2.
 
-    Args:
-        mesh: a part's.
-        double: (F,) twice the facets' areas, mm^2.
-        down: (3,) unit, the direction that points down.
-        lean_rad: maximum lean from the vertical without support: 0 for walls, pi/2 for ceilings.
+    `double`: (F,) twice the facets' areas, mm^2.
+    `down`: (3,) unit, the direction that points down.
     """
     limit = math.sin(min(lean_rad + UNCERTAINTY_RAD, math.pi / 2))
     below = np.flatnonzero(np.einsum("in,i->n", mesh.area, down) > limit * double)

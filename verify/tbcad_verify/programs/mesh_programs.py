@@ -6,13 +6,15 @@ import math
 import re
 from pathlib import Path
 
-from tbcad_verify.programs.answers import VOLUME, mesh_checks, text_of
 from tbcad_verify.programs.program_query import (
+    VOLUME,
     Command,
     ExpectedPart,
     ProgramQuery,
     Sandbox,
+    mesh_checks,
     on_path,
+    text_of,
 )
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, informative, unknown
 

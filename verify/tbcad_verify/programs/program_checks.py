@@ -7,9 +7,8 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 
-from tbcad_verify.programs.answers import skipped
 from tbcad_verify.programs.mesh_programs import ADMESH, PRUSA_3MF, PRUSA_SLICES, PRUSA_STL
-from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, sandbox
+from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, sandbox, skipped
 from tbcad_verify.programs.step_programs import FREECAD, GMSH
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
@@ -32,12 +31,8 @@ def check_with_programs(
     The checks of a program that is not installed are skipped: see `is_skipped`. Those of one that
     crashes, runs out of time or gives no clear answer are unknown. An interrupt kills all of them.
 
-    Args:
-        folder: the export; its files should have been compared with the manifest before.
-        parts: of the export.
-        seconds: time limit of one run of one program.
-        progress: called with program and file before each run, from several threads.
-        queries: what is asked.
+    `folder`: the export; its files should have been compared with the manifest before.
+    `progress`: called with program and file before each run, from several threads.
 
     Raises:
         BadExport: the folder is missing or is no folder.

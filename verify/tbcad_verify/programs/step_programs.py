@@ -8,23 +8,21 @@ import re
 import sys
 from pathlib import Path
 
-from tbcad_verify.programs.answers import (
+from tbcad_verify.programs.program_query import (
     NO_ANSWER,
     SCRIPT_END,
     SOLID,
     SPHERES,
     VOLUME,
-    script_figures,
-    skipped,
-    solid_checks,
-    text_of,
-)
-from tbcad_verify.programs.program_query import (
     Command,
     ExpectedPart,
     ProgramQuery,
     Sandbox,
     on_path,
+    script_figures,
+    skipped,
+    solid_checks,
+    text_of,
 )
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most
 

@@ -25,7 +25,7 @@ from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require, unknown
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
-from tbcad_verify.shell import coverage, match, pixels
+from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.integrity import (
     MANIFEST,
     manifest_checks,
@@ -62,11 +62,7 @@ def run_stages(
 ) -> None:
     """Run all stages, and hand over what each measures.
 
-    Args:
-        folder: what `tbcad build` wrote.
-        printers: profiles that every part must suit; without any, the built-in ones inform only.
-        sink: takes the results.
-        beside: does the prototype's stages while the shells' are done here.
+    `printers`: profiles that every part must suit; without any, the built-in ones inform only.
 
     Raises:
         BadExport: the folder is not a readable export, or a profile cannot be used.
@@ -159,10 +155,8 @@ def _shell_measures(
 ) -> PartMeasures:
     """What printers need to know of a shell; of a mirror image it is known already.
 
-    Args:
-        shell: to measure.
-        measured: shells before it.
-        first: scene of the first of two, if the second is its image.
+    `measured`: shells before it.
+    `first`: scene of the first of two, if the second is its image.
     """
     original = measured.get(shell.image_of.name) if shell.image_of else None
     if original and shell.mesh and shell.mass:
@@ -251,7 +245,7 @@ def _trace_shells(
 
     sink(Results(stages=[SETUP]))
     setup, no_setup = attempt(lambda: _set_up(export, shells, first))
-    report(match.CHECKS, lambda: match.checks(require(setup, no_setup), files))
+    report(mirrors_found.CHECKS, lambda: mirrors_found.checks(require(setup, no_setup), files))
     casing = guarded(casing_names(export), lambda: casing_checks(require(setup, no_setup), holes))
     sink(Results(checks=casing))
     sink(Results(stages=[COVERAGE]))

@@ -197,12 +197,7 @@ def gaps(
     0 where the halves overlap, and for virtual cameras of whole mirrors; NaN where one half is
     missing.
 
-    Args:
-        outlines: of each camera.
-        lines: reflected on fitted surfaces, at each outline's samples.
-        virtual: pairs halves.
-        u: (3, M) directions of the virtual cameras.
-        radius_mm: of the disc.
+    `u`: (3, M) directions of the virtual cameras.
     """
     halves = np.unique(virtual.index[virtual.halved])
     widest = np.zeros(virtual.count)

@@ -27,14 +27,13 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.printing.orientations import part_hull
 from tbcad_verify.printing.part_measures import PartMeasures, WallThickness
-from tbcad_verify.record.export import Camera, Export, Part
+from tbcad_verify.record.export import Export, Part
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
-from tbcad_verify.shell.optics import pinhole_of
+from tbcad_verify.shell.optics import FLIP, pinhole_of
 from tbcad_verify.shell.recover import Recovery, recover
 from tbcad_verify.types import Floats
 
-FLIP = np.array([-1.0, 1.0, 1.0])
 # The half-edge between the same two corners when a facet's three are taken in reverse.
 REVERSED = np.array([1, 0, 2])
 
@@ -119,17 +118,6 @@ def is_mirror_image(one: Facets, other: Facets) -> bool:
         one.corners.shape == other.corners.shape
         and np.array_equal(one.corners[:, ::-1] * flip, other.corners)
         and np.array_equal(one.normals * flip, other.normals)
-    )
-
-
-def is_image_of_camera(other: Camera, one: Camera) -> bool:
-    """Whether one camera's pixels see along the mirror images of the other's, in any order."""
-    across = one.right * FLIP
-    same = [(one.pinhole * FLIP, other.pinhole), (one.forward * FLIP, other.forward)]
-    return (
-        (one.width, one.height, one.hfov_deg) == (other.width, other.height, other.hfov_deg)
-        and all(np.array_equal(*pair) for pair in same)
-        and (np.array_equal(across, other.right) or np.array_equal(-across, other.right))
     )
 
 

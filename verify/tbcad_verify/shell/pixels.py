@@ -52,11 +52,8 @@ CLOSE_MM = 1e-4
 def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> MirrorChecks:
     """What the sensor and the rim show, and the useful pixels of each recorded mirror (M,).
 
-    Args:
-        setup: what to look at.
-        seen: what the mirrors cover; no rim is looked for where they do not reach. None takes
-            them to reach the whole object.
-        files: where, for the report.
+    `seen`: what the mirrors cover; no rim is looked for where they do not reach. None takes
+    them to reach the whole object.
     """
     path, clear, minimum, median, maximum, framed, double, half, nearly_all = check_names(
         CHECKS, files
@@ -168,12 +165,10 @@ def rim_rays(
 ) -> RimRays:
     """Aim at the rim of the capture sphere off each mirror, by Newton's method.
 
-    Args:
-        seen: the mirrors' surfaces from the pinhole.
-        mirrors: (K,) which of them.
-        start: (3, K) mm, a point on each mirror to begin with.
-        u: (3, K) their virtual cameras' directions.
-        radius: (K,) of the sphere about the origin to graze, mm.
+    `mirrors`: (K,) which of them.
+    `start`: (3, K) mm, a point on each mirror to begin with.
+    `u`: (3, K) their virtual cameras' directions.
+    `radius`: (K,) of the sphere about the origin to graze, mm.
     """
     chief = _aim(seen, mirrors, start - seen.origin[:, None], u, np.zeros((2, mirrors.size)))
     angle = np.tile(np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS), mirrors.size)
