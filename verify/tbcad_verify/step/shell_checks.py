@@ -69,7 +69,7 @@ class ShellComparison(FrontComparison):
 def shell_comparisons(
     export: Export, files: dict[str, StepFile | Unknown]
 ) -> dict[str, ShellComparison | Unknown]:
-    """Each shell's STEP file with all that it is compared with but its mesh, or why not, by part."""
+    """Each shell's STEP file with all that it is compared with but its mesh, or why not."""
     return each_compared(export.parts, files, partial(_comparison, export))
 
 
