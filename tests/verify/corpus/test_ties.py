@@ -16,7 +16,7 @@ pytestmark = pytest.mark.corpus
 
 README = Path(__file__).parents[3] / "verify" / "README.md"
 KINDS = {"measured", "worked out", "spec", "form", "hash"}
-MAPS = {"files", "versions"}  # objects whose keys are data
+MAPS = {"files", "versions", "totals.bought_price", "totals.filament_price"}  # keys are data
 
 
 def json_fields(value: Any, path: str = "") -> Iterator[str]:

@@ -55,9 +55,8 @@ def test_what_is_off_by_twenty_micrometres_is_named(tmp_path: Path) -> None:
     moved = {10: [0.012, 0.012, 0.011], 12: [0.004, 0, 0]}
     folder, _ = export(tmp_path / "x", Design(moved=moved, grown={17: 0.02}))
     said = failing(folder)
-    assert said["centre error"].startswith("a0010 0.0202 mm, b0010 0.0202 mm")
-    assert "more" not in said["centre error"]
-    assert said["radius error"] == "a0017 0.0200 mm, b0017 0.0200 mm"
+    assert {*said["centre error"].split(", ")} == {"a0010 0.0202 mm", "b0010 0.0202 mm"}
+    assert {*said["radius error"].split(", ")} == {"a0017 0.0200 mm", "b0017 0.0200 mm"}
 
 
 def test_a_missing_mirror_is_named(tmp_path: Path) -> None:
