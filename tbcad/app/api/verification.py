@@ -10,7 +10,7 @@ from tbcad.options.builds import VerificationOptions
 from tbcad.options.call import keywords, silent
 
 if TYPE_CHECKING:
-    from tbcad_verify.as_built.report import AsBuiltReport
+    from tbcad_verify.as_built.verify import AsBuiltReport
     from tbcad_verify.report.report import Report
 
     from tbcad.types import Progress

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 from tbcad_verify.report.as_made import NOT_MODELLED, AsMade
-from tbcad_verify.report.key_figures import KEY_FIGURES
+from tbcad_verify.report.methods import KEY_FIGURES
 
 from tbcad.cad.formats.checked_files import Finite, Record, read_json
 from tbcad.output.manifest import VERDICT

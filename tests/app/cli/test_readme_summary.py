@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.report.as_made import as_made_lines
-from tbcad_verify.report.key_figures import KEY_FIGURES
+from tbcad_verify.report.methods import KEY_FIGURES
 from tbcad_verify.report.summary import MAX_LINES
 
 from tbcad.common.screen import WIDTH

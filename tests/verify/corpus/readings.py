@@ -9,17 +9,14 @@ import hashlib
 import io
 import pickle
 import stat
-import threading
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import manifold3d
-import numpy as np
 from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype import (
     assembly,
@@ -104,68 +101,16 @@ def remembered() -> Iterator[None]:
         (lamp_light, "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )
-    kept = _Kept()
     with ExitStack() as stack:
         for module, name, key in keyed:
-            once = _Once(getattr(module, name), key, kept)
+            once = _Once(getattr(module, name), key)
             stack.enter_context(mock.patch.object(module, name, once))
         each = _EachOnce(step_file.examine_all)
         stack.enter_context(mock.patch.object(step_file, "examine_all", each))
         yield
 
 
-class _Kept:
-    """Results that are kept, with the arrays and records in them: none changes any more.
-
-    A digest has them by their identity, and all else by its content.
-    """
-
-    def __init__(self) -> None:
-        self._objects: dict[int, object] = {}
-
-    def __contains__(self, one: object) -> bool:
-        return id(one) in self._objects
-
-    def add(self, result: object, given: object) -> None:
-        """Keep a result, but what it was given: that is compared by its content."""
-        new = self._parts(result)
-        for part in self._parts(given):
-            new.pop(part, None)
-        self._objects |= new
-
-    def _parts(self, whole: object) -> dict[int, object]:
-        """All arrays, solids and records in a value that are not kept yet, by identity."""
-        found: dict[int, object] = {}
-        waiting = [whole]
-        while waiting:
-            one = waiting.pop()
-            if isinstance(one, list | tuple):
-                waiting += one
-            elif isinstance(one, dict):
-                waiting += one.values()
-            elif one in self or id(one) in found:
-                continue
-            elif isinstance(one, np.ndarray | manifold3d.Manifold):
-                found[id(one)] = one
-            elif is_dataclass(one):
-                found[id(one)] = one
-                waiting += vars(one).values()
-        return found
-
-    def digest(self, value: object) -> str:
-        stream = io.BytesIO()
-        _Pickler(stream, self).dump(value)
-        return hashlib.sha256(stream.getbuffer()).hexdigest()
-
-
 class _Pickler(pickle.Pickler):
-    def __init__(self, stream: io.BytesIO, kept: _Kept) -> None:
-        super().__init__(stream, pickle.HIGHEST_PROTOCOL)
-        self._kept = kept
-
-    def persistent_id(self, one: object) -> int | None:
-        return id(one) if one in self._kept else None
-
     def reducer_override(self, one: object) -> Any:
         if isinstance(one, Export):
             names = {field.name for field in fields(one)} - NOT_DERIVED_FROM
@@ -181,21 +126,20 @@ class _Pickler(pickle.Pickler):
 class _Once:
     """A function that keeps what it returned, by a key of its arguments; None: it is called."""
 
-    def __init__(self, work: Callable[..., Any], key: Callable[..., object], kept: _Kept) -> None:
-        self._work, self._key, self._kept = work, key, kept
-        self._found: dict[str, Any] = {}
-        self._busy: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
+    def __init__(self, work: Callable[..., Any], key: Callable[..., object]) -> None:
+        self._work, self._key = work, key
+        self._found: dict[bytes, Any] = {}
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         value = self._key(*given, **named)
         if value is None:
             return self._work(*given, **named)
-        key = self._kept.digest(value)
-        with self._busy[key]:
-            if key not in self._found:
-                self._found[key] = self._work(*given, **named)
-                self._kept.add(self._found[key], (given, named))
-            return self._found[key]
+        stream = io.BytesIO()
+        _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+        key = hashlib.sha256(stream.getbuffer()).digest()
+        if key not in self._found:
+            self._found[key] = self._work(*given, **named)
+        return self._found[key]
 
 
 class _EachOnce:

@@ -11,10 +11,9 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
-from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
-from tbcad_verify.mesh.mass import mass_properties
-from tbcad_verify.mesh.mesh import indexed_mesh
+from tbcad_verify.mesh.mesh import indexed_mesh, mass_properties
 from tbcad_verify.mesh.stl import parse
+from tbcad_verify.mesh.vectors import angles_between, polar_and_azimuth, wrapped
 from tbcad_verify.prototype import swing
 from tbcad_verify.prototype.assembly import assembly_meshes
 from tbcad_verify.prototype.context import PrototypeContext

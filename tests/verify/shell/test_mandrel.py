@@ -141,14 +141,6 @@ def with_a_long_foot(mesh: Mesh) -> Mesh:
     return changed(mesh, vertices)
 
 
-def inside_out(mesh: Mesh) -> Mesh:
-    return Mesh(mesh.vertices, mesh.triangles[:, ::-1])
-
-
-def with_a_facet_less(mesh: Mesh) -> Mesh:
-    return Mesh(mesh.vertices, np.delete(mesh.triangles, 1000, axis=0))
-
-
 @pytest.mark.parametrize(
     ("change", "found"),
     [
@@ -156,8 +148,6 @@ def with_a_facet_less(mesh: Mesh) -> Mesh:
         (mirrored_in_y, "mandrel mirrors"),
         (with_a_dent, "mandrel mirrors"),
         (with_a_long_foot, "mandrel body"),
-        (inside_out, "signed volume"),
-        (with_a_facet_less, "watertight"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
@@ -175,16 +165,6 @@ def test_a_broken_mesh_is_refused(
 def test_an_unchanged_mesh_is_not(folder: Path, setup: OpticalSetup, mirrors: MirrorDesign) -> None:
     write_stl(folder / STL, camera_a_mandrel_mesh(mirrors))
     assert failing(folder, setup) == {}
-
-
-def test_a_missing_mirror_is_named(
-    folder: Path, setup: OpticalSetup, mirrors: MirrorDesign
-) -> None:
-    mesh = camera_a_mandrel_mesh(mirrors)
-    array, vertices = mirrors.arrays[0], mesh.vertices.copy()
-    vertices[np.linalg.norm(vertices - array.mirrors.apex[20], axis=1).argmin()] *= 0.999
-    write_stl(folder / STL, changed(mesh, vertices))
-    assert array.ids[20] in failing(folder, setup)["mandrel mirrors"]
 
 
 def test_the_shell_is_no_negative(folder: Path, setup: OpticalSetup, mirrors: MirrorDesign) -> None:
@@ -221,11 +201,6 @@ def rewritten(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 def test_another_draft_is_refused(folder: Path, setup: OpticalSetup) -> None:
     rewritten(folder, lambda one: one["mandrels"][0].update(draft_deg=25.0))
     assert {*failing(folder, setup)} == {"mandrel draft, deviation from record"}
-
-
-def test_another_pull_is_refused(folder: Path, setup: OpticalSetup) -> None:
-    rewritten(folder, lambda one: one["mandrels"][0].update(pull=[1.0, 0.0, 0.0]))
-    assert "mandrel draft, deviation from record" in failing(folder, setup)
 
 
 def test_a_pull_is_a_unit_vector(folder: Path) -> None:

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import distances_to_segments
 from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
-from tbcad_verify.mesh.vectors import unit
+from tbcad_verify.mesh.vectors import distances_to_segments, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
 from tbcad_verify.record.prototype_sections import CameraPlace, MarkPicture

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad_verify.mesh.lines import axis_frame
+from tbcad_verify.mesh.vectors import axis_frame
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.record.prototype import Prototype

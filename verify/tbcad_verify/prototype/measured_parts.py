@@ -8,8 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import MassProperties, mass_properties
-from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes, mesh_from_facets
+from tbcad_verify.mesh.mesh import (
+    MassProperties,
+    Mesh,
+    Topology,
+    examine_topology,
+    join_meshes,
+    mass_properties,
+    mesh_from_facets,
+)
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import polar_and_azimuth, wrapped
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype import BALLS, RECORD
-from tbcad_verify.record.prototype_tables import Balls
+from tbcad_verify.record.prototype_sections import Balls
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

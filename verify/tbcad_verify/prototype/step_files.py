@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import Check, Unknown, guarded

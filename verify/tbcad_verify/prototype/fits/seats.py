@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import half_edge_vectors
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import distance_to_facets
 from tbcad_verify.prototype.record_checks import PAD_UM

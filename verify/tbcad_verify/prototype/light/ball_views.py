@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.surfaces import Surfaces, nearest_on_rays, prepare_for_rays, reflect
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.blocked_rays import blocked_rays
 from tbcad_verify.prototype.light.pinhole_cells import (

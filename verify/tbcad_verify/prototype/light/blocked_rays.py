@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import distances_to_segments
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, distances_to_planes, first_hits, in_threads
 from tbcad_verify.mesh.surfaces import nearest_on_rays
-from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
+from tbcad_verify.mesh.vectors import chunks, distances_to_segments, dot, norm, unit
 from tbcad_verify.prototype.light.ray_transfer import RayTransfer
 from tbcad_verify.prototype.measured_prototype import Obstacles
 from tbcad_verify.types import Bools, Floats, Ints

@@ -8,10 +8,9 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad_verify.mesh.lines import polar_and_azimuth
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK
 from tbcad_verify.mesh.surfaces import ReflectedRays, nearest_on_rays, reflect
-from tbcad_verify.mesh.vectors import chunks
+from tbcad_verify.mesh.vectors import chunks, polar_and_azimuth
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.types import Floats, Ints

@@ -1,4 +1,4 @@
-"""PrusaSlicer: whether a mesh is manifold without repair, and the volume of its print."""
+"""PrusaSlicer and admesh: repairs that a mesh needs, its parts and volume, and its print."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import math
 import re
 from pathlib import Path
 
-from tbcad_verify.programs.answers import VOLUME, mesh_checks, text_of
 from tbcad_verify.programs.program_query import (
+    VOLUME,
     Command,
     ExpectedPart,
     ProgramQuery,
     Sandbox,
+    mesh_checks,
     on_path,
+    text_of,
 )
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, informative, unknown
 
@@ -37,9 +39,20 @@ PROFILE = (
     *("--layer-height", "0.3", "--first-layer-height", "0.3"),
     *("--fill-density", "100%", "--fill-pattern", "rectilinear"),
 )
+FLAWS = (
+    "Total disconnected facets",
+    "Degenerate facets",
+    "Edges fixed",
+    "Facets removed",
+    "Facets added",
+    "Facets reversed",
+    "Backwards edges",
+    "Normals fixed",
+)
+MIN_FACETS = 4
 
 
-def find() -> Command:
+def find_prusa() -> Command:
     """The program, by either of its names."""
     return on_path("prusa-slicer", "PrusaSlicer")
 
@@ -143,16 +156,51 @@ def _print(code: str) -> tuple[float, float]:
 
 def _info(kind: str) -> ProgramQuery:
     questions = {"prusa manifold": "flaws", "prusa parts": "parts", "prusa volume": VOLUME}
-    return ProgramQuery("prusa", kind, INSTALL, questions, find, ask_info)
+    return ProgramQuery("prusa", kind, INSTALL, questions, find_prusa, ask_info)
 
 
-STL = _info("stl")
-THREEMF = _info("3mf")
-SLICES = ProgramQuery(
+PRUSA_STL = _info("stl")
+PRUSA_3MF = _info("3mf")
+PRUSA_SLICES = ProgramQuery(
     program="prusa",
     kind="stl",
     install=INSTALL,
     questions={"prusa slices": "%", "prusa filament": "m", "prusa time": "h"},
-    find=find,
+    find=find_prusa,
     ask=ask_slices,
+)
+
+
+def ask_admesh(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
+    """Nothing to repair, one part, the mesh's volume.
+
+    Raises:
+        Unknown: the program gives no answer.
+    """
+    report = _admesh_figures(text_of(sandbox.run(sandbox.copy)))
+    flaws = {key: report[key] for key in FLAWS}
+    repairs = ", ".join(f"{key} {count:.0f}" for key, count in flaws.items() if count)
+    return [
+        at_most(names[0], sum(flaws.values()), 0, repairs),
+        *mesh_checks(names[1:], report["Number of parts"], report["Volume"], expected),
+    ]
+
+
+def _admesh_figures(text: str) -> dict[str, float]:
+    """Every figure by its label; the first of two columns, "Original"."""
+    rows = re.findall(r"(\w[\w ]{0,40}?) +: +(-?\d{1,20}(?:\.\d{1,9})?)\b", text)
+    report = {label: float(figure) for label, figure in rows}
+    labels = {*FLAWS, "Number of facets", "Number of parts", "Volume"}
+    if not labels <= {*report} or report["Number of facets"] < MIN_FACETS:
+        raise Unknown("ended without error, but without its report")
+    return report
+
+
+ADMESH = ProgramQuery(
+    program="admesh",
+    kind="stl",
+    install="apt install admesh",
+    questions={"admesh repairs": "flaws", "admesh parts": "parts", "admesh volume": VOLUME},
+    find=lambda: on_path("admesh"),
+    ask=ask_admesh,
 )
