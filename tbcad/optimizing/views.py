@@ -14,7 +14,7 @@ import numpy as np
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.light.reconstruction.picture import BY_FIELD
-from tbcad.light.simulate.capture.traced_frame import traced_light_field
+from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles

@@ -15,8 +15,8 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
-from tbcad.light.simulate.capture.traced_frame import traced_light_field
 from tbcad.light.simulate.scene.object import patterned_ball
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -28,8 +28,7 @@ from tbcad.light.simulate.views.viewpoints import (
     viewpoints_over_hemisphere,
     views_by,
 )
-from tbcad.studies.paper import with_lens_of_table_i
-from tbcad.studies.sweep import MAX_N, try_design
+from tbcad.studies.paper import MAX_N, try_design, with_lens_of_table_i
 from tbcad.types import Bools, Bytes, Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
@@ -67,8 +66,7 @@ class Subject:
 def parse_subdivisions(given: list[int] | None) -> tuple[int, ...]:
     """Subdivisions n in ascending order, each once; by default SUBDIVISIONS.
 
-    Raises:
-        InputError: no design has one of them.
+    InputError: no design has one of them.
     """
     ns = tuple(sorted(set(given or SUBDIVISIONS)))
     if ns[0] < 2 or ns[-1] > MAX_N:
@@ -85,16 +83,7 @@ def balance(
     method: StudyMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
-    """The study: SSIM of views over n at the design's sensor, for four objects.
-
-    Args:
-        spec: the design.
-        ns: subdivisions.
-        views: number of viewpoints, evenly over the hemisphere.
-        distance_mm: of the viewpoints.
-        method: how views are made.
-        progress: called with each step.
-    """
+    """The study: SSIM of views over n at the design's sensor, for four objects."""
     spec = with_lens_of_table_i(spec)
     viewpoints = viewpoints_over_hemisphere(views, distance_mm)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)

@@ -21,9 +21,9 @@ from tbcad.studies.paper import (
     BalancedSensor,
     balanced_sensors,
     is_table_i,
+    try_design,
     with_lens_of_table_i,
 )
-from tbcad.studies.sweep import try_design
 from tbcad.types import Floats, Progress
 
 NOTES = (
@@ -64,10 +64,7 @@ def definitions(
 ) -> tuple[Table, Table]:
     """Every definition for rows of Table II, and how far each is from its columns.
 
-    Args:
-        spec: the design, whose n and sensor are those of the rows, one after the other.
-        rows: of Table II.
-        progress: called with each design that is done.
+    n and sensor of the design are those of the rows, one after the other.
     """
     spec = with_lens_of_table_i(spec)
     units = [(row, radii) for row in reversed(rows) for radii in RADII]
@@ -169,10 +166,7 @@ def _rms_percent(values: Floats, columns: Floats) -> float:
 def apices_in_frame(spec: Spec, n: int, pitch: float) -> int:
     """Apices of both arrays in their cameras' frames; those on the seam count for both.
 
-    Args:
-        spec: optics and lens; sensor of its shape.
-        n: subdivision.
-        pitch: from the vertical toward the object, radians; rows of pixels lie along y.
+    `pitch`: from the vertical toward the object, radians; rows of pixels lie along y.
     """
     camera = with_lens_of_table_i(spec).camera
     half_width = np.tan(np.radians(camera.hfov_deg) / 2)

@@ -12,13 +12,18 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import Shift
-from tbcad.light.simulate.views.ground_truth import disc_points, lens_picture, pixel_points
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.simulate.views.refocus import ThinLens, refocus
+from tbcad.light.simulate.views.refocus import (
+    ThinLens,
+    disc_points,
+    lens_picture,
+    pixel_points,
+    refocus,
+)
 from tbcad.light.simulate.views.viewpoints import (
     Viewpoints,
     ground_truths,
@@ -72,11 +77,7 @@ class BlurOptions:
     samples: int = 2
 
     def checked(self) -> "BlurOptions":
-        """These, when all are above 0 to 16.
-
-        Raises:
-            InputError: one is not.
-        """
+        """These, when all are above 0 to 16; InputError: one is not."""
         for option, values in (("--filter-px", self.separations_px), ("--lens-px", self.lens_px)):
             for value in values:
                 if not 0 < value <= MAX_SPREAD_PX:
@@ -117,15 +118,7 @@ def low_pass(
 ) -> Study:
     """The study: captures with each blur, and views of each against the truth.
 
-    Args:
-        export: a design with its prototype.
-        subject: the object.
-        viewpoints: directions of all views; the distance is that of the pinholes.
-        options: the blurs.
-        progress: called with each step.
-
-    Raises:
-        InputError: there is no prototype in the export.
+    The distance of the viewpoints is that of the pinholes. InputError: the export has no prototype.
     """
     targets = _targets(export, subject, viewpoints, progress)
     records: list[Record] = []
@@ -253,15 +246,11 @@ def _bars(means: Table, column: str) -> tuple[Series, ...]:
 
 
 def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
-    """Rays of a pixel behind a birefringent low-pass filter.
+    """Rays of a pixel behind a birefringent low-pass filter: samples x samples for each image.
 
-    Two crossed plates split every point into four, at the corners of a square. Along rows and
-    columns f cycles a pixel pass by |cos(pi separation f)|, and 1 / (2 separation) not at all
-    (J. E. Greivenkamp, Applied Optics 29, 676, 1990).
-
-    Args:
-        separation_px: side of the square, pixels.
-        samples: each of the four images has samples x samples rays.
+    Two crossed plates split every point into four, at the corners of a square of this side. Along
+    rows and columns f cycles a pixel pass by |cos(pi separation f)|, and 1 / (2 separation) not at
+    all (J. E. Greivenkamp, Applied Optics 29, 676, 1990).
     """
     ends = (-separation_px / 2, separation_px / 2)
     return tuple(
@@ -273,12 +262,7 @@ def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
 
 
 def defocus_shifts(diameter_px: float, count: int) -> tuple[Shift, ...]:
-    """Rays of a pixel behind a lens out of focus, each through another point of both.
-
-    Args:
-        diameter_px: of the even blur circle, pixels.
-        count: number of rays.
-    """
+    """Rays of a pixel out of focus: points of an even blur circle and of the pixel."""
     circle = (disc_points(count) * diameter_px / 2).tolist()
     pairs = zip(circle, pixel_points(count), strict=True)
     return tuple((x + column, y + row) for (x, y), (column, row) in pairs)

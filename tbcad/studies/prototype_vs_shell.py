@@ -9,9 +9,9 @@ from tbcad.common.results.plots import PlotPanel, Series
 from tbcad.common.results.study import Figure, Study
 from tbcad.common.results.tables import Table
 from tbcad.light.simulate.camera_photographs import photographed
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
     StudyMethod,
@@ -53,16 +53,8 @@ def prototype_vs_shell(
 ) -> Study:
     """The study: both light fields of one object, and the same views of both.
 
-    Args:
-        export: a design with its prototype.
-        subject: the object.
-        viewpoints: where the views are from.
-        method: how views are made.
-        samples: a pixel of a photograph is the mean of samples x samples rays.
-        progress: called with each step.
-
-    Raises:
-        InputError: there is no prototype in the export.
+    A pixel of a photograph is the mean of samples x samples rays. InputError: there is no prototype
+    in the export.
     """
     scene, views = prepared_scene(subject), viewpoints.cameras(export.capture_mm)
     truths = ground_truths(scene, views, progress)

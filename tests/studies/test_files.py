@@ -23,15 +23,14 @@ from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate import parallel
 from tbcad.light.simulate.capture.pixel_counts import Sensor
-from tbcad.studies.capture_area import capture_area
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
-from tbcad.studies.elevation import elevation
+from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import (
     is_table_i,
+    n_range,
     with_lens_of_table_i,
 )
 from tbcad.studies.resolution import COUNTED, Ratio, resolution
-from tbcad.studies.sweep import n_range
 from tests.mirror_arrays import mirror_array
 
 SMALL = ("n=4", "width_px=208", "height_px=155")

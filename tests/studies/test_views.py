@@ -14,8 +14,8 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.pixel_counts import Sensor
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.viewpoints import Viewpoints, viewpoints_around
 from tbcad.studies.low_pass import BlurOptions, low_pass
 from tbcad.studies.paper import balanced_sensors

@@ -1,29 +1,40 @@
-"""A capture as a folder for another program, with the figures of how well it fits."""
+"""A capture as a folder for another program, with the figures of how well it fits.
+
+Splats and other point-based methods grow from points: seed points are in the visual hull of the
+object in the exported pictures. A point of the capture sphere that several virtual cameras see
+dark, as background, is not on the object (A. Laurentini, The visual hull concept, IEEE PAMI 16,
+150, 1994). Where the background is not dark, or all of the object is, the points fill the sphere.
+"""
 
 import json
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
 from tbcad.cad.formats.colmap import SparseModel
 from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import chosen_mirrors
 from tbcad.light.datasets.machine_scene import write_machine_scene
-from tbcad.light.datasets.nerfstudio import write_nerfstudio, write_pictures
-from tbcad.light.datasets.ngp_rays import write_ngp_rays
 from tbcad.light.datasets.pictures import Pictures, default_size, taken_pictures
-from tbcad.light.datasets.pinholes import pinhole_of
+from tbcad.light.datasets.pinholes import (
+    pinhole_of,
+    write_nerfstudio,
+    write_ngp_rays,
+    write_pictures,
+)
 from tbcad.light.datasets.ray_table import write_ray_table
-from tbcad.light.datasets.seed_points import SeedPoints, seed_points
-from tbcad.light.datasets.virtual_cameras import FittedCameras, virtual_cameras
+from tbcad.light.datasets.virtual_cameras import FittedCameras, chosen_mirrors, virtual_cameras
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.captures import ExportOptions
-from tbcad.types import Floats, Progress
+from tbcad.types import Bools, Bytes, Floats, Progress
 
 SCHEMA = "tbcad-dataset/1"
 RECORD, TABLE = "dataset.json", "cameras.csv"
@@ -32,6 +43,19 @@ COLUMNS = ("name", "x", "y", "z", "rays", "pitch_mm", "rms_mm", "worst_mm", "cen
 MODEL = Path("sparse", "0")
 # COLMAP looks for the mask of a0001.png as a0001.png.png.
 MASK_SUFFIX = ".png.png"
+CANDIDATES = 1 << 16  # in the cube around the capture sphere; half of them are in the sphere
+MOST_CAMERAS = 96
+DARK = 10  # of 255: background, but for noise
+# A point is carved away where more of the cameras that see it see it dark than this.
+DARK_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class SeedPoints:
+    """Points on and in the object."""
+
+    points: Floats  # mm, (n, 3)
+    colours: Bytes  # median of what the virtual cameras see there, (n, 3)
 
 
 def write_dataset(
@@ -40,16 +64,10 @@ def write_dataset(
     scene: Scene | None,
     options: ExportOptions,
 ) -> dict[str, Any]:
-    """Write all files of an export into a folder, and return its record.
+    """Write all files of an export into an empty folder, and return its record.
 
-    Args:
-        folder: exists, is empty, and is the caller's to replace.
-        source: the light field.
-        scene: the object of a simulated capture; None where it is not known.
-        options: what is wanted, and what is told of it.
-
-    Raises:
-        InputError: a mirror is not in the capture, or none gives a camera.
+    `scene` is the object of a simulated capture. InputError: a mirror is not in the capture, or
+    none gives a camera.
     """
     options.progress("virtual cameras")
     mirrors = chosen_mirrors(source, options.cameras, options.every)
@@ -75,17 +93,10 @@ def write_dataset(
 def write_scene(
     folder: Path, source: LightField, scene: Scene | None, exports: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Write scenes of the machine into a folder, and return their record.
+    """Write scenes of the machine into an empty folder, and return their record.
 
-    Args:
-        folder: exists, is empty, and is the caller's to replace.
-        source: the light field.
-        scene: its object.
-        exports: the export that it was captured with.
-        progress: called with each stage.
-
-    Raises:
-        InputError: the capture names no object, or the export has other cameras or no shells.
+    `exports` is the export that the light field was captured with. InputError: the capture names no
+    object, or the export has other cameras or no shells.
     """
     if scene is None:
         raise InputError("the capture names no object, so there is none in the scene: capture one")
@@ -210,3 +221,42 @@ def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> Spa
         seeds.points,
         seeds.colours,
     )
+
+
+def seed_points(
+    cameras: list[Camera], pictures: Bytes, masks: Bools, capture_mm: float
+) -> SeedPoints:
+    """Points inside the visual hull; the same each time.
+
+    Cameras (m,), what they see (m, h, w, 3), and where that is known (m, h, w).
+    """
+    points = _candidates(capture_mm / 2)
+    step = -(-len(cameras) // MOST_CAMERAS)
+    seen = [
+        _colours(camera, picture, mask, points)
+        for camera, picture, mask in zip(
+            cameras[::step], pictures[::step], masks[::step], strict=True
+        )
+    ]
+    colours, known = np.stack([one[0] for one in seen]), np.stack([one[1] for one in seen])
+    dark = known & (colours.max(axis=2) < DARK)
+    seen_at_all = known.any(axis=0)
+    hull = seen_at_all & (dark.sum(axis=0) <= DARK_SHARE * known.sum(axis=0))
+    kept = hull if hull.any() else seen_at_all
+    values = np.where(known[:, kept, None], colours[:, kept].astype(np.float32), np.nan)
+    median = np.nanmedian(values, axis=0)
+    return SeedPoints(points[kept], np.rint(median).astype(np.uint8))
+
+
+def _candidates(radius: float) -> Floats:
+    cube = qmc.Halton(3, scramble=False).random(CANDIDATES)
+    points = radius * (2 * cube - 1)
+    return np.asarray(points[norm(points) < radius])
+
+
+def _colours(camera: Camera, picture: Bytes, mask: Bools, points: Floats) -> tuple[Bytes, Bools]:
+    """Colours (n, 3) of the pixels in which points (n, 3) appear, and whether they are known."""
+    column, row = np.rint(camera.project(points)).astype(np.int64).T
+    inside = (column >= 0) & (column < camera.width_px) & (row >= 0) & (row < camera.height_px)
+    column, row = np.where(inside, column, 0), np.where(inside, row, 0)
+    return picture[row, column], inside & mask[row, column]

@@ -19,10 +19,9 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.geodesic import triangle_grid
 from tbcad.light.simulate.object_files.normals import is_closed
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, SurfaceHits
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.light.simulate.scene.shell_meshes import facet_owners, read_facets
 from tbcad.types import Floats, Ints, Progress
 
@@ -39,8 +38,7 @@ def write_machine_scene(
 ) -> dict[str, Any]:
     """Write meshes and scenes into a folder that exists, and return what is in it.
 
-    Raises:
-        InputError: the export has no shells.
+    InputError: the export has no shells.
     """
     (folder / MESHES).mkdir()
     facets, cameras = {}, {}
@@ -161,8 +159,7 @@ def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[SceneMes
     A facet reflects like a flat mirror, but renderers reflect at normals that they interpolate
     between its corners, and there these are exact.
 
-    Raises:
-        InputError: the shell's STL file is not there, or cannot be read.
+    InputError: the shell's STL file is not there, or cannot be read.
     """
     corners = read_facets(export.folder / f"shell_{reflector.camera_id}.stl")
     bare = reflector.mirrors.offset(-export.spec.mirrors.coating_um / 1000)

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from tbcad.light.datasets.crops import reading_order
 from tbcad.light.datasets.pictures import crop_of
-from tbcad.light.datasets.virtual_cameras import FittedCameras
+from tbcad.light.datasets.virtual_cameras import FittedCameras, reading_order
+from tbcad.light.simulate.capture.files import chunked
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.capture.light_field_writer import chunked
 from tbcad.types import Progress
 
 RAYS, RAYS_H5 = "rays.npz", "rays.h5"

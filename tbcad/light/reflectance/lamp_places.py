@@ -18,10 +18,14 @@ from tbcad.core.geometry.vectors import dot, norm
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.csv_rows import number, read_rows
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import MirrorId, chosen_mirrors, spread_evenly
-from tbcad.light.datasets.virtual_cameras import virtual_cameras
+from tbcad.light.datasets.virtual_cameras import (
+    MirrorId,
+    chosen_mirrors,
+    spread_evenly,
+    virtual_cameras,
+)
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.point_lights import Spots, lit_cosine
+from tbcad.light.simulate.scene.lamps import Spots, lit_cosine
 from tbcad.types import Floats
 
 MIRRORS = "mirrors"
@@ -49,8 +53,7 @@ class LampPlaces:
 def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
     """Lamps of a table with the columns x_mm, y_mm and z_mm.
 
-    Raises:
-        InputError: it cannot be read, has no rows, or a lamp is in the capture sphere.
+    InputError: it cannot be read, has no rows, or a lamp is in the capture sphere.
     """
     if not path.exists():
         raise InputError(f"{path} is not there: give a table with {','.join(COLUMNS)}, or mirrors")
@@ -70,8 +73,7 @@ def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
 def lamps_of_mirrors(source: LightField, every: int) -> LampPlaces:
     """Lamps at virtual cameras: one of so many, the kept ones spread evenly.
 
-    Raises:
-        InputError: no mirror gives a virtual camera.
+    InputError: no mirror gives a virtual camera.
     """
     mirrors = [one for one in chosen_mirrors(source, None, 1) if not _second_half(source, one)]
     u = np.array([source.frames[one.frame].u[one.index] for one in mirrors])
@@ -195,14 +197,9 @@ def reflected(
 def _turn(p: float, q: float, whole: float, radius: float) -> float:
     """Angle at a circle's centre from the pinhole to the normal that reflects it, radians.
 
-    The angles of incidence and reflection differ by a sum that grows with the turn, from below
-    zero where the normal looks at the pinhole to above zero where it looks at the other point.
-
-    Args:
-        p: distance of the pinhole from the centre, mm.
-        q: of the other point.
-        whole: angle between both, radians.
-        radius: of the circle, less than p and q.
+    The angles of incidence and reflection differ by a sum that grows with the turn, from below zero
+    where the normal looks at the pinhole to above zero where it looks at the other point. Pinhole
+    and point are at p and q from the centre, mm, more than the radius, and `whole` apart, radians.
     """
     low, high = 0.0, whole
     turn = whole / 2

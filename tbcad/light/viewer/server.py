@@ -51,17 +51,7 @@ class ViewServer(ThreadingHTTPServer):
     request_queue_size = MAX_CONNECTIONS
 
     def __init__(self, renderer: ViewRenderer, title: str, start: Query, port: int = 0) -> None:
-        """Listen on this computer alone.
-
-        Args:
-            renderer: makes the views.
-            title: name of what is shown.
-            start: the first view.
-            port: 0 for any that is free.
-
-        Raises:
-            InputError: the port is taken.
-        """
+        """Listen on this computer alone, at a port, 0 for any; InputError if it is taken."""
         self.renderer = renderer
         page = viewer_page(
             title, start, renderer.capture_mm, renderer.method, lens=renderer.lens is not None

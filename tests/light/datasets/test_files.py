@@ -14,10 +14,10 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.crops import MirrorId, read_crop
+from tbcad.light.datasets.virtual_cameras import MirrorId, read_crop
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
-from tbcad.light.simulate.scene.viewpoint import view_directions
+from tbcad.light.simulate.scene.rays import view_directions
 
 Document = dict[str, Any]
 

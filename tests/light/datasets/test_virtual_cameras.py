@@ -8,10 +8,18 @@ from scipy.optimize import minimize
 
 from tbcad.core.geometry.vectors import unit
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import Crop, MirrorId, chosen_mirrors, read_crop, spread_evenly
+from tbcad.light.datasets.export import seed_points
 from tbcad.light.datasets.pictures import places, resampled
-from tbcad.light.datasets.seed_points import seed_points
-from tbcad.light.datasets.virtual_cameras import _measured, camera_at, virtual_cameras
+from tbcad.light.datasets.virtual_cameras import (
+    Crop,
+    MirrorId,
+    _measured,
+    camera_at,
+    chosen_mirrors,
+    read_crop,
+    spread_evenly,
+    virtual_cameras,
+)
 from tbcad.light.simulate.capture.light_field import LightField
 
 RADIUS = 30.0

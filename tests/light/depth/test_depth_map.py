@@ -16,11 +16,10 @@ from tbcad.light.depth.depth_map import DepthMap, depth_map, depth_views
 from tbcad.light.simulate.capture.light_field import light_field_in_memory
 from tbcad.light.simulate.capture.photograph import photograph, to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
-from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tests.light.simulate.conftest import knot  # noqa: F401

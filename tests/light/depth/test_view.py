@@ -11,10 +11,9 @@ from tbcad.light.depth.depth_map import depth_views
 from tbcad.light.depth.plane_sweep import QUICK
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.simulate.views.refocus import ThinLens, refocus
+from tbcad.light.simulate.views.refocus import ThinLens, pinhole_picture, refocus
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tests.light.depth.test_depth_map import CAPTURE_MM, tiles  # noqa: F401
 from tests.light.simulate.conftest import knot  # noqa: F401

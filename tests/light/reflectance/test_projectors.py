@@ -8,12 +8,11 @@ import pytest
 from tbcad.app.cli import run
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.crops import MirrorId
-from tbcad.light.reflectance.field_file import open_reflectance
+from tbcad.light.datasets.virtual_cameras import MirrorId
 from tbcad.light.reflectance.lamp_places import LEAST_CURVATURE, MirrorPixels, projectors, reflected
-from tbcad.light.reflectance.transport import seen_spots
+from tbcad.light.reflectance.transport import open_reflectance, seen_spots
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.point_lights import Spots, received_light
+from tbcad.light.simulate.scene.lamps import Spots, received_light
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.types import Floats
 from tests.light.reflectance.test_transport import plate_scene

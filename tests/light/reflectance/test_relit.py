@@ -11,14 +11,14 @@ import tbcad
 from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.light.reflectance.environment import read_environment
-from tbcad.light.reflectance.field_file import TRUE_LIGHTS, lit_scene, open_reflectance, relit
 from tbcad.light.reflectance.lamp_places import lamps_of_mirrors
+from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene, open_reflectance, relit
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.light.reflectance.field_file import open_reflectance
-from tbcad.light.reflectance.transport import seen_spots
+from tbcad.light.reflectance.transport import open_reflectance, seen_spots
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import photograph
+from tbcad.light.simulate.scene.lamps import PointLights, Spots, received_light
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.point_lights import PointLights, Spots, received_light
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector

@@ -13,9 +13,8 @@ from tbcad.errors import InputError
 from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.simulate.views.refocus import ThinLens, refocus
 from tbcad.light.viewer.page import Query
-from tbcad.light.viewer.render import FieldRenderer, Renderer
+from tbcad.light.viewer.render import FieldRenderer, Renderer, Turntable, write_turntable
 from tbcad.light.viewer.server import ViewServer
-from tbcad.light.viewer.turntable import Turntable, write_turntable
 from tests.light.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, ball, data_of
 
 SMALL = Query(azimuth=40, elevation=20, width=160, height=120, still=1)

@@ -7,10 +7,10 @@ from tbcad.core.optics.camera import Camera
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.ray_casting import Scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import horizon_search_radius, search_radius, synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.light.viewer.moving import moving_view

@@ -13,11 +13,11 @@ from tbcad.light.depth.depth_map import depth_views
 from tbcad.light.depth.plane_sweep import QUICK
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.viewer.page import Query
-from tbcad.light.viewer.render import Renderer
-from tbcad.light.viewer.turntable import (
+from tbcad.light.viewer.render import (
     BEGIN,
     KIND,
     WEBP_QUALITIES,
+    Renderer,
     Turntable,
     smallest_loss,
     turntable_page,

@@ -45,12 +45,7 @@ def photograph(
 ) -> Iterator[RowBand]:
     """The bands of a camera's picture from top to bottom; few are in memory at a time.
 
-    Args:
-        view: the camera.
-        trace: gives the rays of rows after the mirrors.
-        scene: the object.
-        samples: a pixel is the mean of these rays.
-        progress: called with each step.
+    `trace` gives the rays of rows after the mirrors; a pixel is the mean of `samples`.
     """
     height = view.height_px
     work = partial(_band, view, trace, scene, samples)
@@ -102,11 +97,7 @@ def seen_by(
 ) -> tuple[TracedRays, Colours]:
     """What rays after the mirrors see, (h, w, 3), and those that the object itself does not hide.
 
-    Args:
-        view: the camera.
-        rays: of h x w pixels.
-        direction: unit vectors from the camera through the pixels, (h, w, 3).
-        scene: the object.
+    `direction`: unit vectors from the camera through the pixels, (h, w, 3).
     """
     hits = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3))
     colour = hits.colour.reshape(*rays.mirror.shape, 3)

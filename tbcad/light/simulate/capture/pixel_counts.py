@@ -47,8 +47,7 @@ class PixelCounts:
 def parse_sensor(text: str) -> Sensor:
     """A sensor from text like 2080x1552.
 
-    Raises:
-        InputError: it is none, or sides are not from 16 to 32768.
+    InputError: it is none, or sides are not from 16 to 32768.
     """
     width, _, height = text.lower().partition("x")
     if width.isdecimal() and height.isdecimal() and len(text) < 20:
@@ -75,13 +74,10 @@ def count_pixels(
 ) -> list[PixelCounts]:
     """Count the pixels of a camera with each sensor, the lens and mirrors as they are.
 
-    Args:
-        array: the camera and its mirrors.
-        sensors: in place of the design's; the camera is turned so that the mirrors fit it best.
-        radius: of the capture sphere, mm.
-        most_rays: larger sensors are sampled by one ray for each square block of pixels, so that
-            sensors of one shape may share their rays.
-        axes: forward and right of the camera, (3,) each, in place of those that fit best.
+    With each sensor in place of the design's the camera is turned so that the mirrors fit it best,
+    or has `axes`: forward and right, (3,) each. `radius`: of the capture sphere, mm. Sensors beyond
+    `most_rays` are sampled by one ray for each square block of pixels, so that sensors of one shape
+    may share their rays.
     """
     traced: dict[tuple[int, int, float], PixelCounts] = {}
     counts = []
@@ -124,10 +120,7 @@ def traced_pixels(
 ) -> tuple[Floats, Floats, Floats]:
     """Rays on each mirror, those that go on to the capture sphere, those in its cone, each (m,).
 
-    Args:
-        reflector: the camera and its m mirrors.
-        theta0: half angles of the cones about the apices, radians, (m,).
-        radius: of the capture sphere, mm.
+    `theta0` (m,): half angles of the cones about the apices, radians; `radius`: of the sphere, mm.
     """
     trace, m = exact_tracer(reflector), len(reflector)
     pinhole, cosine = reflector.camera.pinhole, np.cos(theta0)

@@ -70,8 +70,7 @@ def shown_shares(values: NDArray[Any]) -> Floats:
 
     Whole numbers of other types are taken for bytes, and real ones if the largest is at least 2.
 
-    Raises:
-        InputError: they are out of range.
+    InputError: they are out of range.
     """
     largest = {"u1": 255, "u2": 65535}.get(values.dtype.str[-2:])
     if largest is None:
@@ -110,13 +109,8 @@ def without_facets(points: int) -> InputError:
 def triangles(counts: Ints, points: Floats) -> tuple[Ints, Ints]:
     """Cut polygons into triangles; those that are not convex are cut by their outline.
 
-    Args:
-        counts: corners of each polygon, (p,).
-        points: of all corners, one polygon after the other, (sum of counts, 3).
-
-    Returns:
-        Numbers of corners (t, 3) of triangles, and their polygons (t,), ascending. Polygons of one
-        or two corners give none.
+    Of the numbers of corners (p,) and all corners one polygon after the other, (sum, 3): numbers of
+    corners (t, 3), and their polygons (t,), ascending. Polygons of one or two corners give none.
     """
     begin = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
     number = np.maximum(counts - 2, 0)
@@ -162,8 +156,7 @@ def _cut(points: Floats) -> NDArray[Any]:
 def file_beside(mesh: Path, name: str) -> Path:
     """The file that a mesh names, or the one with its base name beside the mesh.
 
-    Raises:
-        InputError: there is none in the folder of the mesh; links that lead out do not count.
+    InputError: there is none in the folder of the mesh; links that lead out do not count.
     """
     folder = mesh.parent.resolve()
     parts = PureWindowsPath(name.strip().strip('"')).parts  # takes both kinds of slashes
@@ -231,14 +224,7 @@ def shown_bytes(picture: Picture) -> Bytes:
 def warn_of_small_object(
     name: str, size_mm: float, capture_mm: float, other_units: Iterable[str]
 ) -> None:
-    """Warn of an object whose size is likely to be in another unit.
-
-    Args:
-        name: of the object.
-        size_mm: longest side of the box that holds it.
-        capture_mm: diameter of the capture sphere.
-        other_units: in which it would have the size of an object.
-    """
+    """Warn of an object whose longest side is likely to be in another unit."""
     if size_mm >= SMALL_SHARE * capture_mm:
         return
     units = " or ".join(f"--unit {unit}" for unit in other_units) or "another --unit"

@@ -26,8 +26,7 @@ REMEDY = {
 def read_gltf(path: Path) -> ObjectFile:
     """Read all triangles of the file's scene, in the frame of the scene.
 
-    Raises:
-        InputError: it is no glTF 2.0, damaged, needs an extension that is not read, or has none.
+    InputError: it is no glTF 2.0, damaged, needs an extension that is not read, or has none.
     """
     document, binary = _document(path)
     if str(document.get("asset", {}).get("version", "2")).split(".")[0] != "2":

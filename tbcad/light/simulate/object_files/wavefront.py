@@ -52,8 +52,7 @@ class _Lines:
 def read_obj(path: Path) -> ObjectFile:
     """Read a mesh, a part for each material.
 
-    Raises:
-        InputError: it is no OBJ file, or its facets name corners that do not exist.
+    InputError: it is no OBJ file, or its facets name corners that do not exist.
     """
     lines = _lines(text_of(path.read_bytes()))
     notes = [f"its {what} are left out" for what in sorted(lines.left_out)]

@@ -58,11 +58,7 @@ class ObjectOptions:
     unit: Unit | None = None  # of the file; None: as the file or its format says, else mm
 
     def __post_init__(self) -> None:
-        """Refuse what is none of these.
-
-        Raises:
-            InputError: it is not.
-        """
+        """Refuse what is none of these; InputError: it is not."""
         for name, value, allowed in (
             ("paint", self.paint, get_args(Paint)),
             ("up", self.up, (None, *get_args(Up))),
@@ -91,13 +87,9 @@ def load_object(
     options: ObjectOptions | None = None,
     told: Progress | None = None,
 ) -> SceneObject:
-    """Read a triangle mesh.
+    """Read a triangle mesh: PLY, STL, OBJ, OFF, GLB, glTF or 3MF, its textures in the same folder.
 
-    Args:
-        path: PLY, STL, OBJ, OFF, GLB, glTF or 3MF; its textures must be in the same folder.
-        capture_mm: diameter of the capture sphere.
-        options: how it is taken.
-        told: called with a line that says which unit, axis and colours were taken.
+    `told` is called with a line that says which unit, axis and colours were taken.
 
     Raises:
         InputError: it cannot be read, is empty, has no facets or is too large; it names the size.

@@ -12,9 +12,9 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.light.simulate.views.ground_truth import GOLDEN_ANGLE, pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE, pinhole_picture
 from tbcad.light.simulate.views.synthesis import DepthFunction, Method, synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress
 
@@ -139,8 +139,7 @@ def viewpoints_around(
 ) -> Viewpoints:
     """Viewpoints at some elevations, and at each a number of azimuths evenly around the object.
 
-    Raises:
-        InputError: there are none or too many.
+    InputError: there are none or too many.
     """
     if not 1 <= azimuths <= MAX_AZIMUTHS:
         raise InputError(
@@ -154,8 +153,7 @@ def viewpoints_around(
 def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
     """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral).
 
-    Raises:
-        InputError: there are none or too many.
+    InputError: there are none or too many.
     """
     if not 1 <= count <= MAX_VIEWS:
         raise InputError(f"--views {count}: allowed is 1 to {MAX_VIEWS} viewpoints")
@@ -187,13 +185,7 @@ def _object_mask(depth: DepthFunction, view: Camera) -> Bools:
 
 
 def views_by(method: StudyMethod, tiles: MirrorTiles, scene: Scene) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera.
-
-    Args:
-        method: how.
-        tiles: the light field.
-        scene: the object, whose depth a blend takes.
-    """
+    """What makes the picture (h, w, 3) of a camera; a blend takes the depth of the scene."""
     if isinstance(method, OwnMethod):
         return method.views(tiles.source)
     depth = depth_along_rays(scene) if method == "blend" else None
@@ -208,16 +200,7 @@ def view_quality(
     method: StudyMethod,
     progress: Progress,
 ) -> dict[str, Floats]:
-    """The light field's views against the truth: QUALITY, each (v,).
-
-    Args:
-        tiles: the light field.
-        scene: the object, whose depth a blend takes.
-        views: the viewpoints, v of them.
-        truths: the ground truth at each.
-        method: how the views are made.
-        progress: called with each step.
-    """
+    """The light field's views against the truth at each viewpoint: QUALITY, each (v,)."""
     picture_of, masks, qualities = views_by(method, tiles, scene), object_masks(scene, views), []
     for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
         progress(f"view {k + 1} of {len(views)}")

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.files import create_light_field, write_camera
 from tbcad.light.simulate.capture.light_field import PIXEL_ARRAYS, SCHEMA, SHOWN_PX, LightField
-from tbcad.light.simulate.capture.light_field_writer import create_light_field, write_camera
 from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import exact_tracer

@@ -8,10 +8,9 @@ import pytest
 from tbcad.cad.formats.stl import write_stl
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.light.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.shell.files import camera_a_mesh
 

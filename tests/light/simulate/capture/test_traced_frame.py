@@ -3,8 +3,7 @@
 import numpy as np
 
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.light.simulate.capture.light_field import PIXEL_ARRAYS, LightField
-from tbcad.light.simulate.capture.traced_frame import traced_light_field
+from tbcad.light.simulate.capture.light_field import PIXEL_ARRAYS, LightField, traced_light_field
 from tbcad.light.simulate.scene.ray_casting import Scene
 
 

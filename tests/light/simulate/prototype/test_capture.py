@@ -31,13 +31,18 @@ from tbcad.light.simulate.prototype.merge import (
     merged_bands,
     merged_pixels,
 )
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan, read_plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector, prototype_runs
-from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.prototype.run import (
+    HALF_TURN,
+    Plan,
+    PrototypeRun,
+    ball_reflector,
+    prototype_runs,
+    read_plan,
+)
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, object_in_front, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import Reflector, read_export
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.types import Bools, Bytes
 from tests.exported_files import Rows, edit_csv, edit_json

@@ -10,10 +10,9 @@ from PIL import Image
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.simulate.capture.files import read_object, write_object
-from tbcad.light.simulate.prototype.lamps import RectangularLamps, lit_by
+from tbcad.light.simulate.scene.lamps import PointLights, RectangularLamps, lit_by
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
-from tbcad.light.simulate.scene.point_lights import PointLights
 from tbcad.light.simulate.scene.ray_casting import (
     Scene,
     built_in_shade,

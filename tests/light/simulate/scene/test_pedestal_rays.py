@@ -10,10 +10,9 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.light.simulate.capture.photograph import photograph
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
-from tbcad.light.simulate.scene.reflector import Reflector, reflectors
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, reflectors
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw

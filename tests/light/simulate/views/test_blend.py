@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.blend import CAMERAS, blend_cameras
+from tbcad.light.simulate.scene.rays import camera_around_object
+from tbcad.light.simulate.views.blend import CAMERAS, SIGMA_PX, blend_cameras
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.simulate.views.pixels_about import SIGMA_PX
 from tbcad.light.simulate.views.ray_bundle import RayBundle
 from tbcad.light.simulate.views.synthesis import nearby_rays, search_radius
 from tbcad.types import Bools, Floats, Ints

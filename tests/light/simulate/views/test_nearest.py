@@ -8,10 +8,9 @@ from scipy.spatial import cKDTree
 
 from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles, convergence_point
-from tbcad.light.simulate.views.nearest import nearest_rays
-from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
+from tbcad.light.simulate.views.ray_bundle import TwoPlane, nearest_rays, two_plane_along
 from tbcad.light.simulate.views.synthesis import Rays, nearby_rays, search_radius
 
 CAPTURE_MM = 60.0

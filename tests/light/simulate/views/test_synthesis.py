@@ -16,14 +16,15 @@ from tbcad.light.depth.depth_map import depth_views
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.light.simulate.views.ground_truth import lens_picture, pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import two_plane_along
 from tbcad.light.simulate.views.refocus import (
     ThinLens,
+    lens_picture,
     lens_pinholes,
     lens_rays,
+    pinhole_picture,
     refocus,
     refocus_sweep,
 )
