@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import dotted_fields, section_of
 from tbcad.core.spec.load import load_spec
-from tbcad.light.simulate.capture.pixel_counts import virtual_cameras
+from tbcad.light.simulate.capture.photograph import virtual_cameras
 from tbcad.optimizing.candidate import figures_of, size_of
 from tbcad.optimizing.views import mean_ssim
 from tests.mirror_arrays import designed

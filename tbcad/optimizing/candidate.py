@@ -14,7 +14,7 @@ from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
 from tbcad.optimizing.views import ViewsBy, mean_ssim
 from tbcad.types import Floats, Ints
 

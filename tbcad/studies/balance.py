@@ -16,7 +16,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import traced_light_field
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles

@@ -9,7 +9,7 @@ from tbcad.common.schedule import run_units
 from tbcad.core.geometry.ellipsoid import Ellipsoid
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions
 from tbcad.core.spec.design import Spec
-from tbcad.light.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.photograph import (
     PixelCounts,
     Sensor,
     count_pixels,

@@ -11,7 +11,7 @@ from tbcad.common.results.tables import Cell, Record, Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorArray, design
 from tbcad.core.spec.design import Spec, spec_with
-from tbcad.light.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.photograph import (
     PixelCounts,
     Sensor,
     count_pixels,
@@ -65,10 +65,7 @@ NOTES = (
 
 
 def capture_area(
-    spec: Spec,
-    ns: range,
-    progress: Progress = lambda _: None,
-    scheduler: str | None = None,
+    spec: Spec, ns: range, progress: Progress = lambda _: None, scheduler: str | None = None
 ) -> Study:
     """The study: coverage of flat and convex mirrors for every n."""
     records = for_each_n(partial(_area_record, spec), ns, progress, scheduler)

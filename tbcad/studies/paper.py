@@ -146,10 +146,7 @@ def n_range(first: int, last: int) -> range:
 
 
 def for_each_n(
-    work: Callable[[int], Result],
-    ns: range,
-    progress: Progress,
-    scheduler: str | None = None,
+    work: Callable[[int], Result], ns: range, progress: Progress, scheduler: str | None = None
 ) -> list[Result]:
     """Work for every n, results in the order of n.
 

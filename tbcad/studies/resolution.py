@@ -10,7 +10,7 @@ from tbcad.common.results.study import Figure, Study
 from tbcad.common.results.tables import Record, Table
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.photograph import (
     PixelCounts,
     Sensor,
     allowed,

@@ -17,8 +17,7 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.files import create_light_field, write_camera
 from tbcad.light.simulate.capture.light_field import NAME, LightField
-from tbcad.light.simulate.capture.photograph import photograph
-from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.capture.photograph import Sensor, photograph
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer

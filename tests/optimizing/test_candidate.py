@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.core.spec.load import load_spec
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.optimizing.candidate import (
     STEP_MM,
     bounds,

@@ -22,7 +22,7 @@ from tbcad.core.spec.design import FIT
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate import parallel
-from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.capture.photograph import Sensor
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import (

@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.photograph import (
     Sensor,
     count_pixels,
     parse_sensor,

@@ -13,7 +13,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.capture.photograph import Sensor
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.viewpoints import Viewpoints, viewpoints_around

@@ -1,40 +1,41 @@
-"""A capture as a folder for another program, with the figures of how well it fits.
-
-Splats and other point-based methods grow from points: seed points are in the visual hull of the
-object in the exported pictures. A point of the capture sphere that several virtual cameras see
-dark, as background, is not on the object (A. Laurentini, The visual hull concept, IEEE PAMI 16,
-150, 1994). Where the background is not dark, or all of the object is, the points fill the sphere.
-"""
+"""A capture as a folder for another program, with the figures of how well it fits."""
 
 import json
+import zipfile
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
-from scipy.stats import qmc
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 from tbcad.cad.formats.colmap import SparseModel
 from tbcad.cad.formats.csv_table import Row, write_table
-from tbcad.core.geometry.vectors import norm
-from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.machine_scene import write_machine_scene
-from tbcad.light.datasets.pictures import Pictures, default_size, taken_pictures
+from tbcad.light.datasets.pictures import Pictures, crop_of, default_size, taken_pictures
 from tbcad.light.datasets.pinholes import (
+    SeedPoints,
     pinhole_of,
+    seed_points,
     write_nerfstudio,
     write_ngp_rays,
     write_pictures,
 )
-from tbcad.light.datasets.ray_table import write_ray_table
-from tbcad.light.datasets.virtual_cameras import FittedCameras, chosen_mirrors, virtual_cameras
+from tbcad.light.datasets.virtual_cameras import (
+    FittedCameras,
+    chosen_mirrors,
+    reading_order,
+    virtual_cameras,
+)
+from tbcad.light.simulate.capture.files import chunked
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.captures import ExportOptions
-from tbcad.types import Bools, Bytes, Floats, Progress
+from tbcad.types import Floats, Progress
 
 SCHEMA = "tbcad-dataset/1"
 RECORD, TABLE = "dataset.json", "cameras.csv"
@@ -43,26 +44,20 @@ COLUMNS = ("name", "x", "y", "z", "rays", "pitch_mm", "rms_mm", "worst_mm", "cen
 MODEL = Path("sparse", "0")
 # COLMAP looks for the mask of a0001.png as a0001.png.png.
 MASK_SUFFIX = ".png.png"
-CANDIDATES = 1 << 16  # in the cube around the capture sphere; half of them are in the sphere
-MOST_CAMERAS = 96
-DARK = 10  # of 255: background, but for noise
-# A point is carved away where more of the cameras that see it see it dark than this.
-DARK_SHARE = 0.05
-
-
-@dataclass(frozen=True)
-class SeedPoints:
-    """Points on and in the object."""
-
-    points: Floats  # mm, (n, 3)
-    colours: Bytes  # median of what the virtual cameras see there, (n, 3)
+RAYS, RAYS_H5 = "rays.npz", "rays.h5"
+RAYS_PER_CHUNK = 1 << 16
+# Zip files have times; a fixed one gives the same bytes each time.
+NO_TIME = (1980, 1, 1, 0, 0, 0)
+RAY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "origin": ("<f4", (3,)),
+    "direction": ("<f4", (3,)),
+    "colour": ("|u1", (3,)),
+    "camera": ("<u2", ()),
+}
 
 
 def write_dataset(
-    folder: Path,
-    source: LightField,
-    scene: Scene | None,
-    options: ExportOptions,
+    folder: Path, source: LightField, scene: Scene | None, options: ExportOptions
 ) -> dict[str, Any]:
     """Write all files of an export into an empty folder, and return its record.
 
@@ -223,40 +218,60 @@ def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> Spa
     )
 
 
-def seed_points(
-    cameras: list[Camera], pictures: Bytes, masks: Bools, capture_mm: float
-) -> SeedPoints:
-    """Points inside the visual hull; the same each time.
+def write_ray_table(
+    folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
+) -> int:
+    """Write origin, direction, colour and virtual camera of each ray that meets the sphere.
 
-    Cameras (m,), what they see (m, h, w, 3), and where that is known (m, h, w).
+    Returns:
+        The number of rays.
     """
-    points = _candidates(capture_mm / 2)
-    step = -(-len(cameras) // MOST_CAMERAS)
-    seen = [
-        _colours(camera, picture, mask, points)
-        for camera, picture, mask in zip(
-            cameras[::step], pictures[::step], masks[::step], strict=True
-        )
-    ]
-    colours, known = np.stack([one[0] for one in seen]), np.stack([one[1] for one in seen])
-    dark = known & (colours.max(axis=2) < DARK)
-    seen_at_all = known.any(axis=0)
-    hull = seen_at_all & (dark.sum(axis=0) <= DARK_SHARE * known.sum(axis=0))
-    kept = hull if hull.any() else seen_at_all
-    values = np.where(known[:, kept, None], colours[:, kept].astype(np.float32), np.nan)
-    median = np.nanmedian(values, axis=0)
-    return SeedPoints(points[kept], np.rint(median).astype(np.uint8))
+    total = int(virtual.rays.sum())
+    with zipfile.ZipFile(folder / RAYS, "w") as packed:
+        for name, (kind, last) in RAY_COLUMNS.items():
+            progress(name)
+            header = {"descr": kind, "fortran_order": False, "shape": (total, *last)}
+            with packed.open(_entry(name), "w", force_zip64=True) as file:
+                npy.write_array_header_1_0(file, header)
+                for values in _values(source, virtual, name):
+                    file.write(values.astype(kind).tobytes())
+        for name, table in _tables(virtual).items():
+            with packed.open(_entry(name), "w") as file:
+                npy.write_array(file, table, allow_pickle=False)
+    progress(RAYS_H5)
+    _write_h5(folder / RAYS_H5, source, virtual, total)
+    return total
 
 
-def _candidates(radius: float) -> Floats:
-    cube = qmc.Halton(3, scramble=False).random(CANDIDATES)
-    points = radius * (2 * cube - 1)
-    return np.asarray(points[norm(points) < radius])
+def _write_h5(path: Path, source: LightField, virtual: FittedCameras, total: int) -> None:
+    """The same arrays, of which programs read parts."""
+    with h5py.File(path, "w", libver=("v110", "v110")) as store:
+        stored = {
+            name: chunked(store, name, kind, (total, *last), (min(RAYS_PER_CHUNK, total), *last))
+            for name, (kind, last) in RAY_COLUMNS.items()
+        }
+        for name in RAY_COLUMNS:
+            first = 0
+            for values in _values(source, virtual, name):
+                stored[name][first : first + len(values)] = values
+                first += len(values)
+        tables = _tables(virtual)
+        store.create_dataset("name", data=tables["name"].astype("S"))
+        store.create_dataset("centre", data=tables["centre"])
 
 
-def _colours(camera: Camera, picture: Bytes, mask: Bools, points: Floats) -> tuple[Bytes, Bools]:
-    """Colours (n, 3) of the pixels in which points (n, 3) appear, and whether they are known."""
-    column, row = np.rint(camera.project(points)).astype(np.int64).T
-    inside = (column >= 0) & (column < camera.width_px) & (row >= 0) & (row < camera.height_px)
-    column, row = np.where(inside, column, 0), np.where(inside, row, 0)
-    return picture[row, column], inside & mask[row, column]
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(f"{name}.npy", NO_TIME)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    return entry
+
+
+def _values(source: LightField, virtual: FittedCameras, name: str) -> Iterator[NDArray[np.generic]]:
+    for k in reading_order(source, virtual.mirrors).tolist():
+        crop = crop_of(source, virtual.mirrors[k])
+        yield np.full(crop.meets.sum(), k) if name == "camera" else getattr(crop, name)[crop.meets]
+
+
+def _tables(virtual: FittedCameras) -> dict[str, NDArray[np.generic]]:
+    names = np.array([one.name for one in virtual.mirrors], dtype="<U8")
+    return {"name": names, "centre": virtual.centre}

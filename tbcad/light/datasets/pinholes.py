@@ -5,6 +5,11 @@ data_conventions.html): matrices are from camera to world, cameras look along -z
 world's +z is up. After instant-ngp's loader of data sets (src/nerf_loader.cu): beside the image
 NAME.png lie rays_NAME.dat, origin and direction of each pixel, row by row, six 32-bit floats in the
 axes of transforms.json, and dynamic_mask_NAME.png, not black where a pixel is not used.
+
+Splats and other point-based methods grow from points: seed points are in the visual hull of the
+object in the exported pictures. A point of the capture sphere that several virtual cameras see
+dark, as background, is not on the object (A. Laurentini, The visual hull concept, IEEE PAMI 16,
+150, 1994). Where the background is not dark, or all of the object is, the points fill the sphere.
 """
 
 import json
@@ -15,17 +20,17 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import qmc
 
 from tbcad.cad.formats.ply import points_ply
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.export import SeedPoints
 from tbcad.light.datasets.pictures import Pictures, crop_of
 from tbcad.light.datasets.virtual_cameras import Crop, FittedCameras, at_middle
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import png_bytes
 from tbcad.light.simulate.parallel import in_batches
-from tbcad.types import Bools, Floats, Progress
+from tbcad.types import Bools, Bytes, Floats, Progress
 
 # As many rays, evenly out of all, fix seven numbers as well as thousands.
 FITTED_RAYS = 150
@@ -34,6 +39,19 @@ SCALES = np.array([0.01] * 5 + [1.0] * 2)
 TRANSFORMS, POINTS = "transforms.json", "points.ply"
 IMAGES, MASKS = "images", "masks"
 NO_DISTORTION = {"k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0}
+CANDIDATES = 1 << 16  # in the cube around the capture sphere; half of them are in the sphere
+MOST_CAMERAS = 96
+DARK = 10  # of 255: background, but for noise
+# A point is carved away where more of the cameras that see it see it dark than this.
+DARK_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class SeedPoints:
+    """Points on and in the object."""
+
+    points: Floats  # mm, (n, 3)
+    colours: Bytes  # median of what the virtual cameras see there, (n, 3)
 
 
 @dataclass(frozen=True)
@@ -214,3 +232,42 @@ def _central_rays(pinhole: Pinhole) -> Floats:
     y = (np.arange(height) + 0.5 - pinhole.principal_px[1]) / pinhole.focal_px[1]
     right, down, forward = pinhole.axes
     return unit(forward + x[None, :, None] * right + y[:, None, None] * down)
+
+
+def seed_points(
+    cameras: list[Camera], pictures: Bytes, masks: Bools, capture_mm: float
+) -> SeedPoints:
+    """Points inside the visual hull; the same each time.
+
+    Cameras (m,), what they see (m, h, w, 3), and where that is known (m, h, w).
+    """
+    points = _candidates(capture_mm / 2)
+    step = -(-len(cameras) // MOST_CAMERAS)
+    seen = [
+        _colours(camera, picture, mask, points)
+        for camera, picture, mask in zip(
+            cameras[::step], pictures[::step], masks[::step], strict=True
+        )
+    ]
+    colours, known = np.stack([one[0] for one in seen]), np.stack([one[1] for one in seen])
+    dark = known & (colours.max(axis=2) < DARK)
+    seen_at_all = known.any(axis=0)
+    hull = seen_at_all & (dark.sum(axis=0) <= DARK_SHARE * known.sum(axis=0))
+    kept = hull if hull.any() else seen_at_all
+    values = np.where(known[:, kept, None], colours[:, kept].astype(np.float32), np.nan)
+    median = np.nanmedian(values, axis=0)
+    return SeedPoints(points[kept], np.rint(median).astype(np.uint8))
+
+
+def _candidates(radius: float) -> Floats:
+    cube = qmc.Halton(3, scramble=False).random(CANDIDATES)
+    points = radius * (2 * cube - 1)
+    return np.asarray(points[norm(points) < radius])
+
+
+def _colours(camera: Camera, picture: Bytes, mask: Bools, points: Floats) -> tuple[Bytes, Bools]:
+    """Colours (n, 3) of the pixels in which points (n, 3) appear, and whether they are known."""
+    column, row = np.rint(camera.project(points)).astype(np.int64).T
+    inside = (column >= 0) & (column < camera.width_px) & (row >= 0) & (row < camera.height_px)
+    column, row = np.where(inside, column, 0), np.where(inside, row, 0)
+    return picture[row, column], inside & mask[row, column]

@@ -33,10 +33,7 @@ _FACES = {
     (1, 2): ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
     (2, 1): ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
 }
-_BACK = {
-    (3, 1): ((-1, 0, 0), (0, 1, 0), (0, 0, -1)),
-    (1, 3): ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
-}
+_BACK = {(3, 1): ((-1, 0, 0), (0, 1, 0), (0, 0, -1)), (1, 3): ((-1, 0, 0), (0, -1, 0), (0, 0, 1))}
 # So far away light from one direction is parallel: 60 mm apart it differs by 0.003 degrees.
 FAR_MM = 1e6
 GIVE = "give a picture of light: Radiance (.hdr), OpenEXR (.exr) or TIFF in floating point"

@@ -27,11 +27,7 @@ from tbcad.errors import InputError
 from tbcad.light.datasets.virtual_cameras import MirrorId
 from tbcad.light.reflectance.environment import Environment
 from tbcad.light.reflectance.lamp_places import LampPlaces, projectors
-from tbcad.light.simulate.capture.files import (
-    COMPRESSION_LEVEL,
-    chunked,
-    filtered_chunk,
-)
+from tbcad.light.simulate.capture.files import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.light.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.light.simulate.parallel import chunks, in_batches, in_threads

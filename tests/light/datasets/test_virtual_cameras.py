@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from tbcad.core.geometry.vectors import unit
 from tbcad.errors import InputError
-from tbcad.light.datasets.export import seed_points
 from tbcad.light.datasets.pictures import places, resampled
+from tbcad.light.datasets.pinholes import seed_points
 from tbcad.light.datasets.virtual_cameras import (
     Crop,
     MirrorId,

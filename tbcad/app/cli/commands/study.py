@@ -21,7 +21,7 @@ from tbcad.options.shared import (
 
 if TYPE_CHECKING:
     from tbcad.core.spec.design import Spec
-    from tbcad.light.simulate.capture.pixel_counts import Sensor
+    from tbcad.light.simulate.capture.photograph import Sensor
     from tbcad.light.simulate.scene.object import SceneObject
     from tbcad.light.simulate.views.viewpoints import StudyMethod
 
@@ -261,7 +261,7 @@ def _subject(
 
 def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:
     """The sensors that are wanted, each once; by default those of Table II for the design."""
-    from tbcad.light.simulate.capture.pixel_counts import parse_sensor
+    from tbcad.light.simulate.capture.photograph import parse_sensor
     from tbcad.studies.resolution import default_sensors
 
     return tuple(map(parse_sensor, dict.fromkeys(given or ()))) or default_sensors(spec)

@@ -14,12 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.light_field import (
-    MIRROR_ARRAYS,
-    NAME,
-    PIXEL_ARRAYS,
-    band_arrays,
-)
+from tbcad.light.simulate.capture.light_field import MIRROR_ARRAYS, NAME, PIXEL_ARRAYS, band_arrays
 from tbcad.light.simulate.capture.light_field import SCHEMA as LIGHT_FIELD_SCHEMA
 from tbcad.light.simulate.capture.photograph import BAND_ROWS, CameraPhotographs, RowBand
 from tbcad.light.simulate.image_files import write_images

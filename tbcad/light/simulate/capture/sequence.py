@@ -21,11 +21,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.cad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.files import (
-    COMPRESSION_LEVEL,
-    chunked,
-    filtered_chunk,
-)
+from tbcad.light.simulate.capture.files import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.light.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.light.simulate.parallel import chunks, in_threads

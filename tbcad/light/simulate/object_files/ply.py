@@ -1,6 +1,7 @@
 """PLY files (G. Turk, The PLY Polygon File Format, 1994), text and binary, with their colours."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -16,7 +17,7 @@ from tbcad.light.simulate.object_files.contents import (
     triangles,
     without_facets,
 )
-from tbcad.types import Bytes, Floats, Ints
+from tbcad.types import Floats, Ints
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -53,22 +54,22 @@ class List(NamedTuple):
     values: Values
 
 
-Table: TypeAlias = dict[str, Values | List]
-Tables: TypeAlias = dict[str, Table]
+Table = dict[str, Values | List]
 
 
-def read_tables(data: bytes) -> tuple[Tables, list[str]]:
+def read_tables(data: bytes) -> tuple[dict[str, Table], list[str]]:
     """Tables by the name of their element, and the names of textures in comments.
 
     InputError: it is no PLY file, or cut off.
     """
-    encoding, elements, textures, start = _header(data)
-    rows: _AsciiRows | _BinaryRows
-    if encoding == "ascii":
-        rows = _AsciiRows(np.array(data[start:].split(), dtype=np.float64))
-    else:
-        rows = _BinaryRows(data, start, ENCODINGS[encoding])
-    return {one.name: _table(one, rows) for one in elements}, textures
+    encoding, elements, textures, at = _header(data)
+    order = ENCODINGS[encoding]
+    if encoding == "ascii":  # as if all of its numbers were stored as real ones
+        data, at = np.array(data[at:].split(), dtype=np.float64).tobytes(), 0
+    tables = dict[str, Table]()
+    for one in elements:
+        tables[one.name], at = _table(one, data, at, order)
+    return tables, textures
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
@@ -100,115 +101,60 @@ def _header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
     return encoding, elements, textures, start
 
 
-class _AsciiRows:
-    """Rows of numbers in a text."""
+def _table(one: _Element, data: bytes, at: int, order: str) -> tuple[Table, int]:
+    """Columns of an element at a place in the data, and where it ends.
 
-    def __init__(self, numbers: Floats) -> None:
-        self._numbers, self.at = numbers, 0
-
-    def even(self, kinds: list[str], rows: int) -> list[Values]:
-        """Columns of rows that are all alike."""
-        size = rows * len(kinds)
-        part = self._numbers[self.at : self.at + size]
-        if len(part) < size:
-            raise InputError("it is cut off: copy it again")
-        self.at += size
-        return [column.astype(kind) for kind, column in zip(kinds, part.reshape(rows, -1).T,
-                                                            strict=True)]  # fmt: skip
-
-    def peek(self, skipped: list[str], kind: str) -> int:
-        """The number behind some others of the next row."""
-        return int(self._numbers[self.at + len(skipped)])
-
-
-class _BinaryRows:
-    """Rows of numbers in bytes."""
-
-    def __init__(self, data: bytes, start: int, order: str) -> None:
-        self._data, self.at, self._order = data, start, order
-
-    def _type(self, kinds: list[str]) -> np.dtype[Any]:
-        return np.dtype([(str(k), self._order + kind) for k, kind in enumerate(kinds)])
-
-    def even(self, kinds: list[str], rows: int) -> list[Values]:
-        """Columns of rows that are all alike."""
-        row = self._type(kinds)
-        if self.at + rows * row.itemsize > len(self._data):
-            raise InputError("it is cut off: copy it again")
-        table = np.frombuffer(self._data, row, rows, self.at)
-        self.at += rows * row.itemsize
-        return [table[str(k)].astype(kind) for k, kind in enumerate(kinds)]
-
-    def peek(self, skipped: list[str], kind: str) -> int:
-        """The number behind some others of the next row."""
-        at = self.at + self._type(skipped).itemsize
-        return int(np.frombuffer(self._data, self._order + kind, 1, at)[0])
-
-
-def _table(element: _Element, rows: _AsciiRows | _BinaryRows) -> dict[str, Values | List]:
-    """Columns of an element: at once where all its lists are as long as the first, else by row."""
-    if element.length == 0:
-        return {one.name: _empty(one) for one in element.properties}
-    begin = rows.at
+    At once where all its lists are as long as those of the first row, else row by row.
+    """
+    if one.length == 0:
+        none = List(np.zeros(0, dtype=np.int64), np.zeros(0))
+        return {name: none if length else none.values for name, _, length in one.properties}, at
     try:
-        sizes = _list_sizes(element, rows)
-        columns = _named(element, sizes, rows.even(_kinds(element, sizes), element.length))
-        if all((one.counts == one.counts[0]).all() for one in columns.values()
-               if isinstance(one, List)):  # fmt: skip
-            return columns
+        found, end = _rows(one, one.length, data, at, order)
+        lists = (column for column in found.values() if isinstance(column, List))
+        if all((column.counts == column.counts[0]).all() for column in lists):
+            return found, end
     except InputError:
         pass  # where lists differ in length, the first says nothing of the others
-    rows.at = begin
-    parts = list(_rows_one_by_one(element, rows))
-    return {one.name: _joined([part[one.name] for part in parts]) for one in element.properties}
+    parts = []
+    for _ in range(one.length):
+        part, at = _rows(one, 1, data, at, order)
+        parts.append(part)
+    return {name: _joined([part[name] for part in parts]) for name, _, _ in one.properties}, at
 
 
-def _empty(one: _Property) -> Values | List:
-    values = np.zeros(0, dtype=one.kind)
-    return values if one.length is None else List(np.zeros(0, dtype=np.int64), values)
-
-
-def _list_sizes(element: _Element, rows: _AsciiRows | _BinaryRows) -> dict[str, int]:
-    """Lengths of the lists of the next row."""
-    sizes, before = dict[str, int](), list[str]()
-    for name, kind, count in element.properties:
-        if count is not None:
-            try:
-                sizes[name] = rows.peek(before, count)
-            except (IndexError, ValueError):
-                raise InputError("it is cut off: copy it again") from None
-            if not 0 <= sizes[name] <= MOST_ENTRIES:
-                raise InputError(f"its list {name} has {sizes[name]} entries: it is damaged")
-            before += [count]
-        before += [kind] * sizes.get(name, 1)
-    return sizes
-
-
-def _kinds(element: _Element, sizes: Mapping[str, int]) -> list[str]:
-    kinds = list[str]()
-    for name, kind, count in element.properties:
-        kinds += [kind] if count is None else [count] + [kind] * sizes[name]
-    return kinds
-
-
-def _named(
-    element: _Element, sizes: Mapping[str, int], columns: list[Values]
-) -> dict[str, Values | List]:
-    named, at = dict[str, Values | List](), 0
-    for name, kind, count in element.properties:
-        if count is None:
-            named[name], at = columns[at], at + 1
+def _rows(one: _Element, count: int, data: bytes, at: int, order: str) -> tuple[Table, int]:
+    """Columns of rows that are all as the first, and where they end."""
+    fields = list[Any]()
+    for k, (name, kind, length) in enumerate(one.properties):
+        if length is None:
+            fields.append((f"{k}", _stored(kind, order)))
             continue
-        values = columns[at + 1 : at + 1 + sizes[name]]
-        flat = np.column_stack(values).ravel() if values else np.zeros(0, dtype=kind)
-        named[name], at = List(columns[at].astype(np.int64), flat), at + 1 + sizes[name]
-    return named
+        size = _first(data, at + np.dtype(fields).itemsize, _stored(length, order))
+        if not 0 <= size <= MOST_ENTRIES:
+            raise InputError(f"its list {name} has {size} entries: it is damaged")
+        fields += [(f"{k}n", _stored(length, order)), (f"{k}", _stored(kind, order), (size,))]
+    row = np.dtype(fields)
+    end = at + count * row.itemsize
+    if end > len(data):
+        raise InputError("it is cut off: copy it again")
+    table, columns = np.frombuffer(data, row, count, at), Table()
+    for k, (name, kind, length) in enumerate(one.properties):
+        values = table[f"{k}"].astype(kind)
+        columns[name] = List(table[f"{k}n"].astype(np.int64), values.ravel()) if length else values
+    return columns, end
 
 
-def _rows_one_by_one(element: _Element, rows: _AsciiRows | _BinaryRows) -> Iterator[Table]:
-    for _ in range(element.length):
-        sizes = _list_sizes(element, rows)
-        yield _named(element, sizes, rows.even(_kinds(element, sizes), 1))
+def _stored(kind: str, order: str) -> str:
+    return order + kind if order else "f8"
+
+
+def _first(data: bytes, at: int, kind: str) -> int:
+    """The number at a place."""
+    try:
+        return int(np.frombuffer(data, kind, 1, at)[0])
+    except ValueError:
+        raise InputError("it is cut off: copy it again") from None
 
 
 def _joined(parts: list[Any]) -> Values | List:
@@ -219,10 +165,8 @@ def _joined(parts: list[Any]) -> Values | List:
 
 def read_ply(path: Path) -> ObjectFile:
     """Read a mesh; InputError: it is no PLY file, cut off, or without facets."""
-    return _contents(path, *read_tables(path.read_bytes()))
-
-
-def _contents(path: Path, tables: dict[str, dict[str, Any]], textures: list[str]) -> ObjectFile:
+    tables: dict[str, dict[str, Any]]
+    tables, textures = read_tables(path.read_bytes())
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not {*"xyz"} <= vertex.keys():
         raise InputError("its vertices have no x, y, z")
@@ -230,7 +174,9 @@ def _contents(path: Path, tables: dict[str, dict[str, Any]], textures: list[str]
     corners = next((face[name] for name in CORNERS if isinstance(face.get(name), List)), None)
     if corners is None or len(corners.counts) == 0:
         raise without_facets(len(points))
-    index = _checked(corners.values, len(points))
+    index = corners.values.astype(np.int64)
+    if len(index) and not (index.min() >= 0 and index.max() < len(points)):
+        raise InputError("its facets name corners that do not exist: it is damaged")
     cut, polygon = triangles(corners.counts, points[index])
     faces = index[cut]
     notes = list[str]()
@@ -247,13 +193,6 @@ def _contents(path: Path, tables: dict[str, dict[str, Any]], textures: list[str]
 
 def _stack(table: Mapping[str, Values], names: tuple[str, ...]) -> Floats:
     return np.column_stack([table[name] for name in names]).astype(np.float64)
-
-
-def _checked(index: Values, count: int) -> Ints:
-    found = index.astype(np.int64)
-    if len(found) and not (found.min() >= 0 and found.max() < count):
-        raise InputError("its facets name corners that do not exist: it is damaged")
-    return found
 
 
 def _colours(
@@ -301,17 +240,11 @@ def _textured(
     for k in np.unique(number).tolist():
         own = number == k
         name = textures[k] if 0 <= k < len(textures) else textures[0]
-        picture: Bytes | None = texture_beside(path, name, notes)
-        part = _some(whole, own)
+        picture = texture_beside(path, name, notes)
+        colours = None if whole.colours is None else whole.colours[own]
+        part = replace(whole, faces=whole.faces[own], colours=colours)
         if picture is not None:
-            part = ObjectPart(part.points, part.faces, part.normals, None, uv[own], picture,
-                        f"texture {Path(name).name}")  # fmt: skip
+            part = replace(part, colours=None, uv=uv[own], picture=picture,
+                           source=f"texture {Path(name).name}")  # fmt: skip
         parts.append(part)
     return parts
-
-
-def _some(whole: ObjectPart, facets: NDArray[np.bool_]) -> ObjectPart:
-    colours = None if whole.colours is None else whole.colours[facets]
-    return ObjectPart(
-        whole.points, whole.faces[facets], whole.normals, colours, source=whole.source
-    )

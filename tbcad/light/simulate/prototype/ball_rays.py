@@ -57,11 +57,7 @@ def trace_own_ball(run: PrototypeRun, direction: Floats, stop: Ints, ball: Ints)
 
 
 def ball_hits(
-    pinhole: Floats,
-    balls: Floats,
-    direction: Floats,
-    stop: Ints,
-    walls: GrooveWalls = NO_WALLS,
+    pinhole: Floats, balls: Floats, direction: Floats, stop: Ints, walls: GrooveWalls = NO_WALLS
 ) -> BallHits:
     """What unit directions (n, 3) meet at stops (n,): balls (s, k, 8) as of PrototypeRun."""
     ends = walls.of_mirrors(balls.shape[1])

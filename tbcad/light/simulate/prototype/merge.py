@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import without_distortion
-from tbcad.light.simulate.capture.photograph import (
-    CENTRE,
-    RowBand,
-    Samples,
-    Tracer,
-    row_bands,
-)
+from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, Samples, Tracer, row_bands
 from tbcad.light.simulate.parallel import in_batches, in_threads
 from tbcad.light.simulate.prototype.ball_rays import (
     BallHits,
@@ -242,10 +236,7 @@ class SimulatedPhotographs:
 
 
 def merge_run(
-    run: PrototypeRun,
-    scene: Scene,
-    samples: Samples = 1,
-    progress: Progress = lambda _: None,
+    run: PrototypeRun, scene: Scene, samples: Samples = 1, progress: Progress = lambda _: None
 ) -> Iterator[RowBand]:
     """Bands of the merged picture; pixels of photographs are means of `samples`."""
     photographs = SimulatedPhotographs(run, scene, samples)

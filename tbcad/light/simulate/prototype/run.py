@@ -81,9 +81,8 @@ def read_plan(exported: ExportedDesign) -> Plan:
     frame = np.array([document.frame.axis, document.frame.zero, document.frame.third])
     _check_frame(record, exported, frame)
     _check_balls(table, balls)
-    _check_pictures(plan_file, pictures, len(balls))
-    angle = _angles(plan_file, pictures)
-    ball, stop = _served(plan_file, pictures, len(exported.reflectors[0]))
+    mirrors = len(exported.reflectors[0])
+    ball, stop = _served(plan_file, pictures, len(balls), mirrors)
     plan = Plan(
         frame=frame,
         apex=columns(balls, APEX),
@@ -92,7 +91,7 @@ def read_plan(exported: ExportedDesign) -> Plan:
         body_centre=columns(balls, "bx by bz"),
         body_radius=columns(balls, "body_radius_mm")[:, 0],
         moved=document.picture == "moved",
-        angle=np.radians(angle),
+        angle=np.radians(_angles(plan_file, pictures)),
         ball=ball,
         stop=stop,
     )
@@ -133,19 +132,6 @@ def _check_balls(path: Path, balls: list[BallRow]) -> None:
             raise InputError(f"{path}: ball {int(np.argmax(wrong)) + 1} {what}: {REBUILD}")
 
 
-def _check_pictures(path: Path, pictures: list[PictureRow], balls: int) -> None:
-    for row, one in enumerate(pictures, 1):
-        if one.object_turn_deg not in (0, 180):
-            raise InputError(
-                f"{path}: row {row} has object_turn_deg {one.object_turn_deg:g}, allowed is 0 or "
-                f"180: {REBUILD}"
-            )
-        if one.ball > balls:
-            raise InputError(
-                f"{path}: row {row} names ball {one.ball}, allowed is 1 to {balls}: {REBUILD}"
-            )
-
-
 def _angles(path: Path, pictures: list[PictureRow]) -> Floats:
     """Base angle at each stop, degrees, (s,)."""
     angles: dict[int, float] = {}
@@ -161,19 +147,25 @@ def _angles(path: Path, pictures: list[PictureRow]) -> Floats:
     return angle
 
 
-def _served(path: Path, pictures: list[PictureRow], mirrors: int) -> tuple[Ints, Ints]:
+def _served(path: Path, pictures: list[PictureRow], balls: int, mirrors: int) -> tuple[Ints, Ints]:
     """Ball and stop, from 0, of each mirror of camera a and of camera b, (2, m)."""
     ball_and_stop = np.full((2, 2, mirrors), -1, dtype=np.int64)
     for row, one in enumerate(pictures, 1):
-        camera, mirror = int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1
-        if one.mirror[0] != "ab"[camera] or not 0 <= mirror < mirrors:
-            raise InputError(
-                f"{path}: row {row} shows {one.mirror}, allowed with the object turned by "
-                f"{one.object_turn_deg:g} degrees is {_name(camera, 0)} to "
-                f"{_name(camera, mirrors - 1)}: {REBUILD}"
+        turn, wrong = one.object_turn_deg, ""
+        camera, mirror = int(turn != 0), int(one.mirror[1:]) - 1
+        if turn not in (0, 180):
+            wrong = f"has object_turn_deg {turn:g}, allowed is 0 or 180"
+        elif one.ball > balls:
+            wrong = f"names ball {one.ball}, allowed is 1 to {balls}"
+        elif one.mirror[0] != "ab"[camera] or not 0 <= mirror < mirrors:
+            wrong = (
+                f"shows {one.mirror}, allowed with the object turned by {turn:g} degrees is "
+                f"{_name(camera, 0)} to {_name(camera, mirrors - 1)}"
             )
-        if ball_and_stop[0, camera, mirror] >= 0:
-            raise InputError(f"{path}: row {row} shows {one.mirror} a second time: {REBUILD}")
+        elif ball_and_stop[0, camera, mirror] >= 0:
+            wrong = f"shows {one.mirror} a second time"
+        if wrong:
+            raise InputError(f"{path}: row {row} {wrong}: {REBUILD}")
         ball_and_stop[:, camera, mirror] = one.ball - 1, one.stop - 1
     missing = np.argwhere(ball_and_stop[0] < 0)
     if missing.size:
@@ -271,10 +263,10 @@ def prototype_run(
 def balls_at_stops(
     plan: Plan, centre: Floats, radius: Floats, place: Callable[[Floats], Floats]
 ) -> Floats:
-    """Balls as of `PrototypeRun`, (s, k, 8), of reflecting spheres (k, 3), (k,) at base angle zero.
+    """Balls as of `PrototypeRun`, (s, k, 8), from spheres (k, 3), (k,) at base angle zero, mm.
 
-    The plan says where the sphere in the seat is, from the reflecting one, and how much larger; `place`
-    moves points of the base (s, k, 3) from angle zero to the stops.
+    The plan says where the sphere in the seat is, from the reflecting one, and how much larger;
+    `place` moves points of the base (s, k, 3) from angle zero to the stops.
     """
     shape = (len(plan.angle), len(plan))
     front, body = (

@@ -172,7 +172,7 @@ def boxes_around(targets: Floats, count: int) -> Floats:
 
 @compiled
 def mirrors_near_boxes(pinholes: Floats, boxes: Floats, limit: float) -> Ints:
-    """Mirrors (c,) with rays within a limit of targets in boxes (r, 2, 4): middles, half sides, mm."""
+    """Mirrors (c,) with rays within a limit of targets in boxes (r, 2, 4): middles, half sides."""
     kept = np.empty(len(pinholes), dtype=np.int64)
     count = 0
     for k in range(len(pinholes)):

@@ -59,10 +59,7 @@ class SynthesisedView:
 
 
 def synthesise(
-    tiles: MirrorTiles,
-    view: Camera,
-    method: Method = "nearest",
-    depth: DepthFunction | None = None,
+    tiles: MirrorTiles, view: Camera, method: Method = "nearest", depth: DepthFunction | None = None
 ) -> SynthesisedView:
     """The picture that a pinhole camera would see.
 
