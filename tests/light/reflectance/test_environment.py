@@ -43,25 +43,6 @@ def test_an_even_sky_gives_the_irradiance_of_a_hemisphere() -> None:
     assert up == pytest.approx([np.pi] * 3, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("row", "column", "turn_deg", "expected"),
-    [
-        (0, 0, 0.0, (0, 0, 1)),
-        (31, 64, 0.0, (1, 0, 0)),
-        (31, 32, 0.0, (0, 1, 0)),
-        (31, 64, 90.0, (0, 1, 0)),
-    ],
-)
-def test_where_pixels_are(
-    row: int, column: int, turn_deg: float, expected: tuple[float, float, float]
-) -> None:
-    picture = np.zeros((64, 128, 3))
-    picture[row, column] = 1
-    found = environment(picture, np.radians(turn_deg))
-    (bright,) = np.flatnonzero(found.light[:, 0])
-    assert found.direction[bright] == pytest.approx(expected, abs=0.06)
-
-
 def test_lamps_share_all_of_the_light() -> None:
     found = environment(sky())
     place = 245 * even_directions(40)

@@ -110,17 +110,6 @@ def test_damaged_files_are_refused(captured: Path, tmp_path: Path, name: str) ->
         pass
 
 
-@pytest.mark.parametrize("link", [h5py.SoftLink("/b/transport"), h5py.ExternalLink("x.h5", "/t")])
-def test_links_are_refused(captured: Path, tmp_path: Path, link: object) -> None:
-    """As in lightfield.h5; the other kinds are those of `test_hdf5`."""
-    (tmp_path / "reflectance.h5").write_bytes((captured / "reflectance.h5").read_bytes())
-    with h5py.File(tmp_path / "reflectance.h5", "r+") as store:
-        del store["a/transport"]
-        store["a/transport"] = link
-    with pytest.raises(InputError, match="elsewhere"), open_reflectance(tmp_path):
-        pass
-
-
 def test_a_field_of_another_capture_is_refused(
     captured: Path, hdr: Path, light_field: LightField
 ) -> None:

@@ -19,7 +19,7 @@ from tests.light.simulate.conftest import cameras, knot, light_field  # noqa: F4
 
 CAPTURE_MM = 60.0
 FAR = (1e3,)
-PLACES_DEG = ((0.0, 5.0), (100.0, 30.0), (200.0, 45.0), (300.0, 60.0), (45.0, 88.0))
+PLACES_DEG = ((0.0, 5.0), (200.0, 45.0), (45.0, 88.0))
 
 
 def seen_at(azimuth: float, elevation: float, distance: float, size: tuple[int, int]) -> Camera:

@@ -110,24 +110,6 @@ def test_convergence_point_of_rays() -> None:
     assert spread == pytest.approx(1)
 
 
-def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: MirrorTiles) -> None:
-    """A view whose rays are captured ones gives their colours back."""
-    frame = light_field.frames["a"]
-    number = 10
-    on = frame.planes["mirror"][:] == number + 1
-    origin, direction, colour = (
-        frame.planes[name][:][on] for name in ("origin", "direction", "colour")
-    )
-    two_plane = two_plane_along(
-        -frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM
-    )
-    targets = two_plane.coordinates(origin, direction)
-    bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
-    assert bundle is not None
-    found = nearest_rays(bundle, targets)
-    assert np.array_equal(bundle.colour[found], colour)
-
-
 def bundle_and_targets(
     tiles: MirrorTiles, azimuth: float, elevation: float
 ) -> tuple[RayBundle, Floats]:
