@@ -34,6 +34,10 @@ from tbcad.types import Bools, Bytes, Progress
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
 NEAR, FAR = 0.3, 0.98  # radius of the ball, in that of the capture sphere
 GLOSS = 1.0  # highlights as bright as the lamps
+BEST_COLUMNS = (
+    *("surface", "radius_mm", "n", "virtual_cameras", "pixels", "cameras_per_pixel"),
+    "ssim_on_object",
+)
 COLUMNS = ("n", "virtual_cameras", "pixels", "surface", "radius_mm", "ssim_on_object", "reason")
 NOTES = (
     "ssim_on_object: mean of the local SSIM where the truth shows the object, over all views of "
@@ -92,7 +96,9 @@ def balance(
     table = Table.of_records("balance", records, (f"Method: {method}.", *NOTES), COLUMNS)
     best = [one for subject in seen for one in _best(table, subject)]
     panels = (_panel(table, seen, method),)
-    return Study("balance", tuple(map(_figure, best)), (table, _best_table(best)), panels)
+    figures = (Figure(f"{one['object']}: best n", "", one["n"], where="section 6") for one in best)
+    bests = Table.of_records("balance-best", best, columns=BEST_COLUMNS)
+    return Study("balance", tuple(figures), (table, bests), panels)
 
 
 def subjects(capture_mm: float, cameras: list[Camera], progress: Progress) -> list[Subject]:
@@ -122,15 +128,11 @@ def _of_n(
     if attempt.design is None:
         return [head]
     head |= _counts(attempt.design)
-    rows = []
-    for subject in seen:
-        progress(f"n = {n}: {subject.name}")
-        value = ssim_on_object(attempt.design, subject, cameras, method)
-        own: Record = {
-            "surface": subject.surface,
-            "radius_mm": subject.radius_mm,
-            "ssim_on_object": value,
-        }
+    rows: list[Record] = []
+    for one in seen:
+        progress(f"n = {n}: {one.name}")
+        value = ssim_on_object(attempt.design, one, cameras, method)
+        own = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
         rows.append({**head, **own})
     return rows
 
@@ -168,15 +170,6 @@ def _best(table: Table, subject: Subject) -> list[Record]:
     best = max(rows, key=lambda row: float(row["ssim_on_object"] or 0))
     ratio = float(best["virtual_cameras"] or 0) / float(best["pixels"] or 1)
     return [{**best, "cameras_per_pixel": ratio, "object": subject.name}]
-
-
-def _best_table(best: list[Record]) -> Table:
-    columns = ("surface", "radius_mm", "n", "virtual_cameras", "pixels", "cameras_per_pixel")
-    return Table.of_records("balance-best", best, columns=(*columns, "ssim_on_object"))
-
-
-def _figure(best: Record) -> Figure:
-    return Figure(f"{best['object']}: best n", "", best["n"], where="section 6")
 
 
 def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> PlotPanel:

@@ -153,14 +153,11 @@ def _fits(table: Table, *, known: bool) -> list[Record]:
         rows = table.where(definition=definition, radii=radii)
         fit: Record = {"definition": definition, "radii": radii}
         for name, column in zip(FIT_COLUMNS[2:], (NUMBER, RESOLUTION), strict=True):
-            off = _rms_percent(rows.numbers("value"), rows.numbers(f"paper_{column}"))
+            share = rows.numbers("value") / rows.numbers(f"paper_{column}")
+            off = float(100 * np.sqrt(np.mean((share - 1) ** 2)))
             fit[name] = off if known and np.isfinite(off) else None
         fits.append(fit)
     return fits
-
-
-def _rms_percent(values: Floats, columns: Floats) -> float:
-    return float(100 * np.sqrt(np.mean((values / columns - 1) ** 2)))
 
 
 def apices_in_frame(spec: Spec, n: int, pitch: float) -> int:

@@ -196,19 +196,15 @@ def _correlations(rule: str, array: MirrorArray) -> list[Record]:
 
 def _pixel_correlations(mirrors: Table) -> list[Record]:
     """What section 4.2 says of mirrors in higher positions, and section 6 of those nearby."""
-    elevation = ("elevation", mirrors.numbers("elevation_deg"))
-    to_object = ("distance from the object", mirrors.numbers("to_object_mm"))
-    area = ("area", mirrors.numbers("area_mm2"))
+    pairs = (
+        ("pixels", "seeing_px", "elevation", "elevation_deg", PIXELS_PLACE),
+        ("area", "area_mm2", "elevation", "elevation_deg", PIXELS_PLACE),
+        ("distance from the camera", "to_camera_mm", "elevation", "elevation_deg", PIXELS_PLACE),
+        ("area", "area_mm2", "distance from the object", "to_object_mm", UNEVEN_PLACE),
+    )
     return [
-        _correlated("traced", ("pixels", mirrors.numbers("seeing_px")), elevation, PIXELS_PLACE),
-        _correlated("traced", area, elevation, PIXELS_PLACE),
-        _correlated(
-            "traced",
-            ("distance from the camera", mirrors.numbers("to_camera_mm")),
-            elevation,
-            PIXELS_PLACE,
-        ),
-        _correlated("traced", area, to_object, UNEVEN_PLACE),
+        _correlated("traced", (of, mirrors.numbers(one)), (to, mirrors.numbers(other)), where)
+        for of, one, to, other, where in pairs
     ]
 
 

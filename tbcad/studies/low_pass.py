@@ -130,7 +130,7 @@ def low_pass(
         relative = contrast / sharpest.setdefault(case.geometry, contrast)
         head: Record = {"geometry": case.geometry, "blur": case.name, "px": case.px}
         for kind, quality in _views(MirrorTiles(light_field), targets, progress).items():
-            for row in _rows(viewpoints, quality):
+            for row in Table.of_columns("", {**viewpoints.angles(), **quality}).records():
                 records.append({**head, "view": kind, **row, "photograph_contrast": relative})
     table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *NOTES))
     means = Table.of_records("low-pass-means", _means(table))
@@ -151,11 +151,6 @@ def _targets(
         lens_truths.append(to_bytes(lens_picture(scene, view, focus, TRUTH_RAYS)))
     truths = ground_truths(scene, pinholes, progress)
     return _Targets(scene, pinholes, truths, lenses, lens_truths, focus)
-
-
-def _rows(viewpoints: Viewpoints, quality: dict[str, Floats]) -> list[Record]:
-    angles = {"elevation_deg": viewpoints.elevation_deg, "azimuth_deg": viewpoints.azimuth_deg}
-    return Table.of_columns("", {**angles, **quality}).records()
 
 
 def _contrast(light_field: LightField) -> float:
@@ -220,29 +215,27 @@ def _figures(means: Table) -> tuple[Figure, ...]:
 
 
 def _panels(means: Table) -> tuple[PlotPanel, ...]:
+    names = tuple(_name(record) for record in means.where(view="pinhole").records())
+    place = np.arange(len(names), dtype=np.float64)
     labels = {
         "ssim": ("Similarity of views to the truth", "mean SSIM"),
         "blur_mm": ("Blur of views", "mean standard deviation at the object, mm"),
     }
-    return tuple(
-        PlotPanel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
-        for column, (title, unit) in labels.items()
-    )
-
-
-def _names(means: Table) -> list[str]:
-    return [_name(record) for record in means.where(view="pinhole").records()]
-
-
-def _bars(means: Table, column: str) -> tuple[Series, ...]:
-    place = np.arange(len(_names(means)), dtype=np.float64)
-    series = []
-    for view, label, style in (
+    kinds = (
         ("pinhole", "pinhole at --distance", "C0o"),
         ("aperture", "aperture of 80 mm at 160 mm", "C1s"),
-    ):
-        series.append(Series(label, means.where(view=view).numbers(column), place, style))
-    return tuple(series)
+    )
+    bars = {
+        column: tuple(
+            Series(label, means.where(view=view).numbers(column), place, style)
+            for view, label, style in kinds
+        )
+        for column in labels
+    }
+    return tuple(
+        PlotPanel(title, unit, "", bars[column], names=names)
+        for column, (title, unit) in labels.items()
+    )
 
 
 def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:

@@ -66,14 +66,12 @@ def prototype_vs_shell(
     )
     facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
     columns = {
-        "elevation_deg": viewpoints.elevation_deg,
-        "azimuth_deg": viewpoints.azimuth_deg,
-        "shell_psnr_db": shell["psnr_db"],
-        "prototype_psnr_db": prototype["psnr_db"],
-        "shell_ssim": shell["ssim"],
-        "prototype_ssim": prototype["ssim"],
-        "shell_blur_mm": shell["blur_mm"],
-        "prototype_blur_mm": prototype["blur_mm"],
+        **viewpoints.angles(),
+        **{
+            f"{name}_{key}": quality[key]
+            for key in ("psnr_db", "ssim", "blur_mm")
+            for name, quality in (("shell", shell), ("prototype", prototype))
+        },
         "ssim_difference": prototype["ssim"] - shell["ssim"],
     }
     table = Table.of_columns("prototype", columns, (facts, *NOTES))

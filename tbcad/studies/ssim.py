@@ -112,13 +112,8 @@ def _compared(
         with _light_field(attempt.design, scene, progress) as light_field:
             tiles = MirrorTiles(light_field)
             quality = view_quality(tiles, scene, cameras, truths, method, progress)
-    columns = {
-        "elevation_deg": viewpoints.elevation_deg,
-        "azimuth_deg": viewpoints.azimuth_deg,
-        **quality,
-    }
     head: Record = {**asdict(sensor), "n": n}
-    views = Table.of_columns("", columns).records()
+    views = Table.of_columns("", {**viewpoints.angles(), **quality}).records()
     return [{**head, **view, "reason": attempt.reason} for view in views]
 
 

@@ -6,6 +6,7 @@ pixels of a cell at once are a lamp in that place, whose light is as wide as the
 Mirrors are convex, so these places are not far behind them: light falls off over the object.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -121,27 +122,16 @@ class MirrorPixels:
         return np.asarray(inside & (owner == self.number))
 
 
-@dataclass(frozen=True)
-class Projectors:
-    """The mirrors of some lamps."""
+def projectors(source: LightField, lamps: Iterable[MirrorId]) -> list[tuple[MirrorPixels, ...]]:
+    """What projectors in the places of the cameras throw by mirrors.
 
-    # of each lamp: one, or both halves of one on the seam
-    mirrors: tuple[tuple[MirrorPixels, ...], ...]
-
-    def light(self, embree: Any, lamp: int, spots: Spots) -> Floats:
-        """Light on spots (k,) of a lamp by its number."""
-        return np.asarray(sum(one.light(embree, spots) for one in self.mirrors[lamp]))
-
-
-def projectors(source: LightField, lamps: tuple[MirrorId, ...]) -> Projectors:
-    """The projectors of mirrors, in the places of the cameras of a light field."""
+    By one for each lamp, or by both halves of one on the seam.
+    """
     owner = {name: np.asarray(frame.planes["mirror"][:]) for name, frame in source.frames.items()}
-    return Projectors(
-        tuple(
-            tuple(_pixels(source, one, owner[one.frame]) for one in _halves(source, lamp))
-            for lamp in lamps
-        )
-    )
+    return [
+        tuple(_pixels(source, one, owner[one.frame]) for one in _halves(source, lamp))
+        for lamp in lamps
+    ]
 
 
 def _halves(source: LightField, mirror: MirrorId) -> list[MirrorId]:

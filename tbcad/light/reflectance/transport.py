@@ -131,16 +131,12 @@ def relit(source: LightField, reflectance: ReflectanceField, light: Environment)
         shape = (frame.camera.height_px, frame.camera.width_px)
         if name not in lit or reflectance.pixel[name].max(initial=0) >= shape[0] * shape[1]:
             raise InputError(f"the reflectance field is not of this light field: {AGAIN}")
-        colour = _picture(255 * exposure * lit[name], reflectance.pixel[name], shape)
-        frames[name] = replace(frame, planes={**frame.planes, "colour": colour})
+        picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
+        picture[reflectance.pixel[name]] = to_bytes(255 * exposure * lit[name])
+        planes = {**frame.planes, "colour": picture.reshape(*shape, 3)}
+        frames[name] = replace(frame, planes=planes)
     points = reflectance.facts.get("light", "points") == "points"
     return Relit(replace(source, frames=frames), lamps, points, exposure)
-
-
-def _picture(colours: Colours, pixel: Any, shape: tuple[int, int]) -> Any:
-    picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
-    picture[pixel] = to_bytes(colours)
-    return picture.reshape(*shape, 3)
 
 
 def lit_scene(scene: Scene, lights: PointLights, exposure: float) -> Scene:
@@ -180,7 +176,14 @@ def write_reflectance(
         )
     kind = "projectors" if thrown else "points"
     facts = {"lamps": len(lamps.name), "rays": rays, "unpacked_bytes": size, "light": kind}
-    light = thrown_light(scene, source, lamps) if thrown else point_lamps(scene, lamps)
+    mirrors = [MirrorId(one[0], int(one[1:]) - 1) for one in lamps.name if thrown]
+    throwing = projectors(source, mirrors) if thrown else []
+
+    def light(lamp: int, spots: Spots) -> Floats:
+        if not thrown:
+            return received_light(scene.embree, spots, lamps.place[lamp])
+        return np.asarray(sum(one.light(scene.embree, spots) for one in throwing[lamp]))
+
     with h5py.File(folder / NAME, "w", libver=("v110", "v110")) as store:
         store.attrs["schema"], store.attrs["facts"] = SCHEMA, json.dumps(facts)
         group = store.create_group("lamps")  # by name and create_dataset: without times
@@ -211,17 +214,6 @@ def seen_spots(frame: CameraFrame, scene: Scene) -> SeenSpots:
         Spots(*places),
         np.concatenate([part.albedo for part in parts]),
     )
-
-
-def point_lamps(scene: Scene, lamps: LampPlaces) -> Light:
-    """The light of lamps that shine alike in all directions."""
-    return lambda k, spots: received_light(scene.embree, spots, lamps.place[k])
-
-
-def thrown_light(scene: Scene, source: LightField, lamps: LampPlaces) -> Light:
-    """The light of projectors in the places of the cameras, by the mirrors of the lamps' names."""
-    found = projectors(source, tuple(MirrorId(one[0], int(one[1:]) - 1) for one in lamps.name))
-    return lambda k, spots: found.light(scene.embree, k, spots)
 
 
 def transport(seen: SeenSpots, light: Light, lamp: int, rays: slice) -> Colours:

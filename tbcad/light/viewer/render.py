@@ -1,7 +1,7 @@
 """Views of a light field or a field: one after the other as asked for, and a turntable of many."""
 
-import base64
 from abc import ABC, abstractmethod
+from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -84,7 +84,7 @@ class ViewRenderer(ABC):
 
         with self._lock:
             image = self.picture(query, proceed)
-        return jpeg_bytes(image)
+        return image_bytes(image, "JPEG", quality=JPEG_QUALITY)
 
     def picture(self, query: Query, proceed: Callable[[], None] = lambda: None) -> Bytes:
         """The picture (h, w, 3) of a query; a lens that moves gives a smaller one.
@@ -100,7 +100,8 @@ class ViewRenderer(ABC):
         lens = ThinLens(query.aperture, query.focus)
         if query.still:
             return refocus(self.lens, view, lens, proceed=proceed).image
-        smaller = _smaller(query).camera(self.capture_mm)
+        width, height = (max(side // MOVING_STEP, 1) for side in (query.width, query.height))
+        smaller = replace(query, width=width, height=height).camera(self.capture_mm)
         return refocus(self.lens, smaller, lens, lens_pinholes(MOVING_RADIUS2)).image
 
     @abstractmethod
@@ -113,12 +114,7 @@ class ViewRenderer(ABC):
 
 
 class Renderer(ViewRenderer):
-    """Pictures of a light field.
-
-    Attributes:
-        tiles: the light field.
-        pictures: of its virtual cameras, for views that move.
-    """
+    """Pictures of a light field: its tiles, and pictures of its virtual cameras to move fast."""
 
     method: MethodAtRest
 
@@ -165,15 +161,10 @@ def capture_mm(pictured: MirrorTiles | Field) -> float:
     return pictured.source.capture_mm
 
 
-def _smaller(query: Query) -> Query:
-    width, height = query.width // MOVING_STEP, query.height // MOVING_STEP
-    return replace(query, width=max(width, 1), height=max(height, 1))
-
-
-def jpeg_bytes(image: Bytes) -> bytes:
-    """An image (h, w, 3) as a JPEG file."""
+def image_bytes(image: Bytes, kind: str, **options: int) -> bytes:
+    """An image (h, w, 3) as a file of a kind that Pillow writes."""
     with BytesIO() as buffer:
-        Image.fromarray(np.ascontiguousarray(image)).save(buffer, "JPEG", quality=JPEG_QUALITY)
+        Image.fromarray(np.ascontiguousarray(image)).save(buffer, kind, **options)
         return buffer.getvalue()
 
 
@@ -212,10 +203,12 @@ def write_turntable(
 
     InputError: it cannot be written, or so many views do not fit into MAX_BYTES.
     """
-    picture, pictures = _maker(shown, table, progress), []
+    picture, pictures = _pictures(shown, table.method, progress), []
+    azimuths = (2 * np.pi * np.arange(table.columns) / table.columns).tolist()
     for k, elevation in enumerate(table.elevations_deg):
         progress(f"row {k + 1} of {len(table.elevations_deg)}, elevation {elevation:.0f} degrees")
-        pictures.append([picture(elevation, i) for i in range(table.columns)])
+        place = float(np.radians(elevation)), table.distance, capture_mm(shown), table.size
+        pictures.append([picture(camera_around_object(one, *place)) for one in azimuths])
     page = smallest_loss(pictures, table, title)
     replace_files(file.parent, {file.name: page})
     return len(page)
@@ -239,7 +232,11 @@ def turntable_page(
     pictures: Sequence[Sequence[Bytes]], table: Turntable, title: str, quality: int
 ) -> str:
     """The page with its pictures (h, w, 3), row by row, in WebP of a quality."""
-    frames = [[_webp(picture, quality) for picture in row] for row in pictures]
+    kind = {"quality": quality, "method": 4}
+    frames = [
+        [b64encode(image_bytes(picture, "WEBP", **kind)).decode() for picture in row]
+        for row in pictures
+    ]
     data = {
         "size": table.size,
         "elevations": table.elevations_deg,
@@ -252,20 +249,6 @@ def turntable_page(
     return filled("turntable", title, data, begin=BEGIN, images="data: blob:", about=about)
 
 
-def _maker(
-    shown: MirrorTiles | Field, table: Turntable, progress: Progress
-) -> Callable[[float, int], Bytes]:
-    """What makes the picture of an elevation, degrees, and a column."""
-    of_camera = _pictures(shown, table.method, progress)
-    capture = capture_mm(shown)
-
-    def picture(elevation: float, column: int) -> Bytes:
-        place = 2 * np.pi * column / table.columns, float(np.radians(elevation)), table.distance
-        return of_camera(camera_around_object(*place, capture, table.size))
-
-    return picture
-
-
 def _pictures(
     shown: MirrorTiles | Field, method: MethodAtRest, progress: Progress
 ) -> Callable[[Camera], Bytes]:
@@ -276,9 +259,3 @@ def _pictures(
         views = depth_views(shown, QUICK, progress)
         return lambda camera: views.of(camera)[0].image
     return lambda camera: synthesise(shown, camera, method).image
-
-
-def _webp(image: Bytes, quality: int) -> str:
-    with BytesIO() as buffer:
-        Image.fromarray(image).save(buffer, "WEBP", quality=quality, method=4)
-        return base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -38,13 +38,7 @@ TEXT, HTML, JPEG = "text/plain; charset=utf-8", "text/html; charset=utf-8", "ima
 
 
 class ViewServer(ThreadingHTTPServer):
-    """Serves one light field or field until it is shut down.
-
-    Attributes:
-        renderer: makes the views.
-        page: the page, HTML.
-        token: random word of the address.
-    """
+    """Serves one light field or field until it is shut down; `token` is a word of its address."""
 
     daemon_threads = True
     allow_reuse_address = False

@@ -170,7 +170,7 @@ def test_what_a_mirror_sees_is_what_it_lights(field: LightField, scene: Scene) -
     numbers = frame.planes["mirror"].ravel()[seen.pixel]
     number = int(np.bincount(numbers).argmax())
     own = numbers == number
-    (found,) = projectors(field, (MirrorId("a", number - 1),)).mirrors
+    (found,) = projectors(field, (MirrorId("a", number - 1),))
     spots = Spots(*(values[own] for values in vars(seen.spots).values()))
     light = found[0].light(scene.embree, spots)
     steep = np.einsum("kj,kj->k", spots.normal, unit(found[0].centre - spots.place)) > 0.2

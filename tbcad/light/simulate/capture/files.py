@@ -56,7 +56,10 @@ def write_camera(
     group.attrs["forward"] = camera.forward
     group.attrs["right"] = camera.right
     group.attrs["hfov_rad"] = camera.hfov
-    _write_mirrors(group.create_group("mirrors"), reflector)
+    mirrors, table = reflector.mirrors, group.create_group("mirrors")
+    columns = (reflector.u, mirrors.apex, mirrors.normal, mirrors.curvature, reflector.boxes())
+    for name, values in zip(MIRROR_ARRAYS, columns, strict=True):
+        table.create_dataset(name, data=values)
     shape = (camera.height_px, camera.width_px)
     chunk = (min(CHUNK[0], shape[0]), min(CHUNK[1], shape[1]))
     planes = {
@@ -109,13 +112,6 @@ def filtered_chunk(part: NDArray[Any], shape: tuple[int, ...]) -> bytes:
     chunk[: part.shape[0], : part.shape[1]] = part
     shuffled = chunk.reshape(-1, 1).view(np.uint8).T
     return zlib.compress(shuffled.tobytes(), COMPRESSION_LEVEL)
-
-
-def _write_mirrors(group: h5py.Group, reflector: Reflector) -> None:
-    mirrors = reflector.mirrors
-    columns = (reflector.u, mirrors.apex, mirrors.normal, mirrors.curvature, reflector.boxes())
-    for name, values in zip(MIRROR_ARRAYS, columns, strict=True):
-        group.create_dataset(name, data=values)
 
 
 def write_capture(

@@ -177,18 +177,14 @@ def count_pixels(
     traced: dict[tuple[int, int, float], PixelCounts] = {}
     counts = []
     for sensor in sensors:
-        width, height = _sampled(sensor, most_rays)
+        step = math.ceil(math.sqrt(sensor.width_px * sensor.height_px / most_rays))
+        width, height = -(-sensor.width_px // step), -(-sensor.height_px // step)
         key = width, height, sensor.height_px / sensor.width_px
         if key not in traced:
             traced[key] = _counted(array, _view(array, sensor, axes), (width, height), radius)
         one, scale = traced[key], (sensor.width_px / width) ** 2
         counts.append(replace(one, on=one.on * scale, seen=one.seen * scale, disc=one.disc * scale))
     return counts
-
-
-def _sampled(sensor: Sensor, most_rays: int) -> tuple[int, int]:
-    step = math.ceil(math.sqrt(sensor.width_px * sensor.height_px / most_rays))
-    return -(-sensor.width_px // step), -(-sensor.height_px // step)
 
 
 def _view(array: MirrorArray, sensor: Sensor, axes: tuple[Floats, Floats] | None) -> Camera:

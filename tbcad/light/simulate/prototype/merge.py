@@ -95,7 +95,11 @@ def merge_photographs(
     """
     picture, shown = _resampled(plan, photographs, progress)
     known = replace(plan, ball=np.where(shown[plan.stop], plan.ball, NO_BALL))
-    yield from merged_bands(known, partial(_resampled_colours, picture), progress)
+
+    def colours(rows: range, some: Bools) -> Bytes:
+        return np.asarray(picture[rows.start : rows.stop].reshape(-1, 3) * some[:, None])
+
+    yield from merged_bands(known, colours, progress)
 
 
 def merged_bands(
@@ -211,10 +215,6 @@ def _band(plan: MergePlan, colours: Callable[[range, Bools], Bytes], rows: range
     removed = (hits.ball == 0) | front
     colour = colours(rows, (hits.ball > 0) | front)
     return RowBand(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
-
-
-def _resampled_colours(picture: Bytes, rows: range, shown: Bools) -> Bytes:
-    return np.asarray(picture[rows.start : rows.stop].reshape(-1, 3) * shown[:, None])
 
 
 @dataclass(frozen=True)

@@ -227,8 +227,10 @@ def prototype_runs(
 ) -> tuple[PrototypeRun, PrototypeRun]:
     """Both runs as designed: for camera a's mirrors, and for camera b's, the object turned."""
     camera = without_distortion(reflectors[0].camera)
+    place = partial(rotated, axis=plan.frame[0], angle=plan.angle[:, None])
+    balls = balls_at_stops(plan, plan.centre, plan.radius, place)
     a, b = (
-        prototype_run(reflector, plan, half, camera, _designed_balls(plan))
+        prototype_run(reflector, plan, half, camera, balls)
         for half, reflector in enumerate(reflectors)
     )
     return a, b
@@ -242,12 +244,15 @@ def prototype_run(
     `half` is 0 for camera a's mirrors, 1 for camera b's, the object turned.
     """
     flip = HALF_TURN if half else np.ones(3)
-    balls, camera = balls * np.concatenate([flip, [1.0], flip, [1.0]]), _turned(camera, flip)
+    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    camera = replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
     ball, stop = plan.ball[half], plan.stop[half]
     centre, radius = balls[stop, ball, :3], balls[stop, ball, 3]
     apex = reflection_points(centre, radius, np.zeros(3), camera.pinhole)
     normal = (apex - centre) / radius[:, None]
-    window = reflector.mirrors.apex if plan.moved else _designed_apex(plan, half) * flip
+    window = reflector.mirrors.apex
+    if not plan.moved:
+        window = rotated(plan.apex[ball], plan.frame[0], plan.angle[stop]) * flip
     return PrototypeRun(
         reflector=reflector,
         camera=camera,
@@ -285,20 +290,6 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     """
     shell, balls = run.reflector, run.ball_surfaces
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
-
-
-def _designed_balls(plan: Plan) -> Floats:
-    place = partial(rotated, axis=plan.frame[0], angle=plan.angle[:, None])
-    return balls_at_stops(plan, plan.centre, plan.radius, place)
-
-
-def _designed_apex(plan: Plan, half: int) -> Floats:
-    """Apices of the balls in place of a half's mirrors, where they are designed to be, (m, 3)."""
-    return rotated(plan.apex[plan.ball[half]], plan.frame[0], plan.angle[plan.stop[half]])
-
-
-def _turned(camera: LensCamera, flip: Floats) -> LensCamera:
-    return replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
 
 
 def _window_rotations(

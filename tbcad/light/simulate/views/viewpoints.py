@@ -15,7 +15,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE, pinhole_picture
-from tbcad.light.simulate.views.synthesis import DepthFunction, Method, synthesise
+from tbcad.light.simulate.views.synthesis import Method, synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress
 
 # Blurs that are tried, standard deviations of a Gaussian in pixels, and how finely.
@@ -125,6 +125,10 @@ class Viewpoints:
     azimuth_deg: Floats  # of each viewpoint, (v,)
     distance_mm: float  # of all of them from the origin
 
+    def angles(self) -> dict[str, Floats]:
+        """Both as columns of a table."""
+        return {"elevation_deg": self.elevation_deg, "azimuth_deg": self.azimuth_deg}
+
     def cameras(self, capture_mm: float, size: tuple[int, int] = (640, 480)) -> list[Camera]:
         """The cameras, of these columns and rows, each filled by the capture sphere."""
         azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
@@ -174,14 +178,13 @@ def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list
 def object_masks(scene: Scene, views: list[Camera]) -> list[Bools]:
     """Which pixels of each viewpoint's picture show the object, (h, w)."""
     depth = depth_along_rays(scene)
-    return [_object_mask(depth, view) for view in views]
-
-
-def _object_mask(depth: DepthFunction, view: Camera) -> Bools:
-    direction = view_directions(view)
-    origin = np.broadcast_to(view.pinhole, direction.shape)
-    distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
-    return np.isfinite(distance).reshape(direction.shape[:2])
+    masks = []
+    for view in views:
+        direction = view_directions(view)
+        origin = np.broadcast_to(view.pinhole, direction.shape)
+        distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
+        masks.append(np.isfinite(distance).reshape(direction.shape[:2]))
+    return masks
 
 
 def views_by(method: StudyMethod, tiles: MirrorTiles, scene: Scene) -> Callable[[Camera], Bytes]:
