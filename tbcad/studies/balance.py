@@ -132,7 +132,7 @@ def _of_n(
     for one in seen:
         progress(f"n = {n}: {one.name}")
         value = ssim_on_object(attempt.design, one, cameras, method)
-        own = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
+        own: Record = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
         rows.append({**head, **own})
     return rows
 

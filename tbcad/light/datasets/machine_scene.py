@@ -74,7 +74,7 @@ def mitsuba_scene(camera: Camera, parts: list[str]) -> bytes:
     target, up = camera.pinhole + 100 * camera.forward, -camera.axes[1]
     places = {"origin": camera.pinhole, "target": target, "up": up}
     place = {name: ", ".join(repr(float(x)) for x in at) for name, at in places.items()}
-    _add(_add(sensor, "transform", name="to_world"), "lookat", **place)
+    _add(_add(sensor, "transform", name="to_world"), "lookat", (), **place)
     size = [
         ("integer", "width", str(camera.width_px)),
         ("integer", "height", str(camera.height_px)),

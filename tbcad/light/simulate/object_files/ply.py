@@ -54,7 +54,7 @@ class List(NamedTuple):
     values: Values
 
 
-Table = dict[str, Values | List]
+Table = dict[str, Any]  # columns by name: Values or List
 
 
 def read_tables(data: bytes) -> tuple[dict[str, Table], list[str]]:
@@ -165,7 +165,6 @@ def _joined(parts: list[Any]) -> Values | List:
 
 def read_ply(path: Path) -> ObjectFile:
     """Read a mesh; InputError: it is no PLY file, cut off, or without facets."""
-    tables: dict[str, dict[str, Any]]
     tables, textures = read_tables(path.read_bytes())
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not {*"xyz"} <= vertex.keys():
