@@ -56,7 +56,7 @@ class SmallViews(Viewpoints):
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 2, 640.0)))
+    viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 1, 640.0)))
     return ssim(
         load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest", quiet
     )

@@ -53,7 +53,7 @@ def pinhole_crop(centre: np.ndarray, size: int = 40) -> Crop:
     return crop_of_points(origin, points, np.rint(colour).astype(np.uint8))
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(angles=DIRECTIONS, distance=DISTANCES)
 def test_rays_of_a_pinhole_give_it_back(angles: tuple[float, float], distance: float) -> None:
     centre = distance * on_sphere(angles)
@@ -66,7 +66,7 @@ def test_rays_of_a_pinhole_give_it_back(angles: tuple[float, float], distance: f
     assert int(row[3]) == crop.meets.sum()
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(angles=DIRECTIONS, distance=DISTANCES, size=st.integers(16, 90))
 def test_the_picture_of_a_pinhole_shows_every_point_where_it_is(
     angles: tuple[float, float], distance: float, size: int

@@ -10,11 +10,11 @@ from tbcad.light.reconstruction.mesh_distance import mesh_distance
 from tbcad.light.simulate.scene.object import patterned_ball
 from tests.light.reconstruction.balls import parallel_rays
 
-RAYS = parallel_rays(lambda away: away < 7, across=81)
+RAYS = parallel_rays(lambda away: away < 7, across=41)
 
 
 def sphere(radius: float) -> trimesh.Trimesh:
-    return trimesh.creation.icosphere(subdivisions=5, radius=radius)
+    return trimesh.creation.icosphere(subdivisions=4, radius=radius)
 
 
 def test_of_two_spheres_it_is_the_difference_of_their_radii() -> None:

@@ -174,7 +174,10 @@ def test_sparse_strided_and_normalized_numbers(tmp_path: Path) -> None:
         ({"nodes": [{"children": [0]}]}, "hold each other"),
     ],
 )
-def test_refused(tmp_path: Path, change: dict[str, Any], wrong: str) -> None:
+def test_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: dict[str, Any], wrong: str
+) -> None:
+    monkeypatch.setattr("tbcad.light.simulate.object_files.gltf.MOST_NODES", 1000)
     (tmp_path / "secret.bin").write_bytes(b"0" * 1000)
     inside = tmp_path / "inside"
     inside.mkdir()

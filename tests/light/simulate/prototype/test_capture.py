@@ -1,9 +1,8 @@
 """Capture with the prototype: its plan as read, its photographs, and what is merged of them."""
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +14,15 @@ import tbcad.light.simulate.parallel
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
-from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, sample_shifts, to_bytes
+from tbcad.light.simulate.capture.photograph import CENTRE, RowBand
 from tbcad.light.simulate.capture.photograph import photograph as shell_photograph
 from tbcad.light.simulate.prototype.ball_rays import (
-    reflected_colours,
     resampled_photograph,
     trace_balls,
     trace_own_ball,
 )
 from tbcad.light.simulate.prototype.merge import (
-    MergePlan,
-    SimulatedPhotographs,
-    merge_plan,
     merge_run,
-    merged_bands,
-    merged_pixels,
 )
 from tbcad.light.simulate.prototype.run import (
     HALF_TURN,
@@ -40,11 +33,10 @@ from tbcad.light.simulate.prototype.run import (
     read_plan,
 )
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import Scene, object_in_front, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector, read_export
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.types import Bools, Bytes
 from tests.exported_files import Rows, edit_csv, edit_json
 from tests.light.simulate.conftest import CAPTURE_MM
 from tests.photographed_runs import stop_photograph
@@ -52,7 +44,6 @@ from tests.prototype_exports import plan_of
 
 PLAN, RECORD, BALLS = "rotation_plan.csv", "prototype.json", "balls.csv"
 Runs = tuple[PrototypeRun, PrototypeRun]
-Merge = Callable[..., Iterator[RowBand]]
 
 
 @pytest.fixture(scope="module")
@@ -65,28 +56,9 @@ def merged(runs: Runs, knot: Scene) -> LightField:
     return merged_light_field(runs, knot)
 
 
-def merged_light_field(runs: Runs, scene: Scene, merge: Merge = merge_run) -> LightField:
-    photographs = ((ball_reflector(run), merge(run, scene)) for run in runs)
+def merged_light_field(runs: Runs, scene: Scene) -> LightField:
+    photographs = ((ball_reflector(run), merge_run(run, scene)) for run in runs)
     return light_field_in_memory(photographs, CAPTURE_MM)
-
-
-def traced(plan: MergePlan, photographs: SimulatedPhotographs, rows: range, _: Bools) -> Bytes:
-    """Colours (n, 3) along the rotated directions themselves."""
-    pinhole, scene = plan.run.camera.pinhole, photographs.scene
-    total = np.zeros((len(rows) * plan.run.reflector.camera.width_px, 3), dtype=np.float32)
-    shifts = sample_shifts(photographs.samples)
-    for shift in shifts:
-        _mirror, hits, front, direction = merged_pixels(plan, rows, shift)
-        direct = object_in_front(scene, pinhole, direction, hits.distance)[1]
-        total += np.where(front[:, None], direct, reflected_colours(scene, hits))
-    return to_bytes(total / np.float32(len(shifts)))
-
-
-def traced_merge(run: PrototypeRun, scene: Scene, samples: int = 1) -> Iterator[RowBand]:
-    """The merged picture without photographs between."""
-    photographs = SimulatedPhotographs(run, scene, samples)
-    plan = merge_plan(run, scene.radius, photographs.in_front)
-    yield from merged_bands(plan, partial(traced, plan, photographs), lambda _: None)
 
 
 def ideal(layout: PrototypeLayout, angle: float) -> Plan:
@@ -208,12 +180,10 @@ class TestPhotographs:
 
 
 class TestMerged:
-    @pytest.mark.parametrize("merge", [traced_merge, merge_run])
     def test_balls_like_the_mirrors_give_the_shells_picture(
         self,
         layout: PrototypeLayout,
         cameras: tuple[Reflector, Reflector],
-        merge: Merge,
     ) -> None:
         """Also where the object, which is too large, hides mirrors.
 
@@ -221,7 +191,7 @@ class TestMerged:
         """
         scene = prepared_scene(built_in_object(1.7 * CAPTURE_MM))
         ideal_runs = prototype_runs(cameras, ideal(layout, 0.7))
-        found = merged_light_field(ideal_runs, scene, merge)
+        found = merged_light_field(ideal_runs, scene)
         for at in cameras:
             shell = list(shell_photograph(at.camera, exact_tracer(at), scene))
             planes = found.frames[at.camera_id].planes
@@ -270,16 +240,15 @@ class TestMerged:
         """A camera of a narrower lens takes no rays beyond its frame, and no colours."""
         wide = runs[0].camera
         narrow = replace(runs[0], camera=replace(wide, focal=1.4 * wide.focal))
-        for merge in (traced_merge, merge_run):
-            bands = list(merge(narrow, knot))
-            mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
-            place = narrow.camera.project(origin[mirror > 0])
-            assert (place >= -1e-6).all()
-            assert (place <= np.array([415, 309]) + 1e-6).all()
-            free = exact_tracer(runs[0].reflector)(range(310), CENTRE).mirror
-            lost = (mirror == 0) & (free > 0)
-            assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
-            assert not np.concatenate([band.colour for band in bands])[lost].any()
+        bands = list(merge_run(narrow, knot))
+        mirror, origin = joined(bands, "mirror"), joined(bands, "origin")
+        place = narrow.camera.project(origin[mirror > 0])
+        assert (place >= -1e-6).all()
+        assert (place <= np.array([415, 309]) + 1e-6).all()
+        free = exact_tracer(runs[0].reflector)(range(310), CENTRE).mirror
+        lost = (mirror == 0) & (free > 0)
+        assert 0.1 < lost.sum() / (free > 0).sum() < 0.9
+        assert not np.concatenate([band.colour for band in bands])[lost].any()
 
     def test_same_bytes_on_one_thread(
         self, merged: LightField, runs: Runs, knot: Scene, monkeypatch: pytest.MonkeyPatch
