@@ -14,7 +14,7 @@ RAYS = parallel_rays(lambda away: away < 7, across=41)
 
 
 def sphere(radius: float) -> trimesh.Trimesh:
-    return trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    return trimesh.creation.icosphere(subdivisions=5, radius=radius)
 
 
 def test_of_two_spheres_it_is_the_difference_of_their_radii() -> None:
