@@ -12,10 +12,9 @@ import numpy as np
 from tbcad.light.simulate.capture.photograph import Samples, row_bands
 from tbcad.light.simulate.parallel import in_threads
 from tbcad.light.simulate.prototype.ball_rays import photographed_pixels
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.exposure import LIT, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.records.run import RECORD, RunRecord
 from tbcad.rig.machine.machine import Machine

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.mirror_limits.files import halves, write_half, write_record
 from tbcad.mirror_limits.sensitivity import (
     Deviation,

@@ -36,6 +36,9 @@ from tbcad.light.simulate.views.viewpoints import (
     views_by,
 )
 from tbcad.types import Bytes, Floats, Ints
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
+from tbcad.optimizing.views import ViewsBy, mean_ssim
+from tbcad.types import Floats, Ints
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
 

@@ -21,8 +21,7 @@ from tbcad.core.camera.requirements import (
 )
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.studies.paper import claimed, claims, with_lens_of_table_i
-from tbcad.studies.sweep import try_design
+from tbcad.studies.paper import claimed, claims, try_design, with_lens_of_table_i
 from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")
@@ -85,11 +84,7 @@ class LensOptions:
     wide_open: float = 2.8  # F-number of the lens fully open
 
     def checked(self) -> "LensOptions":
-        """These, when all are above 0 to 1000.
-
-        Raises:
-            InputError: one is not.
-        """
+        """These, when all are above 0 to 1000; InputError: one is not."""
         for option, value in vars(self).items():
             if not 0 < value <= MAX_OPTION:
                 name = "--" + option.replace("_", "-")

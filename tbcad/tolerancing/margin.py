@@ -18,7 +18,7 @@ import numpy as np
 from tbcad.core.mirrors.array import DIRECTION_DIGITS, MirrorArray, design
 from tbcad.core.spec.design import MAX_MARGIN, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.builds import coverage_at_yield
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.light.simulate.scene.reflector import reflectors
+from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.mirror_limits.inspect import minimum_at_limits
 from tbcad.mirror_limits.sensitivity import (
     Deviation,

@@ -15,6 +15,7 @@ from tbcad.light.simulate.capture.pixel_counts import Sensor
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
 from tbcad.optimizing import candidate
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.optimizing.candidate import (
     MachineLimits,
     bounds,

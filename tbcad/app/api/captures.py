@@ -58,10 +58,10 @@ def photograph(options: CaptureOptions) -> Photographs:
     check_is_export(exports)
     check_is_object(None if file is None else Path(file), options.up, options.unit)
     from tbcad.light.simulate.camera_photographs import camera_photographs
-    from tbcad.light.simulate.prototype.lamps import lit_by, read_lamps
-    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
     from tbcad.light.simulate.scene.ray_casting import prepared_scene
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.folder import check_replaceable
     from tbcad.output.inputs import files_named
 
@@ -184,7 +184,7 @@ def relight(
     from math import radians
 
     from tbcad.light.reflectance.environment import read_environment
-    from tbcad.light.reflectance.field_file import open_reflectance, relit
+    from tbcad.light.reflectance.transport import open_reflectance, relit
     from tbcad.light.simulate.capture.light_field import LightField
 
     folder, environment = (

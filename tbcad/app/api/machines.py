@@ -61,8 +61,8 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     if options.bits not in (8, 16):
         raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
     options.stop_numbers(), options.seconds()  # refused before what is heavy is loaded
-    from tbcad.light.simulate.scene.exported import read_export
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.inputs import files_named
     from tbcad.rig.runs.photographs import read_run
     from tbcad.rig.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run

@@ -20,7 +20,7 @@ from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.parallel import chunks, in_threads
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.viewpoints import OwnMethod
 from tbcad.types import Bytes, Floats
 

@@ -13,7 +13,7 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.report.page.packing import PackedArrays
 from tbcad.shell.envelope import closing_envelope

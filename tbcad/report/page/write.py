@@ -12,7 +12,7 @@ from tbcad_verify.report.as_made import AsMade
 from tbcad.common.atomic_files import replace_files
 from tbcad.common.web_page import web_page
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.output.manifest import (
     MANIFEST,
     REPORT,

@@ -15,8 +15,8 @@ from tbcad.cad.kernel.solids import common, one_solid, sphere
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.light.simulate.image_files import write_images
-from tbcad.light.simulate.prototype.plan import Plan, read_plan
-from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.prototype.run import Plan, read_plan
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.rig.machine.machine import Machine
 from tbcad.rig.machine.record import RECORD as MACHINE
 from tbcad.rig.machine.record import read_machine

@@ -12,9 +12,8 @@ from tbcad.common.results.tables import Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.windows import cell_windows
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan, read_plan
-from tbcad.light.simulate.prototype.run import PrototypeRun
-from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, read_plan
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.records.tables import RayRow
 from tbcad.rig.machine.photographed import machine_runs, stops_known
 from tbcad.rig.machine.record import RECORD, read_machine

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Geometry

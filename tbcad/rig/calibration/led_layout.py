@@ -13,7 +13,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflected_rays
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
 from tbcad.rig.calibration.estimate.reflection import projection, reflections

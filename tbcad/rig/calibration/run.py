@@ -9,7 +9,7 @@ from typing import Any
 from tbcad.common.atomic_files import InFolder
 from tbcad.common.figure_files import PlotFormat
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import CalibrateOptions
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, files_named

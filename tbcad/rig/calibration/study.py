@@ -14,8 +14,8 @@ from tbcad.common.results.plots import PlotPanel, Series
 from tbcad.common.results.study import Figure, Study
 from tbcad.common.results.tables import Cell, Record, Table
 from tbcad.core.geometry.vectors import unit
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
 from tbcad.records.exposure import Frame
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places

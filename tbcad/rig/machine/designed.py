@@ -6,9 +6,8 @@ import numpy as np
 
 from tbcad.core.optics.camera import without_distortion
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.rig.machine.machine import Machine

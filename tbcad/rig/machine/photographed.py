@@ -4,9 +4,8 @@ import numpy as np
 
 from tbcad.core.geometry.rotations import rotated
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, balls_at_stops, prototype_run
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.exposure import Frame
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats

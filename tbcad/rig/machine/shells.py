@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan, read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.calibration import NAME, CalibrationRecord
 from tbcad.records.exposure import Frame
 from tbcad.records.run import Geometry

@@ -11,10 +11,9 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, ball_reflector
 from tbcad.light.simulate.scene.rays import meets_sphere
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import MergeOptions
 from tbcad.records.exposure import LIT, Frame
 from tbcad.rig.machine.machine import Machine

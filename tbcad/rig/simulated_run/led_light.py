@@ -18,7 +18,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
     balls_between,
     points_within_walls,
 )
-from tbcad.light.simulate.prototype.plan import HALF_TURN
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.rig.machine.built import BuiltPrototype

@@ -17,12 +17,12 @@ from PIL import Image
 from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import THREADS
-from tbcad.light.simulate.prototype.lamps import lit_by, read_lamps
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
 from tbcad.light.simulate.scene.object import SceneObject, built_in_object
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, refuse_inputs

@@ -7,8 +7,8 @@ import numpy as np
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.tables import StopRow
 from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.error_kinds import Errors

@@ -18,8 +18,7 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.optics.windows import cell_windows
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers

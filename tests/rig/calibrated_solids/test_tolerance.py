@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.rig.calibrated_solids.tolerance import (
     as_built_tolerance,

@@ -17,8 +17,8 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.drive.drive import Drive

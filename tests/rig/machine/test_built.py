@@ -7,7 +7,7 @@ import pytest
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import without_distortion
-from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.prototype.run import Plan
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.rig.machine.built import BuiltPrototype, designed_build, draw_other_errors, random_build
 from tbcad.rig.machine.machine import Machine

@@ -13,12 +13,11 @@ from tbcad.app.api import merge
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
 from tbcad.light.simulate.prototype.merge import merge_run
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import ball_reflector, prototype_runs
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan, ball_reflector, prototype_runs
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.scene.rays import camera_around_object
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.rig.machine.record import TRUTH, read_machine
 from tbcad.rig.runs.photographs import read_photograph, read_run

@@ -11,9 +11,8 @@ from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.rays import exact_tracer, reflect_pixels
+from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer, reflect_pixels
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
 from tbcad.light.simulate.views.viewpoints import ground_truths
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import draw

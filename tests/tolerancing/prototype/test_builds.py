@@ -10,8 +10,7 @@ from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.windows import cell_windows
 from tbcad.core.spec.load import load_spec
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.tolerancing.montecarlo.builds import simulate

@@ -52,7 +52,7 @@ def viewpoint_of(
     """
     from math import radians
 
-    from tbcad.light.simulate.scene.viewpoint import camera_around_object
+    from tbcad.light.simulate.scene.rays import camera_around_object
 
     azimuth, elevation, distance = place
     if fov is not None and not 0 < fov < WIDEST_DEG:
@@ -76,7 +76,7 @@ def scene_of(folder: Path) -> "Scene | None":
 def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
     """What a pinhole camera would see, ray-traced with samples x samples rays a pixel."""
     from tbcad.light.simulate.capture.photograph import to_bytes
-    from tbcad.light.simulate.views.ground_truth import pinhole_picture
+    from tbcad.light.simulate.views.refocus import pinhole_picture
 
     return to_bytes(pinhole_picture(scene, at, samples))
 

@@ -35,9 +35,9 @@ from tbcad.options.shared import (
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
     from tbcad.light.reflectance.environment import Environment
-    from tbcad.light.reflectance.field_file import Relit
+    from tbcad.light.reflectance.transport import Relit
     from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.scene.point_lights import PointLights
+    from tbcad.light.simulate.scene.lamps import PointLights
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.types import Bytes, Progress
@@ -206,7 +206,7 @@ def _environment(light: Path, turn_deg: float, kind: LightFormat | None) -> "Env
 
 
 def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
-    from tbcad.light.reflectance.field_file import open_reflectance, relit
+    from tbcad.light.reflectance.transport import open_reflectance, relit
 
     with open_reflectance(folder) as reflectance:
         return relit(source, reflectance, wanted)
@@ -216,7 +216,7 @@ def _lit_truths(
     scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
 ) -> tuple["Bytes", "Bytes | None"]:
     """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
-    from tbcad.light.reflectance.field_file import TRUE_LIGHTS, lit_scene
+    from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene
 
     def truth(lights: "PointLights") -> "Bytes":
         return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)

@@ -57,21 +57,9 @@ def trace_own_ball(run: PrototypeRun, direction: Floats, stop: Ints, ball: Ints)
 
 
 def ball_hits(
-    pinhole: Floats,
-    balls: Floats,
-    direction: Floats,
-    stop: Ints,
-    walls: GrooveWalls = NO_WALLS,
+    pinhole: Floats, balls: Floats, direction: Floats, stop: Ints, walls: GrooveWalls = NO_WALLS
 ) -> BallHits:
-    """What unit directions (n, 3) from a pinhole (3,) meet.
-
-    Args:
-        pinhole: mm, (3,).
-        balls: at each stop, (s, k, 8): see PrototypeRun.
-        direction: (n, 3).
-        stop: from 0, (n,).
-        walls: that end the balls as mirrors on pedestals, if any.
-    """
+    """What unit directions (n, 3) meet at stops (n,): balls (s, k, 8) as of PrototypeRun."""
     ends = walls.of_mirrors(balls.shape[1])
     ball, distance = _first_ball(pinhole, direction, stop, balls, ends)
     return _reflected(pinhole, direction, ball, distance, balls[stop, np.maximum(ball, 1) - 1])
