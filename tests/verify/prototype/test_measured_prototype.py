@@ -11,10 +11,10 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
-from tbcad_verify.mesh.lines import angles_between, polar_and_azimuth, wrapped
+from tbcad_verify.mesh.lines import angles_between
 from tbcad_verify.mesh.mass import mass_properties
 from tbcad_verify.mesh.stl import parse
-from tbcad_verify.prototype import record_checks, seats, swing
+from tbcad_verify.prototype import seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
@@ -112,19 +112,6 @@ def test_pads_are_found_without_the_contacts_being_right(context: PrototypeConte
     np.testing.assert_allclose(centres, recorded.balls.columns("bx", 3).T, atol=1e-5)
 
 
-def test_turns_about_the_axis(context: PrototypeContext) -> None:
-    x = np.random.default_rng(2).normal(size=(3, 5))
-    for angle in (-70.0, 33.0):
-        found = context.base_rotation(np.radians(np.full(5, angle))).apply(x.T).T
-        wanted = np.stack([turned(one, angle) for one in x.T], axis=1)
-        np.testing.assert_allclose(found, wanted, atol=1e-12)
-        before, after = (polar_and_azimuth(context.frame, d) for d in (x, found))
-        np.testing.assert_allclose(before[0], after[0], atol=1e-12)
-        np.testing.assert_allclose(
-            wrapped(after[1] - before[1]), np.full(5, np.radians(angle)), atol=1e-12
-        )
-
-
 def test_outlines_are_those_of_cells_cut_by_hand(context: PrototypeContext) -> None:
     """`Cells` goes through all pairs of cutting planes, with no camera."""
     design = shell_of(SyntheticPrototype())
@@ -219,16 +206,6 @@ def test_coverage_by_rays_on_a_fine_outline(
         assert shown.coverage[i] == pytest.approx(least, rel=5e-3)
 
 
-def test_twins_are_turned_about_z(context: PrototypeContext) -> None:
-    rows = context.export.mirrors
-    u = rows.columns("ux", 3)
-    np.testing.assert_allclose(
-        u[:, record_checks.twins(context)],
-        u[:, context.mirror_rows] * [[-1], [-1], [1]],
-        atol=1e-12,
-    )
-
-
 @pytest.mark.parametrize(("turn", "meets"), [(0.0, True), (170.0, False)])
 def test_no_step_of_the_swing_is_too_large(
     measured: MeasuredPrototype, turn: float, meets: bool
@@ -267,15 +244,15 @@ def random_body(rng: np.random.Generator) -> Any:
     return (ball if rng.random() < 0.3 else block).translate(rng.uniform(-45, 45, 3))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_swing_is_that_of_many_angles(measured: MeasuredPrototype, seed: int) -> None:
-    """Against booleans at 41 angles."""
+    """Against booleans at 21 angles."""
     rng = np.random.default_rng(seed)
     place = np.hstack([measured.context.frame[[1, 2, 0]].T, np.zeros((3, 1))])
     solids = [random_body(rng).transform(place) for _ in range(2)]
     one, two = (swing.axial_solid(measured, "body", solid) for solid in solids)
     found = swing.sweep(measured, one, two)
-    some = np.linspace(*np.radians(measured.context.prototype.swing), 41)
+    some = np.linspace(*np.radians(measured.context.prototype.swing), 21)
     turns = measured.context.base_rotation(some).as_matrix()
     at = [solids[0].transform(np.hstack([turn, np.zeros((3, 1))])) for turn in turns]
     volume = max((turned ^ solids[1]).volume() for turned in at)
