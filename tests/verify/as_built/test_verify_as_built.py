@@ -16,12 +16,12 @@ from tbcad_verify.cli import main
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
+from tbcad_verify.prototype.bodies import MeasuredPrototype, Obstacles
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.fits.seats import touching_sphere
 from tbcad_verify.prototype.light.ball_views import ball_coverage, ended_on_balls, outline_coverage
 from tbcad_verify.prototype.light.pinhole_cells import cell_outlines, mirror_spheres
-from tbcad_verify.prototype.light.ray_transfer import ray_transfer
-from tbcad_verify.prototype.measured_prototype import MeasuredPrototype, Obstacles
+from tbcad_verify.prototype.light.ray_paths import ray_transfer
+from tbcad_verify.prototype.seats import touching_sphere
 from tbcad_verify.record.export import read_export
 
 from tests.verify.prototype.synthetic_prototype import SyntheticPrototype, export

@@ -22,22 +22,22 @@ from tbcad_verify.prototype import (
     assembly,
     bodies,
     camera_gauge_checks,
-    flat_drawing,
+    caps,
+    cut_checks,
+    fastener_checks,
     measured_parts,
-    measured_prototype,
+    seats,
     stage_checks,
 )
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.bodies import Bodies
+from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import gcode_checks, homing_checks, klipper_checks
-from tbcad_verify.prototype.fits import caps, fastener_checks, seats
 from tbcad_verify.prototype.light import lamp_light
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
-from tbcad_verify.prototype.light.ray_transfer import ray_transfer
-from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
+from tbcad_verify.prototype.light.ray_paths import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
@@ -65,19 +65,17 @@ PURE: dict[Any, tuple[str, ...]] = {
     verification: ("area_checks",),
     shell_checks: ("wall", "cells_of_export"),
     prototype_stages: ("measure_part", "joined_meshes"),
-    prototype_stages.inventory: ("read_solids",),
     prototype_stages.swing: ("_parts_apart",),
     measured_parts: ("manifold",),
-    assembly: ("manifold",),
-    bodies: ("_scene",),
+    assembly: ("manifold", "read_solids"),
+    bodies: ("_scene", "join_meshes", "build_scene"),
     camera_gauge_checks: ("joined_meshes", "build_scene"),
     caps: ("fit_sphere",),
-    flat_drawing: ("dxf_entities",),
+    cut_checks: ("dxf_entities",),
     fastener_checks: ("_hole_spans",),
     gcode_checks: ("run_program",),
     homing_checks: ("run_program",),
-    klipper_checks: ("run_program", "_run"),
-    measured_prototype: ("join_meshes", "build_scene"),
+    klipper_checks: ("run_klipper",),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
     stage_checks: ("joined_meshes", "build_scene"),
 }

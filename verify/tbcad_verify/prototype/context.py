@@ -38,6 +38,11 @@ class PrototypeContext:
         """Radius of the capture sphere, mm."""
         return self.export.target_mm / 2
 
+    @property
+    def moved(self) -> bool:
+        """Whether pictures are moved along with their balls when they are merged."""
+        return self.export.spec.prototype.picture == "moved"
+
     @cached_property
     def frame(self) -> Floats:
         """(3, 3) rows axis, azimuth zero, third: from the camera, not from the record."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -47,6 +47,12 @@ def at_least(check: CheckName, measured: float, limit: float, detail: str = "") 
 def exactly(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a figure has its only allowed value; NaN fails."""
     return _limited(check, measured, limit, measured == limit, detail, EXACTLY)
+
+
+def no_faults(check: CheckName, faults: Iterable[str]) -> Check:
+    """A check that counts faults; the detail names the first."""
+    found = list(faults)
+    return at_most(check, len(found), 0, short_list(found))
 
 
 def informative(check: CheckName, measured: float, detail: str = "") -> Check:

@@ -17,7 +17,7 @@ import numpy as np
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
-from tbcad_verify.prototype.step_files import part_step_checks
+from tbcad_verify.prototype.assembly import part_step_checks
 from tbcad_verify.record.export import TEXTS, Export, listed_names, read_export
 from tbcad_verify.record.files import open_folder, stamps
 from tbcad_verify.record.validation import PartFiles

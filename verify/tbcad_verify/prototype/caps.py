@@ -105,26 +105,18 @@ def _least_squares(points: Floats, sphere: Floats) -> tuple[Floats, Floats]:
 def checks(
     names: list[CheckName], context: PrototypeContext, caps: list[MeasuredCap]
 ) -> list[Check]:
-    """Fronts and bodies against the record."""
-    front, body, form = names
-    balls, which = context.prototype.balls, [cap.ball for cap in caps]
-    fronts, bodies = [cap.front for cap in caps], [cap.body for cap in caps]
-    worst = 1000 * max(sphere.form for sphere in fronts + bodies)
-    return [
-        _fit_check(front, which, fronts, balls.columns("cx", 3), balls.radius_mm),
-        _fit_check(body, which, bodies, balls.columns("bx", 3), balls.body_radius_mm),
-        at_most(form, worst, FORM_UM, "vertices do not lie on a sphere"),
-    ]
-
-
-def _fit_check(
-    name: CheckName, balls: list[int], fits: list[FittedSphere], centre: Floats, radius: Floats
-) -> Check:
-    """Errors of centre and radius, less the uncertainty of float32."""
-    off = [np.linalg.norm(fit.centre - centre[:, k]) for k, fit in zip(balls, fits, strict=True)]
-    size = np.abs([fit.radius - radius[k] for k, fit in zip(balls, fits, strict=True)])
-    errors = 1000 * np.maximum(off, size)
-    over = np.maximum(errors - 1000 * np.array([fit.blur for fit in fits]), 0)
-    k = int(over.argmax())
-    detail = f"ball {balls[k] + 1}: centre or radius {errors[k]:.3g} um off"
-    return at_most(name, float(over[k]), CENTRE_UM, detail)
+    """Fronts and bodies against the record: errors less the uncertainty of float32; their form."""
+    balls, made = context.prototype.balls, []
+    spheres = [[cap.front for cap in caps], [cap.body for cap in caps]]
+    recorded = ("cx", balls.radius_mm), ("bx", balls.body_radius_mm)
+    which = [cap.ball for cap in caps]
+    for name, fits, (key, radius) in zip(names, spheres, recorded, strict=False):
+        centre = np.array([fit.centre for fit in fits]).T - balls.columns(key, 3)[:, which]
+        size = np.array([fit.radius for fit in fits]) - radius[which]
+        errors = 1000 * np.maximum(norm(centre), np.abs(size))
+        over = np.maximum(errors - 1000 * np.array([fit.blur for fit in fits]), 0)
+        k = int(over.argmax())
+        detail = f"ball {which[k] + 1}: centre or radius {errors[k]:.3g} um off"
+        made.append(at_most(name, float(over[k]), CENTRE_UM, detail))
+    worst = 1000 * max(sphere.form for fits in spheres for sphere in fits)
+    return [*made, at_most(names[2], worst, FORM_UM, "vertices do not lie on a sphere")]

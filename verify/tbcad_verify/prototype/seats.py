@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from tbcad_verify.mesh.segments import half_edge_vectors
 from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import distance_to_facets
-from tbcad_verify.prototype.record_checks import PAD_UM
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -21,8 +21,9 @@ from tbcad_verify.report.checks import (
     informative,
     worst_offenders,
 )
-from tbcad_verify.types import Bools, Floats, Ints
+from tbcad_verify.types import Floats, Ints
 
+PAD_UM = 10.0  # largest error of a ball's centre that its pads may cause
 # A facet may be a pad's if it faces the ball to within this, near where the record has the pad.
 FACING_COS = np.cos(np.radians(5.0))
 NEAR_MM = 1.0
@@ -57,8 +58,7 @@ class MeasuredSeat:
     reason: str = ""  # why the centre is not known; empty where it is
 
 
-@dataclass(frozen=True)
-class Pad:
+class Pad(NamedTuple):
     """A plane n.x = d, n toward the ball, and its facets."""
 
     normal: Floats
@@ -71,7 +71,8 @@ def measure_seats(context: PrototypeContext, base: Mesh) -> list[MeasuredSeat]:
 
     The spec moves pads off the balls by what a printer adds to them: as printed they touch.
     """
-    boxes = _facet_boxes(base)
+    a, b, c = (np.take(base.points, base.faces[:, k], axis=0) for k in range(3))
+    boxes = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     return [_seat(context, base, boxes, k) for k in range(len(context.prototype.balls))]
 
 
@@ -86,24 +87,17 @@ def checks(
 ) -> list[Check]:
     """Centres against the record, contacts against the pads, balls against the base."""
     centre, pads, clear, clearance = names
-    error, limit = centre_errors(context, seats), PAD_UM
+    ids, error = context.prototype.balls.names(np.arange(len(seats))), centre_errors(context, seats)
     missing = [f"ball {k}: {seat.reason}" for k, seat in enumerate(seats, 1) if seat.reason]
     margin = np.array([seat.margin for seat in seats])
     gap = np.array([seat.clear for seat in seats])
-
-    def worst(values: Floats, bad: Bools, unit: str = "mm") -> str:
-        ids = context.prototype.balls.names(np.arange(values.size))
-        return worst_offenders(ids, values, unit, bad, ".3g")
-
+    off = worst_offenders(ids, error, "um", error > PAD_UM, ".3g")
+    aside, sunk = (worst_offenders(ids, -x, "mm", x < 0, ".3g") for x in (margin, gap))
+    worst, said = np.inf if missing else float(error.max()), "; ".join(missing[:LISTED])
     return [
-        at_most(
-            centre,
-            np.inf if missing else float(error.max()),
-            limit,
-            "; ".join(missing[:LISTED]) or worst(error, error > limit, "um"),
-        ),
-        at_least(pads, float(margin.min()), 0, worst(-margin, margin < 0)),
-        at_least(clear, float(gap.min()), -SUNK_MM, worst(-gap, gap < 0)),
+        at_most(centre, worst, PAD_UM, said or off),
+        at_least(pads, float(margin.min()), 0, aside),
+        at_least(clear, float(gap.min()), -SUNK_MM, sunk),
         informative(clearance, float(gap.min())),
     ]
 
@@ -121,7 +115,7 @@ def _seat(context: PrototypeContext, base: Mesh, boxes: Boxes, k: int) -> Measur
         centre = touching_sphere([p.normal for p in pads], [p.offset for p in pads], off)
     except Unknown as error:
         return MeasuredSeat(np.full(3, np.nan), -np.inf, -np.inf, str(error))
-    margin = min(_margin(base, pad, centre) - INSIDE * _radius(base, pad) for pad in pads)
+    margin = min(_margin(base, pad, centre) for pad in pads)
     others = np.setdiff1d(near, np.concatenate([pad.facets for pad in pads]))
     return MeasuredSeat(centre, margin, distance_to_facets(centre, base, others) - radius)
 
@@ -136,12 +130,6 @@ def touching_sphere(normals: list[Floats], offsets: list[float], radius: float) 
     if abs(float(np.linalg.det(matrix))) < MIN_DETERMINANT:
         raise Unknown("the pads' planes do not meet in a point")
     return np.asarray(np.linalg.solve(matrix, np.array(offsets) + radius))
-
-
-def _facet_boxes(mesh: Mesh) -> Boxes:
-    """Lower and upper corners of the boxes about all facets."""
-    a, b, c = (np.take(mesh.points, mesh.faces[:, k], axis=0) for k in range(3))
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def _facets_near(boxes: Boxes, point: Floats, distance: float) -> Ints:
@@ -198,17 +186,16 @@ def _sides(mesh: Mesh, facets: Ints) -> tuple[Ints, Ints]:
     return half, mesh.twin[half] // 3
 
 
-def _radius(mesh: Mesh, pad: Pad) -> float:
-    """Radius of a disc of the pad's area, mm: the recorded one might be of any size."""
-    return float(np.sqrt(norm(mesh.area[:, pad.facets]).sum() / 2 / np.pi))
-
-
 def _margin(mesh: Mesh, pad: Pad, centre: Floats) -> float:
-    """Distance of where a ball touches a pad from the pad's edge, mm; negative outside."""
+    """Distance of where a ball touches a pad from the pad's edge, mm, less the required one.
+
+    Of the radius of a disc of the pad's area: the recorded one might be of any size.
+    """
+    radius = float(np.sqrt(norm(mesh.area[:, pad.facets]).sum() / 2 / np.pi))
     half, other = _sides(mesh, pad.facets)
     start, edge = half_edge_vectors(mesh, half[~np.isin(other, pad.facets)])
     contact = centre + (start.T[0] - centre) @ pad.normal * pad.normal
     x, normal = (np.broadcast_to(v[:, None], start.shape) for v in (contact, pad.normal))
     distance = float(distances_to_segments(x, start, start + edge).min())
     turns = rotation_angles(normal, start - x, start + edge - x).sum() / (2 * np.pi)
-    return distance if abs(turns) > 0.5 else -distance
+    return (distance if abs(turns) > 0.5 else -distance) - INSIDE * radius

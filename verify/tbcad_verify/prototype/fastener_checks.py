@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype_sections import PlacedFastener
-from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
+from tbcad_verify.report.checks import Check, CheckName, no_faults, short_list
 from tbcad_verify.step.solids_text import RoundFace, TextSolid, cross_length, distance_to_line
+from tbcad_verify.types import Floats
 
 CHECKS = {"fasteners": "faults", "fastener holes": "faults"}
 SAME_MM = 1e-6
@@ -46,8 +47,7 @@ NUTS = (INSERT, "TNUT-", "NUT-")  # what a screw is turned into
 MOTOR_DEPTH_MM = 4.5  # of the thread in a NEMA 17 motor's face
 
 
-@dataclass(frozen=True)
-class Size:
+class Size(NamedTuple):
     """Radius of a round face that the body must have, where it begins and ends along, mm.
 
     The nominal diameter of a thread is zero where there is none. What lies on a part covers a hole
@@ -67,15 +67,13 @@ def _screw(thread: str, length: str) -> Size:
     return Size((nominal - CORE * PITCH_MM[nominal]) / 2, 0.0, float(length), nominal)
 
 
-def _rod(diameter: str, length: str) -> Size:
-    return Size(float(diameter) / 2, 0.0, float(length))
-
-
 NUMBER = r"(\d+(?:\.\d+)?)"
 KINDS: dict[str, Callable[..., Size]] = {
     rf"(?:SET-)?M{NUMBER}x{NUMBER}": _screw,
     rf"UNC1/4-20x{NUMBER}": lambda length: _screw("6.35", length),
-    rf"(?:DOWEL|MAGNET)-{NUMBER}x{NUMBER}": _rod,
+    rf"(?:DOWEL|MAGNET)-{NUMBER}x{NUMBER}": lambda wide, long: Size(
+        float(wide) / 2, 0.0, float(long)
+    ),
     r"(INSERT-\S+)": lambda name: Size(INSERTS[name][0] / 2, 0.0, INSERTS[name][1]),
     r"(WASHER-\d)": lambda name: Size(WASHERS[name][0] / 2, -WASHERS[name][1], 0.0, covers=True),
     r"NUT-M(\d)": lambda thread: Size(
@@ -99,22 +97,9 @@ def size_of(part: str) -> Size | None:
 def checks(
     names: list[CheckName], context: PrototypeContext, solids: Mapping[str, TextSolid]
 ) -> list[Check]:
-    """Fasteners against holes, and holes against fasteners.
-
-    Args:
-        names: of the checks.
-        context: the record.
-        solids: of the STEP assembly, by name.
-    """
-    return [
-        _check(names[0], _fastener_faults(context, solids)),
-        _check(names[1], _hole_faults(context, solids)),
-    ]
-
-
-def _check(name: CheckName, faults: Iterator[str]) -> Check:
-    found = list(faults)
-    return at_most(name, len(found), 0, short_list(found))
+    """Fasteners against holes, and holes against fasteners, in the solids of the STEP assembly."""
+    found = _fastener_faults(context, solids), _hole_faults(context, solids)
+    return [no_faults(*pair) for pair in zip(names, found, strict=True)]
 
 
 def _fastener_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
@@ -125,38 +110,33 @@ def _fastener_faults(context: PrototypeContext, solids: Mapping[str, TextSolid])
         others = [name for name in one.through if one.turns != (name in turning)]
         if others:
             yield f"{one.name} turns otherwise than {short_list(others)}"
-        yield from (f"{one.name} {fault}" for fault in _faults(one, fasteners, solids))
+        yield from (f"{one.name} {fault}" for fault in faults_of(one, fasteners, solids))
 
 
-def _faults(
+def faults_of(
     one: PlacedFastener, others: list[PlacedFastener], solids: Mapping[str, TextSolid]
 ) -> Iterator[str]:
     """What is wrong with a fastener."""
-    missing = [name for name in (one.name, *one.through) if name not in solids]
+    size, missing = (
+        size_of(one.part),
+        [name for name in (one.name, *one.through) if name not in solids],
+    )
     if missing:
         yield f"needs {short_list(missing)} in the assembly"
     elif one.part in LEDS:
-        if not _led_drawn(one, solids[one.name]):
+        faces = _coaxial(one, solids[one.name])
+        if not any(abs(face.radius - LEDS[one.part] / 2) <= SAME_MM for face in faces):
             yield "is drawn elsewhere"
-    elif size := size_of(one.part):
-        yield from _size_faults(one, size, others, solids)
-    else:
+    elif not size:
         yield f"is of an unknown part {one.part}"
-
-
-def _size_faults(
-    one: PlacedFastener,
-    size: Size,
-    others: list[PlacedFastener],
-    solids: Mapping[str, TextSolid],
-) -> Iterator[str]:
-    if not _is_drawn(one, size, solids[one.name]):
-        yield "is drawn elsewhere, or of another size"
-    for name in one.through:
-        if name not in SOLID and not _hole_depth(one, size, solids[name]):
-            yield f"has no hole in {name}"
-    if size.thread and not _grips(one, size, others, solids):
-        yield f"grips too little in {one.through[-1]}"
+    else:
+        if not _is_drawn(one, size, solids[one.name]):
+            yield "is drawn elsewhere, or of another size"
+        for name in one.through:
+            if name not in SOLID and not _hole_depth(one, size, solids[name]):
+                yield f"has no hole in {name}"
+        if size.thread and not _grips(one, size, others, solids):
+            yield f"grips too little in {one.through[-1]}"
 
 
 def _is_drawn(one: PlacedFastener, size: Size, body: TextSolid) -> bool:
@@ -169,25 +149,18 @@ def _is_drawn(one: PlacedFastener, size: Size, body: TextSolid) -> bool:
     )
 
 
-def _led_drawn(one: PlacedFastener, body: TextSolid) -> bool:
-    radius = LEDS[one.part] / 2
-    return any(abs(face.radius - radius) <= SAME_MM for face in _coaxial(one, body))
+def _parallel(one: PlacedFastener, solid: TextSolid) -> list[RoundFace]:
+    cylinders = [face for face in solid.faces if face.kind == "cylinder"]
+    return [face for face in cylinders if cross_length(face.axis, one.along) <= PARALLEL]
 
 
 def _coaxial(one: PlacedFastener, solid: TextSolid) -> list[RoundFace]:
-    return [
-        face
-        for face in _parallel(one, solid)
-        if distance_to_line(face.point, one.position, one.along) <= SAME_MM
-    ]
+    return [face for face in _parallel(one, solid) if _is_on(one, face.point)]
 
 
-def _parallel(one: PlacedFastener, solid: TextSolid) -> list[RoundFace]:
-    return [
-        face
-        for face in solid.faces
-        if face.kind == "cylinder" and cross_length(face.axis, one.along) <= PARALLEL
-    ]
+def _is_on(one: PlacedFastener, point: Floats) -> bool:
+    """Whether a point is on a fastener's axis."""
+    return distance_to_line(point, one.position, one.along) <= SAME_MM
 
 
 def _span(one: PlacedFastener, face: RoundFace) -> tuple[float, float]:
@@ -210,21 +183,15 @@ def _hole_depth(one: PlacedFastener, size: Size, solid: TextSolid) -> float:
 
 def _hole_spans(one: PlacedFastener, size: Size, solid: TextSolid) -> list[tuple[float, float]]:
     """Where holes, or middles of slots, that a fastener fits begin and end along it, mm."""
-    wide = [
-        face
-        for face in _parallel(one, solid)
-        if face.hollow and (size.covers or face.radius >= size.radius - SAME_MM)
-    ]
+    hollow = [face for face in _parallel(one, solid) if face.hollow]
+    wide = [face for face in hollow if size.covers or face.radius >= size.radius - SAME_MM]
     return [_span(one, face) for k, face in enumerate(wide) if _holds(one, face, wide[:k])]
 
 
 def _holds(one: PlacedFastener, face: RoundFace, others: list[RoundFace]) -> bool:
     """Whether a hollow face is round a fastener, or with another one a slot's end round it."""
-    if distance_to_line(face.point, one.position, one.along) <= SAME_MM:
-        return True
-    return any(
-        abs(face.radius - other.radius) <= SAME_MM
-        and distance_to_line((face.point + other.point) / 2, one.position, one.along) <= SAME_MM
+    return _is_on(one, face.point) or any(
+        abs(face.radius - other.radius) <= SAME_MM and _is_on(one, (face.point + other.point) / 2)
         for other in others
     )
 
@@ -236,20 +203,21 @@ def _grips(
     solids: Mapping[str, TextSolid],
 ) -> bool:
     """Whether a screw is long enough in insert, nut, thread or motor."""
+    last = one.through[-1]
     nuts = [
         (other, nut)
         for other in others
-        if other.through[-1] == one.through[-1]
+        if other.through[-1] == last
         and other.part.startswith(NUTS)
         and (nut := size_of(other.part))
-        and distance_to_line(other.position, one.position, one.along) <= SAME_MM
+        and _is_on(one, other.position)
     ]
     if nuts:
         # A nut on the way to an insert only locks.
         inserts = [pair for pair in nuts if pair[0].part.startswith(INSERT)]
         return any(_in_nut(one, size, *pair) for pair in inserts or nuts)
-    if one.through[-1] not in SOLID:
-        return _hole_depth(one, size, solids[one.through[-1]]) > 0
+    if last not in SOLID:
+        return _hole_depth(one, size, solids[last]) > 0
     before = _hole_spans(one, size, solids[one.through[-2]])
     beyond = size.high - max([size.low, *(high for _, high in before)])
     return beyond >= min(GRIP * size.thread, MOTOR_DEPTH_MM) - SAME_MM
@@ -265,43 +233,34 @@ def _in_nut(one: PlacedFastener, size: Size, other: PlacedFastener, nut: Size) -
 
 
 def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
-    """Holes of fasteners' diameters that nothing goes through."""
-    fasteners, prototype = context.prototype.fasteners, context.prototype
-    base = context.export.spec.prototype.base
-    inserts = {hole for hole, _ in INSERTS.values()} | {base.insert_hole_mm}
-    dowels = {base.dowel_mm + base.dowel_press_mm, base.dowel_mm + base.dowel_slip_mm}
-    dowels = dowels if [p for p in prototype.parts if p.name.startswith("carrier_")] else set()
-    diameters = {
-        part.name: {*IN_PRINTED_MM, *inserts, *dowels}
-        for part in prototype.parts
-        if part.role in ("base", "stage", "frame")
-    }
-    diameters["plate"] = set(IN_PLATE_MM)
-    for name, sizes in diameters.items():
-        solid = solids.get(name)
-        if solid is None:
-            continue  # another check says so
-        through = [one for one in fasteners if name in one.through]
-        faces = [face for face in solid.faces if _is_for_fastener(face, sizes)]
+    """Holes of fasteners' diameters that nothing goes through, but for bores for wires."""
+    prototype, base = context.prototype, context.export.spec.prototype.base
+    printed = {*IN_PRINTED_MM, base.insert_hole_mm, *(hole for hole, _ in INSERTS.values())}
+    if any(part.name.startswith("carrier_") for part in prototype.parts):
+        printed |= {base.dowel_mm + base.dowel_press_mm, base.dowel_mm + base.dowel_slip_mm}
+    some = [part.name for part in prototype.parts if part.role in ("base", "stage", "frame")]
+    diameters = dict.fromkeys(some, printed) | {"plate": {*IN_PLATE_MM}}
+    for name in diameters.keys() & solids.keys():  # another check says what is missing
+        through = [one for one in prototype.fasteners if name in one.through]
+        faces = [
+            face
+            for face in solids[name].faces
+            if face.kind == "cylinder"
+            and face.hollow
+            and any(abs(2 * face.radius - diameter) <= SAME_MM for diameter in diameters[name])
+        ]
         empty = [
             face
             for face in faces
-            if not any(_is_filled(one, face, faces) for one in through)
-            and distance_to_line(np.zeros(3), face.point, face.axis) > SAME_MM  # bores for wires
+            if not any(is_filled(one, face, faces) for one in through)
+            and distance_to_line(np.zeros(3), face.point, face.axis) > SAME_MM
         ]
         if empty:
             yield f"{name}: {len(empty)} of {2 * empty[0].radius:g} mm without a fastener"
 
 
-def _is_for_fastener(face: RoundFace, diameters: set[float]) -> bool:
-    return (
-        face.kind == "cylinder"
-        and face.hollow
-        and any(abs(2 * face.radius - diameter) <= SAME_MM for diameter in diameters)
-    )
-
-
-def _is_filled(one: PlacedFastener, face: RoundFace, faces: list[RoundFace]) -> bool:
+def is_filled(one: PlacedFastener, face: RoundFace, faces: list[RoundFace]) -> bool:
+    """Whether a fastener goes through a hole, or with another one through a slot of both."""
     if cross_length(face.axis, one.along) > PARALLEL:
         return False
     return _holds(one, face, [other for other in faces if other is not face])

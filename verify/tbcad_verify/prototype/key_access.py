@@ -12,7 +12,6 @@ base is turned by hand then. Order and places are the record's, shapes those of 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
@@ -20,12 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.bodies import NOT_BODIES, turning
+from tbcad_verify.prototype.assembly import Shape, closed_solid
+from tbcad_verify.prototype.bodies import turning
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import manifold
 from tbcad_verify.record.prototype_sections import PlacedFastener
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
+from tbcad_verify.report.checks import Check, CheckName, no_faults, short_list
 from tbcad_verify.types import Floats
 
 CHECKS = {"key access": "screws"}
@@ -108,56 +106,44 @@ def key_of(one: PlacedFastener) -> Key | None:
 def checks(
     names: list[CheckName], context: PrototypeContext, drawn: Mapping[str, Shape]
 ) -> list[Check]:
-    """Screws that no key reaches, and bodies that are in no step or in several.
-
-    Args:
-        names: of the checks.
-        context: the record.
-        drawn: shapes of the assembly, by name.
-    """
-    found = [*_order_faults(context, drawn), *_unreached(context, drawn)]
-    return [at_most(names[0], len(found), 0, short_list(found))]
-
-
-def _steps(context: PrototypeContext) -> dict[str, int]:
-    """Number of the step that mounts each body."""
+    """Screws that no key reaches, or that are mounted before what they hold."""
     steps = enumerate(context.prototype.assembly_steps)
-    return {name: number for number, step in steps for name in step.mounts}
+    step_of = {name: number for number, step in steps for name in step.mounts}
+    faults = [*_order_faults(context, step_of), *_unreached(context, drawn, step_of)]
+    return [no_faults(names[0], faults)]
 
 
-def _order_faults(context: PrototypeContext, drawn: Mapping[str, Shape]) -> Iterator[str]:
-    steps = _steps(context)
-    counts = Counter(name for step in context.prototype.assembly_steps for name in step.mounts)
-    yield from (f"{name} is in {count} steps" for name, count in counts.items() if count > 1)
-    fasteners = [one.name for one in context.prototype.fasteners]
-    missing = sorted({*drawn, *fasteners} - NOT_BODIES - set(steps))
-    yield from (f"{name} is in no step" for name in missing)
+def _order_faults(context: PrototypeContext, steps: Mapping[str, int]) -> Iterator[str]:
     for one in context.prototype.fasteners:
-        later = [name for name in one.through if steps.get(name, -1) > steps.get(one.name, np.inf)]
+        if one.name not in steps:
+            yield f"{one.name} is in no step"
+            continue
+        later = [name for name in one.through if steps.get(name, -1) > steps[one.name]]
         if later:
             yield f"{one.name} is mounted before {short_list(later)}"
 
 
-def _unreached(context: PrototypeContext, drawn: Mapping[str, Shape]) -> Iterator[str]:
-    steps, swung = _steps(context), turning(context, drawn)
-    solids = {name: _solid(name, drawn[name]) for name in drawn if name in steps}
-    keys = [(one, key_of(one)) for one in context.prototype.fasteners if one.name in steps]
-    screws = {one.name: key for one, key in keys if key}
+def _unreached(
+    context: PrototypeContext, drawn: Mapping[str, Shape], steps: Mapping[str, int]
+) -> Iterator[str]:
+    swung = turning(context, drawn)
+    solids = {name: closed_solid(name, drawn) for name in drawn if name in steps}
+    placed = [one for one in context.prototype.fasteners if one.name in steps]
+    keys = {one.name: key for one in placed if (key := key_of(one))}
     after: dict[str, list[str]] = {}
-    for one, key in keys:
-        if not key:
+    for one in placed:
+        if one.name not in keys:
             continue
-        step = steps[one.name]
-        beside = [name for name in screws if steps[name] == step and name != one.name]
+        key, step = keys[one.name], steps[one.name]
+        beside = [name for name in keys if steps[name] == step and name != one.name]
         after[one.name] = list(_met(key.solid, solids, beside))
         there = _there(context, one, steps, swung)
         before = [name for name in solids if name in there.difference(beside)]
         along = [name for name in before if (name in swung) == one.turns]
         across = [name for name in before if (name in swung) != one.turns]
-        met = [*_in_the_way(context, one, key, solids, (along, across))]
-        if met:
-            yield f"{one.name} behind {met[0]}"
-    yield from _without_order(after)
+        if met := _in_the_way(context, one, key, solids, (along, across)):
+            yield f"{one.name} behind {met}"
+    yield from without_order(after)
 
 
 def _there(
@@ -190,7 +176,7 @@ def _together(steps: Mapping[str, int]) -> int:
     return steps.get(DISC, 0)
 
 
-def _without_order(after: Mapping[str, list[str]]) -> Iterator[str]:
+def without_order(after: Mapping[str, list[str]]) -> Iterator[str]:
     """Screws of one step that are in the way of each other's keys, whichever comes first."""
     try:
         TopologicalSorter(after).prepare()
@@ -204,20 +190,19 @@ def _in_the_way(
     key: Key,
     solids: Mapping[str, Any],
     names: tuple[list[str], list[str]],
-) -> Iterator[str]:
-    """For each way to hold a key a body in its way; nothing when there is a free way.
+) -> str:
+    """A body in the way of the first way to hold a key; empty when there is a free way.
 
     Names are of bodies on the screw's own side of the base's bearing, and on the other.
     """
-    along, across = names
-    found = []
+    first, (along, across) = "", names
     for way in key.ways():
         met = next(_met(way, solids, along), "")
         met = met or _met_at_all_angles(context, one, way, solids, across)
         if not met:
-            return
-        found.append(met)
-    yield from found
+            return ""
+        first = first or met
+    return first
 
 
 def _met_at_all_angles(
@@ -248,10 +233,3 @@ def _met(key: Any, solids: Mapping[str, Any], names: list[str]) -> Iterator[str]
         apart = any(box[k] > own[k + 3] or box[k + 3] < own[k] for k in range(3))
         if not apart and (key ^ solids[name]).volume() > TOUCH_MM3:
             yield name
-
-
-def _solid(name: str, shape: Shape) -> Any:
-    solid = manifold(*shape)
-    if solid.status().name != "NoError":
-        raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
-    return solid
