@@ -13,10 +13,9 @@ from tbcad.prototype.base.hub import (
     SET_SCREW_AZIMUTHS,
     ZERO_DISC_MM,
 )
-from tbcad.prototype.base.joints import Joint
+from tbcad.prototype.base.joints import M3_MM, MIN_ENGAGEMENT_MM, Joint, joint_hardware
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
-from tbcad.prototype.base.screws import M3_MM, MIN_ENGAGEMENT_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener

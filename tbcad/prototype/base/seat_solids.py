@@ -1,6 +1,7 @@
-"""Bosses of the seats, and what is cut out of them: cup, pocket and path, but not the pads.
+"""Bosses of the seats, what is cut out of them, and caps.
 
-Each is built in the seat's own frame with the ball's centre at the origin and the seat's axis
+A cap is a part like a ball whose front is turned to a larger radius, for the same seat. Each is
+built in the seat's own frame with the ball's centre at the origin and the seat's axis
 along z, and then moved: a sphere whose axis is not the axis of the cut comes out invalid now and
 then.
 """
@@ -19,12 +20,18 @@ from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import Maker, Ring, hole_faces
+from tbcad.cad.kernel.checks import closed_mesh
+from tbcad.cad.kernel.measures import properties
 from tbcad.cad.kernel.meshing import growth, primitive_mesh
-from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, revolved, wires
+from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, one_solid, revolved, wires
 from tbcad.core.geometry.primitives import Cylinder, Revolved
 from tbcad.core.geometry.vectors import perpendicular_axes
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.caps import cap_pocket, cap_spigot, flat_depth
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
+from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.types import Floats
 
 # The path is narrower than the cup by this share of the cup's clearance, so that the two meet at
@@ -38,6 +45,7 @@ ALONG = OWN_AXES[2]
 
 Point = tuple[float, float]
 """A point (x out, z along) of the half-plane y = 0."""
+UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
@@ -186,3 +194,47 @@ def arc_about_axis(middle: float, radius: float, start: Point, end: Point) -> To
     circle = gp_Circ(gp_Ax2(gp_Pnt(0, 0, middle), gp_Dir(0, -1, 0), gp_Dir(1, 0, 0)), radius)
     ends = (gp_Pnt(start[0], 0, start[1]), gp_Pnt(end[0], 0, end[1]))
     return BRepBuilderAPI_MakeEdge(circle, *ends).Edge()
+
+
+def cap_parts(base: BaseLayout, prototype: PrototypeLayout, mesh_mm: float) -> list[PlacedSolid]:
+    """A cap for each ball that is not bought, in its seat, its front up when it is printed.
+
+    Raises:
+        InvalidSolidError: when the kernel fails.
+    """
+    caps = np.flatnonzero(prototype.balls.cap).tolist()
+    return [_cap(base, prototype, k, mesh_mm) for k in caps]
+
+
+def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int, mesh_mm: float) -> PlacedSolid:
+    seats, balls, name = base.seats, prototype.balls, f"cap_{k + 1}"
+    section = _section(base, float(balls.radius[k]), float(balls.body_depth[k]), k)
+    axes, centre = seats.axes[k], seats.centre[k]
+    shape = one_solid(name, moved(revolved(section), axes, centre))
+    # The front is up and the flat lies on the bed.
+    on_bed = axes.T @ UPSIDE_DOWN
+    _, end = cap_spigot(base, k)
+    mesh, origin = closed_mesh(name, shape, mesh_mm), np.array([0, 0, end]) - centre @ on_bed
+    return PlacedSolid(name, shape, mesh, properties(shape), on_bed, origin)
+
+
+def _section(base: BaseLayout, front: float, depth: float, k: int) -> TopoDS_Face:
+    """Half section in y = 0: front, body, flat, spigot, pocket."""
+    body, flat = float(base.seats.radius[k]), flat_depth(base, k)
+    pocket, pocket_depth = cap_pocket(base, k, depth)
+    spigot, end = cap_spigot(base, k)
+    half_width = body / np.sqrt(2)
+    apex, edge = (0.0, -depth), (half_width, -half_width)
+    rim = (float(np.sqrt(body**2 - flat**2)), flat)
+    if front > body:
+        arcs = [
+            arc_about_axis(front - depth, front, apex, edge),
+            arc_about_axis(0.0, body, edge, rim),
+        ]
+    else:
+        arcs = [arc_about_axis(0.0, body, apex, rim)]
+    back: list[Point] = [(spigot, flat), (spigot, end)]
+    if pocket:
+        back += [(pocket, end), (pocket, end - pocket_depth)]
+    back.append((0.0, end - (pocket_depth if pocket else 0.0)))
+    return section_face([*arcs, *lines([rim, *back, apex])])

@@ -13,10 +13,11 @@ from tbcad.core.geometry.vectors import dot, norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
-from tbcad.prototype.base.pockets import (
+from tbcad.prototype.base.holding import (
+    AT_DEFAULT_SPEED,
     PAD_AZIMUTHS,
     WEB_MM,
+    Motion,
     Pockets,
     first_ball,
     glue_wells,

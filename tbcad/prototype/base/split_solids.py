@@ -20,9 +20,9 @@ from tbcad.prototype.base.joints import (
     LABEL_MM,
     Joint,
     flange_profile,
+    joint_hardware,
 )
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.types import Bools, Floats

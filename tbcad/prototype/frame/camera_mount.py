@@ -28,7 +28,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,
     THROUGH_MM,

@@ -12,7 +12,7 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
     HALF_FLANGE_MM,
@@ -21,9 +21,9 @@ from tbcad.prototype.frame.brackets import (
     Bracket,
     drilled_holes,
     level_prism,
+    on_uprights,
     webs,
 )
-from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats

@@ -22,27 +22,25 @@ from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
+    COUPLING_MM,
     HALF_FLANGE_MM,
     OVERLAP_MM,
-    THROUGH_MM,
-    drilled_holes,
-    level_prism,
-    webs,
-)
-from tbcad.prototype.frame.purchased import (
-    COUPLING_MM,
     PLATE_MM,
     STAGE_HEIGHT_MM,
+    THROUGH_MM,
     HeadPlate,
     ShaftParts,
     axial_cylinder,
+    drilled_holes,
     hub_point,
+    level_prism,
     motor_fasteners,
     motor_screw_places,
     on_uprights,
     purchased_components,
+    webs,
     wheel_radius,
 )
 from tbcad.prototype.homing.sizes import (

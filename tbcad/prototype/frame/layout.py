@@ -17,18 +17,18 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import home_angles
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
+from tbcad.prototype.frame.feet import stage_foot, upright_foot
+from tbcad.prototype.frame.head import BearingHead, bearing_head
+from tbcad.prototype.frame.purchased import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
     THROUGH_MM,
     Bracket,
     drilled_holes,
     frame_axes,
+    plate_fasteners,
 )
-from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
-from tbcad.prototype.frame.feet import stage_foot, upright_foot
-from tbcad.prototype.frame.head import BearingHead, bearing_head
-from tbcad.prototype.frame.purchased import plate_fasteners
 from tbcad.prototype.homing.layout import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import LampLayout

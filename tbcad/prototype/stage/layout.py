@@ -20,7 +20,6 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
-from tbcad.prototype.stage.arms import UP
 from tbcad.prototype.stage.crown import (
     DISC_MM,
     INSIDE_MM,
@@ -29,6 +28,7 @@ from tbcad.prototype.stage.crown import (
     SCREW_DIRECTION,
     SEAT_MM,
     SHOULDER_MM,
+    UP,
     CrownSizes,
     crown_component,
     disc_component,

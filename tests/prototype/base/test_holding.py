@@ -11,7 +11,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.held import holding
+from tbcad.prototype.base.caps import holding
 from tbcad.prototype.base.holding import (
     AT_DEFAULT_SPEED,
     DERATING,
@@ -21,12 +21,12 @@ from tbcad.prototype.base.holding import (
     Motion,
     base_motion,
     force_needed,
+    pad_normals,
     pull_of_pair,
     pull_on_ball,
     pull_on_plate,
 )
 from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.base.pockets import pad_normals
 from tbcad.prototype.drive.balance import GRAVITY
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.prototype import HeldBall

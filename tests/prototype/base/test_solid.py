@@ -24,20 +24,9 @@ from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base import seat_solids
-from tbcad.prototype.base.cap_solids import cap_parts
 from tbcad.prototype.base.caps import cap_pocket, cap_spigot, cap_tilt, flat_depth
-from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
-from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.base.solid import (
-    added_solids,
-    carrier_parts,
-    hub_bodies,
-    hub_holes,
-    removed_solids,
-)
-from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
-from tbcad.prototype.coupon.coupon import CouponRow, coupon_plates, coupon_rows, coupon_seats
-from tbcad.prototype.coupon.seat import (
+from tbcad.prototype.base.coupon import CouponRow, coupon_plates, coupon_rows, coupon_seats
+from tbcad.prototype.base.coupon_seats import (
     KEEL_MM,
     SeatPose,
     core_radius,
@@ -50,6 +39,17 @@ from tbcad.prototype.coupon.seat import (
     with_pads,
     worst_pose,
 )
+from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
+from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.seat_solids import cap_parts
+from tbcad.prototype.base.solid import (
+    added_solids,
+    carrier_parts,
+    hub_bodies,
+    hub_holes,
+    removed_solids,
+)
+from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.types import Floats

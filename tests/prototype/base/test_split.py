@@ -10,10 +10,9 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.joints import flange_profile
+from tbcad.prototype.base.joints import flange_profile, joint_hardware
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.profile import distance_outside
-from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.bed import min_bed, shortfall, usable_size
 from tbcad.prototype.purchased.parts import load_parts

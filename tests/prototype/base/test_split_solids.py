@@ -19,9 +19,8 @@ from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import SCREW_MM
-from tbcad.prototype.base.joints import LABEL_MM, Joint
+from tbcad.prototype.base.joints import LABEL_MM, Joint, joint_hardware
 from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.printing.placing import PlacedSolid

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.prototype.drive.balance import GRAVITY, BaseBalance
-from tbcad.prototype.drive.power_off import PowerOff, power_off
+from tbcad.prototype.drive.travel import PowerOff, power_off
 from tbcad.prototype.homing.sizes import PIN_OUT_MM
 
 # The axis is level along y; one kilogram 100 mm above it at base angle zero.

@@ -16,9 +16,9 @@ from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.split import UNCUT
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.frame.brackets import frame_axes
 from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
+from tbcad.prototype.frame.purchased import frame_axes
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import choose_part, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout

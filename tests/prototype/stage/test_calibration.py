@@ -5,11 +5,12 @@ import pytest
 
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.core.spec.load import load_spec
-from tbcad.prototype.stage.calibration import (
+from tbcad.prototype.stage.leds import (
+    MIN_SEEN,
     NOISE_PX,
     calibration_estimate,
+    hidden_by_object,
 )
-from tbcad.prototype.stage.leds import MIN_SEEN, hidden_by_object
 from tests.mirror_arrays import mirror_array
 
 STAGE = load_spec(None).prototype.stage

@@ -20,9 +20,9 @@ from tbcad.core.geometry.primitives import rectangle
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
+from tbcad.prototype.base.coupon_seats import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.coupon.seat import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.types import Floats
