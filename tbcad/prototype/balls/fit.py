@@ -79,17 +79,10 @@ def _pixels(array: MirrorArray, outline: Floats) -> Floats:
 def ball_alternatives(
     spec: Spec, array: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
 ) -> tuple[Alternative, ...]:
-    """What each rule costs, for groups of camera a's mirrors.
+    """What each rule costs for groups of camera a's mirrors; fit is by the spec's own rule.
 
     pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
     within the moved cells, and mirrors_below_target counts those whose coverage is less.
-
-    Args:
-        spec: the design.
-        array: camera a's mirrors.
-        groups: of them.
-        balls: chosen by the spec's own rule, from the catalogue that all rules choose from.
-        fit: of these balls.
     """
     target = spec.optics.capture_diameter_mm
     candidates = ball_candidates(array, groups, target, spec.prototype.ball_margin_mm)

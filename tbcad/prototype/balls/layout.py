@@ -146,14 +146,8 @@ def prototype_layout(
 ) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
-    Args:
-        spec: the design.
-        design: its mirrors.
-        count: number of balls; None: the first that the spec permits.
-        choices: of balls that were looked at before.
-
-    Raises:
-        SpecError: when there is no such layout; it says what to change.
+    count None: the first number of balls that the spec permits. choices were looked at before.
+    SpecError when there is no such layout says what to change.
     """
     array = design.arrays[0]
     choices = choices or BallChoices(spec, array)
@@ -184,14 +178,7 @@ def ball_counts(
     """Numbers of balls that the spec permits, in the order in which layouts are tried.
 
     With prototype.k auto: the smallest number within the limits auto_..., a few more, then fewer.
-
-    Args:
-        spec: the design.
-        design: its mirrors.
-        choices: takes the balls that are looked at.
-
-    Raises:
-        SpecError: no prototype of balls suits the mirrors.
+    choices take the balls that are looked at. SpecError: no prototype of balls suits the mirrors.
     """
     array = design.arrays[0]
     check_suitable(spec)

@@ -136,10 +136,7 @@ def _placed_in_order(
 def min_swing_placement(problem: PlacementProblem) -> Placement:
     """Azimuths with the minimum swing, and of those the ones with the minimum outermost azimuth.
 
-    The search stops at MAX_NODES nodes with the best found.
-
-    Raises:
-        SpecError: when there are none.
+    The search stops at MAX_NODES nodes with the best found. SpecError when there are none.
     """
     limits = problem.rounded()
     solution = None if _is_crowded(problem) else _min_swing(limits, greedy_placement(limits))

@@ -73,13 +73,7 @@ class StopPlan:
 
 
 def stop_requests(groups: MirrorGroups, azimuth: Floats, error: float) -> StopRequests:
-    """The base angles that the mirrors request.
-
-    Args:
-        groups: of the m mirrors.
-        azimuth: of the mirrors, radians, (m,).
-        error: maximum error of direction that a shared stop may cause, radians.
-    """
+    """The base angles that mirrors at azimuths (m,) request; error: most that a stop may cause."""
     share = np.sin(error / 2) / np.maximum(np.sin(groups.polar), MIN_SINE)
     tolerance = 2 * np.arcsin(np.minimum(share, 1))
     return StopRequests(groups.group_of, azimuth, tolerance[groups.group_of])
@@ -88,8 +82,7 @@ def stop_requests(groups: MirrorGroups, azimuth: Floats, error: float) -> StopRe
 def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     """The fewest points that hit all intervals [low, high] (m,).
 
-    Returns:
-        The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
+    The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
     """
     order = np.argsort(high, kind="stable")
     new = _new_points(low[order], high[order])
@@ -166,14 +159,7 @@ def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) 
 def plan_stops(
     groups: MirrorGroups, polar: Floats, requests: StopRequests, azimuth: Floats
 ) -> StopPlan:
-    """The stops for balls at azimuths (k,), each mirror at the one with the smallest error.
-
-    Args:
-        groups: of the mirrors.
-        polar: of the mirrors, radians, (m,).
-        requests: of the mirrors.
-        azimuth: of the balls on the base, radians, (k,).
-    """
+    """The stops for balls at azimuths (k,), each mirror at that of its smallest error."""
     exact = requests.base_angles(azimuth)
     angle = _stop_angles(exact, *requests.intervals(azimuth))
     stop = np.abs(angle - exact[:, None]).argmin(axis=1)

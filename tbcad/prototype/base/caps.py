@@ -70,12 +70,9 @@ def flat_depth(base: BaseLayout, k: int) -> float:
 
 
 def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
-    """Radius and depth of the pocket for the cap's own magnet, mm; zeros where there is none.
+    """Radius and depth of the pocket for the own magnet of cap k, mm; zeros where there is none.
 
-    Args:
-        base: with the seats.
-        k: number of the seat.
-        depth: of the body's centre behind the apex, mm.
+    depth is that of the body's centre behind the apex, mm.
     """
     spec, (spigot, end) = base.spec, cap_spigot(base, k)
     largest = spigot - WEB_MM
@@ -87,11 +84,7 @@ def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
 
 
 def cap_magnets(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> list[Fastener]:
-    """Magnets in the caps' own pockets.
-
-    Raises:
-        SpecError: when one is in no list.
-    """
+    """Magnets in the caps' own pockets; SpecError when one is in no list."""
     seats, spec, magnets = base.seats, base.spec, []
     for k in np.flatnonzero(prototype.balls.cap).tolist():
         radius, height = cap_pocket(base, k, float(prototype.balls.body_depth[k]))

@@ -37,25 +37,15 @@ DECIMALS = 6  # to which sizes are the same, mm
 
 @dataclass(frozen=True)
 class CouponRow:
-    """Seats of one size side by side on a bar, the size left of all, each offset left of its seat.
+    """Seats of one size side by side on a bar; the size left of all, offsets left of seats."""
 
-    Attributes:
-        seat: number of a seat of this size.
-        offsets: of the pads, one for each seat, mm.
-        name: the body's diameter.
-        first: width of the size's place, mm.
-        cell: width of the place of one seat with its offset, mm.
-        size: width and depth of the whole, mm.
-        middle: y of the seats' balls from the shelf's middle line, mm.
-    """
-
-    seat: int
-    offsets: tuple[float, ...]
-    name: str
-    first: float
-    cell: float
-    size: tuple[float, float]
-    middle: float
+    seat: int  # number of a seat of this size
+    offsets: tuple[float, ...]  # of the pads, one for each seat, mm
+    name: str  # the body's diameter
+    first: float  # width of the size's place, mm
+    cell: float  # width of the place of one seat with its offset, mm
+    size: tuple[float, float]  # width and depth of the whole, mm
+    middle: float  # y of the seats' balls from the shelf's middle line, mm
 
 
 Place = tuple[CouponRow, Floats]
@@ -67,15 +57,8 @@ def coupon_plates(
 ) -> list[PlacedSolid]:
     """Plates with a seat for each chosen size and each offset of the pads, few as the bed allows.
 
-    Args:
-        base: with the seats.
-        printer: with its bed.
-        pose: of the seats on the bed.
-        mesh_mm: largest distance of their meshes from the surface.
-
-    Raises:
-        SpecError: when a single seat is larger than the bed.
-        InvalidSolidError: when the kernel fails.
+    Meshes are at most mesh_mm from the surface. SpecError when a single seat is larger than the
+    bed.
     """
     seats = coupon_seats(base, pose)
     plates = _plates(coupon_rows(seats, base.spec, printer, pose.lean), printer)
@@ -98,14 +81,7 @@ def coupon_seats(base: BaseLayout, pose: SeatPose) -> Seats:
 
 
 def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec, lean: float) -> list[CouponRow]:
-    """A row for each chosen size, the largest first; several where the bed is too narrow.
-
-    Args:
-        seats: from `coupon_seats`.
-        spec: of the base.
-        printer: with its bed.
-        lean: of the seats' axes, radians.
-    """
+    """A row of `coupon_seats` for each size, the largest first; several on a narrow bed."""
     width = float(usable_size(printer)[0])
     rows = []
     for k in _seats_to_try(seats, spec):

@@ -84,10 +84,7 @@ def _expected_down(base: BaseLayout, seats: list[int]) -> Floats:
 def worst_pose(base: BaseLayout, split: BaseSplit, downs: Sequence[Floats]) -> SeatPose:
     """Pose of the seat with the pad that is nearest to facing down; of several, that leans most.
 
-    Args:
-        base: with its seats.
-        split: into pieces.
-        downs: direction that is down when each piece is printed, (3,) each.
+    downs are the directions (3,) that are down when each piece is printed.
     """
     seats, pieces = base.seats, _seats_of_pieces(base, split)
     down = {k: way for way, in_piece in zip(downs, pieces, strict=True) for k in in_piece}
@@ -119,14 +116,9 @@ def _bed(axis: Floats, down: Floats) -> Floats:
 
 
 def seat_body(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose, to_bar: float) -> TopoDS_Shape:
-    """A seat without its pads, with its keel, along the bed's axes, the ball's centre at 0.
+    """Seat k without its pads, with its keel to a bar at y = to_bar, mm.
 
-    Args:
-        seats: from `coupon_seats`.
-        spec: of the base.
-        k: number of the seat.
-        pose: of the seat on the bed.
-        to_bar: y of the bar that the keel reaches, mm.
+    Along the bed's axes, with the ball's centre at 0; seats are those of `coupon_seats`.
     """
     wall = revolved_polygon(wall_section(seats, spec, k), 0.0, 2 * np.pi)
     legs = cut(wall, list(_between_legs(seats, spec, k)))

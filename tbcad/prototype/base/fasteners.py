@@ -36,17 +36,7 @@ AXIS, ACROSS = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 def base_fasteners(
     base: BaseLayout, split: BaseSplit, drive: Drive, parts: Parts
 ) -> list[Fastener]:
-    """Fasteners of the base.
-
-    Args:
-        base: in numbers.
-        split: its pieces and joints.
-        drive: that is bolted to its hub.
-        parts: lists of purchased parts.
-
-    Raises:
-        SpecError: when a part is in no list.
-    """
+    """Fasteners of the base; SpecError when a part is in no list."""
     places = _Places(base, split)
     return [
         *_magnets(places, parts),
@@ -87,11 +77,7 @@ def _magnets(places: _Places, parts: Parts) -> Iterator[Fastener]:
 
 
 def seat_magnets(base: BaseLayout, parts: Parts) -> list[PurchasedPart | None]:
-    """The magnet behind each ball, None where there is none.
-
-    Raises:
-        SpecError: when one is in no list.
-    """
+    """The magnet behind each ball, None for glue; SpecError when one is in no list."""
     sizes = np.column_stack([base.seats.magnet, base.seats.magnet_height]).tolist()
     return [
         magnet_part(diameter, height, parts) if diameter else None for diameter, height in sizes
@@ -99,11 +85,7 @@ def seat_magnets(base: BaseLayout, parts: Parts) -> list[PurchasedPart | None]:
 
 
 def magnet_part(diameter: float, height: float, parts: Parts) -> PurchasedPart:
-    """The disc magnet of a diameter and a height, mm.
-
-    Raises:
-        SpecError: when it is in no list.
-    """
+    """The disc magnet of a diameter and a height, mm; SpecError when it is in no list."""
     for part in of_kind(parts, "magnets", diameter_mm=diameter, height_mm=height):
         return part
     raise SpecError(
@@ -209,11 +191,7 @@ def _shortest_set_screw(length: float, parts: Parts) -> PurchasedPart:
 
 
 def m3_insert(spec: BaseSpec, parts: Parts) -> PurchasedPart:
-    """The longest M3 insert that the holes of the spec take.
-
-    Raises:
-        SpecError: when none is in the lists.
-    """
+    """The longest M3 insert that the holes of the spec take; SpecError when there is none."""
     inserts = of_kind(parts, "inserts", thread_mm=M3_MM, hole_mm=spec.insert_hole_mm)
     inserts = [insert for insert in inserts if _fits(insert, spec.insert_depth_mm)]
     if not inserts:

@@ -30,12 +30,9 @@ def ring_arcs(base: BaseLayout, ring: Floats, low: float, high: float) -> list[t
 
 
 def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
-    """Polygons (n, 2) of (z, r) over which a rib at an azimuth is left out.
+    """Polygons (n, 2) of (z, r) over which a rib at an azimuth (radians) is left out.
 
-    Args:
-        base: with its seats about z.
-        azimuth: of the rib, radians.
-        side: where the rib begins beside the azimuth, in its thicknesses.
+    The rib begins at a side of the azimuth, in its thicknesses.
     """
     spec = base.spec
     place, normal = _points_along(base.outline)

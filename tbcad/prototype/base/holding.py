@@ -50,15 +50,9 @@ WEB_MM = 0.8  # between pocket and pads
 def pull_on_ball(ball: float, gap: float, magnet: float, height: float) -> float:
     """Pull between a steel ball and a disc magnet on one axis, N, derated.
 
-    The ball's moment of order l follows from a_l, the magnet's potential on the ball; with the
-    magnet farther away a_l shrinks by (l + 1) a_(l+1) / ball, whence the force is a sum of their
-    products.
-
-    Args:
-        ball: its radius, mm.
-        gap: between ball and magnet, mm, above 0.
-        magnet: its radius, mm.
-        height: of the magnet, mm.
+    All in mm: radii of ball and magnet, the gap between them above 0, the magnet's height. The
+    ball's moment of order l follows from a_l, the magnet's potential on the ball; with the magnet
+    farther away a_l shrinks by (l + 1) a_(l+1) / ball, whence the force is a sum of their products.
     """
     decay = math.log((ball + gap) / ball)
     terms = min(math.ceil(-math.log(LAST_TERM) / 2 / decay) + 2, MAX_TERMS)
@@ -87,17 +81,11 @@ def _moments(ball: float, distance: float, disc: float, terms: int) -> Floats:
 
 @cache
 def pull_of_pair(one: float, two: float, gap: float, heights: tuple[float, float]) -> float:
-    """Pull between two disc magnets on one axis, N, derated.
+    """Pull between two disc magnets on one axis, N, derated; radii, gap above 0 and heights in mm.
 
-    The pull of two coaxial discs of charge is pi r s times the integral of J1(k r) J1(k s)
-    exp(-k z) / k (Vokoun et al., Magnetostatic interactions and forces between cylindrical
-    permanent magnets, J. Magn. Magn. Mater. 321, 2009). Two magnets have four such pairs.
-
-    Args:
-        one: radius of one, mm.
-        two: radius of the other, mm.
-        gap: between their faces, mm, above 0.
-        heights: of both, mm.
+    The pull of two coaxial discs of charge is pi r s times the integral of J1(k r) J1(k s) exp(-k
+    z) / k (Vokoun et al., Magnetostatic interactions and forces between cylindrical permanent
+    magnets, J. Magn. Magn. Mater. 321, 2009). Two magnets have four such pairs.
     """
 
     def wave(k: float) -> float:
@@ -142,13 +130,9 @@ def force_needed(
     bears load where F is above v_i . f, v_i being row i of the inverse of -n^T over its product
     with a. Over a full turn of the base, gravity across its axis points everywhere.
 
-    Args:
-        normals: of the pads toward the balls, unit, (..., k, 3, 3).
-        axis: of the seats, away from the balls' pads, unit, (k, 3).
-        centre: of the balls, mm, (k, 3).
-        mass_g: of the balls, (k,).
-        frame: rows: axis of the base and two across it, (3, 3).
-        motion: of the base.
+    The pads' unit normals (..., k, 3, 3) point toward the balls, the seats' unit axes (k, 3) away
+    from their pads; centres (k, 3) in mm, masses (k,) in g; rows of the frame are the base's axis
+    and two across it.
     """
     inverse: Floats = np.linalg.inv(np.swapaxes(normals, -1, -2)).astype(np.float64)
     share = -inverse / dot(inverse, axis[:, None])[..., None]
@@ -169,9 +153,8 @@ def glue_force(radius: Floats) -> Floats:
 def pad_normals(tilt: float, azimuth: Floats) -> Floats:
     """Unit normals toward the ball's centre of the pads of k seats, (k, 3, 3).
 
-    Args:
-        tilt: angle to the seat's axis, which is z and away from the ball's pads, radians.
-        azimuth: of each seat's first pad about the axis, radians, (k,).
+    Tilted from the seat's axis, which is z, away from the pads; azimuths (k,) of first pads,
+    radians.
     """
     around = azimuth[:, None] + np.arange(3) * 2 * np.pi / 3
     along = np.full((*around.shape, 1), np.cos(tilt))
@@ -188,16 +171,7 @@ class Pockets:
 
 
 def glue_wells(prototype: PrototypeLayout, needed: Floats, room: Floats) -> Pockets:
-    """Wells for glue behind all balls.
-
-    Args:
-        prototype: with its balls.
-        needed: force that each ball needs, N, (k,).
-        room: radius between the pads, mm, (k,).
-
-    Raises:
-        SpecError: when glue does not hold a ball.
-    """
+    """Wells for glue in rooms of radii (k,) in mm; SpecError where it holds too little."""
     radius = room / 2
     if (weak := glue_force(radius) < MIN_RATIO * needed).any():
         ball = first_ball(weak)
@@ -214,14 +188,7 @@ def magnet_pockets(
 ) -> Pockets:
     """The largest magnets that fit, of the strong height only where the other would not hold.
 
-    Args:
-        spec: of the base.
-        prototype: with its balls.
-        needed: force that each ball needs, N, (k,).
-        room: radius between the pads, mm, (k,).
-
-    Raises:
-        SpecError: when no magnet fits, or none that fits holds a ball.
+    SpecError when none fits into a room between the pads (radii (k,), mm), or holds as needed (N).
     """
     diameter = _largest(spec, room)
     height = np.full_like(diameter, spec.magnet_height_mm)

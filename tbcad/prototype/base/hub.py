@@ -82,11 +82,7 @@ class Hub:
 
 
 def hub_layout(spec: BaseSpec, front: float) -> Hub:
-    """The hub whose disc begins at z = front.
-
-    Raises:
-        SpecError: when the shaft's bore meets the holes of the drive.
-    """
+    """The hub whose disc begins at z = front; SpecError when bore and drive's holes meet."""
     pattern, bore = PATTERNS[spec.drive], spec.shaft_mm / 2
     hole = pattern.hole or spec.insert_hole_mm
     _check_shaft(spec, pattern, hole)

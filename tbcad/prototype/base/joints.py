@@ -96,13 +96,7 @@ def flange_top(base: BaseLayout) -> Floats:
 
 
 def plan_joint(base: BaseLayout, cut: Cut, others: Sequence[Cut]) -> Joint | None:
-    """Dowels, screws and numbers of a joint, or None where they have no room.
-
-    Args:
-        base: to be cut.
-        cut: that the joint is on.
-        others: all other cuts.
-    """
+    """Dowels, screws and numbers of a joint clear of other cuts; None where they have no room."""
     spec, flanges = base.spec, _Flanges(base, *cut, others)
     head = joint_hardware(spec).access_radius
     places = flanges.places(max(spec.dowel_mm / 2, spec.insert_hole_mm / 2))
@@ -124,14 +118,7 @@ def plan_joint(base: BaseLayout, cut: Cut, others: Sequence[Cut]) -> Joint | Non
 
 
 def _label(flanges: "_Flanges", side: int, holes: Floats, head: float) -> Floats:
-    """Place for a number on a side, if there is one, (0 or 1, 3); preferably off all ribs.
-
-    Args:
-        flanges: on the plane.
-        side: above the plane 1, below -1.
-        holes: their places, mm, (n, 3).
-        head: radius of what is kept clear round them, mm.
-    """
+    """Place (0 or 1, 3) for a number off holes (n, 3) and heads' radius, best off all ribs."""
     places = flanges.places(LABEL_MM - MIN_WALL_MM)
     places = places[flanges.accessible(places, side, LABEL_MM, ACCESS_MM)]
     best = _spread(places[flanges.off_ribs(places, side)], holes, 1, LABEL_MM + head)
@@ -268,11 +255,7 @@ class JointHardware:
 
 
 def joint_hardware(spec: BaseSpec) -> JointHardware:
-    """The longest dowel and the shortest M3 screw for the flanges' thickness.
-
-    Raises:
-        SpecError: when none is in the lists.
-    """
+    """The longest dowel and the shortest M3 screw for the flanges; SpecError without any."""
     parts = load_parts()
     _check_insert(spec)
     longest_dowel = 2 * (spec.joint_mm - FLOOR_MM - BEYOND_DOWEL_MM)

@@ -113,16 +113,7 @@ class BaseLayout:
 def base_layout(
     spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
 ) -> BaseLayout:
-    """The base for a prototype's balls.
-
-    Args:
-        spec: of the base.
-        prototype: with its balls.
-        motion: of the base, against which its balls are held.
-
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-    """
+    """The base for a prototype's balls in motion; SpecError names what to change to fit."""
     frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype, motion)
     light = _light(spec, prototype)
     _check_fronts(seats, light, frame)

@@ -14,12 +14,7 @@ from tbcad.types import Floats
 
 
 def carrier_masses(base: BaseLayout, density: float) -> PointMasses:
-    """The carrier's pieces as point masses.
-
-    Args:
-        base: in numbers.
-        density: g/cm^3.
-    """
+    """The carrier's pieces as point masses, by a density in g/cm^3."""
     pieces = [_wall(base), *(_ring(base, ring) for ring in base.rings), _ribs(base), _bosses(base)]
     pieces.append(_hub(base))
     volume = np.concatenate([volumes for volumes, _ in pieces])

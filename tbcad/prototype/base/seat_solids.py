@@ -55,12 +55,9 @@ def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
 
 
 def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
-    """What a ball and its magnet need, without the posts of the pads, in the seat's own frame.
+    """What a ball and its magnet need, without posts of pads, in the own frame of seat k.
 
-    Args:
-        seats: of all balls.
-        k: number of the seat.
-        offset: how far the pads are moved off the ball, mm.
+    Pads are moved off the ball by an offset, mm.
     """
     return Maker(mirrored=False).solid(with_posts(faces(seat_room(seats, k)), seats, k, offset))
 
@@ -76,15 +73,11 @@ def seat_room(seats: Seats, k: int) -> TopoDS_Shape:
 def with_posts(
     room: Sequence[TopoDS_Face], seats: Seats, k: int, offset: float, axes: Floats = OWN_AXES
 ) -> list[TopoDS_Face]:
-    """Faces that bound a seat's room with those of the posts of its pads.
+    """Faces that bound the room of seat k with those of the posts of its pads.
 
-    Args:
-        room: faces with the room on their inner side, the ball's centre at the origin; the only
-            ones on a sphere are the cup's.
-        seats: of all balls.
-        k: number of the seat.
-        offset: how far the pads are moved off the ball, mm.
-        axes: what the seat's own x, y and z have become, as rows, (3, 3).
+    The room is on the inner side of its faces, the ball's centre at the origin; the only ones on a
+    sphere are the cup's. Pads are moved off the ball by an offset (mm). The rows of axes (3, 3) are
+    what the seat's own x, y and z have become.
     """
     maker = Maker(mirrored=False)
     size = (float(seats.cup[k]), float(seats.radius[k]) + offset, float(seats.pad[k]))
@@ -112,16 +105,10 @@ def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:
 def _post_faces(
     maker: Maker, normal: Floats, cup: float, end: float, radius: float
 ) -> tuple[Ring, list[TopoDS_Face]]:
-    """A pad's post in a cup: its rim on the cup's sphere; its wall, and the pad at its end.
+    """A pad's post: its rim on the sphere of a cup (mm); its wall, and the pad at its end.
 
-    Seats leave a web between their pads and the pocket, so that the rim is a whole circle.
-
-    Args:
-        maker: of kernel shapes.
-        normal: from the pad to the ball's centre, which is the origin, (3,).
-        cup: radius, mm.
-        end: distance of the pad from the origin, mm.
-        radius: of the post, mm.
+    The normal (3,) points from the pad to the ball's centre, which is the origin. Seats leave a web
+    between pads and pocket, so that the rim is a whole circle.
     """
     start = float(np.sqrt(cup**2 - radius**2))
     centre, depth = -start * normal[None], (start - end) * normal
@@ -197,11 +184,7 @@ def arc_about_axis(middle: float, radius: float, start: Point, end: Point) -> To
 
 
 def cap_parts(base: BaseLayout, prototype: PrototypeLayout, mesh_mm: float) -> list[PlacedSolid]:
-    """A cap for each ball that is not bought, in its seat, its front up when it is printed.
-
-    Raises:
-        InvalidSolidError: when the kernel fails.
-    """
+    """A cap for each ball that is not bought, in its seat, its front up when it is printed."""
     caps = np.flatnonzero(prototype.balls.cap).tolist()
     return [_cap(base, prototype, k, mesh_mm) for k in caps]
 

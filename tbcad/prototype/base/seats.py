@@ -93,16 +93,9 @@ class Seats:
 def seat_layout(
     spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
 ) -> Seats:
-    """One seat for each body of the prototype.
+    """One seat for each body of the prototype, which holds it in a motion of the base.
 
-    Args:
-        spec: of the base.
-        prototype: with its balls.
-        motion: of the base, against which its balls are held.
-
-    Raises:
-        SpecError: when a pad, pocket or magnet does not fit, or does not hold a ball; it says
-            what to change.
+    SpecError when a pad, pocket or magnet does not fit, or does not hold a ball: what to change.
     """
     pad_angle = spec.pad_angles_deg[0]
     radius, tilt = prototype.balls.body_radius, float(np.radians(pad_angle))

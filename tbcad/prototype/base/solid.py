@@ -154,17 +154,9 @@ def facet_count(radius: float, angle: float) -> int:
 def carrier_parts(
     base: BaseLayout, split: BaseSplit, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
-    """The carrier placed on the bed: in one piece or as it is split.
+    """The carrier placed on the bed, in one piece or as it is split, meshes within mesh_mm.
 
-    Args:
-        base: in numbers.
-        split: how it is cut.
-        printer: with its bed.
-        mesh_mm: largest distance of meshes from the surface.
-
-    Raises:
-        SpecError: when a piece does not fit; it says how large the bed must be.
-        InvalidSolidError: when the kernel fails.
+    SpecError when a piece does not fit says how large the bed must be.
     """
     solid, mesh, properties = carrier_solid(base, mesh_mm, split)
     if split.joints:
@@ -179,8 +171,7 @@ def carrier_solid(
 ) -> tuple[TopoDS_Solid, Mesh, SolidProperties]:
     """The carrier before it is cut up, about z, with the flanges of its joints; mesh, properties.
 
-    Raises:
-        InvalidSolidError: when the kernel fails at every distance of SAME_MM.
+    InvalidSolidError when the kernel fails at every distance of SAME_MM.
     """
     seats = base.local_seats
     added, removed = added_solids(base, seats, split), removed_solids(base, seats)

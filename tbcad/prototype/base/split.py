@@ -67,8 +67,7 @@ UNCUT = BaseSplit((WHOLE,), ())
 def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
     """How a base is cut so that every piece fits the bed: into as few as can be found.
 
-    Raises:
-        SpecError: when no cut does; it names the bed that would.
+    SpecError when no cut does; it names the bed that would.
     """
     search = _SplitSearch(base, printer)
     if search.shortfall(WHOLE) <= 0:
@@ -84,12 +83,7 @@ def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
 
 
 def downward_directions(base: BaseLayout, piece: Floats) -> list[Floats]:
-    """Directions of the carrier's own frame that may point down when a piece is printed.
-
-    Args:
-        base: with its sector.
-        piece: region of the piece, (h, 4).
-    """
+    """Directions of the carrier's own frame that may point down when a piece is printed."""
     x, y, up = np.eye(3)
     low, high = (meridian(azimuth)[1] for azimuth in base.sector)
     return [-up, up, 0.0 - low, high, -x, -y, y, *piece[:, :3], *-piece[:, :3]]
@@ -208,12 +202,7 @@ def _sides(piece: Floats, plane: CutPlane) -> tuple[Floats, Floats]:
 
 
 def _widest_of_each_partition(below: Bools, gap: Floats) -> list[int]:
-    """A few of p planes for each partition of the bodies: the widest gaps, evenly thinned.
-
-    Args:
-        below: whether each body is below the plane, (p, b).
-        gap: between the bodies below and above, mm, (p,).
-    """
+    """A few planes for each partition of bodies below (p, b): the widest gaps (p,), thinned."""
     # Partitions in the order of binary numbers, the last body's digit first.
     _, partition = np.unique(below[:, ::-1], axis=0, return_inverse=True)
     chosen: list[int] = []
@@ -276,9 +265,8 @@ def bosses_and_hub(base: BaseLayout) -> RoundBodies:
 def base_points(base: BaseLayout, bodies: RoundBodies) -> tuple[Floats, Floats, Floats]:
     """Points of a base with its bosses and hub, mm.
 
-    Returns:
-        Points in the middle of the wall, a grid over azimuth and meridian, (a, p, 3), points round
-        all of the base, (c, 3), and points on the outer faces that flanges could have, (t, 3).
+    In the middle of the wall, a grid over azimuth and meridian, (a, p, 3); round all of the base,
+    (c, 3); and on the outer faces that flanges could have, (t, 3).
     """
     low, high = base.sector
     azimuth = np.linspace(low, high, int(np.ceil((high - low) / AZIMUTH_STEP)) + 1)

@@ -102,18 +102,9 @@ def _number(base: BaseLayout, split: BaseSplit, out: Floats, place: Floats) -> l
 def carrier_pieces(
     base: BaseLayout, split: BaseSplit, whole: TopoDS_Solid, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
-    """The pieces placed on the bed.
+    """The pieces of a whole carrier with flanges, placed on the bed; meshes within mesh_mm.
 
-    Args:
-        base: that is cut.
-        split: how it is cut.
-        whole: the carrier with its flanges, not yet cut.
-        printer: with its bed.
-        mesh_mm: largest distance of their meshes from the surface.
-
-    Raises:
-        SpecError: when a piece does not fit the bed.
-        InvalidSolidError: when the kernel fails.
+    SpecError when a piece does not fit, InvalidSolidError when the kernel fails.
     """
     seats = base.local_seats
     return [

@@ -58,8 +58,7 @@ class HomeAngles:
 def stop_sequence(prototype: PrototypeLayout, motion: MotionSpec) -> StopSequence:
     """The stops, and a start below them so that play in the drive is taken up before the first.
 
-    Raises:
-        SpecError: when the base cannot be where the program starts, for post or camera.
+    SpecError when the base cannot be where the program starts, for post or camera.
     """
     low, high = free_base_angles(prototype)
     home = math.radians(motion.home_deg)
@@ -83,8 +82,7 @@ def free_base_angles(prototype: PrototypeLayout) -> tuple[float, float]:
 def home_angles(prototype: PrototypeLayout, motion: MotionSpec) -> HomeAngles:
     """Where the switch trips: below all that the program drives to, where the base is still free.
 
-    Raises:
-        SpecError: when there is no room for it below the first stop.
+    SpecError when there is no room for it below the first stop.
     """
     sequence = stop_sequence(prototype, motion)
     lowest = min(sequence.start, motion.home_deg)
@@ -102,14 +100,7 @@ def home_angles(prototype: PrototypeLayout, motion: MotionSpec) -> HomeAngles:
 
 
 def power_off(balance: BaseBalance, low: float, high: float, *, holds_itself: bool) -> PowerOff:
-    """What a base does without power between the ends of its travel.
-
-    Args:
-        balance: of what turns.
-        low: smallest base angle, radians.
-        high: largest.
-        holds_itself: whether the drive cannot be turned from the base's side.
-    """
+    """What a base does without power between the ends of its travel, radians."""
     energy = 0.0 if holds_itself else _fall(balance, low, high) / MJ_PER_J
     inertia = balance.inertia * KG_M2
     speed = math.degrees(math.sqrt(2 * energy / inertia)) if inertia else 0.0

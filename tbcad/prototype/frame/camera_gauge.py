@@ -93,12 +93,7 @@ def camera_gauge(
 ) -> CameraGauge:
     """The gauge whose marks tell most of the pinhole's place.
 
-    Args:
-        base: that carries it.
-        camera: in its place.
-        diameter: of its body, mm.
-        needed: of it.
-        swing: smallest and largest base angle of the stops, radians.
+    diameter is that of the camera's body (mm), swing the smallest and largest base angle (radians).
     """
     distance, pitch = float(norm(camera.pinhole)), camera.pixel_pitch
     sights = _sights(base, camera, diameter, needed)
@@ -154,14 +149,10 @@ def marks_seen(gauge: CameraGauge, base: BaseLayout, camera: Camera) -> tuple[Ma
 def place_errors(sight: Sight, pitch: float, needed: CameraRequirements) -> dict[str, float]:
     """Standard deviations of the pinhole's place, mm: along the base's axis, across, out.
 
-    A displacement is seen as the angle between near and far mark. Along the axis both sides are
-    read at once, and lengths of the gauge count; across and out it is read a quarter turn to
-    either side, where what is wrong with the gauge has opposite signs.
-
-    Args:
-        sight: of the marks.
-        pitch: of pixels at unit distance.
-        needed: of the camera.
+    A displacement is seen as the angle between near and far mark, with pixels of a pitch at unit
+    distance. Along the axis both sides are read at once, and lengths of the gauge count; across and
+    out it is read a quarter turn to either side, where what is wrong with the gauge has opposite
+    signs.
     """
     lines, parallax = math.atan(sight.tangent), 1 / sight.near - 1 / sight.far
     level = _reading(sight, 0.0, pitch, needed) / math.sqrt(2)

@@ -180,17 +180,10 @@ class _Place:
 
 
 def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts) -> CameraMount:
-    """Bracket, plate and fence for a camera.
+    """Bracket, plate and fence for a camera; axes (3, 3) are the frame's, as rows.
 
-    Args:
-        spec: of the prototype.
-        axes: of the frame, as rows, (3, 3).
-        camera: in its place.
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when the camera does not look along the frame's plane, its thread lies beyond
-            its end, or camera or mount reach the base plate.
+    SpecError when the camera does not look along the frame's plane, its thread lies beyond its end,
+    or camera or mount reach the base plate.
     """
     place = _Place(spec, axes, camera, parts[INSERT])
     _check_camera(place)

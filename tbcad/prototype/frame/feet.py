@@ -56,12 +56,7 @@ CHANNEL_ROOF_MM = 3.0  # material above the channel
 def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int, parts: Parts) -> Bracket:
     """A foot on the front (side 1) or the back (side -1) of both uprights.
 
-    Args:
-        spec: section of the frame.
-        axes: of the frame, as rows, (3, 3).
-        face: level coordinate of the uprights' front.
-        side: on which the foot is.
-        parts: lists of purchased parts.
+    face is the level coordinate of the uprights' front; axes (3, 3) are the frame's, as rows.
     """
     low, thick, half = spec.floor_mm, spec.flange_mm, spec.uprights_mm / 2 + HALF_FLANGE_MM
     start = face if side > 0 else face - EXTRUSION_MM

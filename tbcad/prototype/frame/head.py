@@ -92,17 +92,9 @@ class BearingHead:
 def bearing_head(
     spec: FrameSpec, base: BaseLayout, drive: Drive, axes: Floats, parts: Parts
 ) -> BearingHead:
-    """The head for a drive.
+    """The head for a drive behind the base's hub; axes (3, 3) are the frame's, as rows.
 
-    Args:
-        spec: section of the frame.
-        base: whose hub is in front of it.
-        drive: belt, direct or stage.
-        axes: of the frame, as rows, (3, 3).
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when there is no bearing or shaft for the hub's bore, or the motor meets it.
+    SpecError when there is no bearing or shaft for the hub's bore, or the motor meets it.
     """
     plate = _behind_disc(_head_plate(spec, base, drive), base, axes)
     shaft_parts = _shaft_parts(base, plate, parts) if drive.belt else None

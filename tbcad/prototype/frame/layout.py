@@ -79,20 +79,7 @@ def frame_layout(
     keep_out: KeepOut,
     parts: Parts,
 ) -> FrameLayout:
-    """The frame round a base and a stage.
-
-    Args:
-        spec: of the prototype.
-        prototype: balls, their places and stops.
-        base: that turns.
-        stage: that carries the object.
-        drive: chosen for the base.
-        keep_out: what the frame must keep out of.
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-    """
+    """The frame round a base and a stage; SpecError names what to change where it does not fit."""
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)

@@ -237,14 +237,9 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
 def on_uprights(
     name: str, places: Sequence[Floats], along: Floats, flange: float, parts: Parts
 ) -> tuple[Fastener, ...]:
-    """Screws through a flange into T-nuts of the uprights.
+    """Screws through a body's flange (mm thick) into T-nuts of the uprights.
 
-    Args:
-        name: of the body with the flange.
-        places: on a face of the uprights, mm, (3,).
-        along: unit vector into the uprights, (3,).
-        flange: its thickness, mm.
-        parts: lists of purchased parts.
+    Places (3,) are on a face of the uprights, mm; the unit vector along points into them.
     """
     screw, fasteners = choose_screw(parts, 5.0, flange + ENGAGEMENT_MM), list[Fastener]()
     for place in places:

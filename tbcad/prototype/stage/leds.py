@@ -33,16 +33,8 @@ def check_leds(
 ) -> None:
     """Refuse LEDs that are outside the sphere, collide, are in one plane or seen too little.
 
-    Args:
-        stage: section of the stage.
-        prototype: whose virtual cameras see the LEDs.
-        capture: radius of the capture sphere, mm.
-        led: the purchased part.
-        pockets: z of the pockets' floors, mm, (l,).
-        plate: z of the crown's upper face, mm.
-
-    Raises:
-        SpecError: as said.
+    capture is the sphere's radius, pockets (l,) the floors of the pockets and plate the crown's
+    upper face (z), mm.
     """
     domes, pillar = np.array(stage.leds_mm).reshape(-1, 3), pillar_radius(stage, led)
     from_axis, tip = norm(domes[:, :2]), led["diameter_mm"] / 2
@@ -180,11 +172,8 @@ def calibration_estimate(
 ) -> CalibrationEstimate:
     """Covariance (J^T J)^-1 sigma^2 of each sphere's centre, J the highlights' derivatives.
 
-    Args:
-        stage: section of the stage.
-        array: mirrors of the design, in place of the balls that show them.
-        leds: centres of the domes, mm, (l, 3).
-        capture: radius of the capture sphere, mm.
+    The array's mirrors stand for the balls that show them; leds (l, 3) are the centres of the domes
+    and capture the radius of the capture sphere, mm.
     """
     cameras = array.ellipsoid.camera_distance * array.u
     seen = ~hidden_by_object(stage, leds, cameras, capture)
