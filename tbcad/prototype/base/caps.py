@@ -174,18 +174,14 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
     """Force with the gap as drawn and with a wider one, N; None with glue."""
     seats, gap = base.seats, base.spec.magnet_gap_mm
     magnet, height = float(seats.magnet[k]) / 2, float(seats.magnet_height[k])
-    if prototype.balls.cap[k] and magnet:
-        own, own_height = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
-        own -= base.spec.magnet_play_mm / 2
-        between = float(seats.radius[k]) + gap - cap_spigot(base, k)[1]
-        if own > 0:
-            pulls = [
-                pull_of_pair(own, magnet, between + wider, (own_height, height))
-                for wider in (0.0, WIDER_GAP_MM)
-            ]
-            return pulls[0], pulls[1]
-    elif magnet:
-        radius = float(seats.radius[k])
-        pulls = [pull_on_ball(radius, gap + w, magnet, height) for w in (0.0, WIDER_GAP_MM)]
-        return pulls[0], pulls[1]
+    gaps, radius = (0.0, WIDER_GAP_MM), float(seats.radius[k])
+    if magnet and not prototype.balls.cap[k]:
+        drawn, wider = (pull_on_ball(radius, gap + more, magnet, height) for more in gaps)
+        return drawn, wider
+    own, own_height = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
+    own -= base.spec.magnet_play_mm / 2
+    if magnet and own > 0:
+        between, heights = radius + gap - cap_spigot(base, k)[1], (own_height, height)
+        drawn, wider = (pull_of_pair(own, magnet, between + more, heights) for more in gaps)
+        return drawn, wider
     return float(glue_force(seats.pocket[k])), None

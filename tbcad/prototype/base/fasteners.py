@@ -13,7 +13,7 @@ from tbcad.prototype.base.hub import (
     SET_SCREW_AZIMUTHS,
     ZERO_DISC_MM,
 )
-from tbcad.prototype.base.joints import M3_MM, MIN_ENGAGEMENT_MM, Joint, joint_hardware
+from tbcad.prototype.base.joints import M3_MM, MIN_ENGAGEMENT_MM, Joint, by_length, joint_hardware
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.split import BaseSplit
@@ -106,29 +106,30 @@ def _lock(places: _Places, parts: Parts) -> Iterator[Fastener]:
     hub, spec = places.base.hub, places.base.spec
     if hub.lock == "set-screws":
         # It stands out of the boss a little rather than grip too little.
-        insert = m3_insert(spec, parts)
+        insert, middle = m3_insert(spec, parts), hub.lock_z * AXIS
         grip = hub.boss - insert["length_mm"] + M3_MM - hub.bore
-        screw = _shortest_set_screw(grip, parts)
+        refusal = f"no M3 set screw of at least {grip:.1f} mm is in setscrews.csv: add one"
+        screw = by_length(parts, "setscrews", refusal, grip, thread_mm=M3_MM)[0]
+        end = hub.bore + screw["length_mm"]
         for azimuth in SET_SCREW_AZIMUTHS.tolist():
-            out, middle = meridian(azimuth)[0], hub.lock_z * AXIS
+            out = meridian(azimuth)[0]
             yield places.fastener(insert, middle + hub.boss * out, -out)
-            end = hub.bore + screw["length_mm"]
             yield places.fastener(screw, middle + end * out, -out, places.piece(middle))
     elif hub.lock == "clamp":
         middle = np.array([-(hub.bore + hub.boss) / 2, 0.0, hub.lock_z])
         half = float(np.sqrt(hub.boss**2 - middle[0] ** 2)) * ACROSS
         yield places.fastener(m3_insert(spec, parts), middle + half, -ACROSS)
-        screw = _longest_screw(2 * float(half[1]), parts)
+        room = 2 * float(half[1])
+        refusal = f"no M3 screw of at most {room:.1f} mm is in screws.csv: add one"
+        screw = by_length(parts, "screws", refusal, high=room, thread_mm=M3_MM)[-1]
         yield places.fastener(screw, middle - half, ACROSS)
 
 
 def _key(places: _Places, parts: Parts) -> Fastener:
     """The longest dowel through the zero disc into the hub's hole."""
     hub, room = places.base.hub, ZERO_DISC_MM + KEY_DEPTH_MM
-    dowels = [one for one in of_kind(parts, "dowels", diameter_mm=KEY_MM) if _fits(one, room)]
-    if not dowels:
-        raise SpecError(f"no dowel of {KEY_MM:g} mm is at most {room:g} mm long: add one")
-    part = max(dowels, key=lambda one: one["length_mm"])
+    refusal = f"no dowel of {KEY_MM:g} mm is at most {room:g} mm long: add one"
+    part = by_length(parts, "dowels", refusal, high=room, diameter_mm=KEY_MM)[-1]
     piece = places.piece(np.array([*hub.key, hub.face + SAME_SIZE_MM]))
     return places.fastener(part, np.array([*hub.key, hub.mount]), AXIS, "zero_disc", piece)
 
@@ -169,34 +170,11 @@ def _joint(places: _Places, joint: Joint, parts: Parts) -> Iterator[Fastener]:
         yield places.fastener(m3_insert(spec, parts), at, along, through[1])
 
 
-def _fits(part: PurchasedPart, room: float) -> bool:
-    return part["length_mm"] <= room
-
-
-def _longest_screw(room: float, parts: Parts) -> PurchasedPart:
-    """The longest M3 screw no longer than a length (mm)."""
-    screws = [one for one in of_kind(parts, "screws", thread_mm=M3_MM) if _fits(one, room)]
-    if not screws:
-        raise SpecError(f"no M3 screw of at most {room:.1f} mm is in screws.csv: add one")
-    return max(screws, key=lambda one: one["length_mm"])
-
-
-def _shortest_set_screw(length: float, parts: Parts) -> PurchasedPart:
-    """The shortest M3 set screw of at least a length (mm)."""
-    screws = of_kind(parts, "setscrews", thread_mm=M3_MM)
-    screws = [one for one in screws if one["length_mm"] >= length]
-    if not screws:
-        raise SpecError(f"no M3 set screw of at least {length:.1f} mm is in setscrews.csv: add one")
-    return min(screws, key=lambda one: one["length_mm"])
-
-
 def m3_insert(spec: BaseSpec, parts: Parts) -> PurchasedPart:
     """The longest M3 insert that the holes of the spec take; SpecError when there is none."""
-    inserts = of_kind(parts, "inserts", thread_mm=M3_MM, hole_mm=spec.insert_hole_mm)
-    inserts = [insert for insert in inserts if _fits(insert, spec.insert_depth_mm)]
-    if not inserts:
-        raise SpecError(
-            f"no M3 insert for holes of {spec.insert_hole_mm:g} mm, {spec.insert_depth_mm:g} mm "
-            "deep, is in inserts.csv: change prototype.base.insert_hole_mm or insert_depth_mm"
-        )
-    return max(inserts, key=lambda part: part["length_mm"])
+    refusal = (
+        f"no M3 insert for holes of {spec.insert_hole_mm:g} mm, {spec.insert_depth_mm:g} mm deep, "
+        "is in inserts.csv: change prototype.base.insert_hole_mm or insert_depth_mm"
+    )
+    sizes = {"thread_mm": M3_MM, "hole_mm": spec.insert_hole_mm}
+    return by_length(parts, "inserts", refusal, high=spec.insert_depth_mm, **sizes)[-1]

@@ -161,17 +161,8 @@ def pad_normals(tilt: float, azimuth: Floats) -> Floats:
     return -np.concatenate([np.sin(tilt) * unit_circle(around), along], axis=-1)
 
 
-@dataclass(frozen=True)
-class Pockets:
-    """Pockets behind k balls."""
-
-    magnet: Floats  # diameter of the magnet, zero: glue, mm, (k,)
-    height: Floats  # of the magnet, zero: glue, mm, (k,)
-    radius: Floats  # of the pocket, or of the well, mm, (k,)
-
-
-def glue_wells(prototype: PrototypeLayout, needed: Floats, room: Floats) -> Pockets:
-    """Wells for glue in rooms of radii (k,) in mm; SpecError where it holds too little."""
+def glue_wells(prototype: PrototypeLayout, needed: Floats, room: Floats) -> tuple[Floats, ...]:
+    """As `magnet_pockets`, wells for glue; SpecError where glue holds a ball too little."""
     radius = room / 2
     if (weak := glue_force(radius) < MIN_RATIO * needed).any():
         ball = first_ball(weak)
@@ -180,14 +171,15 @@ def glue_wells(prototype: PrototypeLayout, needed: Floats, room: Floats) -> Pock
             f"{glue_force(radius)[ball - 1]:.2f} N, {MIN_RATIO:g} times {needed[ball - 1]:.2f} N "
             "are needed: make prototype.base.pad_mm smaller"
         )
-    return Pockets(np.zeros_like(radius), np.zeros_like(radius), radius)
+    return np.zeros_like(radius), np.zeros_like(radius), radius
 
 
 def magnet_pockets(
     spec: BaseSpec, prototype: PrototypeLayout, needed: Floats, room: Floats
-) -> Pockets:
-    """The largest magnets that fit, of the strong height only where the other would not hold.
+) -> tuple[Floats, ...]:
+    """Diameters and heights of magnets, zero with glue, and radii of their pockets, mm, (k,) each.
 
+    The largest that fit, of the strong height only where the other would not hold.
     SpecError when none fits into a room between the pads (radii (k,), mm), or holds as needed (N).
     """
     diameter = _largest(spec, room)
@@ -206,7 +198,7 @@ def magnet_pockets(
             "prototype.base.strong_magnet_height_mm larger, prototype.base.magnet_gap_mm smaller, "
             "or set prototype.base.hold to glue"
         )
-    return Pockets(diameter, height, (diameter + spec.magnet_play_mm) / 2)
+    return diameter, height, (diameter + spec.magnet_play_mm) / 2
 
 
 def worst_force_needed(

@@ -17,7 +17,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import distance_outside, half_plane, offset
-from tbcad.prototype.purchased.parts import load_parts, of_kind
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts, of_kind
 from tbcad.types import Bools, Floats
 
 GRID_MM = 2.0  # of places tried for holes
@@ -254,36 +254,35 @@ class JointHardware:
     access_radius: float
 
 
+def by_length(
+    parts: Parts, kind: str, refusal: str, low: float = 0.0, high: float = np.inf, **sizes: float
+) -> list[PurchasedPart]:
+    """Parts of a kind with lengths between two (mm), the shortest first; refused without any."""
+    some = [one for one in of_kind(parts, kind, **sizes) if low <= one["length_mm"] <= high]
+    if not some:
+        raise SpecError(refusal)
+    return sorted(some, key=lambda one: one["length_mm"])
+
+
 def joint_hardware(spec: BaseSpec) -> JointHardware:
     """The longest dowel and the shortest M3 screw for the flanges; SpecError without any."""
-    parts = load_parts()
-    _check_insert(spec)
-    longest_dowel = 2 * (spec.joint_mm - FLOOR_MM - BEYOND_DOWEL_MM)
-    dowels = of_kind(parts, "dowels", diameter_mm=spec.dowel_mm)
-    dowels = [dowel for dowel in dowels if dowel["length_mm"] <= longest_dowel]
-    if not dowels:
-        raise SpecError(
-            f"no dowel of {spec.dowel_mm:g} mm is at most {longest_dowel:g} mm long: make "
-            "prototype.base.joint_mm larger or prototype.base.dowel_mm smaller"
-        )
-    shortest, longest = spec.joint_mm + MIN_ENGAGEMENT_MM, spec.joint_mm + spec.insert_depth_mm
-    screws = of_kind(parts, "screws", thread_mm=M3_MM)
-    screws = [screw for screw in screws if shortest <= screw["length_mm"] <= longest]
-    if not screws:
-        raise SpecError(
-            f"no M3 screw is {shortest:g} to {longest:g} mm long: make prototype.base.joint_mm one "
-            "of the lengths on sale less 4"
-        )
-    dowel = max(dowels, key=lambda part: part["length_mm"])
-    screw = min(screws, key=lambda part: part["length_mm"])
-    depth = dowel["length_mm"] / 2 + BEYOND_DOWEL_MM
-    return JointHardware(dowel.name, depth, screw.name, screw["head_mm"] / 2 + KEY_PLAY_MM)
-
-
-def _check_insert(spec: BaseSpec) -> None:
-    minimum = spec.insert_depth_mm + FLOOR_MM
+    minimum, parts = spec.insert_depth_mm + FLOOR_MM, load_parts()
     if spec.joint_mm < minimum:
         raise SpecError(
             f"flanges of {spec.joint_mm:g} mm are too thin for inserts: make "
             f"prototype.base.joint_mm at least {minimum:g}"
         )
+    longest = 2 * (spec.joint_mm - FLOOR_MM - BEYOND_DOWEL_MM)
+    refusal = (
+        f"no dowel of {spec.dowel_mm:g} mm is at most {longest:g} mm long: make "
+        "prototype.base.joint_mm larger or prototype.base.dowel_mm smaller"
+    )
+    dowel = by_length(parts, "dowels", refusal, high=longest, diameter_mm=spec.dowel_mm)[-1]
+    low, high = spec.joint_mm + MIN_ENGAGEMENT_MM, spec.joint_mm + spec.insert_depth_mm
+    refusal = (
+        f"no M3 screw is {low:g} to {high:g} mm long: make prototype.base.joint_mm one of the "
+        "lengths on sale less 4"
+    )
+    screw = by_length(parts, "screws", refusal, low, high, thread_mm=M3_MM)[0]
+    depth = dowel["length_mm"] / 2 + BEYOND_DOWEL_MM
+    return JointHardware(dowel.name, depth, screw.name, screw["head_mm"] / 2 + KEY_PLAY_MM)
