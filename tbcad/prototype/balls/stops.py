@@ -149,11 +149,8 @@ def _free_azimuths(
 
 def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) -> int:
     """Number of stops with one ball moved to another azimuth."""
-    moved = azimuth.copy()
-    moved[ball] = moved_to
-    low, high = requests.intervals(moved)
-    order = np.argsort(high, kind="stable")
-    return int(np.count_nonzero(_new_points(low[order], high[order])))
+    moved = np.where(np.arange(len(azimuth)) == ball, moved_to, azimuth)
+    return len(min_stabbing_points(*requests.intervals(moved))[0])
 
 
 def plan_stops(

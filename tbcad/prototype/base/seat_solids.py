@@ -142,11 +142,6 @@ def column_behind_boss(seats: Seats, k: int, length: float) -> TopoDS_Shape:
     return cylinder(start, ALONG, float(seats.boss[k]) - INTO_BOSS_MM, length)
 
 
-def moved_to_seat(shape: TopoDS_Shape, seats: Seats, k: int) -> TopoDS_Shape:
-    """A shape of the seat's own frame moved to its place."""
-    return moved(shape, seats.axes[k], seats.centre[k])
-
-
 def _hollow_section(cup: float, pocket: float, bottom: float) -> TopoDS_Face:
     """Half section in y = 0: cup and pocket below it.
 

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from tbcad.core.camera.requirements import CameraRequirements
-from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
+from tbcad.core.geometry.primitives import Component, Prism, box
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
@@ -188,37 +188,31 @@ def _axes(base: BaseLayout) -> Floats:
 
 def _marks(sizes: GaugeSizes) -> Floats:
     """Marks in the gauge's own axes, (2, 2, 3)."""
-    near, far = (sizes.near, sizes.near_half), (sizes.far, sizes.far_half)
-    return np.array(
-        [[[along, side * half, 0.0] for along, half in (near, far)] for side in (1, -1)]
-    )
+    side = np.array([1.0, -1.0])[:, None]
+    across = side * [sizes.near_half, sizes.far_half]
+    along = np.broadcast_to([sizes.near, sizes.far], across.shape)
+    return np.stack([along, across, 0 * across], axis=-1)
 
 
 def _component(base: BaseLayout, sizes: GaugeSizes) -> Component:
     """The cross as it sits on the hub, its marked face up when it is printed."""
-    axes, hub = _axes(base), sizes.hub
-
-    def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> Prism:
-        return box(np.array(low), np.array(high), axes)
-
-    added: list[Primitive] = [
-        block(
-            (hub, -FLANGE_HALF_MM, -FLANGE_BELOW_MM),
-            (hub + FLANGE_MM, FLANGE_HALF_MM, THICKNESS_MM),
-        ),
-        block((hub, -MAST_HALF_MM, 0.0), (sizes.near, MAST_HALF_MM, THICKNESS_MM)),
-        block(
-            (sizes.near - ARM_MM, -sizes.near_half, 0.0),
-            (sizes.near, sizes.near_half, THICKNESS_MM),
-        ),
-        block(
-            (sizes.far - ARM_MM, -sizes.far_half - BLOCK_MM, STEP_MM),
-            (sizes.far, sizes.far_half + BLOCK_MM, THICKNESS_MM),
+    axes, hub, near, far = _axes(base), sizes.hub, sizes.near, sizes.far
+    wide = sizes.far_half + BLOCK_MM
+    blocks = (  # of half a width, between two places along the axis, above a level
+        (FLANGE_HALF_MM, hub, hub + FLANGE_MM, -FLANGE_BELOW_MM),
+        (MAST_HALF_MM, hub, near, 0.0),
+        (sizes.near_half, near - ARM_MM, near, 0.0),
+        (wide, far - ARM_MM, far, STEP_MM),
+    )
+    added = (
+        *(
+            box(np.array([low, -half, level]), np.array([high, half, THICKNESS_MM]), axes)
+            for half, low, high, level in blocks
         ),
         *(_far_end(sizes, side, axes) for side in (1, -1)),
         _plug(base, axes),
-    ]
-    return Component("camera_gauge", WHAT, tuple(added), (), (axes[2], -axes[2]))
+    )
+    return Component("camera_gauge", WHAT, added, (), (axes[2], -axes[2]))
 
 
 def _far_end(sizes: GaugeSizes, side: int, axes: Floats) -> Prism:

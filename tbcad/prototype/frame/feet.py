@@ -24,7 +24,7 @@ from tbcad.prototype.frame.purchased import (
     on_uprights,
     webs,
 )
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
+from tbcad.prototype.purchased.parts import Parts, choose_screw
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats
 
@@ -125,10 +125,11 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) 
     width = CHANNEL_WIDTH_MM / 2
     height = min(CHANNEL_HEIGHT_MM, spec.flange_mm - CHANNEL_ROOF_MM)
     channel = np.array([-width, -half - THROUGH_MM, low - THROUGH_MM])
+    clamp, fasteners = _clamp(axes, stage, ear, top, parts)
     removed = (
         Cylinder(middle, up, stage.sizes.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
         Cylinder(base - THROUGH_MM * up, up, wire, COLLAR_HEIGHT_MM),
-        *_clamp(axes, stage, ear, top, parts[CLAMP_INSERT]),
+        *clamp,
         *drilled_holes(places, spec.flange_mm * up, M5_HOLE_MM),
         box(channel, np.array([width, 0.0, low + height]), axes),
     )
@@ -140,40 +141,32 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) 
         (-up, up),
     )
     foot = np.array([[-half, -half], [end, half]])
-    return Bracket(component, holes, foot, _clamp_fasteners(axes, stage, ear, top, parts))
-
-
-def _clamp_fasteners(
-    axes: Floats, stage: StageLayout, ear: float, top: float, parts: Parts
-) -> tuple[Fastener, ...]:
-    """The clamp's screw from one ear, its insert in the other."""
-    middle, side, across = _clamp_screw(stage, ear, top), np.array([0.0, EAR_MM, 0.0]), axes[1]
-    screw, name = choose_screw(parts, *CLAMP_SCREW_MM), ("stage_foot",)
-    return (
-        Fastener(screw, (middle - side) @ axes, across, name),
-        Fastener(parts[CLAMP_INSERT], (middle + side) @ axes, -across, name),
-    )
-
-
-def _clamp_screw(stage: StageLayout, ear: float, top: float) -> Floats:
-    """Middle of the clamp's screw."""
-    height = (stage.foot + SLIT_FLOOR_MM + top) / 2 + SLIT_FLOOR_MM
-    return np.array([ear - EAR_LENGTH_MM / 2, 0.0, height])
+    return Bracket(component, holes, foot, fasteners)
 
 
 def _clamp(
-    axes: Floats, stage: StageLayout, ear: float, top: float, insert: PurchasedPart
-) -> list[Primitive]:
-    """Slit, screw's hole across it, and the insert's hole."""
-    low = stage.foot + SLIT_FLOOR_MM
+    axes: Floats, stage: StageLayout, ear: float, top: float, parts: Parts
+) -> tuple[list[Primitive], tuple[Fastener, ...]]:
+    """Slit, holes of screw and insert across it; the screw in one ear, its insert in the other."""
+    insert, low = parts[CLAMP_INSERT], stage.foot + SLIT_FLOOR_MM
     slit = np.array([0.0, -SLIT_MM / 2, low])
     end = np.array([ear + BEYOND_EAR_MM, SLIT_MM / 2, top + THROUGH_MM])
-    screw = _clamp_screw(stage, ear, top)
-    outside = np.array([0.0, EAR_MM + THROUGH_MM, 0.0])
-    inside = np.array([0.0, EAR_MM - insert["length_mm"] - INSERT_PLAY_MM, 0.0])
-    hole = CLEARANCE_HOLE_MM[insert["thread_mm"]] / 2
-    return [
+    middle = np.array([ear - EAR_LENGTH_MM / 2, 0.0, (low + top) / 2 + SLIT_FLOOR_MM])
+    side, outside, inside = (
+        np.array([0.0, across, 0.0])
+        for across in (
+            *(EAR_MM, EAR_MM + THROUGH_MM),
+            EAR_MM - insert["length_mm"] - INSERT_PLAY_MM,
+        )
+    )
+    through, outer = CLEARANCE_HOLE_MM[insert["thread_mm"]] / 2, (middle + outside) @ axes
+    removed: list[Primitive] = [
         box(slit, end, axes),
-        cylinder_between((screw - outside) @ axes, (screw + outside) @ axes, hole),
-        cylinder_between((screw + inside) @ axes, (screw + outside) @ axes, insert["hole_mm"] / 2),
+        cylinder_between((middle - outside) @ axes, outer, through),
+        cylinder_between((middle + inside) @ axes, outer, insert["hole_mm"] / 2),
     ]
+    screw, name = choose_screw(parts, *CLAMP_SCREW_MM), ("stage_foot",)
+    return removed, (
+        Fastener(screw, (middle - side) @ axes, axes[1], name),
+        Fastener(insert, (middle + side) @ axes, -axes[1], name),
+    )

@@ -85,23 +85,20 @@ def frame_layout(
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
     camera = _camera(spec, prototype)
     mount = camera_mount(spec, axes, prototype.array.camera, parts) if camera else None
-    brackets = _brackets(spec, axes, stage, head, mount, parts)
-    beside = (
-        *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
-        *((mount.plate, mount.fence) if mount else ()),
-        *(*head.purchased, homing.switch, *camera),
-    )
-    lamps = lamp_layout(spec, head.face, prototype.array.camera, keep_out, parts, beside)
+    brackets = [upright_foot(spec.frame, axes, head.face, side, parts) for side in (1, -1)]
+    brackets += [stage_foot(spec.frame, axes, stage, parts), *([mount.bracket] if mount else ())]
+    of_camera = (mount.plate, mount.fence) if mount else ()
+    bought = (*head.purchased, homing.switch, *camera)
+    beside = (head.component, homing.bracket, *(one.component for one in brackets), *of_camera)
+    view = prototype.array.camera
+    lamps = lamp_layout(spec, head.face, view, keep_out, parts, (*beside, *bought))
     brackets += lamps.stands if lamps else ()
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
     plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
-    purchased = (
-        *(plate_body, *bars, *head.purchased, homing.switch, *camera),
-        *(lamps.bodies if lamps else ()),
-    )
+    purchased = (plate_body, *bars, *bought, *(lamps.bodies if lamps else ()))
     printed = (
         *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
-        *((mount.plate, mount.fence) if mount else ()),
+        *of_camera,
         *(lamps.holders if lamps else ()),
     )
     light, swept = _check_clearances((*printed, *purchased), keep_out, spec.frame.clearance_mm)
@@ -119,7 +116,14 @@ def frame_layout(
         plate=plate,
         upright=upright,
         length=length,
-        fasteners=_fasteners(spec.frame, axes, head, homing, brackets, mount, lamps, parts),
+        fasteners=(
+            *head.fasteners,
+            *(one for bracket in brackets for one in bracket.fasteners),
+            *plate_fasteners(spec.frame, brackets, axes, parts),
+            *homing.fasteners,
+            *(mount.fasteners if mount else ()),
+            *(lamps.fasteners if lamps else ()),
+        ),
         light=light,
         swept=swept,
     )
@@ -134,35 +138,6 @@ def frame_purchased_parts(frame: FrameLayout) -> dict[str, int]:
         counts[frame.lamps.strip.name] = math.ceil(frame.lamps.metres)
     counts.update([frame.homing.pin, str(frame.homing.switch.part)])
     return dict(sorted(counts.items()))
-
-
-def _fasteners(
-    spec: FrameSpec,
-    axes: Floats,
-    head: BearingHead,
-    homing: HomingLayout,
-    brackets: list[Bracket],
-    mount: CameraMount | None,
-    lamps: LampLayout | None,
-    parts: Parts,
-) -> tuple[Fastener, ...]:
-    on_brackets = (one for bracket in brackets for one in bracket.fasteners)
-    in_plate = plate_fasteners(spec, brackets, axes, parts)
-    of_camera, of_lamps = mount.fasteners if mount else (), lamps.fasteners if lamps else ()
-    return (*head.fasteners, *on_brackets, *in_plate, *homing.fasteners, *of_camera, *of_lamps)
-
-
-def _brackets(
-    spec: PrototypeSpec,
-    axes: Floats,
-    stage: StageLayout,
-    head: BearingHead,
-    mount: CameraMount | None,
-    parts: Parts,
-) -> list[Bracket]:
-    brackets = [upright_foot(spec.frame, axes, head.face, side, parts) for side in (1, -1)]
-    brackets.append(stage_foot(spec.frame, axes, stage, parts))
-    return [*brackets, mount.bracket] if mount else brackets
 
 
 def _uprights(
