@@ -60,9 +60,8 @@ def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: floa
 
 def _by_polar_angle(group_of: Ints, polar: Floats, k: int) -> Ints:
     """Groups (m,) renumbered by rising mean polar angle."""
-    rank = np.empty(k, dtype=np.int64)
-    rank[np.argsort(_means(group_of, polar, k), kind="stable")] = np.arange(k)
-    return rank[group_of]
+    order = np.argsort(_means(group_of, polar, k), kind="stable")
+    return np.argsort(order)[group_of]
 
 
 def max_groups(polar: Floats, radius: Floats, radius_weight_deg: float) -> int:

@@ -71,14 +71,15 @@ def expected_downs(base: BaseLayout, split: BaseSplit) -> list[Floats]:
     In the frame of the shell, as all directions here. It is where the piece's pads face up, unless
     the bed is too small for that.
     """
-    return [_expected_down(base, in_piece) for in_piece in _seats_of_pieces(base, split)]
-
-
-def _expected_down(base: BaseLayout, seats: list[int]) -> Floats:
-    if not seats:
-        return np.asarray(-base.frame[0])
-    opening = opening_up(base.seats.pad_normals[seats].reshape(-1, 3))
-    return unit(base.seats.axis[seats].sum(axis=0)) if opening is None else opening
+    downs = []
+    for seats in _seats_of_pieces(base, split):
+        down = np.asarray(-base.frame[0])
+        if seats:
+            opening = opening_up(base.seats.pad_normals[seats].reshape(-1, 3))
+            axes = base.seats.axis[seats]
+            down = unit(axes.sum(axis=0)) if opening is None else opening
+        downs.append(down)
+    return downs
 
 
 def worst_pose(base: BaseLayout, split: BaseSplit, downs: Sequence[Floats]) -> SeatPose:

@@ -150,21 +150,16 @@ def _light(spec: BaseSpec, prototype: PrototypeLayout) -> LightSpheroid:
 
 
 def _check_fronts(seats: Seats, light: LightSpheroid, frame: Floats) -> None:
-    """Refuse seats that reach into the light."""
-    excess = light.min_excess(_front_corners(seats) @ frame.T)
+    """Refuse seats that reach into the light, by corners of a polygon round each boss's front."""
+    circle = unit_circle(even_angles(FRONT_CORNERS)) / np.cos(np.pi / FRONT_CORNERS)
+    corners = seats.boss[:, None, None] * (circle @ seats.axes[:, :2])
+    excess = light.min_excess((seats.at_depth(seats.front)[:, None] + corners) @ frame.T)
     worst = int(excess.argmin())
     if excess[worst] < 0:
         raise SpecError(
             f"the seat of ball {worst + 1} reaches {-excess[worst] / 2:.1f} mm into the light: "
             "make prototype.base.pad_angle_deg, pad_mm, cup_wall_mm or light_clearance_mm smaller"
         )
-
-
-def _front_corners(seats: Seats) -> Floats:
-    """Corners of a polygon round the front of each boss, mm, (k, FRONT_CORNERS, 3)."""
-    circle = unit_circle(even_angles(FRONT_CORNERS)) / np.cos(np.pi / FRONT_CORNERS)
-    middle = seats.at_depth(seats.front)[:, None]
-    return np.asarray(middle + seats.boss[:, None, None] * (circle @ seats.axes[:, :2]))
 
 
 def _half_plane(points: Floats) -> Floats:

@@ -39,16 +39,14 @@ SAME_PLANE = 1e-12
 
 def flange_solids(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
     """Both flanges of each joint in one solid."""
-    return [_flange(base, joint) for joint in split.joints]
-
-
-def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
-    low, high = base.sector
+    (low, high), thickness, flanges = base.sector, base.spec.joint_mm, []
     inside = FLANGE_END * base.spec.rib_mm / float(base.inner[:, 1].max())
-    band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
-    thickness, normal = base.spec.joint_mm, joint.plane.normal
-    slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
-    return cut(common(band, slab), [_beyond(row) for row in joint.region])
+    for joint in split.joints:
+        normal = joint.plane.normal
+        band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
+        slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
+        flanges.append(cut(common(band, slab), [_beyond(row) for row in joint.region]))
+    return flanges
 
 
 def _square(normal: Floats, level: float) -> TopoDS_Shape:

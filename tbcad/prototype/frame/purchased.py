@@ -130,7 +130,13 @@ def purchased_components(
         return _rotary_stage(base, drive.motor, plate)
     components = [_motor(base, drive, plate)]
     if drive.wheel and drive.pinion:
-        holes = _drilled(base, drive.wheel)
+        start, end = base.hub.mount, base.hub.mount - drive.wheel["width_mm"]
+        ends = [
+            (hub_point(base, start + THROUGH_MM, x, y), hub_point(base, end - THROUGH_MM, x, y))
+            for x, y in base.hub.holes.tolist()
+        ]
+        # The holes that are drilled into the wheel for the screws into the hub.
+        holes = [cylinder_between(*both, SCREW_MM / 2) for both in ends]
         components += [
             _wheel("wheel", base, drive.wheel, 0.0, *holes, rotates=True),
             _wheel("pinion", base, drive.pinion, drive.centre_mm),
@@ -175,19 +181,6 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
 def wheel_radius(part: PurchasedPart) -> float:
     """Radius of a toothed wheel over its rims, mm."""
     return pitch_diameter(part) / 2 + PULLEY_RIM_MM
-
-
-def _drilled(base: BaseLayout, wheel: PurchasedPart) -> list[Cylinder]:
-    """The holes that are drilled into the wheel for the screws into the hub."""
-    start, end = base.hub.mount, base.hub.mount - wheel["width_mm"]
-    return [
-        cylinder_between(
-            hub_point(base, start + THROUGH_MM, x, y),
-            hub_point(base, end - THROUGH_MM, x, y),
-            SCREW_MM / 2,
-        )
-        for x, y in base.hub.holes.tolist()
-    ]
 
 
 def _wheel(

@@ -157,13 +157,9 @@ def crown_component(
     ]
     removed: list[Primitive] = []
     for dome, floor in zip(leds, pockets.tolist(), strict=True):
-        rim = floor + POCKET * (float(dome[2]) - floor)
-        top, arm = (
-            np.array([*dome[:2], rim]),
-            led_arm(dome, pillar_radius(stage, led), floor, sizes),
-        )
+        rim, arm = floor + POCKET * (float(dome[2]) - floor), led_arm(dome, pillar, floor, sizes)
         foot = np.array([*dome[:2], (floor if arm else sizes.plate) - INSIDE_MM])
-        added.append(cylinder_between(foot, top, pillar))
+        added.append(cylinder_between(foot, np.array([*dome[:2], rim]), pillar))
         added += arm.bodies() if arm else []
         removed += _pocket(stage, led, dome, (floor, rim), sizes.plate, arm)
     seat = (sizes.plug - SEAT_MM) * SCREW_DIRECTION + [0, 0, sizes.joint - PLUG_MM / 2]
@@ -201,22 +197,17 @@ def _pocket(
     arm: Arm | None,
 ) -> list[Primitive]:
     """Pocket between two heights, the wires' way down, and their groove to the bore."""
-    floor, rim = heights
+    (floor, rim), half = heights, stage.wire_mm / 2
     radius, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
     low, bottom = np.array([*dome[:2], groove]), np.array([*dome[:2], floor])
     length = arm.root[0] if arm else float(norm(dome[:2]))
-    way = cylinder_between(low, bottom + THROUGH_MM * UP, stage.wire_mm / 2)
+    way = cylinder_between(low, bottom + THROUGH_MM * UP, half)
+    end = np.array([length, half, plate + OPEN_MM])
     return [
         cylinder_between(bottom, np.array([*dome[:2], rim + THROUGH_MM]), radius),
         *(arm.grooves(stage.wire_mm) if arm else [way]),
-        _groove(stage, dome, (groove, plate + OPEN_MM), length),
+        box(np.array([0.0, -half, groove]), end, arm_axes(dome)),
     ]
-
-
-def _groove(stage: StageSpec, dome: Floats, heights: tuple[float, float], length: float) -> Prism:
-    """A groove from the axis outward toward an LED, between two heights."""
-    half, (low, high) = stage.wire_mm / 2, heights
-    return box(np.array([0.0, -half, low]), np.array([length, half, high]), arm_axes(dome))
 
 
 def led_arm(dome: Floats, pillar: float, floor: float, sizes: CrownSizes) -> Arm | None:
