@@ -120,7 +120,9 @@ def azimuths_for_fewer_stops(
         before = azimuth.copy()
         for ball in range(len(problem)):
             tried = _free_azimuths(problem, azimuth, ball, step[ball], limits)
-            counts = np.array([_count(requests, azimuth, ball, one) for one in tried.tolist()])
+            moves = np.where(np.arange(len(azimuth)) == ball, tried[:, None], azimuth)
+            limits_of = (requests.intervals(one) for one in moves)
+            counts = np.array([len(min_stabbing_points(*both)[0]) for both in limits_of])
             moved = np.round(np.abs(tried - azimuth[ball]), DECIMALS)
             azimuth[ball] = tried[np.lexsort((tried, moved, counts))[0]]
         if np.array_equal(before, azimuth):
@@ -145,12 +147,6 @@ def _free_azimuths(
     clear = (separation >= np.delete(problem.min_separation[ball], ball)).all(axis=1)
     clear[0] = True
     return np.asarray(tried[clear])
-
-
-def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) -> int:
-    """Number of stops with one ball moved to another azimuth."""
-    moved = np.where(np.arange(len(azimuth)) == ball, moved_to, azimuth)
-    return len(min_stabbing_points(*requests.intervals(moved))[0])
 
 
 def plan_stops(

@@ -96,11 +96,6 @@ def pull_of_pair(one: float, two: float, gap: float, heights: tuple[float, float
     return DERATING * math.pi * one * two * REMANENCE_T**2 / MU_0 * PASCAL_MM2 * float(total)
 
 
-def pull_on_plate(gap: float, magnet: float, height: float) -> float:
-    """Pull on a thick steel plate, N, derated: on the magnet's own mirror image."""
-    return pull_of_pair(magnet, magnet, 2 * gap, (height, height))
-
-
 @dataclass(frozen=True)
 class Motion:
     """How the base moves, and what caps weigh."""

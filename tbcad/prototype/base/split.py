@@ -104,7 +104,10 @@ class _SplitSearch:
     def __post_init__(self) -> None:
         self.bodies = bosses_and_hub(self.base)
         self.wall, self.hull, self.flange_tops = base_points(self.base, self.bodies)
-        self.normals = _half_sphere(NORMALS)
+        # Spread evenly over the half sphere x >= 0 by a spiral.
+        share, turn = (np.arange(NORMALS) + 0.5) / NORMALS, np.pi * (1 + np.sqrt(5))
+        spiral = np.sqrt(1 - share**2)[:, None] * unit_circle(turn * np.arange(NORMALS))
+        self.normals = np.column_stack([share, spiral])
 
     def splits(self, count: int) -> Iterator[BaseSplit]:
         """Splits into a number of pieces that fit the bed and whose joints have room."""
@@ -213,13 +216,6 @@ def _widest_of_each_partition(below: Bools, gap: Floats) -> list[int]:
         thinned = np.unique(np.linspace(0, len(wide) - 1, PLANES_PER_PARTITION).astype(np.int64))
         chosen += wide[thinned].tolist()
     return chosen
-
-
-def _half_sphere(count: int) -> Floats:
-    """Directions spread evenly over the half sphere x >= 0 by a spiral, (count, 3)."""
-    share = (np.arange(count) + 0.5) / count
-    spiral = unit_circle(np.pi * (1 + np.sqrt(5)) * np.arange(count))
-    return np.column_stack([share, np.sqrt(1 - share**2)[:, None] * spiral])
 
 
 @dataclass(frozen=True)

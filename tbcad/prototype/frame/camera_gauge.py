@@ -107,10 +107,12 @@ def camera_gauge(
         far_half=sight.far * tangent,
     )
     low, high = (math.degrees(end) for end in swing)
+    across = np.array([[1.0], [-1.0]]) * [sizes.near_half, sizes.far_half]
+    along = np.broadcast_to([sizes.near, sizes.far], across.shape)
     return CameraGauge(
         component=_component(base, sizes),
         sizes=sizes,
-        marks=_marks(sizes) @ _axes(base),
+        marks=np.stack([along, across, 0 * across], axis=-1) @ _axes(base),
         angles=(max(-QUARTER_DEG, low), 0.0, min(QUARTER_DEG, high)),
         errors=place_errors(sight, pitch, needed),
     )
@@ -186,18 +188,15 @@ def _axes(base: BaseLayout) -> Floats:
     return np.stack([axis, third, -zero])
 
 
-def _marks(sizes: GaugeSizes) -> Floats:
-    """Marks in the gauge's own axes, (2, 2, 3)."""
-    side = np.array([1.0, -1.0])[:, None]
-    across = side * [sizes.near_half, sizes.far_half]
-    along = np.broadcast_to([sizes.near, sizes.far], across.shape)
-    return np.stack([along, across, 0 * across], axis=-1)
-
-
 def _component(base: BaseLayout, sizes: GaugeSizes) -> Component:
     """The cross as it sits on the hub, its marked face up when it is printed."""
     axes, hub, near, far = _axes(base), sizes.hub, sizes.near, sizes.far
     wide = sizes.far_half + BLOCK_MM
+    # A prism in the hub's bore, whose edges are pressed in.
+    circle = (base.hub.bore + PLUG_PRESS_MM / 2) * unit_circle(even_angles(PLUG_SIDES))
+    start = base.hub.socket + PLUG_FREE_MM
+    corners = np.column_stack([np.full(PLUG_SIDES, start), circle])
+    plug = Prism(corners @ axes, (base.hub.front + ROOT_MM - start) * axes[0])
     blocks = (  # of half a width, between two places along the axis, above a level
         (FLANGE_HALF_MM, hub, hub + FLANGE_MM, -FLANGE_BELOW_MM),
         (MAST_HALF_MM, hub, near, 0.0),
@@ -210,7 +209,7 @@ def _component(base: BaseLayout, sizes: GaugeSizes) -> Component:
             for half, low, high, level in blocks
         ),
         *(_far_end(sizes, side, axes) for side in (1, -1)),
-        _plug(base, axes),
+        plug,
     )
     return Component("camera_gauge", WHAT, added, (), (axes[2], -axes[2]))
 
@@ -223,11 +222,3 @@ def _far_end(sizes: GaugeSizes, side: int, axes: Floats) -> Prism:
     corners = [(sizes.far, half), (sizes.far, end), (back, end), (back, beyond)]
     points = np.array([[along, side * across, 0.0] for along, across in corners])
     return Prism(points @ axes, THICKNESS_MM * axes[2])
-
-
-def _plug(base: BaseLayout, axes: Floats) -> Prism:
-    """A prism in the hub's bore, whose edges are pressed in."""
-    circle = (base.hub.bore + PLUG_PRESS_MM / 2) * unit_circle(even_angles(PLUG_SIDES))
-    start = base.hub.socket + PLUG_FREE_MM
-    points = np.column_stack([np.full(PLUG_SIDES, start), circle])
-    return Prism(points @ axes, (base.hub.front + ROOT_MM - start) * axes[0])

@@ -83,14 +83,17 @@ def frame_layout(
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
-    camera = _camera(spec, prototype)
-    mount = camera_mount(spec, axes, prototype.array.camera, parts) if camera else None
+    camera, view = [], prototype.array.camera
+    if spec.camera_diameter_mm:
+        size = spec.camera_diameter_mm / 2, spec.camera_length_mm
+        body = Cylinder(view.pinhole, -view.forward, *size)
+        camera = [Component("camera", "camera behind its pinhole", (body,))]
+    mount = camera_mount(spec, axes, view, parts) if camera else None
     brackets = [upright_foot(spec.frame, axes, head.face, side, parts) for side in (1, -1)]
     brackets += [stage_foot(spec.frame, axes, stage, parts), *([mount.bracket] if mount else ())]
     of_camera = (mount.plate, mount.fence) if mount else ()
     bought = (*head.purchased, homing.switch, *camera)
     beside = (head.component, homing.bracket, *(one.component for one in brackets), *of_camera)
-    view = prototype.array.camera
     lamps = lamp_layout(spec, head.face, view, keep_out, parts, (*beside, *bought))
     brackets += lamps.stands if lamps else ()
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
@@ -201,14 +204,6 @@ def _plate(
     holes = drilled_holes(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
     body = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
     return part, body, middle - half
-
-
-def _camera(spec: PrototypeSpec, prototype: PrototypeLayout) -> list[Component]:
-    if spec.camera_diameter_mm == 0:
-        return []
-    camera, radius = prototype.array.camera, spec.camera_diameter_mm / 2
-    body = Cylinder(camera.pinhole, -camera.forward, radius, spec.camera_length_mm)
-    return [Component("camera", "camera behind its pinhole", (body,))]
 
 
 def _check_clearances(

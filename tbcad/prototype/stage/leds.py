@@ -61,17 +61,12 @@ def check_leds(
             if norm(dome[:2] - domes[j, :2]) < 2 * pillar:
                 raise SpecError(f"{name} collides with LED {j + 1}: move one of them")
     if len(domes):
-        _check_flatness(domes)
+        if float(np.linalg.svd(domes - domes.mean(axis=0))[1][-1]) < MIN_FLATNESS_MM:
+            raise SpecError(
+                "prototype.stage.leds_mm: the LEDs lie nearly in one plane, which does not "
+                "calibrate: move one of them up or down"
+            )
         _check_seen(stage, domes, prototype, led, capture)
-
-
-def _check_flatness(domes: Floats) -> None:
-    """Refuse LEDs that lie nearly in one plane."""
-    if float(np.linalg.svd(domes - domes.mean(axis=0))[1][-1]) < MIN_FLATNESS_MM:
-        raise SpecError(
-            "prototype.stage.leds_mm: the LEDs lie nearly in one plane, which does not calibrate: "
-            "move one of them up or down"
-        )
 
 
 def _check_seen(

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.array import design as mirror_design
-from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.fit import BallFit, ball_fit
@@ -123,26 +121,6 @@ class TestPlaces:
         gap = norm(centre[:, None] - centre) - radius[:, None] - radius
         np.fill_diagonal(gap, np.inf)
         assert 0 < gap.min() - LIMITS.ball_wall_mm < 0.05  # and are no farther than they must
-
-    def test_no_ball_blocks_anothers_light(self, prototype: PrototypeLayout) -> None:
-        """Rays off every ball by brute force against every other ball."""
-        outline, balls = prototype.balls.outline, prototype.balls
-        camera, frame = prototype.array.camera.pinhole, prototype.array.ellipsoid.frame()
-        for share in (0.0, 0.5, 1.0):
-            inner = balls.poses.apex[:, None] + share * (outline - balls.poses.apex[:, None])
-            centre = balls.centre[:, None]
-            normal = unit(inner - centre)
-            point = centre + balls.radius[:, None, None] * normal
-            for j in range(len(prototype)):
-                rotation = Rotation.from_euler("x", prototype.placement.azimuth[j])
-                x, n = rotation.apply(point[j]) @ frame, rotation.apply(normal[j]) @ frame
-                out = reflected_rays(camera, x, n)
-                end = x - dot(x, out)[:, None] * out
-                assert norm(end).max() < 30 + 1e-6
-                others = np.arange(len(prototype)) != j
-                for target in (np.broadcast_to(camera, x.shape), end):
-                    gap = segment_distances(x, target, prototype.body_centres()[others])
-                    assert (gap - balls.body_radius[others]).min() > LIMITS.light_margin_mm
 
     def test_post_and_camera_stay_clear_over_the_swing(self, prototype: PrototypeLayout) -> None:
         view = prototype.array.camera

@@ -24,7 +24,6 @@ from tbcad.prototype.base.holding import (
     pad_normals,
     pull_of_pair,
     pull_on_ball,
-    pull_on_plate,
 )
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.drive.balance import GRAVITY
@@ -35,6 +34,11 @@ from tbcad.records.prototype import HeldBall
 def dipole_moment(radius: float, height: float) -> float:
     """Of a magnet in mm, A m^2."""
     return REMANENCE_T / MU_0 * math.pi * radius**2 * height * 1e-9
+
+
+def pull_on_plate(gap: float, magnet: float, height: float) -> float:
+    """Pull on a thick steel plate, N, derated: on the magnet's own mirror image."""
+    return pull_of_pair(magnet, magnet, 2 * gap, (height, height))
 
 
 def test_a_large_ball_is_a_plate() -> None:
