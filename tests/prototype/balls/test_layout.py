@@ -15,7 +15,7 @@ from tbcad.prototype.balls.layout import (
     ball_counts,
     prototype_layout,
 )
-from tbcad.prototype.balls.placement import greedy_placement
+from tbcad.prototype.balls.placement import greedy_placement, min_swing_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
@@ -23,6 +23,7 @@ from tbcad.prototype.balls.selection import (
     ball_candidates,
     choose_balls,
 )
+from tbcad.prototype.balls.stops import plan_stops, stop_requests
 from tbcad.prototype.files.tables import picture_rows
 from tests.helpers import segment_distances
 
@@ -159,6 +160,15 @@ class TestStops:
             apex = prototype.apices(stops.angle[stops.stop[i]])[ball[i]]
             angle = np.arccos(np.clip(unit(apex) @ prototype.array.u[i], -1, 1))
             assert stops.error[i] == pytest.approx(angle, abs=1e-7)
+
+    def test_freed_azimuths_need_fewer_than_those_of_the_swing_alone(
+        self, prototype: PrototypeLayout
+    ) -> None:
+        groups, array = prototype.groups, prototype.array
+        requests = stop_requests(groups, array.azimuth, np.radians(LIMITS.stop_error_deg))
+        azimuth = min_swing_placement(prototype.problem).azimuth
+        other = plan_stops(groups, array.polar, requests, azimuth)
+        assert len(prototype.stops) < len(other)
 
     def test_other_half_with_the_object_turned(
         self, prototype: PrototypeLayout, paper_design: MirrorDesign
