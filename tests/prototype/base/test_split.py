@@ -226,14 +226,15 @@ def mesh_ends(base: BaseLayout, plan: BaseSplit, n: int, at: np.ndarray, out: np
     return float(((hole.vertices - at) @ out).max())
 
 
+@pytest.fixture(scope="module")
+def cut_up(small_prototype: PrototypeLayout) -> CutUp:
+    base, plan = split_at(small_prototype, PRINTER.bed_mm[0], 2)
+    parts = carrier_parts(base, plan, PRINTER, MESH_MM)
+    return base, plan, parts, [as_trimesh(part.shape) for part in parts]
+
+
 @pytest.mark.slow
 class TestPieces:
-    @pytest.fixture(scope="class")
-    def cut_up(self, small_prototype: PrototypeLayout) -> CutUp:
-        base, plan = split_at(small_prototype, PRINTER.bed_mm[0], 2)
-        parts = carrier_parts(base, plan, PRINTER, MESH_MM)
-        return base, plan, parts, [as_trimesh(part.shape) for part in parts]
-
     def test_each_is_a_whole_solid_on_the_bed_with_its_number(self, cut_up: CutUp) -> None:
         base, plan, parts, meshes = cut_up
         assert [part.name for part in parts] == ["carrier_1", "carrier_2"]
