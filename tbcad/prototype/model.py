@@ -21,11 +21,11 @@ from tbcad.prototype.arrangement import (
     shroud_round,
 )
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_solids import cap_parts
+from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.base.seat_solids import cap_parts
 from tbcad.prototype.base.solid import carrier_parts
-from tbcad.prototype.coupon.coupon import coupon_plates
-from tbcad.prototype.coupon.seat import expected_downs, worst_pose
 from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge

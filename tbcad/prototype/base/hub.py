@@ -82,14 +82,15 @@ class Hub:
 
 
 def hub_layout(spec: BaseSpec, front: float) -> Hub:
-    """The hub whose disc begins at z = front.
-
-    Raises:
-        SpecError: when the shaft's bore meets the holes of the drive.
-    """
+    """The hub whose disc begins at z = front; SpecError when bore and drive's holes meet."""
     pattern, bore = PATTERNS[spec.drive], spec.shaft_mm / 2
     hole = pattern.hole or spec.insert_hole_mm
-    _check_shaft(spec, pattern, hole)
+    largest = pattern.circle - max(hole, pattern.head[0]) - 2 * MIN_WALL_MM
+    if spec.shaft_mm > largest:
+        raise SpecError(
+            f"a shaft of {spec.shaft_mm:g} mm leaves no wall to the holes of drive {spec.drive}: "
+            f"make prototype.base.shaft_mm {largest:g} or less"
+        )
     outer = pattern.circle / 2 + max(hole, pattern.head[0]) / 2 + WALL_MM
     if pattern.boss:
         boss = max(outer, bore + WALL_MM + spec.insert_depth_mm)
@@ -133,12 +134,3 @@ def deepened(hub: Hub, face: float) -> Hub:
         head=(diameter, depth + more),
         lock_z=face,
     )
-
-
-def _check_shaft(spec: BaseSpec, pattern: HolePattern, hole: float) -> None:
-    largest = pattern.circle - max(hole, pattern.head[0]) - 2 * MIN_WALL_MM
-    if spec.shaft_mm > largest:
-        raise SpecError(
-            f"a shaft of {spec.shaft_mm:g} mm leaves no wall to the holes of drive {spec.drive}: "
-            f"make prototype.base.shaft_mm {largest:g} or less"
-        )

@@ -19,9 +19,9 @@ from tbcad.prototype.base.joints import (
     LABEL_MM,
     Joint,
     flange_profile,
+    joint_hardware,
 )
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
 from tbcad.types import Bools, Floats
@@ -38,16 +38,14 @@ SAME_PLANE = 1e-12
 
 def flange_solids(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
     """Both flanges of each joint in one solid."""
-    return [_flange(base, joint) for joint in split.joints]
-
-
-def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
-    low, high = base.sector
+    (low, high), thickness, flanges = base.sector, base.spec.joint_mm, []
     inside = FLANGE_END * base.spec.rib_mm / float(base.inner[:, 1].max())
-    band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
-    thickness, normal = base.spec.joint_mm, joint.plane.normal
-    slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
-    return cut(common(band, slab), [_beyond(row) for row in joint.region])
+    for joint in split.joints:
+        normal = joint.plane.normal
+        band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
+        slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
+        flanges.append(cut(common(band, slab), [_beyond(row) for row in joint.region]))
+    return flanges
 
 
 def _square(normal: Floats, level: float) -> TopoDS_Shape:
@@ -101,18 +99,9 @@ def _number(base: BaseLayout, split: BaseSplit, out: Floats, place: Floats) -> l
 def carrier_pieces(
     base: BaseLayout, split: BaseSplit, whole: TopoDS_Solid, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
-    """The pieces placed on the bed.
+    """The pieces of a whole carrier with flanges, placed on the bed; meshes within mesh_mm.
 
-    Args:
-        base: that is cut.
-        split: how it is cut.
-        whole: the carrier with its flanges, not yet cut.
-        printer: with its bed.
-        mesh_mm: largest distance of their meshes from the surface.
-
-    Raises:
-        SpecError: when a piece does not fit the bed.
-        InvalidSolidError: when the kernel fails.
+    SpecError when a piece does not fit, InvalidSolidError when the kernel fails.
     """
     seats = base.local_seats
     return [

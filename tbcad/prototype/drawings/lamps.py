@@ -15,7 +15,7 @@ from tbcad.cad.drafting.sheet import (
 )
 from tbcad.cad.formats.entities import Entity, Layer, Line
 from tbcad.prototype.drawings.parts import Listed, fitted, outer
-from tbcad.prototype.frame.brackets import EXTRUSION_MM
+from tbcad.prototype.frame.purchased import EXTRUSION_MM
 from tbcad.prototype.light.lamp import EDGE_MM, LampLayout
 
 LAMP = "drawing_lamp"

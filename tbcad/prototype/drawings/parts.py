@@ -34,10 +34,9 @@ from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.frame.brackets import TAPPED_M5_MM
 from tbcad.prototype.frame.head import GAP_MM
 from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.prototype.frame.purchased import wheel_radius
+from tbcad.prototype.frame.purchased import TAPPED_M5_MM, wheel_radius
 from tbcad.prototype.purchased.parts import PurchasedPart
 
 PLATE, WHEEL, UPRIGHT = "drawing_plate", "drawing_wheel", "drawing_upright"

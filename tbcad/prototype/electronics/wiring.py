@@ -20,7 +20,7 @@ from tbcad.prototype.electronics.outputs import LAMP, Light, lights
 from tbcad.prototype.electronics.resistors import SeriesResistor, series_resistor
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
-from tbcad.prototype.stage import arms, crown
+from tbcad.prototype.stage import crown
 from tbcad.prototype.stage.layout import StageLayout
 
 COLUMNS = (
@@ -215,7 +215,7 @@ def _led_cells(wiring: Wiring, index: int) -> Row:
 def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Parts) -> PurchasedPart:
     """The thickest wire of which an LED's two go through a groove, and all through the bore."""
     wires, bore = WIRES * len(stage.leds), 2 * stage.sizes.wire
-    groove = min(arms.GROOVE_MM, crown.GROOVE_MM, section.wire_mm / WIRES)
+    groove = min(crown.ARM_GROOVE_MM, crown.GROOVE_MM, section.wire_mm / WIRES)
     thickest = min(groove, bore * math.sqrt(MAX_FILL / wires))
     fitting = [
         wire

@@ -7,8 +7,7 @@ from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
-from tbcad.prototype.base.caps import cap_limits
-from tbcad.prototype.base.held import holding
+from tbcad.prototype.base.caps import cap_limits, holding
 from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import Drive
@@ -20,8 +19,7 @@ from tbcad.prototype.drive.loads import (
     DriveLoads,
     base_torques,
 )
-from tbcad.prototype.drive.power_off import power_off
-from tbcad.prototype.drive.travel import stop_sequence
+from tbcad.prototype.drive.travel import power_off, stop_sequence
 from tbcad.prototype.electronics.outputs import phases
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom_csv import totals
@@ -29,8 +27,8 @@ from tbcad.prototype.frame.camera_gauge import marks_seen
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
 from tbcad.prototype.printing.placing import PrintedPart
-from tbcad.prototype.stage.calibration import calibration_estimate
 from tbcad.prototype.stage.layout import led_poses
+from tbcad.prototype.stage.leds import calibration_estimate
 from tbcad.records import prototype as records
 from tbcad.records.prototype import MATT_BLACK, Prototype
 from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff

@@ -24,8 +24,13 @@ from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import THROUGH_MM
-from tbcad.prototype.frame.purchased import ENGAGEMENT_MM, HeadPlate, axial_cylinder, hub_point
+from tbcad.prototype.frame.purchased import (
+    ENGAGEMENT_MM,
+    THROUGH_MM,
+    HeadPlate,
+    axial_cylinder,
+    hub_point,
+)
 from tbcad.prototype.homing.sizes import (
     BRACKET_HIGH_MM,
     BRACKET_LOW_MM,

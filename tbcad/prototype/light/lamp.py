@@ -11,7 +11,7 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import THROUGH_MM, Bracket
+from tbcad.prototype.frame.purchased import THROUGH_MM, Bracket
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats

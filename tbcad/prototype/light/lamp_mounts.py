@@ -7,7 +7,7 @@ import numpy as np
 
 from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
 from tbcad.core.spec.prototype import FrameSpec
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
     Bracket,

@@ -19,9 +19,9 @@ from tbcad.core.geometry.primitives import rectangle
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
+from tbcad.prototype.base.coupon_seats import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.coupon.seat import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.printing.bed import usable_size
 from tbcad.prototype.printing.placing import PlacedSolid
 from tbcad.types import Floats
@@ -36,25 +36,15 @@ DECIMALS = 6  # to which sizes are the same, mm
 
 @dataclass(frozen=True)
 class CouponRow:
-    """Seats of one size side by side on a bar, the size left of all, each offset left of its seat.
+    """Seats of one size side by side on a bar; the size left of all, offsets left of seats."""
 
-    Attributes:
-        seat: number of a seat of this size.
-        offsets: of the pads, one for each seat, mm.
-        name: the body's diameter.
-        first: width of the size's place, mm.
-        cell: width of the place of one seat with its offset, mm.
-        size: width and depth of the whole, mm.
-        middle: y of the seats' balls from the shelf's middle line, mm.
-    """
-
-    seat: int
-    offsets: tuple[float, ...]
-    name: str
-    first: float
-    cell: float
-    size: tuple[float, float]
-    middle: float
+    seat: int  # number of a seat of this size
+    offsets: tuple[float, ...]  # of the pads, one for each seat, mm
+    name: str  # the body's diameter
+    first: float  # width of the size's place, mm
+    cell: float  # width of the place of one seat with its offset, mm
+    size: tuple[float, float]  # width and depth of the whole, mm
+    middle: float  # y of the seats' balls from the shelf's middle line, mm
 
 
 Place = tuple[CouponRow, Floats]
@@ -66,27 +56,16 @@ def coupon_plates(
 ) -> list[PlacedSolid]:
     """Plates with a seat for each chosen size and each offset of the pads, few as the bed allows.
 
-    Args:
-        base: with the seats.
-        printer: with its bed.
-        pose: of the seats on the bed.
-        mesh_mm: largest distance of their meshes from the surface.
-
-    Raises:
-        SpecError: when a single seat is larger than the bed.
-        InvalidSolidError: when the kernel fails.
+    Meshes are at most mesh_mm from the surface. SpecError when a single seat is larger than the
+    bed.
     """
-    seats = coupon_seats(base, pose)
-    plates = _plates(coupon_rows(seats, base.spec, printer, pose.lean), printer)
-    return [
-        _placed(f"coupon_{k}", _plate(f"coupon_{k}", seats, base.spec, rows, pose), mesh_mm)
-        for k, rows in enumerate(plates, start=1)
-    ]
-
-
-def _placed(name: str, plate: TopoDS_Solid, mesh_mm: float) -> PlacedSolid:
-    mesh = closed_mesh(name, plate, mesh_mm)
-    return PlacedSolid(name, plate, mesh, properties(plate), np.eye(3), np.zeros(3))
+    seats, placed = coupon_seats(base, pose), []
+    shelves = _plates(coupon_rows(seats, base.spec, printer, pose.lean), printer)
+    for k, rows in enumerate(shelves, start=1):
+        plate = _plate(f"coupon_{k}", seats, base.spec, rows, pose)
+        mesh, own = closed_mesh(f"coupon_{k}", plate, mesh_mm), properties(plate)
+        placed.append(PlacedSolid(f"coupon_{k}", plate, mesh, own, np.eye(3), np.zeros(3)))
+    return placed
 
 
 def coupon_seats(base: BaseLayout, pose: SeatPose) -> Seats:
@@ -97,14 +76,7 @@ def coupon_seats(base: BaseLayout, pose: SeatPose) -> Seats:
 
 
 def coupon_rows(seats: Seats, spec: BaseSpec, printer: PrinterSpec, lean: float) -> list[CouponRow]:
-    """A row for each chosen size, the largest first; several where the bed is too narrow.
-
-    Args:
-        seats: from `coupon_seats`.
-        spec: of the base.
-        printer: with its bed.
-        lean: of the seats' axes, radians.
-    """
+    """A row of `coupon_seats` for each size, the largest first; several on a narrow bed."""
     width = float(usable_size(printer)[0])
     rows = []
     for k in _seats_to_try(seats, spec):
@@ -149,14 +121,14 @@ def _text_width(text: str, spec: BaseSpec) -> float:
     return text_width(text) * spec.digit_mm / ROWS
 
 
+def _offset_texts(offsets: tuple[float, ...]) -> list[str]:
+    texts = [_short(f"{offset:+.3f}") for offset in offsets]
+    return ["0" if text in ("+0", "-0") else text for text in texts]
+
+
 def _offsets_width(spec: BaseSpec) -> float:
     """Width of the widest offset, mm."""
-    return max(_text_width(_offset_text(offset), spec) for offset in spec.coupon_offsets_mm)
-
-
-def _offset_text(offset: float) -> str:
-    text = _short(f"{offset:+.3f}")
-    return "0" if text in ("+0", "-0") else text
+    return max(_text_width(text, spec) for text in _offset_texts(spec.coupon_offsets_mm))
 
 
 def _short(number: str) -> str:
@@ -171,7 +143,11 @@ def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[li
     y = x = depth = 0.0
     for row in rows:
         row_width, row_depth = row.size
-        _check_fits(row, printer)
+        if row_width > bed_width or row_depth > bed_depth:
+            raise SpecError(
+                f"the coupon's seat for {row.name} mm takes {row_width:.0f} x {row_depth:.0f} mm: "
+                "make printer.bed_mm larger or prototype.largest_ball_mm smaller"
+            )
         # Rows come with falling depth, so the first of a shelf decides.
         if not shelves or x + row_width > bed_width:
             y, x, depth = (y + depth if shelves else 0.0), 0.0, row_depth
@@ -184,15 +160,6 @@ def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[li
     yield shelves
 
 
-def _check_fits(row: CouponRow, printer: PrinterSpec) -> None:
-    row_width, depth = row.size
-    if (np.array(row.size) > usable_size(printer)[:2]).any():
-        raise SpecError(
-            f"the coupon's seat for {row.name} mm takes {row_width:.0f} x {depth:.0f} mm: make "
-            "printer.bed_mm larger or prototype.largest_ball_mm smaller"
-        )
-
-
 def _plate(
     name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]], pose: SeatPose
 ) -> TopoDS_Solid:
@@ -202,9 +169,10 @@ def _plate(
         bodies += _texts(row, spec, corner)
         body = seat_body(seats, spec, k, pose, -row.middle)
         for n, offset in enumerate(row.offsets):
-            at = np.array([*_ball_middle(row, corner, n, seats), height(seats, spec, k, pose)])
-            seat = with_pads(body, seats, k, offset, pose)
-            bodies.append(moved(seat, np.eye(3), at))
+            right = row.first + (n + 1) * row.cell - GAP_MM
+            middle = corner + np.array([right - float(seats.boss[k]), row.middle])
+            at = np.array([*middle, height(seats, spec, k, pose)])
+            bodies.append(moved(with_pads(body, seats, k, offset, pose), np.eye(3), at))
             contacts.append(at - (seats.radius[k] + offset) * seats.local_normals[k] @ pose.axes)
             pads.append(seats.pad[k])
     solid = one_solid(name, fused(bodies))
@@ -213,39 +181,25 @@ def _plate(
 
 
 def _bars(spec: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
-    """A bar under each shelf, and one at the left that joins them."""
-    half = _bar_width(spec) / 2
+    """A bar under each shelf, and one at the left that joins them, on the bed."""
+    half, up = _bar_width(spec) / 2, np.array([0, 0, _bar_height(spec)])
     middles = [float(corner[1]) for ((_, corner), *_) in shelves]
     ends = [float(corner[0] + row.size[0]) - GAP_MM for (*_, (row, corner)) in shelves]
-    low, high = middles[0] - half, middles[-1] + half
-    bars = [
-        _bar((0.0, y - half), (end, y + half), spec) for y, end in zip(middles, ends, strict=True)
-    ]
-    return [*bars, _bar((0.0, low), (_bar_width(spec), high), spec)]
-
-
-def _bar(low: tuple[float, float], high: tuple[float, float], spec: BaseSpec) -> TopoDS_Shape:
-    """A bar on the bed between two corners (x, y)."""
-    corners = np.column_stack([rectangle(low, high), np.zeros(4)])
-    return prism(polygon(corners), np.array([0, 0, _bar_height(spec)]))
-
-
-def _ball_middle(row: CouponRow, corner: Floats, n: int, seats: Seats) -> Floats:
-    """Above which point of the bed the ball in a row's n-th seat is, (2,)."""
-    right = row.first + (n + 1) * row.cell - GAP_MM
-    return np.asarray(corner + np.array([right - float(seats.boss[row.seat]), row.middle]))
+    corners = [((0.0, y - half), (end, y + half)) for y, end in zip(middles, ends, strict=True)]
+    corners.append(((0.0, middles[0] - half), (_bar_width(spec), middles[-1] + half)))
+    flat = (np.column_stack([rectangle(low, high), np.zeros(4)]) for low, high in corners)
+    return [prism(polygon(one), up) for one in flat]
 
 
 def _texts(row: CouponRow, spec: BaseSpec, corner: Floats) -> list[TopoDS_Shape]:
     """The size at the left end, each offset left of its seat."""
-    solids = _text(row.name, spec, corner, row.first / 2)
     half = _offsets_width(spec) / 2
-    for n, offset in enumerate(row.offsets):
-        solids += _text(_offset_text(offset), spec, corner, row.first + n * row.cell + half)
+    texts = [(row.name, row.first / 2)]
+    texts += [
+        (text, row.first + n * row.cell + half) for n, text in enumerate(_offset_texts(row.offsets))
+    ]
+    solids: list[TopoDS_Shape] = []
+    for text, x in texts:
+        place = np.array([*(corner + np.array([x, 0.0])), _bar_height(spec)])
+        solids += relief(text, spec.digit_mm, spec.relief_mm, SUNK_MM, np.eye(3), place)
     return solids
-
-
-def _text(text: str, spec: BaseSpec, corner: Floats, x: float) -> list[TopoDS_Shape]:
-    """A text about a point at a distance x from a row's left end."""
-    place = np.array([*(corner + np.array([x, 0.0])), _bar_height(spec)])
-    return relief(text, spec.digit_mm, spec.relief_mm, SUNK_MM, np.eye(3), place)

@@ -71,23 +71,21 @@ def expected_downs(base: BaseLayout, split: BaseSplit) -> list[Floats]:
     In the frame of the shell, as all directions here. It is where the piece's pads face up, unless
     the bed is too small for that.
     """
-    return [_expected_down(base, in_piece) for in_piece in _seats_of_pieces(base, split)]
-
-
-def _expected_down(base: BaseLayout, seats: list[int]) -> Floats:
-    if not seats:
-        return np.asarray(-base.frame[0])
-    opening = opening_up(base.seats.pad_normals[seats].reshape(-1, 3))
-    return unit(base.seats.axis[seats].sum(axis=0)) if opening is None else opening
+    downs = []
+    for seats in _seats_of_pieces(base, split):
+        down = np.asarray(-base.frame[0])
+        if seats:
+            opening = opening_up(base.seats.pad_normals[seats].reshape(-1, 3))
+            axes = base.seats.axis[seats]
+            down = unit(axes.sum(axis=0)) if opening is None else opening
+        downs.append(down)
+    return downs
 
 
 def worst_pose(base: BaseLayout, split: BaseSplit, downs: Sequence[Floats]) -> SeatPose:
     """Pose of the seat with the pad that is nearest to facing down; of several, that leans most.
 
-    Args:
-        base: with its seats.
-        split: into pieces.
-        downs: direction that is down when each piece is printed, (3,) each.
+    downs are the directions (3,) that are down when each piece is printed.
     """
     seats, pieces = base.seats, _seats_of_pieces(base, split)
     down = {k: way for way, in_piece in zip(downs, pieces, strict=True) for k in in_piece}
@@ -119,14 +117,9 @@ def _bed(axis: Floats, down: Floats) -> Floats:
 
 
 def seat_body(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose, to_bar: float) -> TopoDS_Shape:
-    """A seat without its pads, with its keel, along the bed's axes, the ball's centre at 0.
+    """Seat k without its pads, with its keel to a bar at y = to_bar, mm.
 
-    Args:
-        seats: from `coupon_seats`.
-        spec: of the base.
-        k: number of the seat.
-        pose: of the seat on the bed.
-        to_bar: y of the bar that the keel reaches, mm.
+    Along the bed's axes, with the ball's centre at 0; seats are those of `coupon_seats`.
     """
     wall = revolved_polygon(wall_section(seats, spec, k), 0.0, 2 * np.pi)
     legs = cut(wall, list(_between_legs(seats, spec, k)))
