@@ -16,7 +16,7 @@ from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
-from tbcad.rig.calibration.estimate.reflection import projection, reflections
+from tbcad.rig.calibration.estimate.jacobian import projection, reflections
 from tbcad.rig.calibration.uncertainty import SPHERE_MM
 from tbcad.rig.machine.designed import designed_shell, read_leds
 from tbcad.types import Bools, Floats, Progress

@@ -15,15 +15,14 @@ from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.inputs import Source, files_named
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detect import detect
-from tbcad.rig.calibration.detection.expected import Room
+from tbcad.rig.calibration.detection.matching import Room
 from tbcad.rig.calibration.intrinsics.files import read_lens
 from tbcad.rig.calibration.priors import parse_measured
 from tbcad.rig.calibration.report.files import write_calibration, write_recovered
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
 from tbcad.rig.machine.designed import dome_radius
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import TRUTH, read_machine
-from tbcad.rig.runs.photographs import Run, check_same_export, read_run
+from tbcad.rig.machine.machine import TRUTH, Machine, read_machine
+from tbcad.rig.runs import Run, check_same_export, read_run
 from tbcad.tolerancing.process.process import Process, load_process, process_errors
 
 DEFAULT_PROCESS = "fdm"

@@ -20,12 +20,12 @@ from tbcad.rig.control.messages import (
     RESTING,
     STATES,
     Message,
+    Port,
     Status,
     firmware_of,
     meaning,
     parse,
 )
-from tbcad.rig.control.port import Port
 from tbcad.types import Progress
 
 RESET, HOLD, QUERY = b"\x18", b"!", b"?"

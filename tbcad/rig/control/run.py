@@ -14,23 +14,23 @@ from tbcad.output.inputs import refuse_inputs
 from tbcad.records.exposure import DARK_LIT, PhaseTimes, exposure_name
 from tbcad.records.run import RunRecord, read_record
 from tbcad.rig.control.base import Base
-from tbcad.rig.control.cameras.choice import (
+from tbcad.rig.control.chosen_camera import (
     check_camera_name,
     check_can_expose,
     connected_camera,
 )
 from tbcad.rig.control.grbl import Grbl
-from tbcad.rig.control.klipper.base import KlipperBase
-from tbcad.rig.control.klipper.files import read_klipper_files
-from tbcad.rig.control.klipper.host import Klipper
-from tbcad.rig.control.klipper.moonraker import PREFIX, Moonraker, read_address
+from tbcad.rig.control.klipper import Klipper
+from tbcad.rig.control.klipper_base import KlipperBase, read_klipper_files
 from tbcad.rig.control.machine import DrivenMachine, MachineFault
-from tbcad.rig.control.outcome import DryRun, Outcome
+from tbcad.rig.control.messages import SerialPort
+from tbcad.rig.control.moonraker import PREFIX, Moonraker, read_address
 from tbcad.rig.control.plan import ControlPlan, read_control_plan
-from tbcad.rig.control.port import SerialPort
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
+    DryRun,
+    Outcome,
     RunSelection,
     Shots,
     chosen_frames,
@@ -40,8 +40,7 @@ from tbcad.rig.control.selection import (
     expected_seconds,
 )
 from tbcad.rig.control.session import Session
-from tbcad.rig.runs.photographs import read_run
-from tbcad.rig.runs.writing import DiskFault, check_new
+from tbcad.rig.runs import DiskFault, check_new, read_run
 from tbcad.types import Progress
 
 STOPPED = "stopped by the operator"

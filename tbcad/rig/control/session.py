@@ -9,11 +9,11 @@ from pathlib import Path
 from tbcad.errors import InputError
 from tbcad.options.runs import Ask, Preflight, Show
 from tbcad.records.exposure import Frame, exposure_name
-from tbcad.rig.control.cameras.camera import RunCamera, Shot
+from tbcad.rig.control.camera import RunCamera, Shot
 from tbcad.rig.control.machine import CameraFault, DrivenMachine, MachineFault
-from tbcad.rig.control.outcome import Outcome
 from tbcad.rig.control.plan import ControlPlan
 from tbcad.rig.control.selection import (
+    Outcome,
     RunSelection,
     Shots,
     bytes_each,
@@ -32,7 +32,7 @@ from tbcad.rig.control.shooting import (
     run_record,
     taken_twice,
 )
-from tbcad.rig.runs.writing import DiskFault, RunWriter, new_run, resumed_run
+from tbcad.rig.runs import DiskFault, RunWriter, new_run, resumed_run
 from tbcad.types import Progress
 
 MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph

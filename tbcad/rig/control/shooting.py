@@ -11,8 +11,14 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import PhaseExposure, RunRecord
-from tbcad.rig.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
-from tbcad.rig.control.cameras.image_facts import ImageFacts, image_facts
+from tbcad.rig.control.camera import (
+    ImageFacts,
+    RunCamera,
+    Shot,
+    are_near,
+    image_facts,
+    shutter_seconds,
+)
 from tbcad.rig.control.machine import CameraFault, DrivenMachine
 from tbcad.rig.control.plan import ControlPlan
 from tbcad.rig.control.selection import RunSelection

@@ -1,14 +1,17 @@
-"""A run's photographs, ready to be merged into the light field of the machine that took them."""
+"""A run's photographs merged into the light field of the machine that took them, and its folder."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import hypot
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.files import capture_record, write_cameras, write_record
+from tbcad.light.simulate.capture.light_field import RAY_SIGMAS
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
 from tbcad.light.simulate.prototype.plan import Plan
@@ -16,20 +19,47 @@ from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
 from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.options.machines import MergeOptions
-from tbcad.records.exposure import LIT, Frame
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import TURNS, machine_run, stops_known
-from tbcad.rig.machine.record import RECORD, read_machine
+from tbcad.records.exposure import LIT, Frame, exposure_name
+from tbcad.records.tables import RayRow
+from tbcad.rig.machine.designed import TURNS, machine_run, stops_known
+from tbcad.rig.machine.machine import RECORD, Machine, read_machine
 from tbcad.rig.machine.shells import NOT_SERVED, plan_of, tied
-from tbcad.rig.merged_run.ray_sigmas import ray_sigmas
 from tbcad.rig.merged_run.stop_photographs import (
     CorrectedPhotographs,
     Corrections,
     common_exposure,
     corrections,
 )
-from tbcad.rig.runs.photographs import Run, check_same_export, read_run
+from tbcad.rig.runs import Run, check_same_export, read_run
 from tbcad.types import Bools, Floats, Ints, Progress
+
+
+def ray_sigmas(
+    folders: Iterable[Path], mirrors: Mapping[str, int], capture_mm: float
+) -> dict[str, list[float | None]]:
+    """Root mean square error of the rays of each mirror where the object is, mm, by camera.
+
+    At the centre it is `sigma_mm`; elsewhere their angle counts too, here at half the radius of
+    the capture sphere. None: the calibration does not say.
+
+    Args:
+        folders: of the calibration, each with a table; older ones have none.
+        mirrors: of each camera, their number.
+        capture_mm: diameter of the capture sphere.
+
+    Raises:
+        InputError: a table is damaged.
+    """
+    known = {
+        ray.mirror: round(hypot(ray.sigma_mm, ray.sigma_mrad / 1000 * capture_mm / 4), 5)
+        for folder in folders
+        if (folder / RayRow.FILE).is_file()
+        for ray in RayRow.read(folder)
+    }
+    return {
+        camera: [known.get(f"{camera}{number + 1:04d}") for number in range(count)]
+        for camera, count in mirrors.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -190,3 +220,46 @@ def _shows_object(
     del distance
     origin = np.broadcast_to(pinhole, direction.shape).copy()
     return np.asarray((mirror == 0) & meets_sphere(origin, direction, radius))
+
+
+def write_merge(folder: Path, merge: Merge, progress: Progress) -> dict[str, Any]:
+    """Merge and write all files into a folder, and return its record.
+
+    Args:
+        folder: exists, and is the caller's to replace.
+        merge: what to merge.
+        progress: called with each step.
+    """
+    record = capture_record(merge.facts)
+    stored = {**record, RAY_SIGMAS: merge.ray_sigma_mm}  # which would fill capture.json
+    write_cameras(folder, merge.cameras(progress), merge.capture_mm, stored)
+    record["based_on"] = {half.camera_id: based_on(half) for half in merge.halves}
+    write_record(folder, record)
+    return record
+
+
+def based_on(half: HalfMerge) -> dict[str, Any]:
+    """What a camera's picture is based on, after its merge, for capture.json."""
+    missing = half.missing_mirrors()
+    run, known = half.photographs.run, [f for f in half.photographs.frames if f is not None]
+    phases = LIT, half.photographs.dark_phase
+    names = {exposure_name(frame, phase) for frame in known for phase in phases}
+    unread = {
+        exposure_name(frame, LIT): half.photographs.missing[stop]
+        for stop, frame in enumerate(half.photographs.frames)
+        if frame is not None and stop in half.photographs.missing
+    }
+    return {
+        "mirrors": len(half.pixels),
+        "mirrors_with_rays": int((half.pixels > 0).sum()),
+        "stops": len(half.photographs.frames),
+        "stops_used": len(known) - len(unread),
+        "mirrors_missing": {
+            reason: [f"{half.camera_id}{number:04d}" for number in numbers]
+            for reason, numbers in missing.items()
+        },
+        "photographs_not_used": {name: fault for name, fault in run.faults.items() if name in names}
+        | unread,
+        "without_dark": sorted(half.photographs.without_dark),
+        "dark_scaled": sorted(half.photographs.dark_scaled),
+    }

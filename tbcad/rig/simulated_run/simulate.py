@@ -30,7 +30,7 @@ from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exp
 from tbcad.records.run import RECORD, Geometry, RunRecord
 from tbcad.rig.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.rig.machine.designed import designed_prototype, dome_radius
-from tbcad.rig.machine.record import truth_file, write_machine
+from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
 from tbcad.rig.simulated_run.photographs import (

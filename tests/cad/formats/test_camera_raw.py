@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.cad.formats.images.pictures import picture_of, read_picture
 from tbcad.errors import InputError
-from tbcad.rig.control.cameras.image_facts import image_facts
+from tbcad.rig.control.camera import image_facts
 from tests.raw_photographs import dng
 
 BLACK, WHITE = 512, 16_383

@@ -10,14 +10,13 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.plan import Plan
 from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.rig.calibrated_solids.tolerance import (
+from tbcad.rig.calibrated_solids import (
     as_built_tolerance,
     summary,
     tolerance_record,
     tolerance_table,
 )
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import write_machine
+from tbcad.rig.machine.machine import Machine, write_machine
 from tests.machine_states import frames_of, machine_of, perturbed
 
 

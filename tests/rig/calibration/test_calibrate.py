@@ -17,17 +17,16 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import DARK, exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detection import Detection
-from tbcad.rig.calibration.estimate.covariance import covariance
 from tbcad.rig.calibration.estimate.jacobian import base_slopes
+from tbcad.rig.calibration.estimate.parameters import covariance
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.report.files import write_calibration
+from tbcad.rig.calibration.report.record import rays_table, residuals_table
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
-from tbcad.rig.calibration.report.tables import rays_table, residuals_table
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
 from tbcad.rig.machine.built import BuiltPrototype, random_build
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import TRUTH, read_machine, write_machine
-from tbcad.rig.runs.photographs import Run
+from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
+from tbcad.rig.runs import Run
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
 from tests.rig.calibration.machines import every_highlight

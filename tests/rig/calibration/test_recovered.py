@@ -9,8 +9,9 @@ from scipy.stats import chi2
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import unit
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.covariance import Covariance, covariance
+from tbcad.rig.calibration.estimate.parameters import Covariance, covariance
 from tbcad.rig.calibration.estimate.solve import estimate
+from tbcad.rig.calibration.report.record import angles_table, spheres_table
 from tbcad.rig.calibration.report.recovered import (
     BESIDES,
     Kind,
@@ -19,7 +20,6 @@ from tbcad.rig.calibration.report.recovered import (
     recovered_errors,
     turn_mrad,
 )
-from tbcad.rig.calibration.report.tables import angles_table, spheres_table
 from tbcad.rig.machine.built import BuiltPrototype
 from tbcad.rig.machine.machine import Machine
 from tests.rig.calibration.machines import drawn, every_highlight

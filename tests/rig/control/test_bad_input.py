@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control.port import opening_reason
+from tbcad.rig.control.messages import opening_reason
 from tests.exported_files import edit_json
 from tests.rig.control.grbl_double import BANNERS
 from tests.rig.control.rig import Rig

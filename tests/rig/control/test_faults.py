@@ -12,9 +12,9 @@ from unittest.mock import patch
 import pytest
 
 from tbcad.app.cli import run as tbcad
+from tbcad.rig import runs
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.plan import read_settings
-from tbcad.rig.runs import writing
 from tests.rig.control.grbl_double import GrblDouble
 from tests.rig.control.rig import Rig, until
 from tests.rig.control.run_checks import check_every_photograph, events
@@ -340,7 +340,7 @@ def test_dead_camera_stops_the_run(rig: Rig, capsys: pytest.CaptureFixture[str])
 def test_full_disk(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    whole, writes = writing.write_safely, list[Path]()
+    whole, writes = runs.write_safely, list[Path]()
 
     def full(path: Path, data: bytes) -> None:
         writes.append(path)
@@ -348,11 +348,11 @@ def test_full_disk(
             raise OSError(errno.ENOSPC, "No space left on device")
         whole(path, data)
 
-    monkeypatch.setattr(writing, "write_safely", full)
+    monkeypatch.setattr(runs, "write_safely", full)
     assert tbcad(rig.words()) == 1
     out = capsys.readouterr().out
     assert "cannot be written: No space left on device" in out
     assert not rig.controller.machine.lights
-    monkeypatch.setattr(writing, "write_safely", whole)
+    monkeypatch.setattr(runs, "write_safely", whole)
     assert tbcad(rig.resume()) == 0
     check_every_photograph(rig.out, ALL)

@@ -6,7 +6,7 @@ import pytest
 
 from tbcad.rig.control.grbl import SYNC, Grbl
 from tbcad.rig.control.machine import ControllerReset, MachineFault
-from tbcad.rig.control.port import SerialPort
+from tbcad.rig.control.messages import SerialPort
 from tests.rig.control.grbl_double import PLANNER, GrblDouble
 from tests.rig.control.rig import until
 

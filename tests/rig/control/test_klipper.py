@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control.klipper.base import PIECE_S
+from tbcad.rig.control.klipper_base import PIECE_S
 from tests.rig.control.rig import Rig, until
 from tests.rig.control.run_checks import check_every_photograph, events
 
@@ -202,7 +202,7 @@ def test_moonraker_that_goes(klipper_rig: Rig, capsys: pytest.CaptureFixture[str
 def test_other_programs_motion_is_waited_for(
     klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tbcad.rig.control.klipper.host.LATE_S", -1000.0)
+    monkeypatch.setattr("tbcad.rig.control.klipper.LATE_S", -1000.0)
     controller = klipper_rig.controller
 
     def busy() -> None:

@@ -11,7 +11,7 @@ from threading import Thread
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control.klipper import files, moonraker
+from tbcad.rig.control import klipper_base, moonraker
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
 
@@ -171,7 +171,7 @@ def test_klipper_that_never_started(klipper_rig: Rig, capsys: pytest.CaptureFixt
 def test_start_is_waited_for(klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     controller = klipper_rig.controller
     controller.state = "startup"
-    monkeypatch.setattr("tbcad.rig.control.klipper.host.STARTING_S", {"startup": 60.0})
+    monkeypatch.setattr("tbcad.rig.control.klipper.STARTING_S", {"startup": 60.0})
 
     def start() -> None:
         until(lambda: controller.asked > 2)
@@ -249,7 +249,7 @@ def test_idle_printer(
     settings: dict[str, object], status: dict[str, object], seconds: float | None
 ) -> None:
     """What is set, and what SET_IDLE_TIMEOUT changed since."""
-    assert files.idle_that_lets_go({"idle_timeout": settings}, status) == seconds
+    assert klipper_base.idle_that_lets_go({"idle_timeout": settings}, status) == seconds
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_idle_printer(
     ],
 )
 def test_same_values(wanted: str, found: object, same: bool) -> None:
-    assert list(files.differences({"a": {"b": wanted}}, {"a": {"b": found}})) == (
+    assert list(klipper_base.differences({"a": {"b": wanted}}, {"a": {"b": found}})) == (
         [] if same else [f"b of [a] is {found!r}, not {wanted}"]
     )
 

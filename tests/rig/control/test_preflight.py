@@ -14,13 +14,12 @@ from tbcad.app.cli import run as tbcad
 from tbcad.errors import InputError
 from tbcad.records.exposure import PhaseTimes
 from tbcad.rig.control.base import Base
-from tbcad.rig.control.cameras.camera import Shot
-from tbcad.rig.control.cameras.choice import CommandCamera
-from tbcad.rig.control.cameras.image_facts import EXIF, EXPOSURE, ImageFacts
+from tbcad.rig.control.camera import EXIF, EXPOSURE, ImageFacts, Shot
+from tbcad.rig.control.chosen_camera import CommandCamera
 from tbcad.rig.control.machine import CameraFault
 from tbcad.rig.control.preflight import look, preflight
 from tbcad.rig.control.shooting import Photograph, common_settings, take
-from tbcad.rig.runs.photographs import read_run
+from tbcad.rig.runs import read_run
 from tests.rig.control import exposing_camera
 from tests.rig.control.exposing_camera import SIZE, radiance
 from tests.rig.control.rig import Rig, connected_rig, put, scene_of

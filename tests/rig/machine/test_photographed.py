@@ -13,8 +13,8 @@ from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
 from tbcad.light.simulate.prototype.run import prototype_runs
 from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.records.exposure import Frame
+from tbcad.rig.machine.designed import machine_runs, stops_known
 from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import machine_runs, stops_known
 from tests.machine_states import frames_of, machine_of, perturbed
 
 

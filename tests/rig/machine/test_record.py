@@ -11,8 +11,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera, without_distortion
 from tbcad.errors import InputError
 from tbcad.records.exposure import Frame
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import read_machine, write_machine
+from tbcad.rig.machine.machine import Machine, read_machine, write_machine
 
 FORWARD = unit(np.array([-0.2, 0.0, 1.0]))
 DESIGNED = Camera(

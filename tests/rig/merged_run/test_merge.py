@@ -22,8 +22,7 @@ from tbcad.light.simulate.scene.viewpoint import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import write_machine
+from tbcad.rig.machine.machine import Machine, write_machine
 from tests.machine_states import frames_of, machine_of
 from tests.photographed_runs import photographs_of, write_exposure, write_run
 

@@ -12,8 +12,7 @@ from PIL import Image
 from tbcad.errors import InputError
 from tbcad.records.exposure import Exposure, Frame, exposure_name
 from tbcad.records.run import RunRecord
-from tbcad.rig.runs.photographs import read_run
-from tbcad.rig.runs.writing import RunWriter, check_new, new_run, resumed_run
+from tbcad.rig.runs import RunWriter, check_new, new_run, read_run, resumed_run
 
 FRAMES = tuple(Frame(object_turn_deg=0, stop=stop, base_angle_deg=stop) for stop in (1, 2))
 RECORD = RunRecord(

@@ -12,8 +12,8 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.plan import read_plan
 from tbcad.light.simulate.scene.exported import read_export
 from tbcad.options.machines import SimulateRunOptions
-from tbcad.rig.machine.record import TRUTH, read_machine
-from tbcad.rig.runs.photographs import read_photograph, read_run
+from tbcad.rig.machine.machine import TRUTH, read_machine
+from tbcad.rig.runs import read_photograph, read_run
 from tbcad.rig.simulated_run import simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.prototype.draws import read_wind_up

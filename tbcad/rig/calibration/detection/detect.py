@@ -17,13 +17,15 @@ from tbcad.rig.calibration.detection.detection import (
     relative_light,
     verdicts,
 )
-from tbcad.rig.calibration.detection.expected import Expected, Room, maybe_hidden
 from tbcad.rig.calibration.detection.matching import (
     CameraMove,
+    Expected,
     NoPairs,
+    Room,
     find_move,
     highlights_of,
     match,
+    maybe_hidden,
     shift_of,
 )
 from tbcad.rig.calibration.detection.spots import (
@@ -38,8 +40,7 @@ from tbcad.rig.calibration.detection.spots import (
 )
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.machine.machine import Machine
-from tbcad.rig.runs.images import Image16
-from tbcad.rig.runs.photographs import Run, read_photograph
+from tbcad.rig.runs import Image16, Run, read_photograph
 from tbcad.types import Bools, Floats, Progress
 
 DOME_MM = 1.5  # radius of a 3 mm LED

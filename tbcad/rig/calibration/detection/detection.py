@@ -1,7 +1,7 @@
 """What a detection gives: the highlights to calibrate from, and what was not used, and why.
 
 `tbcad.rig.calibration.detection.detect.detect(run, prior)` makes it of a run that
-tbcad.rig.runs.photographs has read, and of the prior of its machine, whose frames are those of the
+tbcad.rig.runs has read, and of the prior of its machine, whose frames are those of the
 run's record in the same order.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
-from tbcad.rig.calibration.detection.expected import Expected
+from tbcad.rig.calibration.detection.matching import Expected
 from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, Unmeasured, stacked
 from tbcad.rig.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints

@@ -16,7 +16,7 @@ from tbcad.rig.calibration.intrinsics.boards import (
     find_corners,
 )
 from tbcad.rig.calibration.intrinsics.lens import CalibratedLens, cv
-from tbcad.rig.runs.images import read_image
+from tbcad.rig.runs import read_image
 from tbcad.types import Floats, Progress
 
 MIN_BOARDS = 6

@@ -11,11 +11,10 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.covariance import Covariance
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.parameters import Block, Covariance
 from tbcad.rig.calibration.estimate.solve import Estimate
-from tbcad.rig.calibration.report.tables import angle_sigmas
+from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
 from tbcad.rig.machine.built import is_cap
 from tbcad.rig.machine.machine import Machine

@@ -15,10 +15,10 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import exposure_name
 from tbcad.rig.calibration.detection.detect import detect
 from tbcad.rig.calibration.detection.detection import Detection, Rejection, no_highlights
-from tbcad.rig.calibration.detection.expected import Room, expected_highlights
+from tbcad.rig.calibration.detection.matching import Room, expected_highlights
 from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.rig.machine.machine import Highlights
-from tbcad.rig.runs.photographs import read_run
+from tbcad.rig.runs import read_run
 from tbcad.rig.simulated_run.photographs import ImagingChain
 from tbcad.types import Floats
 from tests.simulated_runs import BRIGHT, Small, small_run
