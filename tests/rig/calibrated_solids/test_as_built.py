@@ -143,10 +143,3 @@ class TestRefused:
         with pytest.raises(InputError, match=r"has 4 balls, .* has 5"):
             as_built(tmp_path / "known", export.folder, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
-
-    def test_a_calibration_that_names_no_export(
-        self, plan: Plan, built: Machine, tmp_path: Path
-    ) -> None:
-        write_machine(tmp_path / "machine.json", built, frames_of(plan))
-        with pytest.raises(InputError, match="name it with --exports"):
-            as_built(tmp_path, out=tmp_path / "out")

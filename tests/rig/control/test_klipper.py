@@ -138,8 +138,9 @@ def test_shutdown_while_something_is_waited_for(
     check_every_photograph(klipper_rig.out, ALL)
 
 
-@pytest.mark.parametrize("act", ["let_go", "restart"])
-@pytest.mark.parametrize("line", [LED, "SET_PIN PIN=lamp VALUE=0"])
+@pytest.mark.parametrize(
+    ("act", "line"), [("let_go", LED), ("restart", "SET_PIN PIN=lamp VALUE=0")]
+)
 def test_motor_that_was_let_go(
     klipper_rig: Rig, act: str, line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

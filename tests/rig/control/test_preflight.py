@@ -12,7 +12,6 @@ from PIL import Image
 
 from tbcad.app.cli import run as tbcad
 from tbcad.errors import InputError
-from tbcad.records.exposure import PhaseTimes
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.camera import EXIF, EXPOSURE, ImageFacts, Shot
 from tbcad.rig.control.chosen_camera import CommandCamera
@@ -168,12 +167,6 @@ def test_what_shines_in_the_dark_is_no_highlight() -> None:
     lamp = pixels(1.0, 3)
     assert look("led_1", lamp, lamp).highlights == 0
     assert look("led_1", lamp + pixels(0.6, 3, number=7) // 2, lamp).highlights == 2
-
-
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
-def test_times_that_are_none(seconds: float) -> None:
-    with pytest.raises(InputError, match="allowed are seconds above 0"):
-        PhaseTimes(lit_s=seconds)
 
 
 def png(image: np.ndarray) -> Shot:

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +22,12 @@ from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.rig.machine.machine import Machine, write_machine
+from tests.exported_files import edit_json
 from tests.machine_states import frames_of, machine_of
 from tests.photographed_runs import photographs_of, write_exposure, write_run
 
 CAPTURE_MM = 60.0
+FIRST = Frame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
 EVEN: dict[str, Any] = {"vignetting": "off"}
 """The photographs of these tests have no loss of light toward the edge, unless they say so."""
 Photographs = dict[str, np.ndarray]
@@ -91,7 +92,7 @@ def apart(one: LightField, other: LightField) -> list[np.ndarray]:
 
 
 class TestPerfectMachine:
-    @pytest.mark.parametrize(("suffix", "factor"), [("png", 1), ("png", 257), ("tif", 257)])
+    @pytest.mark.parametrize(("suffix", "factor"), [("png", 1), ("tif", 257)])
     def test_same_as_the_simulated_capture(
         self,
         export: ExportedDesign,
@@ -209,7 +210,9 @@ class TestIncomplete:
         (images / f"a_{lost + 1:04d}_lit.png").unlink()
         (images / f"a_{lost + 1:04d}_lit.json").unlink()
         (images / f"a_{damaged + 1:04d}_lit.png").write_bytes(b"no picture")
+        before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
         record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
+        assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
         half = record["based_on"]["a"]
         expected = {f"a{m + 1:04d}" for m in np.flatnonzero(np.isin(plan.stop[0], [lost, damaged]))}
         named = {name for names in half["mirrors_missing"].values() for name in names}
@@ -243,28 +246,8 @@ class TestIncomplete:
         (reason,) = record["based_on"]["a"]["mirrors_missing"]
         assert reason == "the calibration has no angle of this stop"
 
-    def test_a_dark_photograph_that_is_missing(
-        self,
-        export: ExportedDesign,
-        frames: tuple[Frame, ...],
-        perfect: Photographs,
-        calibration: Path,
-        tmp_path: Path,
-    ) -> None:
-        run = write_run(tmp_path / "dark", export, frames, perfect, (DARK, LIT))
-        (run / PHOTOGRAPHS / "a_0003_dark.png").write_bytes(b"")
-        record = merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
-        assert record["based_on"]["a"]["without_dark"] == ["a_0003_lit"]
-
-    @pytest.mark.parametrize(
-        "case",
-        [
-            (DARK_LIT, 1.0, [], []),  # as long as the lit one, whatever `dark` has
-            (DARK, 2.0, [], ["a_0003_lit"]),
-            (DARK, 0.01, ["a_0003_lit"], []),
-        ],
-    )
-    def test_a_dark_photograph_of_another_exposure(
+    @pytest.mark.parametrize("dark", [DARK, DARK_LIT])
+    def test_dark_photographs(
         self,
         export: ExportedDesign,
         frames: tuple[Frame, ...],
@@ -272,30 +255,35 @@ class TestIncomplete:
         simulated: LightField,
         calibration: Path,
         tmp_path: Path,
-        case: tuple[str, float, list[str], list[str]],
+        dark: str,
     ) -> None:
-        """Stray light grows with the exposure; `dark` beside `dark_lit` would take off too much."""
-        phase, seconds, without, scaled = case
-        stray = 1000.0
+        """Stray light grows with the exposure; `dark` beside `dark_lit` would take off too much.
 
-        def taken(image: np.ndarray, frame: Frame, taken_in: str) -> np.ndarray:
-            own = seconds if (taken_in, frame.stop) == (phase, 3) else 1.0
-            light = 50_000 if taken_in == DARK != phase else stray * own
+        At the third stop the dark one is exposed twice as long as the lit one, at the fourth far
+        too short, at the sixth it is missing; `dark_lit` is always as long as the lit one.
+        """
+        times = {3: 2.0, 4: 0.01} if dark == DARK else {}
+
+        def taken(image: np.ndarray, frame: Frame, phase: str) -> np.ndarray:
+            own = times.get(frame.stop, 1.0) if phase == dark else 1.0
+            light = 50_000 if phase == DARK != dark else 1000.0 * own
             return np.rint(100.0 * image + light).astype(np.uint16)
 
-        phases = (DARK, LIT) if phase == DARK else (DARK, DARK_LIT, LIT)
+        phases = tuple(dict.fromkeys((DARK, dark, LIT)))
         run = write_run(tmp_path / "dark", export, frames, perfect, phases, taken)
         for frame in frames:
             for name in phases:
-                own = seconds if (name, frame.stop) == (phase, 3) else 1.0
-                set_exposure(run, frame, name, own)
+                set_exposure(run, frame, name, times.get(frame.stop, 1.0) if name == dark else 1.0)
+        if dark == DARK:
+            (run / PHOTOGRAPHS / "a_0006_dark.png").write_bytes(b"")
         options = {"vignetting": "off", "brightness": 2.57}
         record = merge(run, calibration, export.folder, out=tmp_path / "merged", **options)
         half = record["based_on"]["a"]
-        assert half["without_dark"] == without
-        assert half["dark_scaled"] == scaled
+        assert half["without_dark"] == (["a_0004_lit", "a_0006_lit"] if times else [])
+        assert half["dark_scaled"] == (["a_0003_lit"] if times else [])
         off = np.concatenate(apart(LightField.read(tmp_path / "merged"), simulated))
-        assert (off.max() > 1) == bool(without)
+        assert (off.max() > 1) == bool(times)
+        assert np.median(off) <= 1
 
     def test_one_run_of_two(
         self,
@@ -320,59 +308,47 @@ class TestIncomplete:
         at = camera_around_object(0.0, 0.6, 640.0, CAPTURE_MM, (64, 64), None)
         assert synthesise(MirrorTiles(field), at, "nearest", None).image.any()
 
-    def test_nothing_in_the_run_is_changed(
-        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
-    ) -> None:
-        before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-        merge(run, calibration, export.folder, out=tmp_path / "merged", **EVEN)
-        assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+@pytest.mark.parametrize(
+    ("file", "key", "value", "message"),
+    [
+        ("calibration/machine.json", "camera", {"width_px": 417}, "416 x 310 .* 417 x 310"),
+        ("run/run.json", "export_sha256", {"balls.csv": "0"}, "balls.csv is not the file that"),
+    ],
+)
+@pytest.mark.usefixtures("run", "calibration")
+def test_what_does_not_belong_together(
+    export: ExportedDesign,
+    tmp_path: Path,
+    file: str,
+    key: str,
+    value: dict[str, Any],
+    message: str,
+) -> None:
+    edit_json(tmp_path / file, lambda record: record[key].update(value))
+    refused(tmp_path / "run", tmp_path / "calibration", export, tmp_path, message)
 
 
-def edit(path: Path, change: Callable[[dict], object]) -> None:
-    record = json.loads(path.read_text(encoding="utf-8"))
-    change(record)
-    path.write_text(json.dumps(record), encoding="utf-8")
+def test_a_flat_field_of_another_size(
+    export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
+) -> None:
+    name = "a_0001_lit.png"
+    write_exposure(tmp_path, FIRST, LIT, np.full((100, 200, 3), 255, np.uint8), name)
+    message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
+    refused(run, calibration, export, tmp_path, message, {"flat": (tmp_path / name,)})
 
 
-class TestRefused:
-    def test_photographs_of_another_size_than_the_cameras(
-        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
-    ) -> None:
-        edit(calibration / "machine.json", lambda record: record["camera"].update(width_px=417))
-        refused(run, calibration, export, tmp_path, "416 x 310 pixels, the camera of .* 417 x 310")
-
-    def test_another_export(
-        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
-    ) -> None:
-        edit(run / "run.json", lambda record: record["export_sha256"].update({"balls.csv": "0"}))
-        refused(run, calibration, export, tmp_path, "balls.csv is not the file that")
-
-    def test_no_photograph_of_the_object(
-        self,
-        export: ExportedDesign,
-        frames: tuple[Frame, ...],
-        perfect: Photographs,
-        calibration: Path,
-        tmp_path: Path,
-    ) -> None:
-        dark = write_run(tmp_path / "dark", export, frames, perfect, (DARK,))
-        refused(dark, calibration, export, tmp_path, "no photograph of the lit object")
-
-    def test_a_calibration_that_names_no_export(
-        self, run: Path, calibration: Path, tmp_path: Path
-    ) -> None:
-        with pytest.raises(InputError, match="name it with --exports"):
-            merge(run, calibration, out=tmp_path / "merged")
-
-    def test_a_flat_field_of_another_size(
-        self, export: ExportedDesign, run: Path, calibration: Path, tmp_path: Path
-    ) -> None:
-        frame = Frame(object_turn_deg=0, stop=1, base_angle_deg=0.0)
-        image = np.full((100, 200, 3), 255, dtype=np.uint8)
-        write_exposure(tmp_path, frame, LIT, image, "a_0001_lit.png")
-        options = {"flat": (tmp_path / "a_0001_lit.png",)}
-        message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
-        refused(run, calibration, export, tmp_path, message, options)
+def test_no_photograph_of_the_object(
+    export: ExportedDesign,
+    frames: tuple[Frame, ...],
+    perfect: Photographs,
+    calibration: Path,
+    tmp_path: Path,
+) -> None:
+    dark = write_run(tmp_path / "dark", export, frames, perfect, (DARK,))
+    refused(dark, calibration, export, tmp_path, "no photograph of the lit object")
+    with pytest.raises(InputError, match="name it with --exports"):
+        merge(dark, calibration, out=tmp_path / "merged")
 
 
 def refused(
