@@ -108,11 +108,7 @@ def ball_group(machine: Machine, plan: Plan, found: Deviations) -> SolidGroup:
 
 
 def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
-    """Write the files of a machine as built, and return their record.
-
-    Raises:
-        InputError: one cannot be read, or they do not belong together.
-    """
+    """Write the files of a machine as built and return their record, or an InputError."""
     machine, _ = read_machine(calibration / RECORD)
     plan = read_plan(read_export(exports))
     if len(machine.radius) != len(plan):
@@ -120,20 +116,15 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
             f"{calibration} has {len(machine.radius)} balls, {exports} has {len(plan)}: name the "
             "export that was calibrated with --exports"
         )
-    facts = {"calibration": str(calibration), "exports": str(exports), "balls": len(plan)}
-    return write_as_built(folder, machine, plan, deviations(machine, plan), facts)
-
-
-def write_as_built(
-    folder: Path, machine: Machine, plan: Plan, found: Deviations, facts: dict[str, Any]
-) -> dict[str, Any]:
-    """Write all files into the caller's folder, and return the record, with the given facts."""
+    found = deviations(machine, plan)
     write_assembly(folder / STEP, "prototype_as_built", [ball_group(machine, plan, found)])
     write_table(folder / TABLE, COLUMNS, _rows(machine, found))
     write_images({folder / LEGEND: legend(found.scale_um)})
     record = {
         "schema": SCHEMA,
-        **facts,
+        "calibration": str(calibration),
+        "exports": str(exports),
+        "balls": len(plan),
         "scale_um": [0.0, found.scale_um],
         "base": {
             "shift_mm": found.shift.tolist(),
@@ -214,8 +205,7 @@ def as_built_tolerance(
     costs at most 2 d of coverage. The errors d of the mirrors are drawn independently, each with
     its own standard deviation of rays.csv.
 
-    Raises:
-        InputError: one cannot be read, or they do not belong together.
+    InputError: one cannot be read, or they do not belong together.
     """
     export = read_export(exports)
     plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)

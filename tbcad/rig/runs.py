@@ -33,11 +33,7 @@ TAKEN = "taken"
 
 
 def read_image(path: Path) -> Image16:
-    """The photograph in a file, (h, w, 3), 8 or 16 bits a channel.
-
-    Raises:
-        InputError: it cannot be read, or not exactly.
-    """
+    """The photograph in a file, (h, w, 3), 8 or 16 bits; InputError: it cannot be read exactly."""
     return _three_channels(read_picture(path), str(path))
 
 
@@ -88,9 +84,8 @@ class Run(InFolder):
 def read_run(folder: Path) -> Run:
     """Read record and sidecars of a run; photographs themselves are read when they are needed.
 
-    Raises:
-        InputError: the folder is no run; a photograph that is missing or unlike the others is no
-            error but a fault, and the rest goes on.
+    InputError: the folder is no run; a photograph that is missing or unlike the others is no error
+    but a fault, and the rest goes on.
     """
     record = read_record(folder)
     exposures: dict[str, Exposure] = {}
@@ -106,11 +101,7 @@ def read_run(folder: Path) -> Run:
 
 
 def read_photograph(run: Run, exposure: Exposure) -> Image16:
-    """The image of an exposure, (h, w, 3), 8 or 16 bits a channel.
-
-    Raises:
-        InputError: the file is damaged, changed since it was taken, or of another size.
-    """
+    """The image of an exposure, (h, w, 3); InputError: it is not what was photographed."""
     path = run.folder / PHOTOGRAPHS / exposure.file
     try:
         data = path.read_bytes()
@@ -140,11 +131,7 @@ def _exposure(folder: Path, record: RunRecord, frame: Frame, phase: str) -> Expo
 
 
 def check_same_export(run: Run, exports: Path) -> None:
-    """Compare the files that the run depends on with what they were when it began.
-
-    Raises:
-        InputError: one has changed or is missing.
-    """
+    """Refuse an export whose files are not those that the run began with; InputError: which."""
     for name, digest in run.record.export_sha256.items():
         path = exports / name
         if not path.is_file():
@@ -160,25 +147,16 @@ class DiskFault(Exception):
     """A file of the run cannot be written; what was written before is safe."""
 
 
+@dataclass(frozen=True)
 class RunWriter:
-    """Adds photographs to a run's folder.
+    """Adds photographs to a run's folder that `new_run` or `resumed_run` prepared."""
 
-    Attributes:
-        folder: of the run.
-        record: what is to be photographed.
-        taken: names of the photographs that count.
-    """
-
-    def __init__(self, folder: Path, record: RunRecord, taken: set[str]) -> None:
-        """Write to a folder that `new_run` or `resumed_run` prepared."""
-        self.folder, self.record, self.taken = folder, record, taken
+    folder: Path
+    record: RunRecord  # what is to be photographed
+    taken: set[str]  # names of the photographs that count
 
     def add(self, exposure: Exposure, data: bytes) -> None:
-        """Write a photograph with its sidecar, and its line in the journal.
-
-        Raises:
-            DiskFault: the disk is full, or fails; the photograph does not count then.
-        """
+        """Write a photograph with its sidecar and line; DiskFault: it does not count then."""
         photographs = self.folder / PHOTOGRAPHS
         name = exposure_name(exposure.frame, exposure.phase)
         with _disk_faults(self.folder):
@@ -189,11 +167,7 @@ class RunWriter:
         self.taken.add(name)
 
     def log(self, event: str, **facts: Any) -> None:
-        """Add a line to the journal.
-
-        Raises:
-            DiskFault: the disk is full, or fails.
-        """
+        """Add a line to the journal; DiskFault: the disk is full, or fails."""
         line = json.dumps({"time": datetime.now(UTC).isoformat(), "event": event} | facts)
         with _disk_faults(self.folder), (self.folder / JOURNAL).open("ab") as file:
             file.write(line.encode() + b"\n")
@@ -202,11 +176,7 @@ class RunWriter:
 
 
 def check_new(folder: Path) -> None:
-    """Refuse a folder that holds anything.
-
-    Raises:
-        InputError: it does.
-    """
+    """Refuse a folder that holds anything; InputError: it does."""
     if folder.is_dir() and all(path.name.startswith(PARTIAL) for path in folder.iterdir()):
         return
     if (folder / RECORD).is_file():
@@ -216,11 +186,7 @@ def check_new(folder: Path) -> None:
 
 
 def new_run(folder: Path, record: RunRecord) -> RunWriter:
-    """Begin a run in a folder that is new or empty.
-
-    Raises:
-        InputError: it is neither, or cannot be written.
-    """
+    """Begin a run in a folder; InputError: it is not empty, or cannot be written."""
     check_new(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -233,11 +199,7 @@ def new_run(folder: Path, record: RunRecord) -> RunWriter:
 
 
 def resumed_run(folder: Path) -> RunWriter:
-    """Go on with a run: keep each photograph that is complete, and remove remains of others.
-
-    Raises:
-        InputError: the folder holds no run, or cannot be written.
-    """
+    """Go on with a run: keep each photograph that is complete, and remove remains of others."""
     record = read_record(folder)
     run = read_run(folder)
     kept = {name: one for name, one in run.exposures.items() if _is_whole(folder, one)}
@@ -298,11 +260,7 @@ def _name_taken(line: bytes) -> str:
 
 
 def write_safely(path: Path, data: bytes) -> None:
-    """Write a file that has its name only when it is whole and on the disk.
-
-    Raises:
-        OSError: it cannot be written; nothing is left of it.
-    """
+    """Write a file that has its name only when it is whole and on the disk; OSError: it is not."""
     partial = path.with_name(PARTIAL + path.name)
     try:
         with partial.open("wb") as file:

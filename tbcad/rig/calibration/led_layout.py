@@ -63,11 +63,8 @@ def ray_errors(
 ) -> tuple[Floats, Floats]:
     """Root mean square errors of rays at the object's centre, mm, and of directions, mrad, (m,).
 
-    Args:
-        information: of spheres.
-        chosen: numbers of the LEDs.
-        noise_px: standard deviation of each figure of a highlight.
-        sigma: prior standard deviations of centre and radius, mm; infinite for none, 0 for known.
+    By chosen LEDs and noise of each figure of a highlight, px. Prior standard deviations of centre
+    and radius, mm, are infinite for none, 0 for known.
     """
     data = information.by_led[chosen].sum(axis=0) / noise_px**2
     known = np.array([sigma[0]] * 3 + [sigma[1]])

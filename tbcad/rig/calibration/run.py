@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.common.atomic_files import InFolder
-from tbcad.common.figure_files import PlotFormat
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.options.machines import CalibrateOptions
@@ -61,9 +60,8 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
 
     A prototype's files are in `options.out`, those of a shell's cameras in its folders a and b.
 
-    Raises:
-        InputError: one cannot be read, they do not belong together, there is nothing to calibrate
-            from, or out cannot be replaced.
+    InputError: one cannot be read, they do not belong together, there is nothing to calibrate from,
+    or out cannot be replaced.
     """
     folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
     progress, detail = options.progress, options.detail
@@ -94,8 +92,7 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
             out / name,
             _basis(one, result.setup, options, process),
             inputs,
-            options.force,
-            options.plot,
+            options,
         )
         for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
     )
@@ -115,13 +112,12 @@ def _written(
     out: Path,
     basis: dict[str, Any],
     inputs: Iterable[Source],
-    force: bool,
-    plot: PlotFormat,
+    options: CalibrateOptions,
 ) -> WrittenCalibration:
     judged = verdict(result)
-    with replacing(out, "calibration", force, inputs) as new:
-        record = write_calibration(new, result, judged, basis, plot)
-        texts = [] if truth is None else [write_recovered(new, result, truth, plot)]
+    with replacing(out, "calibration", options.force, inputs) as new:
+        record = write_calibration(new, result, judged, basis, options.plot)
+        texts = [] if truth is None else [write_recovered(new, result, truth, options.plot)]
     text = "\n".join([verdict_text(result, judged), *texts])
     return WrittenCalibration(out, result, judged, text, record)
 

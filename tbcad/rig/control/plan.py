@@ -145,11 +145,7 @@ class ControlPlan:
 
 
 def read_control_plan(folder: Path) -> ControlPlan:
-    """Read what a run needs of a folder that `tbcad build` wrote with a prototype.
-
-    Raises:
-        InputError: something is missing or does not fit; it says what.
-    """
+    """Read a build with a prototype; InputError: what is missing or does not fit."""
     design = DesignRecord.read(folder / DESIGN_FILE)
     controller = Prototype.read(folder / RECORD).controller
     program = read_program(folder)

@@ -77,8 +77,7 @@ def preflight(times: dict[str, float | None], shoot: Shoot, where: str, note: Pr
 
     A time of None is that which the camera has; a note is given for each phase.
 
-    Raises:
-        InputError: an exposure will not do; it says which would.
+    InputError: an exposure will not do; it says which would.
     """
     dark: dict[str, Image16] = {}
     seen: dict[str, Seen] = {}

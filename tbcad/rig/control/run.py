@@ -11,7 +11,7 @@ from tbcad.errors import InputError
 from tbcad.options.runs import Ask, RunOptions, Show
 from tbcad.output.content import refuse_inside
 from tbcad.output.inputs import refuse_inputs
-from tbcad.records.exposure import DARK_LIT, PhaseTimes, exposure_name
+from tbcad.records.exposure import DARK_LIT, PhaseTimes
 from tbcad.records.run import RunRecord, read_record
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.chosen_camera import (
@@ -32,7 +32,6 @@ from tbcad.rig.control.selection import (
     DryRun,
     Outcome,
     RunSelection,
-    Shots,
     chosen_frames,
     chosen_phases,
     count,
@@ -50,12 +49,7 @@ def dry_run(options: RunOptions) -> DryRun:
     """What a run would do, without port and camera; nothing is written."""
     plan, chosen = _prepared(options)
     taken = set(read_run(Path(options.out)).exposures) if options.resume else set[str]()
-    names = [phase.name for phase in chosen.phases]
-    remaining = [
-        Shots(frame, left)
-        for frame in chosen.frames
-        if (left := tuple(name for name in names if exposure_name(frame, name) not in taken))
-    ]
+    remaining = chosen.left(taken)
     seconds = expected_seconds(plan, remaining, CAPTURE_S)
     each = BYTES_PER_PX * chosen.size_px[0] * chosen.size_px[1]
     return DryRun(plan, remaining, sum(seconds.values()), disk_bytes(count(remaining), each))
@@ -64,11 +58,8 @@ def dry_run(options: RunOptions) -> DryRun:
 def run_machine(options: RunOptions) -> Outcome:
     """Photograph what is asked for, and leave base held and lights off, whatever happens.
 
-    Returns:
-        What was photographed; nothing, if only the preflight is asked for.
-
-    Raises:
-        InputError: something was wrong before the first photograph of the run.
+    The outcome of a preflight alone is nothing. InputError: something was wrong before the first
+    photograph of the run.
     """
     if options.port is None:
         raise InputError(

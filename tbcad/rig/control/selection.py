@@ -2,14 +2,14 @@
 
 import re
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
 from tbcad.common.atomic_files import InFolder
 from tbcad.errors import InputError
-from tbcad.records.exposure import DARK_LIT, Frame, PhaseTimes
+from tbcad.records.exposure import DARK_LIT, Frame, PhaseTimes, exposure_name
 from tbcad.records.prototype_drive import Phase
 from tbcad.rig.control.base import travel_s
 from tbcad.rig.control.plan import ControlPlan
@@ -37,6 +37,15 @@ class RunSelection:
     size_px: tuple[int, int]  # columns and rows that photographs must have
     # of exposure, as far as the camera is told them
     times: PhaseTimes = field(default_factory=PhaseTimes)
+
+    def left(self, taken: Collection[str] = ()) -> "list[Shots]":
+        """Photographs that are not yet there by name, in the order of photographing."""
+        names = [phase.name for phase in self.phases]
+        left = (
+            Shots(frame, tuple(name for name in names if exposure_name(frame, name) not in taken))
+            for frame in self.frames
+        )
+        return [one for one in left if one.phases]
 
     @property
     def capture_times(self) -> dict[str, float | None]:

@@ -61,6 +61,15 @@ class Photograph:
 
 
 @contextmanager
+def faults_refused(where: str = "the camera", step: str = "") -> Iterator[None]:
+    """Before the first photograph a fault of the camera is one of the input."""
+    try:
+        yield
+    except CameraFault as fault:
+        raise InputError(f"{where}: {fault}{step}") from None
+
+
+@contextmanager
 def light_on(base: DrivenMachine, phase: Phase, seconds: float) -> Iterator[None]:
     """Have the light of a phase on, and let it settle for some seconds."""
     outputs = () if phase.output is None else (phase.output,)
@@ -96,12 +105,7 @@ def taken_twice(
 
 
 def take(camera: RunCamera, base: DrivenMachine, seconds: float | None = None) -> Photograph:
-    """Take one photograph, with an exposure time or that which the camera has.
-
-    Raises:
-        CameraFault: there is none, it cannot be read, or it has another exposure time.
-        MachineFault: the controller does not release the camera.
-    """
+    """Take a photograph with an exposure time or the camera's own; CameraFault: there is none."""
     if seconds is not None:
         camera.expose(seconds)
     begun = monotonic()
@@ -156,10 +160,8 @@ def run_record(
     plan: ControlPlan, options: RunSelection, trials: Mapping[str, Photograph], seconds: float
 ) -> RunRecord:
     """The record of a run, by a photograph for each phase and its expected duration."""
-    try:
+    with faults_refused():
         locked = common_settings(trials.values())
-    except CameraFault as fault:
-        raise InputError(f"the camera: {fault}") from None
     trial = next(iter(trials.values()))
     return RunRecord(
         export_sha256=plan.sha256,

@@ -24,8 +24,7 @@ TURNS = (0, 180)  # of the object in both runs, degrees
 def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
     """The prototype of an export; its frames are the stops of the first run, then of the second.
 
-    Raises:
-        InputError: the record of the prototype cannot be read, or has no LEDs.
+    InputError: the record of the prototype cannot be read, or has no LEDs.
     """
     camera = export.reflectors[0].camera
     return Machine(
@@ -55,11 +54,7 @@ def designed_shell(reflector: Reflector, leds: Floats) -> Machine:
 
 
 def read_leds(folder: Path) -> Floats:
-    """Where the LEDs of an export's prototype shine from, mm, (l, 3).
-
-    Raises:
-        InputError: the record cannot be read, or names none.
-    """
+    """Where the LEDs of a prototype shine from, mm, (l, 3); InputError: it names none."""
     path = folder / NAME
     leds = Prototype.read(path).leds
     if not leds:
@@ -89,11 +84,7 @@ def machine_runs(
 def machine_run(
     export: ExportedDesign, plan: Plan, machine: Machine, frames: tuple[Frame, ...], half: int
 ) -> PrototypeRun:
-    """One run of a machine, 0 for camera a's mirrors, 1 for camera b's; see `machine_runs`.
-
-    Raises:
-        InputError: the machine has another number of balls than the export.
-    """
+    """One run of a machine, 0 for camera a's mirrors, 1 for camera b's; see `machine_runs`."""
     if len(machine.radius) != len(plan):
         raise InputError(
             f"the machine has {len(machine.radius)} balls, {export.folder} has {len(plan)}: name "

@@ -22,6 +22,11 @@ from tbcad.types import Floats, Ints
 
 RECORD = "machine.json"
 TRUTH = "truth.json"  # the machine of a simulated run, in its folder
+CAMERA = {
+    **{"pinhole": "pinhole_mm", "axes": "axes", "focal": "focal_px"},
+    **{"principal": "principal_px", "distortion": "distortion"},
+}
+"""Arrays of a camera, and their keys in machine.json."""
 ROUNDING = 1e-9  # of unit vectors
 
 
@@ -92,11 +97,7 @@ def write_machine(path: Path, machine: Machine, frames: tuple[Frame, ...]) -> No
     spheres = zip(machine.centre.tolist(), machine.radius.tolist(), strict=True)
     MachineRecord(
         camera=CalibratedCamera(
-            pinhole_mm=camera.pinhole.tolist(),
-            axes=camera.axes.tolist(),
-            focal_px=camera.focal.tolist(),
-            principal_px=camera.principal.tolist(),
-            distortion=camera.distortion.tolist(),
+            **{key: getattr(camera, name).tolist() for name, key in CAMERA.items()},
             width_px=camera.width_px,
             height_px=camera.height_px,
         ),
@@ -111,21 +112,13 @@ def write_machine(path: Path, machine: Machine, frames: tuple[Frame, ...]) -> No
 
 
 def read_machine(path: Path) -> tuple[Machine, tuple[Frame, ...]]:
-    """The machine that a file describes, and its frames.
-
-    Raises:
-        InputError: the file is missing or says what cannot be.
-    """
+    """The machine that a file describes, and its frames; InputError: it says what cannot be."""
     found = MachineRecord.read(path)
     axis, axes = np.array(found.axis), np.array(found.camera.axes)
     if abs(norm(axis) - 1) > ROUNDING or np.abs(axes @ axes.T - np.eye(3)).max() > ROUNDING:
         raise InputError(f"{path}: axes are no unit vectors at right angles: calibrate again")
     camera = LensCamera(
-        pinhole=np.array(found.camera.pinhole_mm),
-        axes=axes,
-        focal=np.array(found.camera.focal_px),
-        principal=np.array(found.camera.principal_px),
-        distortion=np.array(found.camera.distortion),
+        **{name: np.array(getattr(found.camera, key)) for name, key in CAMERA.items()},
         width_px=found.camera.width_px,
         height_px=found.camera.height_px,
     )

@@ -39,11 +39,7 @@ def shell_frame(half: int) -> Frame:
 
 
 def designed_half(export: ExportedDesign, half: int) -> Machine:
-    """One camera of an export's shell, 0 for a and 1 for b; LEDs as on the prototype's stage.
-
-    Raises:
-        InputError: a mirror is planar: it shows no LED that could be told from its place.
-    """
+    """One camera of a shell, 0 for a, 1 for b, and the stage's LEDs; InputError: planar mirrors."""
     reflector, flip = export.reflectors[half], _flip(half)
     if (reflector.mirrors.curvature <= 0).any():
         raise InputError(
@@ -168,11 +164,7 @@ def _flip(half: int) -> Floats:
 
 
 def export_of(calibration: Path) -> Path:
-    """The export that a calibration's record names.
-
-    Raises:
-        InputError: it names none.
-    """
+    """The export that a calibration's record names; InputError: it names none."""
     files = [one / NAME for one in (calibration, *(calibration / name for name in CAMERAS))]
     try:
         return Path(CalibrationRecord.read(next(filter(Path.is_file, files), files[0])).exports)

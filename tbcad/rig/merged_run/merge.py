@@ -39,16 +39,8 @@ def ray_sigmas(
 ) -> dict[str, list[float | None]]:
     """Root mean square error of the rays of each mirror where the object is, mm, by camera.
 
-    At the centre it is `sigma_mm`; elsewhere their angle counts too, here at half the radius of
-    the capture sphere. None: the calibration does not say.
-
-    Args:
-        folders: of the calibration, each with a table; older ones have none.
-        mirrors: of each camera, their number.
-        capture_mm: diameter of the capture sphere.
-
-    Raises:
-        InputError: a table is damaged.
+    At the centre it is `sigma_mm`; elsewhere their angle counts too, here at half the radius of the
+    capture sphere. None: the calibration, whose folders may lack the table, does not say.
     """
     known = {
         ray.mirror: round(hypot(ray.sigma_mm, ray.sigma_mrad / 1000 * capture_mm / 4), 5)
@@ -120,8 +112,7 @@ class Merge:
 def prepared_merge(folder: Path, calibration: Path, exports: Path, options: MergeOptions) -> Merge:
     """Read what a merge needs, but the photographs themselves.
 
-    Raises:
-        InputError: one cannot be read, they do not belong together, or nothing was photographed.
+    InputError: one cannot be read, they do not belong together, or nothing was photographed.
     """
     run, export = read_run(folder), read_export(exports)
     check_same_export(run, exports)
@@ -170,13 +161,10 @@ def _half(
         for frame in run.record.frames
         if frame.object_turn_deg == TURNS[half] and frame.stop <= len(plan.angle)
     }
-    frames: list[Frame | None] = []
-    missing: dict[int, str] = {}
-    for stop in range(len(plan.angle)):
-        frames.append(of_stop.get(stop) if known[half, stop] else None)
-        if stop not in of_stop:
-            missing[stop] = "the run leaves this stop out"
-    photographs = CorrectedPhotographs(run, tuple(frames), corrected, common_exposure(run), missing)
+    stops = range(len(plan.angle))
+    frames = tuple(of_stop.get(stop) if known[half, stop] else None for stop in stops)
+    missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
+    photographs = CorrectedPhotographs(run, frames, corrected, common_exposure(run), missing)
     return HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64))
 
 
@@ -223,13 +211,7 @@ def _shows_object(
 
 
 def write_merge(folder: Path, merge: Merge, progress: Progress) -> dict[str, Any]:
-    """Merge and write all files into a folder, and return its record.
-
-    Args:
-        folder: exists, and is the caller's to replace.
-        merge: what to merge.
-        progress: called with each step.
-    """
+    """Merge and write all files into the caller's folder, and return its record."""
     record = capture_record(merge.facts)
     stored = {**record, RAY_SIGMAS: merge.ray_sigma_mm}  # which would fill capture.json
     write_cameras(folder, merge.cameras(progress), merge.capture_mm, stored)

@@ -78,8 +78,7 @@ def flat_field_gain(files: Sequence[AnyPath], encoding: Encoding, camera: LensCa
 
     Pixels with next to no light, beyond the lens's picture, show nothing.
 
-    Raises:
-        InputError: one cannot be read, has another size, or all is dark.
+    InputError: one cannot be read, has another size, or all is dark.
     """
     size = camera.height_px, camera.width_px
     total = np.zeros((*size, 3), dtype=np.float32)

@@ -103,18 +103,10 @@ def recorded(
     random: np.random.Generator,
     seconds: float = 1.0,
 ) -> Image16:
-    """The numbers of a photograph; what is more than full is clipped, and does not bloom.
+    """The numbers of a photograph, (h, w, 3) of 8 bits or (h, w) of 16; more than full is clipped.
 
-    Args:
-        sensor: that takes it.
-        maps: of its pixels.
-        light: that falls on them before lens and dust, 1 fills a pixel, (h, w) or (h, w, 3); None
-            for darkness.
-        random: for the noise.
-        seconds: exposure time, which the dark signal grows with.
-
-    Returns:
-        (h, w, 3) of 8 bits, (h, w) of 16.
+    Light, (h, w) or (h, w, 3), falls on the pixels before lens and dust, 1 fills one; None for
+    darkness. The dark signal grows with the exposure time, s.
     """
     sensor = replace(sensor, dark_electrons=sensor.dark_electrons * seconds)
     shape = maps.transmission.shape

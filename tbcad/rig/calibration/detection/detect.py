@@ -94,15 +94,9 @@ def detect(
 ) -> Detection:
     """Find all highlights of a run, and say of each that is not used why.
 
-    Args:
-        run: that was photographed.
-        prior: of the machine; its frames are those of the run's record.
-        room: that an object may fill; None where nothing stands between LEDs and spheres.
-        dome: radius of the LEDs' domes, mm.
-        progress: called with each step.
-
-    Raises:
-        InputError: no highlights are found, or the run has no phases of single LEDs.
+    The prior's frames are those of the run's record. An object may fill a room, None where nothing
+    stands between LEDs and spheres; LEDs have domes of a radius in mm. InputError: no highlights
+    are found, or the run has no phases of single LEDs.
     """
     frames, machine = run.record.frames, prior.mean
     if not any(phase.startswith("led_") for phase in run.record.phases):

@@ -78,13 +78,10 @@ def no_highlights(
     photographs: int,
     reasons: Sequence[Rejection | None] = (),
 ) -> InputError:
-    """The error of a run without highlights.
+    """The error of a run without highlights, by its spots and what is bright besides.
 
-    Args:
-        spots: of all photographs.
-        unmeasured: what is bright besides.
-        photographs: number of those by LEDs.
-        reasons: of all expected highlights; none where the spots fit no machine.
+    So many photographs are by LEDs; reasons are of all expected highlights, none where the spots
+    fit no machine.
     """
     saturated = int(np.count_nonzero(spots.full >= FULL))
     if reasons:

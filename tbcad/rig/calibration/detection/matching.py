@@ -110,12 +110,8 @@ def match(
 ) -> tuple[Expected, Ints, Estimate]:
     """Pair spots with highlights of a prior's machine, whose LEDs have domes of a radius in mm.
 
-    Returns:
-        The highlights that the machine should show; the spot of each, or -1, (n,); and the machine
-        that was estimated on the way.
-
-    Raises:
-        NoPairs: the spots fit no machine near the prior.
+    Gives the highlights that the machine should show; the spot of each, or -1, (n,); and the
+    machine that was estimated on the way. NoPairs: the spots fit no machine near the prior.
     """
     expected = expected_highlights(prior.mean, dome)
     some = np.unique(np.linspace(0, len(prior.mean.angle) - 1, FIRST_FRAMES).astype(np.int64))

@@ -91,10 +91,9 @@ def _differentiated(
 
 
 def projection(camera: LensCamera, image: Floats) -> tuple[Floats, Floats, Floats]:
-    """Pixels of points (n, 3), mm, in the frame of a camera whose pose does not matter.
+    """Pixels (n, 2) of points (n, 3), mm, in the frame of a camera whose pose does not matter.
 
-    Returns:
-        Column and row (n, 2); by the point (n, 2, 3); by the lens (n, 2, LENS).
+    With their derivatives by the point (n, 2, 3) and by the lens (n, 2, LENS).
     """
     place = image[:, :2] / image[:, 2:]
     shown = distorted(place, camera.distortion)

@@ -145,14 +145,7 @@ def _sigmas(prior: Prior, known: Covariance, columns: Ints) -> Floats:
 def calibration_record(
     result: MachineCalibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
 ) -> CalibrationRecord:
-    """What calibration.json says.
-
-    Args:
-        result: the calibration.
-        judged: its verdict.
-        known: covariance of its parameters.
-        basis: names of run, export, process and lens.
-    """
+    """What calibration.json says; the basis names run, export, process and lens."""
     found = result.found
     return CalibrationRecord(
         **basis,
