@@ -114,20 +114,13 @@ class LedRoom:
     def places(self) -> Floats:
         """Places that are tried: one of each pair, mm, (p, 3)."""
         azimuth = np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+        ring = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
         highest = np.sqrt(self.outer**2 - (self.inner + self.pillar) ** 2)
         rows = []
         for z in np.linspace(self.lowest, highest, HEIGHTS):
             farthest = np.sqrt(self.outer**2 - z**2) - self.pillar
             for radius in np.unique(np.linspace(self.inner, max(farthest, self.inner), RINGS)):
-                rows.append(
-                    np.column_stack(
-                        [
-                            radius * np.cos(azimuth),
-                            radius * np.sin(azimuth),
-                            np.full(AZIMUTHS, z),
-                        ]
-                    )
-                )
+                rows.append(np.column_stack([radius * ring, np.full(AZIMUTHS, z)]))
         return np.round(np.concatenate(rows), DIGITS) + 0.0
 
     def fits(self, places: Floats, chosen: list[int], new: int) -> bool:

@@ -112,28 +112,19 @@ def recorded(
     shape = maps.transmission.shape
     colours = CHANNELS if sensor.bits == 8 else 1
     image = _empty(sensor, (maps.transmission.size, colours), random)
-    lit = np.empty(0, dtype=np.int64) if light is None else _lit(sensor, light)
+    pixels = None if light is None else light.reshape(maps.transmission.size, -1)
+    faint = EMPTY / sensor.full_electrons
+    lit = np.flatnonzero([] if pixels is None else pixels.max(axis=1) > faint)
     bright = np.union1d(lit, maps.hot)
     electrons = np.full((len(bright), colours), sensor.dark_electrons)
     electrons[np.searchsorted(bright, maps.hot)] += seconds * maps.hot_electrons[:, None]
-    if light is not None:
+    if pixels is not None:
         through = sensor.full_electrons * maps.transmission.ravel()[bright, None]
-        electrons += through * _in_colours(
-            light.reshape(maps.transmission.size, -1)[bright], colours
-        )
+        shown = pixels[bright]
+        electrons += through * (shown if colours == CHANNELS else shown.mean(axis=1, keepdims=True))
     image[bright] = _numbers(sensor, electrons, random)
     whole: Image16 = image.reshape(*shape, colours) if colours == CHANNELS else image.reshape(shape)
     return whole
-
-
-def _lit(sensor: SimulatedSensor, light: Signal) -> Ints:
-    """Numbers of the pixels that light falls on."""
-    most = light if light.ndim == 2 else light.max(axis=2)
-    return np.flatnonzero(most > EMPTY / sensor.full_electrons)
-
-
-def _in_colours(light: Signal, colours: int) -> Signal:
-    return light if colours == CHANNELS else light.mean(axis=1, keepdims=True)
 
 
 def _numbers(
