@@ -17,8 +17,8 @@ from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.exposure import LIT, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.records.run import RECORD, RunRecord
+from tbcad.rig.machine.designed import machine_runs
 from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import machine_runs
 from tbcad.types import Bytes
 
 Change = Callable[[np.ndarray, Frame, str], np.ndarray]

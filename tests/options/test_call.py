@@ -17,7 +17,7 @@ from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
 from tbcad.rig.calibration.run import WrittenCalibration
-from tbcad.rig.runs.photographs import Run
+from tbcad.rig.runs import Run
 
 ONLY_WRITTEN = {
     *("json", "all_frames", "mesh", "prototype"),

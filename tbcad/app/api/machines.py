@@ -26,8 +26,8 @@ from tbcad.options.runs import RunOptions
 if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
     from tbcad.rig.calibration.run import WrittenCalibration
-    from tbcad.rig.control.outcome import Outcome
-    from tbcad.rig.runs.photographs import Run
+    from tbcad.rig.control.selection import Outcome
+    from tbcad.rig.runs import Run
 
 
 @keywords(RunOptions)
@@ -64,7 +64,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.inputs import files_named
-    from tbcad.rig.runs.photographs import read_run
+    from tbcad.rig.runs import read_run
     from tbcad.rig.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerancing.process.process import load_process, process_errors
 
@@ -151,8 +151,7 @@ def merge(options: MergeOptions) -> dict[str, Any]:
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
     from tbcad.rig.machine.shells import export_of
-    from tbcad.rig.merged_run.files import write_merge
-    from tbcad.rig.merged_run.merge import prepared_merge
+    from tbcad.rig.merged_run.merge import prepared_merge, write_merge
 
     built = export_of(known) if options.exports is None else Path(options.exports)
     out, inputs = options.folder, (run, known, built, *options.flat)
@@ -187,7 +186,7 @@ def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     built = export_of(known) if options.exports is None else Path(options.exports)
     check_replaceable(out, "as-built", options.force, (known, built))
     options.progress("solids")
-    from tbcad.rig.calibrated_solids.files import as_built as write_files
+    from tbcad.rig.calibrated_solids import as_built as write_files
 
     with replacing(out, "as-built", options.force, (known, built)) as folder:
         record = write_files(known, built, folder)

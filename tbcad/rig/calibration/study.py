@@ -19,9 +19,8 @@ from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
 from tbcad.records.exposure import Frame
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places
-from tbcad.rig.calibration.estimate.covariance import Covariance, covariance
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior, covariance
 from tbcad.rig.calibration.led_layout import (
     FREE,
     PRIOR_MM,

@@ -6,7 +6,7 @@ import pytest
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.led_dome import disc_images, dome_images, dome_samples, sight_axes
 from tbcad.core.optics.reflection import reflection_points
-from tests.rig.machine.test_record import MACHINE
+from tests.rig.machine.test_machine import MACHINE
 
 ELEVATIONS = np.radians([-50.0, -10.0, 0.0, 20.0, 60.0, 90.0])
 GRID, FINE = 100, 1e-3  # of places across a disc; step of differences

@@ -13,12 +13,12 @@ WAITS_S = {
     "grbl.SILENCE_S": 1.0,
     "grbl.BANNER_S": 1.0,
     "grbl.LATE_S": 0.05,
-    "klipper.host.LOOK_S": 0.01,
-    "klipper.host.AGAIN_S": 0.01,
-    "klipper.host.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
-    "klipper.host.BACK_S": 1.0,
-    "cameras.choice.POLL_S": 0.01,
-    "cameras.choice.QUIET_S": 0.05,
+    "klipper.LOOK_S": 0.01,
+    "klipper.AGAIN_S": 0.01,
+    "klipper.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
+    "klipper.BACK_S": 1.0,
+    "chosen_camera.POLL_S": 0.01,
+    "chosen_camera.QUIET_S": 0.05,
 }
 """By name below `tbcad.rig.control`."""
 

@@ -33,7 +33,7 @@ def simulate_run(options: SimulateRunOptions) -> int:
     these photographs should find.
     """
     from tbcad.app.api import simulate_run as simulate
-    from tbcad.rig.machine.record import truth_file
+    from tbcad.rig.machine.machine import truth_file
 
     with stages(2) as screen:
         run = simulate(

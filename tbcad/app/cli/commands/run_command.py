@@ -52,8 +52,8 @@ def run(
         other = "--resume" if options.resume else "--no-preflight"
         raise InputError(f"--preflight-only goes without {other}: leave one of both out")
     if dry_run:
-        from tbcad.rig.control.outcome import dry_run_lines, dry_run_record
         from tbcad.rig.control.run import dry_run as planned
+        from tbcad.rig.control.selection import dry_run_lines, dry_run_record
 
         found = planned(options)
         if json:
@@ -70,7 +70,7 @@ def run(
         )
     from tbcad.app.api import run as photograph
     from tbcad.common.screen import stages
-    from tbcad.rig.control.outcome import outcome_lines, preflight_lines
+    from tbcad.rig.control.selection import outcome_lines, preflight_lines
 
     look: Preflight = "only" if preflight_only else "off" if no_preflight else "first"
     ask = _yes if yes else _asked

@@ -34,11 +34,7 @@ MAX_DEPTH = 20  # a list of Kalibr is four deep
 
 
 def read_lens(path: Path) -> CalibratedLens:
-    """The lens in a file.
-
-    Raises:
-        InputError: the file cannot be read, is none of these, or has another model of the lens.
-    """
+    """The lens in a file; InputError: it is none of these, or has another model of the lens."""
     text, name = read_text(path, str(path), "lens", MAX_BYTES), str(path)
     lines = [line for line in map(str.strip, text.split("\n")) if line and line[0] != "#"]
     if MRCAL_FILE.search(text):

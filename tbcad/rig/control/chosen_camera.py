@@ -11,9 +11,8 @@ from time import monotonic, sleep
 from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
 from tbcad.records.exposure import PhaseTimes
-from tbcad.rig.control.cameras.camera import RunCamera, Shot
-from tbcad.rig.control.cameras.gphoto import GphotoCamera
-from tbcad.rig.control.cameras.image_facts import image_facts, suffix_of
+from tbcad.rig.control.camera import RunCamera, Shot, image_facts, suffix_of
+from tbcad.rig.control.gphoto import GphotoCamera
 from tbcad.rig.control.machine import CameraFault
 
 PLACE = "{output}"

@@ -1,15 +1,16 @@
-"""What a photograph's file says: size, exposure time, settings.
+"""What a run asks of a camera, and what a photograph's file says: size, exposure, settings.
 
 Source: Exif 2.32, tables 4 and 7.
 """
 
 import io
 import math
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from PIL import Image
 
@@ -18,8 +19,10 @@ from tbcad.cad.formats.pixels import TIFF_SIGNATURES
 from tbcad.errors import InputError
 from tbcad.records.exposure import Setting
 from tbcad.rig.control.machine import CameraFault
-from tbcad.rig.runs.images import decoded_image
+from tbcad.rig.runs import decoded_image
 
+NEAR = 1.5  # factor of exposure times: the coarsest cameras have steps of 2
+_TIME = re.compile(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?\s*s?$")
 FORMATS = {"PNG": ".png", "TIFF": ".tif", "JPEG": ".jpg", "MPO": ".jpg"}
 SAME_FORMAT = {".tiff": ".tif", ".jpeg": ".jpg"}
 MAKE, MODEL, EXIF = 0x010F, 0x0110, 0x8769
@@ -33,6 +36,52 @@ LOCKED = {
     0xA403: "white_balance",
     0x920A: "focal_length_mm",
 }
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A photograph as the camera gives it."""
+
+    data: bytes  # bytes of the image file, unchanged
+    suffix: str  # of its name, in small letters, with the dot
+    settings: dict[str, Setting]  # that the camera itself reports for it; the file may tell more
+
+
+class RunCamera(Protocol):
+    """A camera that is connected; what most need not do is done by default."""
+
+    released: bool  # whether the controller's relay releases it
+
+    def expose(self, seconds: float) -> None:
+        """Set the exposure time of the photographs that follow."""
+
+    def expect(self) -> None:
+        """Get ready for a photograph: what was there before is none."""
+        return
+
+    def photograph(self) -> Shot:
+        """Take a photograph, or wait for the one that was released."""
+
+    def again(self) -> None:
+        """Connect anew, after a fault."""
+        return
+
+    def close(self) -> None:
+        """Give the camera up."""
+        return
+
+
+def shutter_seconds(text: str) -> float | None:
+    """Exposure time of a camera's shutter setting, as 1/60 or 0.0100s; None: it says none."""
+    match = _TIME.match(text)
+    if match is None or float(match[2] or 1) == 0 or float(match[1]) == 0:
+        return None
+    return float(match[1]) / float(match[2] or 1)
+
+
+def are_near(one: float, other: float) -> bool:
+    """Whether two exposure times are the same but for a camera's steps."""
+    return abs(math.log(one / other)) <= math.log(NEAR)
 
 
 @dataclass(frozen=True)

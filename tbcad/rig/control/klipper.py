@@ -16,8 +16,8 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from tbcad.rig.control.klipper.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
 from tbcad.rig.control.machine import ControllerReset, MachineFault
+from tbcad.rig.control.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
 from tbcad.types import Progress
 
 MOTOR = "manual_stepper base"
@@ -138,17 +138,10 @@ class Klipper:
     ) -> None:
         """Run lines of G-code and wait until Klipper has taken them; with M400, until it is done.
 
-        While they run, the motor must stay on, and Klipper ready. However long another program's
-        G-code comes first, it is waited for: lines that were sent cannot be taken back.
-
-        Args:
-            lines: to run.
-            expected_s: how long they should take.
-            held: look whether the motor is on.
-            limit_s: how long to wait at most.
-
-        Raises:
-            MachineFault: Klipper refuses a line, is not ready any more, or gives no answer.
+        While they run, the motor must stay on, if it is held, and Klipper ready. However long
+        another program's G-code comes first, it is waited for up to the limit: lines that were sent
+        cannot be taken back. MachineFault: Klipper refuses a line, is not ready any more, or gives
+        no answer.
         """
         text = "\n".join(lines)
         for _ in range(TRIES):
