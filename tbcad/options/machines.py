@@ -8,12 +8,13 @@ from typing import Annotated, Literal
 import typer
 
 from tbcad.options.call import Call
-from tbcad.options.lists import ExposureLeds, ExposureLit, numbers, seconds
 from tbcad.options.shared import (
     AnyPath,
     CalibrationFolder,
     Exports,
     ExportsOption,
+    ExposureLeds,
+    ExposureLit,
     Force,
     ForceFile,
     ObjectFile,
@@ -22,6 +23,8 @@ from tbcad.options.shared import (
     RunFolder,
     UnitOption,
     UpOption,
+    numbers,
+    seconds,
 )
 
 MOST_NOISE = 100.0

@@ -12,8 +12,7 @@ import typer
 from tbcad.common.screen import Stages
 from tbcad.errors import InputError
 from tbcad.options.call import Call
-from tbcad.options.lists import ExposureLeds, ExposureLit, seconds
-from tbcad.options.shared import AnyPath, Exports
+from tbcad.options.shared import AnyPath, Exports, ExposureLeds, ExposureLit, seconds
 
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16

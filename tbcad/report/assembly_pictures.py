@@ -15,8 +15,7 @@ from scipy.ndimage import distance_transform_edt
 from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
-from tbcad.report.apart import offsets
-from tbcad.report.callouts import Callout, draw_callouts, place_callouts
+from tbcad.report.exploded import Callout, draw_callouts, offsets, place_callouts
 from tbcad.report.prototype_pictures import Drawn, assembly_bodies, placed_mesh
 from tbcad.types import Bytes, Floats, Ints
 

@@ -4,9 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.pixel_counts import virtual_cameras
 from tbcad.studies.paper import claims

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.common.schedule import run_units
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.core.spec.design import Spec, spec_with

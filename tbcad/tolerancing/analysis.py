@@ -12,7 +12,7 @@ from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.options.tolerances import ToleranceOptions
+from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,

@@ -10,10 +10,9 @@ from typing import get_args
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.output.content import COSTLY, RECORDS, kind_of
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.manifest import fingerprint, write_manifest
-from tbcad.records.manifest import Kind
+from tbcad.output.manifest import COSTLY, RECORDS, fingerprint, kind_of, write_manifest
+from tbcad.records.document import Kind
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ASKED = ("capture", "merged run", "calibration")

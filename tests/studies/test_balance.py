@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import Study
+from tbcad.common.results import Study
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.object import patterned_ball

@@ -63,7 +63,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     options.stop_numbers(), options.seconds()  # refused before what is heavy is loaded
     from tbcad.light.simulate.scene.exported import read_export
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions
-    from tbcad.output.inputs import files_named
+    from tbcad.output.single_files import files_named
     from tbcad.rig.runs.photographs import read_run
     from tbcad.rig.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerancing.process.process import load_process, process_errors

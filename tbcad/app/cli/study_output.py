@@ -15,7 +15,7 @@ from tbcad.options.shared import Design, Exports, JsonResult, Out, PlotFormatOpt
 
 if TYPE_CHECKING:
     from tbcad.common.figure_files import PlotFormat
-    from tbcad.common.results.study import Study
+    from tbcad.common.results import Study
     from tbcad.core.spec.design import Spec
     from tbcad.types import Progress
 
@@ -78,7 +78,7 @@ def _command(prepare: Callable[..., Work], subject: Callable[..., object]) -> Ca
 
 def _run_study(out: Path, json: bool, plot: "PlotFormat", work: Work) -> int:
     """Make a study, write its files, and show its figures next to the paper's."""
-    from tbcad.common.results.study import check_study_folder, write_study
+    from tbcad.common.results import check_study_folder, write_study
     from tbcad.output.single_files import check_tables
 
     check_tables(out)

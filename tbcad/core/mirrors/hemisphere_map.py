@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.common.palette import shades
+from tbcad.common.colours import shades
 from tbcad.core.mirrors.array import MirrorArray
 from tbcad.types import Floats
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.common.srgb import shown_colour
+from tbcad.common.colours import shown_colour
 from tbcad.core.geometry.ellipsoid import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
@@ -15,7 +15,7 @@ from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.report.page.packing import PackedArrays
+from tbcad.report.page.mirrors import PackedArrays
 from tbcad.shell.envelope import closing_envelope
 from tbcad.shell.facets import Facets, means, middles, mirror_facets
 from tbcad.shell.mesh import shell_mesh

@@ -24,9 +24,9 @@ from tbcad.output.manifest import (
 from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom_view import read_parts_list
 from tbcad.records.design import MISSING
-from tbcad.records.manifest import Manifest
+from tbcad.records.document import Manifest
 from tbcad.report.page import bodies, mirrors
-from tbcad.report.page.packing import PackedArrays
+from tbcad.report.page.mirrors import PackedArrays
 from tbcad.report.page.parts_list import files_html, parts_html
 from tbcad.report.page.pictures import Picture, photographs, pictures_html, read_pictures
 from tbcad.report.page.verdict import (

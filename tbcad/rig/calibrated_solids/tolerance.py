@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.windows import cell_windows
 from tbcad.errors import InputError

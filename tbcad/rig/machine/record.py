@@ -7,8 +7,8 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import LensCamera
 from tbcad.errors import InputError
+from tbcad.records.calibration import CalibratedCamera, MachineRecord, SphereRecord
 from tbcad.records.exposure import Frame
-from tbcad.records.machine import CalibratedCamera, MachineRecord, SphereRecord
 from tbcad.rig.machine.machine import Machine
 
 RECORD = "machine.json"

@@ -25,7 +25,7 @@ from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_obje
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.inputs import Source, refuse_inputs
+from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
 from tbcad.records.run import RECORD, Geometry, RunRecord
 from tbcad.rig.machine.built import BuiltPrototype, designed_build, random_build

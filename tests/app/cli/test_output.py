@@ -16,7 +16,7 @@ from tbcad_verify.report.summary import MAX_LINES
 from tbcad.app.cli import run
 from tbcad.app.cli.study_output import _show
 from tbcad.app.doctor import Finding
-from tbcad.common.results.study import Figure, Study
+from tbcad.common.results import Figure, Study
 from tbcad.common.screen import WIDTH, TimeLeft, paragraph, stages
 from tests.exported_files import contents
 from tests.verify.synthetic_export import Design

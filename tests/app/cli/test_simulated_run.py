@@ -6,7 +6,7 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.errors import InputError
-from tbcad.options.lists import numbers
+from tbcad.options.shared import numbers
 from tbcad.rig.runs.photographs import read_run
 
 

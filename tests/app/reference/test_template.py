@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.app.reference.keys import key_sections
-from tbcad.app.reference.template import ELSEWHERE, design_template
+from tbcad.app.reference.keys import ELSEWHERE, design_template, key_sections
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import PAPER, load_spec, shipped_designs
 

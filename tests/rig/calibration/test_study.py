@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import Study, study_files
+from tbcad.common.results import Study, study_files
 from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.rig.calibration.led_layout import NUMBERS
 from tbcad.rig.calibration.study import (

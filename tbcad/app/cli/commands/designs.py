@@ -59,7 +59,7 @@ def init(
     from tbcad.output.single_files import check_file
 
     check_file(file, force)
-    from tbcad.app.reference.template import design_template
+    from tbcad.app.reference.keys import design_template
 
     replace_files(file.parent, {file.name: design_template(design).encode()})
     typer.echo(f"{file}: written; build it by tbcad build {file}")

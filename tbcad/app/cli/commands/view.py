@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from tbcad.app.cli.app import app
-from tbcad.app.cli.commands.compared_pictures import (
+from tbcad.app.cli.commands.picture_files import (
+    ViewFiles,
     check_pictures,
+    field_view,
     has_object,
     scene_of,
     true_picture,
     viewpoint_of,
     write_compared,
+    write_depth,
 )
-from tbcad.app.cli.commands.view_files import ViewFiles, field_view, write_depth
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.checks import check_is_capture

@@ -9,9 +9,9 @@ import typer
 from tbcad.app.cli.app import app, command
 from tbcad.app.cli.output_mode import print_json, print_result
 from tbcad.common.screen import stages
+from tbcad.options.builds import InspectionOptions
 from tbcad.options.checks import check_is_export, check_is_folder
 from tbcad.options.shared import Design, Exports, ForceFile, JsonResult, Out, Settings
-from tbcad.options.tolerances import InspectionOptions
 
 
 @app.command()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.cad.formats.images.pictures import Picture, picture_of
-from tbcad.common.srgb import srgb
+from tbcad.common.colours import srgb
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.types import Bytes, Floats, Ints
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.records.exposure import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.covariance import Covariance

@@ -1,12 +1,66 @@
-"""Wrong command lines: one line with what is wrong, where, what is allowed and what to do."""
+"""How commands end: by an interrupt, or by options that are no options."""
 
+import os
 import re
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
+
+
+INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
+STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
+DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+IMPORTING = "<frozen importlib._bootstrap>"  # the code of imports
+AGAIN_S = 0.05
+
+
+class Stopped(Exception):
+    """A command was stopped and has kept something; its text says what, and how to go on."""
+
+
+@contextmanager
+def signals_as_interrupt() -> Iterator[None]:
+    """Let a kill or a closed terminal raise KeyboardInterrupt during the block.
+
+    A signal that is ignored, as by nohup, stays so; handlers belong to the main thread.
+    """
+    numbers = [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []
+    taken = {number: signal.getsignal(number) for number in numbers}
+    taken = {number: handler for number, handler in taken.items() if handler in DEFAULTS}
+    again: list[threading.Timer] = []
+    for number in taken:
+        signal.signal(number, partial(_interrupt, again))
+    try:
+        yield
+    finally:
+        for timer in again:  # the command has ended: its caller is not to be stopped
+            timer.cancel()
+        for number, handler in taken.items():
+            signal.signal(number, handler)
+
+
+def _interrupt(again: list[threading.Timer], number: int, frame: FrameType | None) -> None:
+    """Stop, but after an import: native modules that are stopped while they load hide the cause."""
+    while frame:
+        if frame.f_code.co_filename == IMPORTING:
+            timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
+            again.append(timer)
+            timer.start()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
 
 # The typer library keeps the classes of its errors to itself: they differ in what they hold.
 _PARAMETER, _OPTION, _LIKELY = "param", "option_name", "possibilities"
