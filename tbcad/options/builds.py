@@ -118,11 +118,7 @@ class VerificationOptions(Call):
     ] = False
 
     def check(self) -> None:
-        """Refuse what cannot be, before heavy libraries are loaded.
-
-        Raises:
-            InputError: as said.
-        """
+        """Refuse what cannot be, before heavy libraries are loaded."""
         if not self.time_limit > 0:
             raise InputError(f"--time-limit must be more than 0 seconds, not {self.time_limit:g}")
         check_is_folder(Path(self.exports))

@@ -24,7 +24,6 @@ from tbcad.options.shared import (
     UnitOption,
     UpOption,
     numbers,
-    seconds,
 )
 
 MOST_NOISE = 100.0
@@ -238,14 +237,3 @@ class SimulateRunOptions(Call):
         if self.phases is None:
             return None
         return tuple(part.strip() for part in self.phases.split(","))
-
-    def seconds(self) -> tuple[float | None, float | None]:
-        """Exposure by LEDs and of the lit object, s; None where they are not said.
-
-        Raises:
-            InputError: one is no time of an exposure.
-        """
-        return (
-            seconds("--exposure-leds", self.exposure_leds),
-            seconds("--exposure-lit", self.exposure_lit),
-        )

@@ -165,12 +165,18 @@ ExposureLit = Annotated[
 ]
 
 
-def seconds(option: str, given: str | float | None) -> float | None:
-    """An exposure time, s, of a number or a fraction as cameras show it.
+def exposures(
+    leds: str | float | None, lit: str | float | None
+) -> tuple[float | None, float | None]:
+    """Exposure by LEDs and of the lit object, s, of numbers or fractions as cameras show them.
 
     Raises:
-        InputError: it is neither, or no time of an exposure.
+        InputError: one is neither, or no time of an exposure.
     """
+    return _seconds("--exposure-leds", leds), _seconds("--exposure-lit", lit)
+
+
+def _seconds(option: str, given: str | float | None) -> float | None:
     if given is None:
         return None
     text = str(given)

@@ -28,13 +28,10 @@ _MAX_NAMES = 3  # of foreign files in an error
 
 
 def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> None:
-    """Check, before any work, that a folder can be replaced.
+    """Check, before any work, that a folder, which need not exist, can be replaced.
 
-    Args:
-        out: the folder, which need not exist.
-        kind: of the content that is to be written.
-        force: whether content that costs hours may be in it, and files that tbcad did not write.
-        inputs: files and folders that are read for it.
+    With force also content that costs hours, and among files that tbcad did not write. Inputs are
+    files and folders that are read for it.
 
     Raises:
         InputError: it cannot; the text says why and what to do.
@@ -52,12 +49,8 @@ def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Sourc
 def replacing(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> Iterator[Path]:
     """Give a folder to write content into, which replaces out when the block ends well.
 
-    Args:
-        out: the folder to be replaced, which need not exist; missing parents are made.
-        kind: of the content.
-        force: replace content that costs hours, and keep the files that tbcad did not write;
-            without, both are refused.
-        inputs: files and folders that are read for it.
+    Missing parents are made. With force content that costs hours is replaced, and files that tbcad
+    did not write are kept; without, both are refused. Inputs are read for it.
 
     Raises:
         InputError: out cannot be replaced; it is then as before.

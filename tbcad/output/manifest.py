@@ -106,11 +106,7 @@ _MAX_RECORD_BYTES = 64_000_000
 
 
 def kind_of(folder: Path) -> str | None:
-    """Return the kind of content that tbcad wrote; "" where it is unknown, None for other folders.
-
-    Args:
-        folder: which need not exist.
-    """
+    """The kind of content that tbcad wrote; "" where it is unknown, None for other folders."""
     manifest = read_manifest(folder)
     if manifest and manifest.kind:
         return manifest.kind
@@ -124,13 +120,9 @@ def kind_of(folder: Path) -> str | None:
 
 
 def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> None:
-    """Refuse to replace another kind of content, and unasked what cost hours.
+    """Refuse to replace another kind of content, and without force what cost hours.
 
-    Args:
-        out: the folder as the user names it.
-        target: its path, links resolved.
-        kind: of the new content.
-        force: whether content of the same kind may be replaced.
+    out is the folder as the user names it, target its path with links resolved.
 
     Raises:
         InputError: as said, or the folder is inside a folder that tbcad wrote, or above one.
@@ -162,11 +154,7 @@ def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> No
 
 
 def refuse_inside(out: Path, target: Path) -> None:
-    """Refuse a folder inside a folder that tbcad wrote.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse a folder inside a folder that tbcad wrote."""
     for above in target.parents:
         if (outer := kind_of(above)) is not None:
             raise InputError(f"{out} is inside {above}, {words(outer)}: name a folder outside it")

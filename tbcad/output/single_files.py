@@ -20,13 +20,6 @@ def refuse_inputs(out: Path, inputs: Iterable[Source]) -> None:
     """Refuse, before any work, an output that is an input, is inside one, or has one inside.
 
     Files are compared by device and inode, so by whatever name and link they are called.
-
-    Args:
-        out: file or folder to write, which need not exist.
-        inputs: files and folders that are read.
-
-    Raises:
-        InputError: as said.
     """
     target = out.resolve()
     above = _places(target)
@@ -86,21 +79,13 @@ def check_file(file: Path, force: bool, inputs: Iterable[Path | None] = ()) -> N
 
 
 def check_tables(out: Path) -> None:
-    """Refuse, before any work, to write tables and plots into what tbcad wrote as a whole.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse, before any work, to write tables and plots into what tbcad wrote as a whole."""
     with write_errors_as_input_errors(out):
         refuse_inside(out, out.resolve() / "table")
 
 
 def refuse_member(file: Path) -> None:
-    """Refuse a file of a build, a capture ...: another in its place would spoil the whole.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse a file of a build, a capture ...: another in its place would spoil the whole."""
     place = file.parent.resolve() / file.name
     for folder in place.parents:
         kind = kind_of(folder)

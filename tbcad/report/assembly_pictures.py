@@ -85,12 +85,7 @@ class _Scene:
 
 
 def draw(folder: Path, pictures: Path) -> None:
-    """Draw a PNG file for each step that has bodies, named by its key.
-
-    Args:
-        folder: an export with a prototype.
-        pictures: folder to write into.
-    """
+    """Draw a PNG file for each step that has bodies, named by its key, into a folder."""
     machine = read_machine(folder)
     bodies = _meshes(folder, machine)
     for step in assembly_steps(machine):

@@ -53,13 +53,7 @@ LIFTED = 1.5
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
-    """Draw one of SUBJECTS to a PNG file.
-
-    Args:
-        folder: an export with a prototype.
-        subject: key of SUBJECTS.
-        picture: file to write.
-    """
+    """Draw one of SUBJECTS of an export with a prototype to a PNG file."""
     record = Prototype.read(folder / NAME)
     rows = ROWS.get(subject, 1)
     size = (SIZE[0], rows * SIZE[1])

@@ -67,11 +67,7 @@ class Plan:
 
 
 def planned(options: BuildOptions) -> Plan:
-    """Refuse, before any work, what cannot be built or replaced.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse, before any work, what cannot be built or replaced."""
     from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
     from tbcad.output.single_files import design_files, files_named

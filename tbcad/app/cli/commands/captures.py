@@ -93,7 +93,7 @@ def export(options: ExportOptions, json: JsonResult = False) -> int:
     from tbcad.app.api import export as exported
 
     with stages(STAGES) as screen:
-        record = exported(replace(options, progress=screen.stage, detail=screen.detail))
+        record = exported(options.on(screen))
     figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
     files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
     lines = _scene_lines(record) if to == "mitsuba" else _lines(record)

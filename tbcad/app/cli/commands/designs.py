@@ -1,6 +1,5 @@
 """Designs: one to begin with, and the search for a better one."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,7 +88,7 @@ def optimize(options: OptimizeOptions, json: JsonResult = False) -> int:
     from tbcad.app.api import optimize as searched
 
     with stages(2) as screen:
-        result = searched(replace(options, progress=screen.stage, detail=screen.detail))
+        result = searched(options.on(screen))
     if json:
         print_json(_record(result, options.files))
         return 0

@@ -125,11 +125,7 @@ class ViewFiles(NamedTuple):
             yield "opacity", self.opacity
 
     def check(self, out: Path, method: str, force: bool, inputs: tuple[Path | None, ...]) -> None:
-        """Refuse, before any work, what cannot be written or what a method does not give.
-
-        Raises:
-            InputError: as said.
-        """
+        """Refuse, before any work, what cannot be written or what a method does not give."""
         from tbcad.light.simulate.image_files import check_image_path
         from tbcad.output.single_files import check_file
 

@@ -1,6 +1,5 @@
 """What is bought, printed and put together: heavy libraries are imported inside the commands."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -72,7 +71,7 @@ def inspection(options: InspectionOptions, json: JsonResult = False) -> int:
 
     out = Path(options.out)
     with stages(3) as screen:
-        record = inspect(replace(options, progress=screen.stage))
+        record = inspect(options.on(screen))
     if json:
         print_json(record)
         return 0
