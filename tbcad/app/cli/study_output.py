@@ -26,20 +26,12 @@ STUDIES = Path("studies")
 
 
 def of_design(prepare: Callable[..., Work]) -> Callable[..., int]:
-    """A command for a study of a design.
-
-    Args:
-        prepare: takes the design's Spec, then options of its own; returns what makes the study.
-    """
+    """A command for a study of a design: takes its Spec, then options of its own."""
     return _command(prepare, _spec)
 
 
 def of_export(prepare: Callable[..., Work]) -> Callable[..., int]:
-    """A command for a study of an export.
-
-    Args:
-        prepare: takes the export's folder, then options of its own; returns what makes the study.
-    """
+    """A command for a study of an export: takes its folder, then options of its own."""
     return _command(prepare, _folder)
 
 
