@@ -26,8 +26,13 @@ from tbcad.app.cli.commands import view as _view  # noqa: F401 - adds its comman
 from tbcad.app.cli.commands import workshop as _workshop  # noqa: F401 - adds its commands
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import add_examples, order_help
-from tbcad.app.cli.endings import INTERRUPTED, Stopped, signals_as_interrupt
-from tbcad.app.cli.endings import usage_error_text
+from tbcad.app.cli.endings import (
+    INTERRUPTED,
+    Stopped,
+    shortage,
+    signals_as_interrupt,
+    usage_error_text,
+)
 from tbcad.errors import InputError, PlausibilityWarning
 
 order_help(app)
@@ -64,6 +69,12 @@ def _run(arguments: list[str]) -> int:
     except Stopped as stop:
         sys.stderr.write(f"tbcad: stopped; {stop}\n")
         return INTERRUPTED
+    except (MemoryError, OSError, RuntimeError) as error:
+        reason = shortage(error)
+        if reason is None:
+            raise
+        sys.stderr.write(f"tbcad: {reason}\n")
+        return 2
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:  # as typer returns it, too
