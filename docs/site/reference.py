@@ -16,15 +16,13 @@ from tbcad_verify.record.prototype_sections import PlateHoles
 import tbcad
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import HEADINGS
-from tbcad.app.reference.template import design_template
+from tbcad.app.reference.keys import design_template
 from tbcad.prototype.electronics import wiring
 from tbcad.prototype.files import bom_csv
-from tbcad.records.calibration import CalibrationRecord
+from tbcad.records.calibration import CalibrationRecord, MachineRecord
 from tbcad.records.design import DesignRecord
-from tbcad.records.document import Document
+from tbcad.records.document import Document, Manifest
 from tbcad.records.exposure import Exposure
-from tbcad.records.machine import MachineRecord
-from tbcad.records.manifest import Manifest
 from tbcad.records.prototype import Prototype
 from tbcad.records.run import RunRecord
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow

@@ -10,7 +10,7 @@ from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.records.design import NAME as DESIGN
 from tbcad.records.design import DesignRecord
-from tbcad.records.manifest import Manifest
+from tbcad.records.document import Manifest
 from tbcad.records.prototype import NAME as PROTOTYPE
 from tbcad.records.prototype import PrintedPartRecord
 

@@ -49,15 +49,9 @@ def write_export(
     *,
     optional_prototype: bool = False,
 ) -> Export:
-    """Write an export into an empty folder.
+    """Write some of PARTS into an empty folder; `submit` takes what can be done meanwhile.
 
-    Args:
-        design: the mirrors.
-        folder: to write into.
-        parts: some of PARTS.
-        progress: called with each stage.
-        submit: takes what can be done meanwhile.
-        optional_prototype: leave the prototype out where it cannot be made, instead of refusing.
+    An optional prototype is left out where it cannot be made, instead of refusing.
 
     Raises:
         SpecError: when something does not fit; it says what to change.

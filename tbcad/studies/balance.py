@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec

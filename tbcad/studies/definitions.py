@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Record, Table
 from tbcad.common.schedule import run_units
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions

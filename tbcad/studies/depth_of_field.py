@@ -10,6 +10,8 @@ from tbcad.common.results.tables import Record, Table
 from tbcad.core.camera.requirements import (
     FANS,
     PLACES,
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.core.camera.lens import (
     DepthRange,
     Lens,
     VirtualImages,

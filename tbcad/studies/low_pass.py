@@ -4,9 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.simulate.camera_photographs import photographed

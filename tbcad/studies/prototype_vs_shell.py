@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import ttest_rel
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Figure, PlotPanel, Series, Study, Table
 from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene

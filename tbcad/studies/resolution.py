@@ -5,9 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import (

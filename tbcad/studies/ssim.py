@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import linregress
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.files import create_light_field, write_camera

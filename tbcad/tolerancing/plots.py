@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results import PlotPanel, Series
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers

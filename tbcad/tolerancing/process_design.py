@@ -8,7 +8,7 @@ from tbcad.common import schedule
 from tbcad.core.spec.design import EdgeKind, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.options.tolerances import check_yield
+from tbcad.options.builds import check_yield
 from tbcad.tolerancing.margin import (
     STEP_MM,
     SeeingPixels,

@@ -9,14 +9,15 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.common import schedule
-from tbcad.common.results.study import (
+from tbcad.common.results import (
     SUMMARY_COLUMNS,
     Study,
+    Table,
     check_study_folder,
+    csv_text,
     study_files,
     write_study,
 )
-from tbcad.common.results.tables import Table, csv_text
 from tbcad.core.mirrors import radii
 from tbcad.core.spec.design import FIT
 from tbcad.core.spec.load import load_spec

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_rel
 
-from tbcad.common.results.study import Study, study_files
+from tbcad.common.results import Study, study_files
 from tbcad.core.mirrors import radii
 from tbcad.core.mirrors.array import design
 from tbcad.core.optics.camera import Camera

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from tbcad.common.results.study import study_files
+from tbcad.common.results import SUMMARY_COLUMNS, study_files
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.options.tolerances import ToleranceOptions
+from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.analysis import Analysis, ProcessOption
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (

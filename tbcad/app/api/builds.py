@@ -7,16 +7,15 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from tbcad.app.api.arguments import chosen_spec
+from tbcad.app.api.designs import chosen_spec
 from tbcad.app.api.verification import verify as verification
 from tbcad.common.atomic_files import InFolder
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import option_texts
 from tbcad.errors import InputError
-from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions
+from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions, check_yield
 from tbcad.options.call import keywords, silent
 from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
-from tbcad.options.tolerances import check_yield
 
 if TYPE_CHECKING:
     from tbcad_verify.report.as_made import AsMade
@@ -68,14 +67,10 @@ class Plan:
 
 
 def planned(options: BuildOptions) -> Plan:
-    """Refuse, before any work, what cannot be built or replaced.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse, before any work, what cannot be built or replaced."""
     from tbcad.output.folder import check_replaceable
-    from tbcad.output.inputs import design_files, files_named
     from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
+    from tbcad.output.single_files import design_files, files_named
 
     asked = parse_parts(options.parts) if isinstance(options.parts, str) else options.parts
     changes = option_texts(options.settings)

@@ -22,6 +22,7 @@ from tbcad.options.machines import (
     SimulateRunOptions,
 )
 from tbcad.options.runs import RunOptions
+from tbcad.options.shared import exposures
 
 if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
@@ -60,10 +61,11 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     check_is_object(None if file is None else Path(file), options.up, options.unit)
     if options.bits not in (8, 16):
         raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
-    options.stop_numbers(), options.seconds()  # refused before what is heavy is loaded
+    options.stop_numbers()  # refused before what is heavy is loaded
+    exposures(options.exposure_leds, options.exposure_lit)
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions
     from tbcad.light.simulate.scene.reflector import read_export
-    from tbcad.output.inputs import files_named
+    from tbcad.output.single_files import files_named
     from tbcad.rig.runs import read_run
     from tbcad.rig.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerancing.process.process import load_process, process_errors

@@ -10,7 +10,7 @@ from PIL import Image
 
 from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.common.compiled import compiled_loop
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures

@@ -9,7 +9,7 @@ from threading import Lock
 import numpy as np
 from scipy import ndimage
 
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.light.reconstruction.field import Field

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from tbcad.prototype.assembly_steps.machine import Machine, Text, lines
 from tbcad.prototype.frame.camera_mount import GAP_MM
-from tbcad.records.prototype_light import LampsRecord
+from tbcad.records.prototype_drive import LampsRecord
 
 DIGITAL = "digital"
 MA_PER_A = 1000.0

@@ -31,8 +31,16 @@ from tbcad.prototype.stage.layout import led_poses
 from tbcad.prototype.stage.leds import calibration_estimate
 from tbcad.records import prototype as records
 from tbcad.records.prototype import MATT_BLACK, Prototype
-from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
-from tbcad.records.prototype_light import CardPanel, LampPlace, LampsRecord, ShroudRecord
+from tbcad.records.prototype_drive import (
+    CardPanel,
+    Controller,
+    DriveRecord,
+    Home,
+    LampPlace,
+    LampsRecord,
+    PowerOff,
+    ShroudRecord,
+)
 
 STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
 PAD_UM = 10.0  # largest error of a ball's centre, found from its pads

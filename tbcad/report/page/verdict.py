@@ -162,14 +162,12 @@ def checks_html(verdict: Verdict | None) -> Iterator[str]:
     failed = [check for check in every if check.passed is not True]
     if failed:
         yield from _check_table(failed)
-    names: dict[str, list[CheckRow]] = {}
-    for check in every:
-        names.setdefault(check.name, []).append(check)
+    place = {name: k for k, name in enumerate(dict.fromkeys(check.name for check in every))}
     passed = sum(check.passed is True for check in every)
     yield f"<p>{passed} of {len(every)} checks passed.</p>"
     yield f"<details><summary>All {len(every)} checks, by name</summary>"
     yield "<div class=wide>"
-    yield from _check_table([check for checks in names.values() for check in checks])
+    yield from _check_table(sorted(every, key=lambda check: place[check.name]))
     yield "</div></details>"
 
 

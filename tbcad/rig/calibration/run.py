@@ -11,7 +11,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import CalibrateOptions
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.inputs import Source, files_named
+from tbcad.output.single_files import Source, files_named
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detect import detect
 from tbcad.rig.calibration.detection.matching import Room

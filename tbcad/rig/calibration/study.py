@@ -10,9 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign

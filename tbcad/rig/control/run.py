@@ -12,6 +12,10 @@ from tbcad.options.runs import Ask, RunOptions, Show
 from tbcad.output.content import refuse_inside
 from tbcad.output.inputs import refuse_inputs
 from tbcad.records.exposure import DARK_LIT, PhaseTimes
+from tbcad.options.shared import exposures
+from tbcad.output.manifest import refuse_inside
+from tbcad.output.single_files import refuse_inputs
+from tbcad.records.exposure import DARK_LIT, PhaseTimes, exposure_name
 from tbcad.records.run import RunRecord, read_record
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.chosen_camera import (
@@ -125,7 +129,7 @@ def _faults_as_input_errors(port: str) -> Iterator[None]:
 def _prepared(options: RunOptions) -> tuple[ControlPlan, RunSelection]:
     """Plan and choice, or those of the run that is resumed."""
     exports, out, asked = Path(options.exports), Path(options.out), options.size()
-    times = PhaseTimes(*options.seconds())
+    times = PhaseTimes(*exposures(options.exposure_leds_s, options.exposure_lit_s))
     plan = read_control_plan(exports)
     phases = chosen_phases(plan, options.phases, times)
     frames = chosen_frames(plan, options.stops, options.runs or "ab")

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.common.srgb import srgb, srgb_light
+from tbcad.common.colours import srgb, srgb_light
 from tbcad.core.optics.camera import LensCamera, vignetting
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import between_pixels

@@ -24,8 +24,9 @@ from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_obje
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.options.machines import SimulateRunOptions
+from tbcad.options.shared import exposures
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.inputs import Source, refuse_inputs
+from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
 from tbcad.records.run import RECORD, Geometry, RunRecord
 from tbcad.rig.machine.built import BuiltPrototype, designed_build, random_build
@@ -74,7 +75,7 @@ def prepare_run(
     It is the prototype, or both cameras of the shell. InputError: the export has no prototype with
     LEDs, or a shell with planar mirrors, or has not the stops or phases asked for.
     """
-    times = PhaseTimes(*options.seconds())
+    times = PhaseTimes(*exposures(options.exposure_leds, options.exposure_lit))
     prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
     leds = len(prepared.builds[0][0].machine.leds)
     phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))

@@ -10,7 +10,7 @@ import pytest
 from tbcad.cad.formats.checked_files import Record, parse_json, read_json, toml_text
 from tbcad.errors import InputError
 from tbcad.output.manifest import is_listed
-from tbcad.records.manifest import Entry
+from tbcad.records.document import Entry
 
 
 class Numbers(Record):

@@ -5,6 +5,8 @@ import pytest
 
 from tbcad.common.results.study import Study, study_files
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.common.results import Study, study_files
+from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.rig.calibration.led_layout import NUMBERS
 from tbcad.rig.calibration.study import (
     NOISES_PX,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.app.cli.app import app
-from tbcad.app.cli.commands.compared_pictures import (
+from tbcad.app.cli.commands.picture_files import (
     check_pictures,
     compared_files,
     scene_of,

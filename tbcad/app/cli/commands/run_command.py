@@ -11,6 +11,7 @@ from tbcad.app.cli.app import command
 from tbcad.app.cli.output_mode import print_json
 from tbcad.errors import InputError
 from tbcad.options.runs import Preflight, RunOptions
+from tbcad.options.shared import exposures
 
 
 @command()
@@ -47,7 +48,7 @@ def run(
     all photographs are there. 1: some are missing, or the run stopped; --resume goes on. 2: bad
     input, or the preflight finds an exposure that will not do.
     """
-    options.size(), options.seconds()  # refused first
+    options.size(), exposures(options.exposure_leds_s, options.exposure_lit_s)  # refused first
     if preflight_only and (no_preflight or options.resume):
         other = "--resume" if options.resume else "--no-preflight"
         raise InputError(f"--preflight-only goes without {other}: leave one of both out")

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from tbcad.cad.formats.pictures import Picture, picture_of
 from tbcad.common.srgb import srgb
 from tbcad.errors import InputError
+from tbcad.cad.formats.images.pictures import Picture, picture_of
+from tbcad.common.colours import srgb
+from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.types import Bytes, Floats, Ints
 
 Up = Literal["y", "z"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.views.blend import blend_cameras

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.common.figure_files import PlotFormat, figure_file
-from tbcad.common.results.tables import csv_text
+from tbcad.common.results import csv_text
 from tbcad.common.screen import WIDTH
 from tbcad.core.geometry.vectors import norm
 from tbcad.output.manifest import write_manifest
