@@ -33,7 +33,7 @@ from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses,
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import base_torques, choose_drive
 from tbcad.prototype.drive.travel import OVERTRAVEL_DEG, home_angles
-from tbcad.prototype.electronics.wiring import Wiring, wiring_layout
+from tbcad.prototype.electronics import Wiring, wiring_layout
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
@@ -44,7 +44,7 @@ from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_fasteners, stage_layout
 
 if TYPE_CHECKING:
-    from tbcad.prototype.printing.placing import PrintedPart
+    from tbcad.prototype.printed import PrintedPart
 
 OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 """Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""

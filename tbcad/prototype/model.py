@@ -30,7 +30,7 @@ from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
-from tbcad.prototype.printing.placing import PlacedSolid, PrintedPart, Role, placed_components
+from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_components
 from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.

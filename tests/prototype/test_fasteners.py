@@ -13,7 +13,7 @@ from tbcad.prototype.fasteners import (
     fastener_component,
     numbered,
 )
-from tbcad.prototype.printing.placing import component_solid
+from tbcad.prototype.printed import component_solid
 from tbcad.prototype.purchased.parts import load_parts, of_kind
 
 PARTS = load_parts()

@@ -5,7 +5,7 @@ import pytest
 
 from tbcad.core.geometry.round_cones import RoundCones
 from tbcad.core.geometry.vectors import norm
-from tbcad.prototype.keepout_distances import (
+from tbcad.prototype.keepout import (
     azimuth_ranges,
     cone_table,
     distances_to_balls,

@@ -16,11 +16,9 @@ from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics.wiring import wiring_layout, wiring_rows
-from tbcad.prototype.files.bom_csv import ALWAYS, PrintedItem, bom_rows, totals
-from tbcad.prototype.printing.estimate import PrintEstimate
-from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.purchased.prices import Prices, load_prices
+from tbcad.prototype.electronics import wiring_layout, wiring_rows
+from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
+from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices
 from tbcad.prototype.stage.layout import StageLayout
 
 PARTS = load_parts()
@@ -123,7 +121,7 @@ def test_every_row_of_the_list(
 ) -> None:
     drive, prices = DRIVES[0], load_prices(["estimates"]) if priced else Prices(())
     printed = [
-        PrintedItem(f"part_{k}", "a part", volume, PrintEstimate(volume / 2, volume / 1e4))
+        PrintedItem(f"part_{k}", "a part", volume, (volume / 2, volume / 1e4))
         for k, volume in enumerate(volumes)
     ]
     rows = bom_rows(layout, drive, counts, printed, density, PARTS, prices)

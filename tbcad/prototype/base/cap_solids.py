@@ -13,7 +13,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_pocket, cap_spigot, flat_depth
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import Point, arc_about_axis, lines, section_face
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printed import PlacedSolid
 
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 

@@ -22,7 +22,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split_points import STEP_MM, base_points, bosses_and_hub
-from tbcad.prototype.printing.bed import min_bed, shortfall, size_text
+from tbcad.prototype.print_bed import min_bed, shortfall, size_text
 from tbcad.types import Bools, Floats, Ints
 
 CLEARANCE_MM = 1.0  # of a plane from any boss

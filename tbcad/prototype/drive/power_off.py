@@ -10,7 +10,7 @@ import numpy as np
 
 from tbcad.prototype.base.hub import ZERO_DISC_MM
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.homing.sizes import PIN_MM, PIN_OUT_MM
+from tbcad.prototype.homing import PIN_MM, PIN_OUT_MM
 from tbcad.records.prototype_drive import PowerOff
 
 # Permitted of a printed hole round a pin, as below the heads of screws; of a rod of hardened steel

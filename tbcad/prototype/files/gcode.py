@@ -14,13 +14,12 @@ Sources: grblHAL core gcode.c; grbl/gcode.c, grbl/protocol.h and doc/markdown/se
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import StopSequence, home_angles, stop_sequence
-from tbcad.prototype.electronics.outputs import LIT, phases
+from tbcad.prototype.electronics import LIT, phases
 from tbcad.records.prototype_drive import Phase
 
 MAX_LINE_LENGTH = 79
@@ -74,11 +73,6 @@ def _known_angle(prototype: PrototypeLayout, motion: MotionSpec) -> Iterator[str
     yield "$H"
     yield modes
     yield f"G92 {_axis_word(homed, motion)}"
-
-
-def write_program(path: Path, lines: list[str]) -> None:
-    """Write rotation_plan.nc."""
-    path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
 
 
 def duration_minutes(sequence: StopSequence, motion: MotionSpec, lit: tuple[Phase, ...]) -> float:

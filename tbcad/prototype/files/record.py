@@ -22,13 +22,13 @@ from tbcad.prototype.drive.loads import (
 )
 from tbcad.prototype.drive.power_off import power_off
 from tbcad.prototype.drive.travel import stop_sequence
-from tbcad.prototype.electronics.outputs import phases
+from tbcad.prototype.electronics import phases
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.files.bom_csv import totals
+from tbcad.prototype.files.bom import totals
 from tbcad.prototype.frame.camera_gauge import marks_seen
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.printing.placing import PrintedPart
+from tbcad.prototype.printed import PrintedPart
 from tbcad.prototype.stage.calibration import calibration_estimate
 from tbcad.prototype.stage.layout import led_poses
 from tbcad.records import prototype as records

@@ -29,7 +29,7 @@ from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
 from tbcad.prototype.frame.feet import stage_foot, upright_foot
 from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.purchased import plate_fasteners
-from tbcad.prototype.homing.layout import HomingLayout, homing_layout
+from tbcad.prototype.homing import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.lamps import lamp_layout

@@ -20,8 +20,17 @@ from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.core.spec.section import AUTO
 from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.keepout import KeepOut, min_distance
-from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout, hidden_by_base, in_view
-from tbcad.prototype.light.lamp_mounts import HOLDER_MM, OUT_MM, TAIL_MM, LampMounts
+from tbcad.prototype.light.lamp import (
+    HOLDER_MM,
+    OUT_MM,
+    SHORT_STRIP,
+    STRIP,
+    TAIL_MM,
+    LampLayout,
+    LampMounts,
+    hidden_by_base,
+    in_view,
+)
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.types import Floats
 

@@ -14,8 +14,8 @@ from tbcad.cad.formats.csv_table import write_table
 from tbcad.errors import InputError
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
-from tbcad.prototype.electronics.wiring import COLUMNS as WIRING
-from tbcad.prototype.files.bom_csv import COLUMNS
+from tbcad.prototype.electronics import COLUMNS as WIRING
+from tbcad.prototype.files.bom import COLUMNS
 from tbcad.records.tables import BallRow
 from tests.prototype_records import (
     drive_section,

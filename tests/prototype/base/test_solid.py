@@ -50,8 +50,8 @@ from tbcad.prototype.coupon.seat import (
     with_pads,
     worst_pose,
 )
-from tbcad.prototype.printing.bed import usable_size
-from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.prototype.print_bed import usable_size
+from tbcad.prototype.printed import PlacedSolid, placed_on_bed
 from tbcad.types import Floats
 from tests.helpers import as_trimesh, bounds, manifold
 

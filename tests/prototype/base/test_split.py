@@ -15,7 +15,7 @@ from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.profile import distance_outside
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.printing.bed import min_bed, shortfall, usable_size
+from tbcad.prototype.print_bed import min_bed, shortfall, usable_size
 from tbcad.prototype.purchased.parts import load_parts
 
 SPEC = BaseSpec()

@@ -24,7 +24,7 @@ from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printed import PlacedSolid
 from tests.helpers import as_trimesh, bounds, cylinders, manifold
 
 PRINTER = PrinterSpec(bed_mm=(160.0, 160.0, 160.0))

@@ -12,8 +12,7 @@ from tbcad.cad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
 from tbcad.cad.formats.entities import Circle, Dimension, Layer, Line, Polyline, Text, simple
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drawings.lamps import LAMP, lamp_sheet
-from tbcad.prototype.drawings.parts import PLATE, UPRIGHT, WHEEL, Listed, sheets
+from tbcad.prototype.drawings.parts import LAMP, PLATE, UPRIGHT, WHEEL, Listed, lamp_sheet, sheets
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.purchased.parts import load_parts

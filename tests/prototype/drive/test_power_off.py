@@ -7,7 +7,7 @@ import pytest
 
 from tbcad.prototype.drive.balance import GRAVITY, BaseBalance
 from tbcad.prototype.drive.power_off import PowerOff, power_off
-from tbcad.prototype.homing.sizes import PIN_OUT_MM
+from tbcad.prototype.homing import PIN_OUT_MM
 
 # The axis is level along y; one kilogram 100 mm above it at base angle zero.
 FRAME = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.electronics.resistors import E24, e24_at_least, series_resistor
+from tbcad.prototype.electronics import E24, e24_at_least, series_resistor
 from tbcad.prototype.purchased.parts import load_parts
 
 PARTS = load_parts()

@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics.wiring import Wiring, wiring_layout, wiring_rows
+from tbcad.prototype.electronics import Wiring, wiring_layout, wiring_rows
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 

@@ -10,7 +10,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import ball_masses, sum_masses
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, base_torques, choose_drive
-from tbcad.prototype.files.bom_csv import (
+from tbcad.prototype.files.bom import (
     COLUMNS,
     PrintedItem,
     bom_rows,
@@ -18,9 +18,7 @@ from tbcad.prototype.files.bom_csv import (
     standard_in,
 )
 from tbcad.prototype.files.record import drive_record
-from tbcad.prototype.printing.estimate import PrintEstimate
-from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.purchased.prices import load_prices
+from tbcad.prototype.purchased.parts import load_parts, load_prices
 from tests.exported_files import Rows, read_csv
 
 
@@ -48,8 +46,8 @@ PURCHASED = {
 }
 DENSITY = 1.27
 PRINTED = (
-    PrintedItem("base", "carrier", 5e5, PrintEstimate(4.2e5, 41.26)),
-    PrintedItem("foot", "below the plate", 1e3, PrintEstimate(800.0, 0.0834)),
+    PrintedItem("base", "carrier", 5e5, (4.2e5, 41.26)),
+    PrintedItem("foot", "below the plate", 1e3, (800.0, 0.0834)),
 )
 PRICES = load_prices(["estimates"])
 
@@ -63,7 +61,7 @@ def drive() -> Drive:
 def read(layout: PrototypeLayout, drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     path = tmp_path_factory.mktemp("bom") / "bom.csv"
     caps = np.flatnonzero(layout.balls.cap).tolist()
-    printed = [*PRINTED, *(cap_item(layout, j, 2e3, PrintEstimate(1e3, 0.2)) for j in caps)]
+    printed = [*PRINTED, *(cap_item(layout, j, 2e3, (1e3, 0.2)) for j in caps)]
     rows = bom_rows(layout, drive, PURCHASED, printed, DENSITY, PARTS, PRICES)
     write_table(path, COLUMNS, rows)
     return read_csv(path)

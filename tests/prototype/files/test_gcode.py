@@ -1,7 +1,6 @@
 """The program of random motions, run by the verification's controller."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +16,8 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import free_base_angles, home_angles, stop_sequence
-from tbcad.prototype.electronics.outputs import phases
-from tbcad.prototype.files.gcode import DECIMALS, duration_minutes, gcode_program, write_program
+from tbcad.prototype.electronics import phases
+from tbcad.prototype.files.gcode import DECIMALS, duration_minutes, gcode_program
 from tbcad.prototype.purchased.parts import load_parts
 
 LEDS, TRUNCATED = 4, 10.0**-DECIMALS
@@ -111,8 +110,3 @@ def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) ->
 def test_a_start_out_of_reach(layout: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
         stop_sequence(layout, MotionSpec(home_deg=170))
-
-
-def test_written(tmp_path: Path) -> None:
-    write_program(tmp_path / "a.nc", ["G1 X1", "M2"])
-    assert (tmp_path / "a.nc").read_bytes() == b"G1 X1\nM2\n"

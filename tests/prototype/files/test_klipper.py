@@ -4,8 +4,8 @@ from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
-from tbcad.prototype.electronics.outputs import lights
-from tbcad.prototype.files.klipper import klipper_config, klipper_program
+from tbcad.prototype.electronics import lights
+from tbcad.prototype.files.controllers import klipper_config, klipper_program
 from tbcad.prototype.purchased.parts import load_parts
 
 MOTION = MotionSpec(home_trim_deg=0.5)

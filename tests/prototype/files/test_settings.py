@@ -6,7 +6,7 @@ from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import HomeAngles
-from tbcad.prototype.files.settings import settings
+from tbcad.prototype.files.controllers import settings
 from tbcad.prototype.purchased.parts import load_parts
 
 ANGLES = HomeAngles(-98.5, -96.5, 191.0)

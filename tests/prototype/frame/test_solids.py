@@ -15,7 +15,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.brackets import CLEARANCE_HOLE_MM
 from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
-from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
+from tbcad.prototype.printed import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats

@@ -19,9 +19,8 @@ from tbcad.prototype.drive.travel import (
     stop_sequence,
 )
 from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.prototype.homing.layout import ROLLER_MM, homing_layout
-from tbcad.prototype.homing.sizes import PIN_HOLE_MM, tab_radius
-from tbcad.prototype.printing.placing import component_solid
+from tbcad.prototype.homing import PIN_HOLE_MM, ROLLER_MM, homing_layout, tab_radius
+from tbcad.prototype.printed import component_solid
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.types import Floats
 

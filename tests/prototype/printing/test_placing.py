@@ -10,7 +10,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.printing.placing import NO_PADS, downward_pads, opening_up, primitive_solid
+from tbcad.prototype.printed import NO_PADS, downward_pads, opening_up, primitive_solid
 
 
 def cone(axis: np.ndarray, angle_deg: float, count: int = 12) -> np.ndarray:

@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.purchased.prices import COLUMNS, load_prices
+from tbcad.prototype.purchased.parts import PRICE_FIELDS, load_parts, load_prices
 
-HEADER = ",".join(COLUMNS)
+HEADER = ",".join(PRICE_FIELDS)
 
 
 def listed(folder: Path, *lines: str) -> str:
