@@ -60,6 +60,7 @@ SWITCH = "SWITCH-SS-5GL2"
 BODY_IN_MM, BODY_OUT_MM, BODY_HALF_MM = 7.3, 2.9, 9.9
 PRESSED_MM = 13.2
 SWITCH_MM, SWITCH_HOLES_MM, SWITCH_HOLE_MM = 6.4, 9.5, 2.35  # thickness, distance, diameter
+HOLES_MM = -SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2  # around, from the middle of the switch
 ROLLER_MM, ROLLER_LENGTH_MM = 4.8, 3.4
 LEVER_FROM_MM, LEVER_TO_MM, LEVER_HALF_MM = 9.0, 7.0, 6.0
 PILOT_MM, PILOT_DEPTH_MM = 1.7, 8.0  # hole that an M2 screw cuts its thread in
@@ -160,7 +161,13 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
             f"the carrier reaches {hub.face - base.rearmost:.1f} mm behind its hub, where the zero "
             "disc is: make prototype.base.hub_boss_mm larger"
         )
-    removed: list[Primitive] = [_hole(base, hub.face, back, *hole) for hole in holes]
+    low, high = back - THROUGH_MM, hub.face + THROUGH_MM
+    removed: list[Primitive] = [
+        cylinder_between(
+            hub_point(base, low, out, side), hub_point(base, high, out, side), diameter / 2
+        )
+        for out, side, diameter in holes
+    ]
     rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
     removed.append(_prism(base, rim, back - THROUGH_MM, ZERO_DISC_MM + 2 * THROUGH_MM))
     engraved = hub.face - MARK_DEPTH_MM
@@ -170,13 +177,6 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
     ]
     what = "disc with mark, arrow and the tab of the switch, between hub and drive"
     return Component("zero_disc", what, tuple(added), tuple(removed), (-w, w), rotates=True)
-
-
-def _hole(
-    base: BaseLayout, front: float, back: float, out: float, side: float, diameter: float
-) -> Cylinder:
-    start, end = (hub_point(base, z, out, side) for z in (back - THROUGH_MM, front + THROUGH_MM))
-    return cylinder_between(start, end, diameter / 2)
 
 
 def _prism(base: BaseLayout, polygon: Floats, back: float, height: float) -> Prism:
@@ -216,7 +216,7 @@ def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Compone
         outer = hub_point(base, middle, out, far + THROUGH_MM)
         removed.append(cylinder_between(inner, outer, SCREW_MM / 2))
     axes = place.axes(base)
-    for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2):
+    for around in HOLES_MM:
         top = np.array([place.radius, around, place.low + THROUGH_MM]) @ axes
         depth = PILOT_DEPTH_MM + THROUGH_MM
         removed.append(Cylinder(top, -base.frame[0], PILOT_MM / 2, depth))
@@ -237,14 +237,10 @@ def _fasteners(
         for out in bracket_screws()
     ]
     top = place.low + SWITCH_MM
+    bodies = ("home_switch", "home_bracket")
     on_bracket = [
-        Fastener(
-            switch,
-            np.array([place.radius, around, top]) @ axes,
-            -base.frame[0],
-            ("home_switch", "home_bracket"),
-        )
-        for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2)
+        Fastener(switch, np.array([place.radius, around, top]) @ axes, -base.frame[0], bodies)
+        for around in HOLES_MM
     ]
     return (*on_head, *on_bracket)
 
@@ -266,13 +262,7 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
         ),
         Cylinder(roller, axes[2], ROLLER_MM / 2, ROLLER_LENGTH_MM),
     )
-    holes = tuple(
-        Cylinder(
-            at(0.0, around, -THROUGH_MM) @ axes,
-            axes[2],
-            SWITCH_HOLE_MM / 2,
-            SWITCH_MM + 2 * THROUGH_MM,
-        )
-        for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2)
-    )
+    depth = SWITCH_MM + 2 * THROUGH_MM
+    starts = (at(0.0, around, -THROUGH_MM) @ axes for around in HOLES_MM)
+    holes = tuple(Cylinder(start, axes[2], SWITCH_HOLE_MM / 2, depth) for start in starts)
     return Component("home_switch", parts[SWITCH].what, added, holes, part=SWITCH)

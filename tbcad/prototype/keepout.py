@@ -39,11 +39,6 @@ class SweptSection:
     low: float  # smallest azimuth it reaches, radians
     high: float  # largest one
 
-    @property
-    def azimuths(self) -> tuple[float, float]:
-        """The range that it reaches."""
-        return self.low, self.high
-
 
 @dataclass(frozen=True)
 class KeepOut:
@@ -79,7 +74,7 @@ class KeepOut:
         local, swung = _cylindrical(self.frame, points), azimuth_ranges(self.swung)
         nearest = distances_to_balls(local, self.centre, self.radius, swung)
         for section in self.sections:
-            (turned,) = azimuth_ranges(np.array([section.azimuths]))
+            (turned,) = azimuth_ranges(np.array([[section.low, section.high]]))
             lower_to_section(local, section.polygon, turned, nearest)
         return nearest
 
@@ -87,13 +82,9 @@ class KeepOut:
 def keep_out_volume(
     prototype: PrototypeLayout, base: BaseLayout, capture: float, approach: float
 ) -> KeepOut:
-    """The keep-out volume of a prototype.
+    """The keep-out volume of a prototype, by the radius of the capture sphere, mm.
 
-    Args:
-        prototype: balls, their places and stops.
-        base: that carries them.
-        capture: radius of the capture sphere, mm.
-        approach: angle by which the base starts below its first stop, radians.
+    The base starts below its first stop by the approach, radians.
     """
     stops, azimuth = prototype.stops, prototype.placement.azimuth
     angle = stops.angle[stops.stop]
@@ -150,7 +141,9 @@ def _split(triangles: Floats) -> Floats:
 
 def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
     low, high = base.sector[0] + float(swing[0]), base.sector[1] + float(swing[1])
-    wall = _wall(base)
+    # The wall with the edges of its facets, which are off its cones.
+    line = shortened(base.inner, -FACETS_OUT_MM)
+    wall = np.vstack([line, offset(line, base.spec.thickness_mm + FACETS_OUT_MM)[::-1]])
     ribs = np.vstack([base.outline, base.inner[::-1]])
     bosses = [_boss(base, k) for k in range(len(base.seats))]
     hub = base.hub
@@ -158,12 +151,6 @@ def _sections(base: BaseLayout, swing: Floats) -> tuple[SweptSection, ...]:
     discs += [rectangle((hub.face, 0.0), (hub.back, hub.boss))] if hub.boss else []
     turning = [SweptSection(polygon, low, high) for polygon in (wall, ribs, *base.rings, *bosses)]
     return (*turning, *(SweptSection(polygon, -np.pi, np.pi) for polygon in discs))
-
-
-def _wall(base: BaseLayout) -> Floats:
-    """Section of the wall with the edges of its facets, which are off its cones, (z, r), (p, 2)."""
-    line = shortened(base.inner, -FACETS_OUT_MM)
-    return np.vstack([line, offset(line, base.spec.thickness_mm + FACETS_OUT_MM)[::-1]])
 
 
 def _boss(base: BaseLayout, k: int) -> Floats:
@@ -208,12 +195,9 @@ def cone_table(cones: RoundCones) -> Floats:
 
 @compiled_loop
 def distances_to_cones(points: Floats, cones: Floats, ranges: Floats) -> Floats:
-    """Distance of points (n, 3) to the nearest of round cones, mm, (n,); negative inside.
+    """Distance of points (n, 3) to the nearest of round cones (m, ...), mm, (n,); negative inside.
 
-    Args:
-        points: z, r, azimuth.
-        cones: see `cone_table`, (m, CONE_COLUMNS).
-        ranges: in which each cone turns, see `azimuth_ranges`, (m, 2).
+    Each cone turns in a range (m, 2).
     """
     result, near = np.full(len(points), inf), 0
     for i in range(len(points)):
@@ -233,11 +217,7 @@ def distances_to_cones(points: Floats, cones: Floats, ranges: Floats) -> Floats:
 def distances_to_balls(points: Floats, centre: Floats, radius: Floats, ranges: Floats) -> Floats:
     """Distance of points (n, 3) to the nearest of balls, mm, (n,); negative inside.
 
-    Args:
-        points: z, r, azimuth.
-        centre: z and r of the balls, mm, (k, 2).
-        radius: of the balls, mm, (k,).
-        ranges: in which each ball turns, see `azimuth_ranges`, (k, 2).
+    Centres are z and r, mm, (k, 2); each ball turns in a range (k, 2).
     """
     result = np.full(len(points), inf)
     for i in range(len(points)):
@@ -253,11 +233,7 @@ def distances_to_balls(points: Floats, centre: Floats, radius: Floats, ranges: F
 def lower_to_section(points: Floats, polygon: Floats, turned: Floats, distances: Floats) -> None:
     """Lower the distances (n,) of points (n, 3) to those to a section that turns, 0 inside.
 
-    Args:
-        points: z, r, azimuth.
-        polygon: z and r of the section's corners, mm, (p, 2).
-        turned: range in which it turns, see `azimuth_ranges`, (2,).
-        distances: of the points from other bodies, mm.
+    The polygon (p, 2) has z and r of the section's corners, mm; it turns in a range (2,).
     """
     low_z, high_z = polygon[:, 0].min(), polygon[:, 0].max()
     low_r, high_r = polygon[:, 1].min(), polygon[:, 1].max()

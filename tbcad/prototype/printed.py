@@ -48,11 +48,9 @@ VOLUME_ERROR = 1e-4
 
 
 def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
-    """Pads that face down by more than 45 degrees, and all that face down.
+    """Pads that face down by more than 45 degrees, and all that do, by unit normals (n, 3).
 
-    Args:
-        normals: unit, (n, 3).
-        orientation: rows that the axes become, the third is up on the bed, (3, 3).
+    Rows of the orientation (3, 3) are what the axes become; the third is up on the bed.
     """
     height = normals @ orientation[:, 2]
     return int((height < -STEEP).sum()), int((height < -LEVEL).sum())
@@ -61,13 +59,8 @@ def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
 def opening_up(normals: Floats) -> Floats | None:
     """Unit direction that is down when the pad nearest to facing down is as far up as possible.
 
-    The point of the normals' convex hull that is nearest to the origin is up.
-
-    Args:
-        normals: unit, (n, 3).
-
-    Returns:
-        (3,), or None where some pad faces down in every direction.
+    The point of the convex hull of the unit normals (n, 3) that is nearest to the origin is up.
+    None where some pad faces down in every direction.
     """
     if not len(normals):
         return None
@@ -132,17 +125,9 @@ def placed_on_bed(
 ) -> PlacedSolid:
     """A part on the bed: of the orientations that fit, one with the fewest pads that face down.
 
-    Among these, the one that needs the least support.
-
-    Args:
-        name: of the part.
-        shape: one valid solid about z, in the carrier's own frame; a move keeps it valid.
-        mesh: of the shape.
-        properties: of the shape.
-        downs: directions of that frame that may point down, as (3,) unit vectors.
-        axes: of that frame in the frame of the shell, as rows.
-        printer: with its bed.
-        pads: unit normals of its pads in that frame, (n, 3).
+    Among these, the one that needs the least support. The shape is one valid solid in a frame of
+    its own, whose axes in the frame of the shell are rows; a move keeps it valid. Directions that
+    may point down are unit vectors (3,) of that frame, as are the normals of pads, (n, 3).
 
     Raises:
         SpecError: when it fits in no orientation.
@@ -193,12 +178,11 @@ class PrintedPart:
 
 
 def part_mesh(part: PrintedPart) -> Mesh:
-    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL."""
-    return rounded(part.solid.mesh_on_bed)
+    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL.
 
-
-def rounded(mesh: Mesh) -> Mesh:
-    """The mesh with coordinates rounded to 32 bits; vertices that become equal are merged."""
+    Vertices that become equal are merged.
+    """
+    mesh = part.solid.mesh_on_bed
     single = mesh.vertices.astype(np.float32).astype(np.float64) + 0.0
     corners, group = np.unique(single, axis=0, return_inverse=True)
     return without_degenerate(corners, group.reshape(-1)[mesh.triangles])
@@ -226,10 +210,8 @@ def component_solid(component: Component) -> TopoDS_Solid:
     added = [primitive_solid(body) for body in component.added]
     removed = [primitive_solid(body) for body in component.removed]
     solid = one_solid(component.name, cut(fused(added), removed))
-    meshes = (
-        [primitive_mesh(body) for body in bodies] for bodies in (component.added, component.removed)
-    )
-    expected = volume_by_meshes(*meshes)
+    bodies = (component.added, component.removed)
+    expected = volume_by_meshes(*([primitive_mesh(one) for one in some] for some in bodies))
     check_volume(component.name, volume(solid), expected, VOLUME_ERROR)
     return solid
 
@@ -284,12 +266,9 @@ def print_estimate(mesh: Mesh) -> tuple[float, float]:
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     area = np.maximum(norm(across), np.finfo(float).tiny)
     up = across[:, 2] / area
-    solid = np.array(
-        [
-            SIDE_MM * (area * np.sqrt(np.maximum(1 - up**2, 0))).sum(),
-            FLAT_MM * (area * np.abs(up))[np.abs(up) > FLAT].sum(),
-        ]
-    )
+    sides = (area * np.sqrt(np.maximum(1 - up**2, 0))).sum()
+    flats = (area * np.abs(up))[np.abs(up) > FLAT].sum()
+    solid = np.array([SIDE_MM * sides, FLAT_MM * flats])
     solid *= min(1.0, mesh.volume / solid.sum())
     infill = INFILL * (mesh.volume - solid.sum())
     heights = corners[..., 2]

@@ -79,10 +79,9 @@ def listed(design: str, rows: Sequence[Row]) -> Listed:
 
 def sheets(frame: FrameLayout, base: BaseLayout, drive: Drive, bill: Listed) -> list[Sheet]:
     """All sheets of a prototype."""
-    found = [plate_sheet(frame, bill), upright_sheet(frame, bill)]
-    if drive.wheel:
-        found.append(wheel_sheet(base, drive.wheel, bill))
-    return found
+    wheel = [wheel_sheet(base, drive.wheel, bill)] if drive.wheel else []
+    lamps = [lamp_sheet(frame.lamps, bill)] if frame.lamps else []
+    return [plate_sheet(frame, bill), upright_sheet(frame, bill), *wheel, *lamps]
 
 
 def plate_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
@@ -136,6 +135,7 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
     circles = [one for one in drawn if isinstance(one, Circle) and one.layer == Layer.CUT]
     title = "driven wheel"
     angle = float(np.degrees(np.arctan2(places[0][1], places[0][0])))
+    on_holes = f"{len(holes)} x Ø<> on Ø{circle:g}"
     text = (
         f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, width of the belt's rim as bought.",
         f"{len(holes)} x Ø{SCREW_MM:g} through on a circle of Ø{circle:g} ± 0.1,",
@@ -146,30 +146,20 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
         f"Turn off a hub: the head's plate is {GAP_MM:g} mm behind.",
     )
     ring, bore, first = circles[0], circles[1], circles[2]
-    top = ring.centre[1] + ring.radius
+    right, top = origin[0] + ring.radius, ring.centre[1] + ring.radius
     entities = [
         *sheet_frame(paper, scale, bill.block(title, part, "on the face at the zero disc")),
         *drawn,
         *(line for one in (ring, *circles[2:]) for line in centre_cross(one)),
         across(
             (origin[0] - ring.radius, origin[1]),
-            (origin[0] + ring.radius, origin[1]),
+            (right, origin[1]),
             origin[1] - ring.radius - ASIDE_MM / 2,
             f"{2 * radius:.1f}",
             "(Ø<>)",
         ),
-        diameter(
-            first,
-            *_called(first, (origin[0] + ring.radius, top)),
-            f"{SCREW_MM:g}",
-            f"{len(holes)} x Ø<> on Ø{circle:g}",
-        ),
-        diameter(
-            bore,
-            *_called(bore, (origin[0] + ring.radius, origin[1])),
-            f"{part['bore_mm']:g}",
-            "Ø<>",
-        ),
+        diameter(first, *_called(first, (right, top)), f"{SCREW_MM:g}", on_holes),
+        diameter(bore, *_called(bore, (right, origin[1])), f"{part['bore_mm']:g}", "Ø<>"),
         *notes(corner, NOTES_MM - BESIDE_MM, text),
     ]
     return Sheet(WHEEL, title, part.name, paper, scale, origin, tuple(entities))
@@ -188,7 +178,8 @@ def upright_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
     ]
     drawn = placed([rectangle((0, 0, length, side), Layer.CUT), *lines], origin, scale)
     centre = origin[1] + side * scale / 2
-    heights = _lamp_screws(frame)
+    # Of a lamp holder's screws above the plate, mm; none without lamps.
+    heights = sorted(z - frame.floor for z in frame.lamps.screws) if frame.lamps else []
     title = "upright"
     text = (
         f"Saw from {part.what}.",
@@ -205,13 +196,6 @@ def upright_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
         *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
     ]
     return Sheet(UPRIGHT, title, part.name, paper, scale, origin, tuple(entities))
-
-
-def _lamp_screws(frame: FrameLayout) -> list[float]:
-    """Heights of a lamp holder's screws above the plate, mm; none without lamps."""
-    if frame.lamps is None:
-        return []
-    return sorted(z - frame.floor for z in frame.lamps.screws)
 
 
 def _heights(
@@ -249,10 +233,8 @@ def _datum(origin: Point) -> Iterator[Entity]:
     x, y = origin
     corner = x - OFF_MM, y - OFF_MM
     right, up = (x + DATUM_MM, corner[1]), (corner[0], y + DATUM_MM)
-    for tip, place, name in (
-        (right, (right[0] + 1.0, right[1] - 1.0), "x"),
-        (up, (up[0] - 0.6, up[1] + 1.0), "y"),
-    ):
+    beyond_x, beyond_y = (right[0] + 1.0, right[1] - 1.0), (up[0] - 0.6, up[1] + 1.0)
+    for tip, place, name in ((right, beyond_x, "x"), (up, beyond_y, "y")):
         yield Line(Layer.DIMENSIONS, corner, tip)
         yield arrow(tip, corner)
         yield Text(Layer.DIMENSIONS, place, TEXT_MM, name)
@@ -292,7 +274,9 @@ def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
         rectangle((0.0, k * wide, lamps.length, (k + 1) * wide), Layer.CUT)
         for k in range(lamps.strips)
     ]
-    drawn = placed([*strips, *_marks(lamps)], origin, scale)
+    steps = part["cut_mm"] * np.arange(1, round(lamps.length / part["cut_mm"]))
+    uncut = [Line(Layer.CENTRE, (x, 0.0), (x, lamps.width)) for x in steps.tolist()]
+    drawn = placed([*strips, *uncut], origin, scale)
     title = "strips of a lamp"
     text = (
         f"Cut {pieces} pieces of {lamps.length:g} \u00b1 {STRIP_CUT_MM:g}, {lamps.strips} for each "
@@ -311,13 +295,6 @@ def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
         *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
     ]
     return Sheet(LAMP, title, part.name, paper, scale, origin, tuple(entities))
-
-
-def _marks(lamps: LampLayout) -> Iterator[Entity]:
-    """Marks between the ends that are not cut."""
-    step = lamps.strip["cut_mm"]
-    for k in range(1, round(lamps.length / step)):
-        yield Line(Layer.CENTRE, (k * step, 0.0), (k * step, lamps.width))
 
 
 def _one_strip(lamps: LampLayout, origin: tuple[float, float], scale: float) -> Iterator[Entity]:

@@ -13,7 +13,7 @@ from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.errors import InputError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.purchased.parts import Parts, Price, Prices, PurchasedPart
+from tbcad.prototype.purchased.parts import Parts, Price, Prices
 
 # A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
 STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
@@ -64,24 +64,23 @@ def bom_rows(
 ) -> list[Row]:
     """One record for each kind of part, in the order of COLUMNS, items numbered from 1.
 
-    Balls come first, by size, then the drive, other purchased parts, and last what is printed.
-
-    Args:
-        prototype: with its balls.
-        drive: of the base.
-        purchased: quantity of each other purchased part, by its name in the lists.
-        printed: parts to print.
-        density: of their material, g/cm^3.
-        parts: the lists.
-        prices: of the parts.
+    Balls come first, by size, then the drive, other purchased parts by their quantity, and last
+    what is printed of a material of a density (g/cm^3).
 
     Raises:
         SpecError: when a part is in no list.
     """
+    counts = Counter(ALWAYS) + Counter(purchased)
+    if unknown := [name for name in counts if name not in parts]:
+        raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
+    bought = [(part, 1) for part in drive.parts]
+    bought += [(part, counts[name]) for name, part in parts.items() if counts[name]]
     rows = [
         *ball_rows(prototype, prices),
-        *(_purchased(part, 1, prices) for part in drive.parts),
-        *_other_purchased(purchased, parts, prices),
+        *(
+            _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
+            for part, quantity in bought
+        ),
         *(_printed(item, density, prices) for item in printed),
     ]
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
@@ -115,7 +114,7 @@ def totals(rows: Iterable[Row]) -> dict[str, Any]:
 
 def _row(part: str, what: str, quantity: int, material: str, mass: float) -> Row:
     """What all rows have; mass is that of one, grams."""
-    rounded = _grams(mass)
+    rounded = round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
     return {
         "quantity": quantity,
         "part": part,
@@ -141,13 +140,9 @@ def _bought(part: str, what: str, quantity: int, material: str, mass: float, pri
     return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
 
 
-def _purchased(part: PurchasedPart, quantity: int, prices: Prices) -> Row:
-    return _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
-
-
 def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
     """Its mass is that of a solid print, and its price that of its filament."""
-    (filament_mm3, hours) = item.estimate
+    filament_mm3, hours = item.estimate
     filament = filament_mm3 / MM3_PER_CM3 * density
     mass = item.volume / MM3_PER_CM3 * density
     return {
@@ -169,18 +164,6 @@ def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:
         yield _bought(f"ball {ball.size}", what, count, "steel", ball.mass_g, prices)
 
 
-def _other_purchased(purchased: Mapping[str, int], parts: Parts, prices: Prices) -> list[Row]:
-    """Parts by name, in the order of the lists; those of none are left out."""
-    counts = Counter(ALWAYS) + Counter(purchased)
-    if unknown := [name for name in counts if name not in parts]:
-        raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
-    return [_purchased(part, counts[name], prices) for name, part in parts.items() if counts[name]]
-
-
-def _grams(mass: float) -> float:
-    return round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
-
-
 def _estimate(value: float) -> float:
     """A figure to as many digits as can be known."""
     return float(f"{value:.{ESTIMATE_DIGITS}g}")
@@ -200,9 +183,7 @@ def by_currency(rows: Iterable[Row]) -> dict[str, float]:
 
 
 SHOWN = 6  # rows without --full
-WIDTH = 80  # columns of a terminal
-WHAT = 34  # of them for what a part is
-PART = 17
+WHAT, PART = 34, 17  # columns, of the 80 of a terminal
 DAY_H, KG_G = 24.0, 1000.0
 
 
@@ -218,15 +199,12 @@ class PartsList:
 
     def lines(self, *, full: bool) -> list[str]:
         """At most 80 columns: the sums, and all rows or the dearest."""
-        return [*_sums(self.rows), *_table(self.rows if full else _dearest(self.rows))]
+        dearest = sorted(self.rows, key=lambda row: -float(row["total_price"] or 0))
+        return [*_sums(self.rows), *_table(self.rows if full else dearest[:SHOWN])]
 
 
 def read_parts_list(folder: Path, prices: Prices | None = None) -> PartsList:
-    """The parts list of an export.
-
-    Args:
-        folder: written by a build.
-        prices: in place of those of the build; parts without one keep theirs.
+    """The parts list of a build, with other prices where these have one.
 
     Raises:
         InputError: no such list, or a broken one; it names the line.
@@ -278,15 +256,11 @@ def _money(prices: Mapping[str, float]) -> str:
     return " + ".join(f"{amount:.0f} {name}" for name, amount in prices.items()) or "no prices"
 
 
-def _dearest(rows: Sequence[Row]) -> list[Row]:
-    """The rows that cost most; what has no price is last."""
-    return sorted(rows, key=lambda row: -float(row["total_price"] or 0))[:SHOWN]
-
-
 def _table(rows: Sequence[Row]) -> Iterator[str]:
     yield f"{'item':>4} {'qty':>3} {'part':<{PART}} {'what':<{WHAT}} {'price':>8}"
     for row in rows:
-        part, what = _cut(str(row["part"]), PART), _cut(str(row["what"]), WHAT)
+        columns = ("part", PART), ("what", WHAT)
+        part, what = (_cut(str(row[column]), width) for column, width in columns)
         price = "-" if row["total_price"] is None else f"{float(row['total_price']):.2f}"
         yield (
             f"{row['item']:>4} {row['quantity']:>3} {part:<{PART}} {what:<{WHAT}} {price:>8}  "

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.drafting.sheet import Sheet
 from tbcad.cad.formats.csv_table import Row, write_table
 from tbcad.cad.formats.dxf import write_dxf
 from tbcad.cad.formats.glb import write_glb
@@ -27,7 +26,7 @@ from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
-from tbcad.prototype.drawings.parts import Listed, lamp_sheet, listed, sheets
+from tbcad.prototype.drawings.parts import listed, sheets
 from tbcad.prototype.drive.loads import DriveLoads, base_torques
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.files import bom, controllers, tables
@@ -42,7 +41,7 @@ from tbcad.prototype.printed import (
     print_estimate,
 )
 from tbcad.prototype.purchased.parts import Prices, load_prices
-from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.prototype import NAME
 from tbcad.types import Progress
 
 
@@ -54,14 +53,7 @@ def export_prototype(
 ) -> Spec:
     """Build the prototype and write all of its files into a folder.
 
-    Args:
-        design: the mirrors.
-        folder: to write into.
-        progress: called with each stage.
-        submit: takes what can be done meanwhile.
-
-    Returns:
-        The design's spec with what was chosen for the prototype.
+    Returns the design's spec with what was chosen for the prototype.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -76,39 +68,24 @@ def export_prototype(
         for panel in shroud.panels:
             submit(write_dxf, folder / f"{panel.name}.dxf", pattern(panel, shroud.sheet))
     _write_tables(built, folder)
+    title = f"{spec.name}, n = {spec.optics.n}"  # in the title blocks of drawings
     for one in cap_limits(spec, built.base, built.layout):
-        submit(cap_sheet(_title(spec), built.base, built.layout, one).write, folder)
+        submit(cap_sheet(title, built.base, built.layout, one).write, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
     submit(write_glb, folder / GLB, "prototype", mesh_groups(groups))
     write_assembly(folder / STEP, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)
-    drawings = _drawings(built, listed(_title(spec), bill))
+    drawings = sheets(built.frame, built.base, built.drive, listed(title, bill))
     for sheet in drawings:
         submit(sheet.write, folder)
     record = prototype_record(built, bill, drawings)
-    steps = mounting_record(_machine(built, record))
+    caps = enumerate(built.layout.balls.cap.tolist(), 1)
+    sizes = {ball: "" for ball, cap in caps if not cap}
+    steps = mounting_record(Machine((), record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
     return spec
-
-
-def _machine(built: PrototypeModel, record: Prototype) -> Machine:
-    """Its bodies and fasteners, as the steps of assembly take them."""
-    caps = enumerate(built.layout.balls.cap.tolist(), 1)
-    return Machine((), record, (), {ball: "" for ball, cap in caps if not cap}, built.parts)
-
-
-def _drawings(built: PrototypeModel, bill: Listed) -> list[Sheet]:
-    """Sheets of what is cut or drilled."""
-    lamps = built.frame.lamps
-    of_lamps = [lamp_sheet(lamps, bill)] if lamps else []
-    return [*sheets(built.frame, built.base, built.drive, bill), *of_lamps]
-
-
-def _title(spec: Spec) -> str:
-    """The design in the title blocks of drawings."""
-    return f"{spec.name}, n = {spec.optics.n}"
 
 
 def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, float]:

@@ -188,8 +188,8 @@ class LampMounts:
         """A plate on the front of an upright, with two screws below the strips."""
         ends = self.across - EXTRUSION_MM / 2, abs(float(place[1])) + self.half
         y = np.sort(np.sign(place[1]) * np.array(ends))
-        low, high = self._end(place) - TAIL_MM, self._top(place)
-        return self._holder(number, place, y, (low, high), self.holder_screws(place))
+        plate = self._plate(place, y, (self._end(place) - TAIL_MM, self._top(place)))
+        return _holder(number, "an upright", plate, self.holder_screws(place))
 
     def holder_screws(self, place: Floats) -> list[Floats]:
         """Places of a holder's screws on its upright's face, the upper first."""
@@ -200,7 +200,8 @@ class LampMounts:
         """A plate across both uprights, with a screw on each."""
         end, half = self.across + EXTRUSION_MM / 2, self.half_height
         heights = float(place[2]) - half, float(place[2]) + half
-        return self._holder(number, place, np.array([-end, end]), heights, self.bar_screws(place))
+        plate = self._plate(place, np.array([-end, end]), heights)
+        return _holder(number, "both uprights", plate, self.bar_screws(place))
 
     def bar_screws(self, place: Floats) -> list[Floats]:
         """Places of a bar's screws on the uprights' faces."""
@@ -242,23 +243,6 @@ class LampMounts:
         x = np.sort(np.sign(place[0]) * np.array([near, near + HOLDER_MM]))
         return box(np.array([x[0], y[0], z[0]]), np.array([x[1], y[1], z[1]]), np.eye(3))
 
-    def _holder(
-        self,
-        number: int,
-        place: Floats,
-        y: Floats,
-        z: tuple[float, float],
-        screws: Sequence[Floats],
-    ) -> Component:
-        one = float(y[0]) * float(y[1]) > 0
-        return Component(
-            f"lamp_holder_{number}",
-            f"holder of lamp {number} on {'an upright' if one else 'both uprights'}",
-            (self._plate(place, y, z),),
-            tuple(drilled_holes(screws, HOLDER_MM * LEVEL, CLEARANCE_HOLE_MM[SCREW_MM])),
-            (-LEVEL,),
-        )
-
     def _standing(
         self,
         number: int,
@@ -272,15 +256,13 @@ class LampMounts:
         x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
         floor, flange = self.frame.floor_mm, self.frame.flange_mm
         feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
+        half = np.array([COLUMN_MM / 2, FOOT_IN_MM])
         for side in sides:
             middle = np.array([x, side * self.column])
             y = np.sort(middle[1] + side * np.array([-FOOT_IN_MM, FOOT_OUT_MM]))
             foot = np.array([[x - FOOT_HALF_MM, y[0]], [x + FOOT_HALF_MM, y[1]]])
-            half = np.array([COLUMN_MM / 2, FOOT_IN_MM])
-            low, high = (np.array([*corner, floor]) for corner in foot)
-            added.append(box(low, high + flange * UP, np.eye(3)))
-            low, high = np.array([*(middle - half), floor]), np.array([*(middle + half), top])
-            added.append(box(low, high, np.eye(3)))
+            for (low, high), end in ((foot, floor + flange), ((middle - half, middle + half), top)):
+                added.append(box(np.array([*low, floor]), np.array([*high, end]), np.eye(3)))
             feet.append(foot)
             beside = np.array([[-SCREW_SIDE_MM, 0], [SCREW_SIDE_MM, 0]])
             holes.append(middle + beside + [0.0, side * SCREW_OUT_MM])
@@ -294,3 +276,9 @@ class LampMounts:
             (LEVEL, -UP),
         )
         return Bracket(component, places, np.vstack(feet))
+
+
+def _holder(number: int, where: str, plate: Prism, screws: Sequence[Floats]) -> Component:
+    holes = tuple(drilled_holes(screws, HOLDER_MM * LEVEL, CLEARANCE_HOLE_MM[SCREW_MM]))
+    what = f"holder of lamp {number} on {where}"
+    return Component(f"lamp_holder_{number}", what, (plate,), holes, (-LEVEL,))

@@ -1,4 +1,7 @@
-"""Purchased parts: one CSV file for each kind in this folder."""
+"""Purchased parts, one CSV file for each kind in this folder, and their prices.
+
+Prices are tbcad's estimates in a CSV list, and lists of users before it.
+"""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -80,10 +83,7 @@ def package_lists() -> Traversable:
 
 
 def load_parts(folder: Traversable | None = None) -> Parts:
-    """All purchased parts by name.
-
-    Args:
-        folder: that holds a CSV file for each kind; without, tbcad's own.
+    """All purchased parts by name, from a folder with a CSV file for each kind, or tbcad's own.
 
     Raises:
         SpecError: when a file is wrong; it names line and column.
@@ -122,16 +122,9 @@ def choose_part(
 ) -> PurchasedPart:
     """The smallest purchased part of a kind that has all sizes, and at least the size in order.
 
-    Args:
-        parts: lists of purchased parts.
-        kind: a list.
-        key: of the spec that asks for it.
-        hint: what to change when there is none.
-        order: size that must only be large enough; the smallest is taken.
-        sizes: required.
-
     Raises:
-        SpecError: when the list has none.
+        SpecError: when the list has none; it names the key of the spec that asks for it, and the
+            hint what to change.
     """
     exact = {size: value for size, value in sizes.items() if size != order}
     candidates = [
@@ -196,18 +189,14 @@ class Prices:
 
     def of(self, part: str, mass_g: float) -> Price | None:
         """The price of one piece by the first rule that fits its name; None without any."""
-        for rule in self.rules:
-            if fnmatchcase(part, rule.pattern):
-                return rule.price(mass_g)
-        return None
+        fitting = (rule for rule in self.rules if fnmatchcase(part, rule.pattern))
+        return next((rule.price(mass_g) for rule in fitting), None)
 
 
 def load_prices(names: Iterable[str]) -> Prices:
     """The rules of several lists, those of the first list first.
 
-    Args:
-        names: "estimates", or paths of CSV files (from the current folder) with the columns of
-            PRICE_FIELDS.
+    A list is "estimates", or the path of a CSV file (from the current folder) with PRICE_FIELDS.
 
     Raises:
         SpecError: a list that cannot be read, or is wrong; it names line and column.
@@ -231,17 +220,16 @@ def _rules(file: Path | Traversable, name: str) -> Iterator[PriceRule]:
     for where, row in read_rows(file, name, PRICE_FIELDS, ("each", "per_kg")):
         pattern = required_text(where, row, "part")
         check_unique(where, row, "part", patterns)
-        each, per_kg = (_amount(where, row, column) for column in ("each", "per_kg"))
+        each, per_kg = (
+            positive_number(where, row, column, MAX_PRICE) if row[column] else 0.0
+            for column in ("each", "per_kg")
+        )
         if not each and not per_kg:
             raise SpecError(f"{where}: no price: fill in column each, per_kg or both")
         currency = _matching(where, row, "currency", CURRENCY, "three letters such as EUR")
         date = _matching(where, row, "date", DATE, "a month or day such as 2026-11")
         source = required_text(where, row, "source")
         yield PriceRule(pattern, each, per_kg, currency, date, source)
-
-
-def _amount(where: str, row: Row, column: str) -> float:
-    return positive_number(where, row, column, MAX_PRICE) if row[column] else 0.0
 
 
 def _matching(where: str, row: Row, column: str, form: re.Pattern[str], allowed: str) -> str:

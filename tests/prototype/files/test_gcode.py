@@ -47,7 +47,7 @@ def drive() -> Drive:
     return choose_drive("nema17-belt", BaseTorques(450.0, 500.0, 1000.0), load_drives(load_parts()))
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @example(motion=MotionSpec())
 @given(motion=MOTIONS)
 def test_what_a_controller_does(layout: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
@@ -99,14 +99,13 @@ def test_more_leds_than_outputs(layout: PrototypeLayout, drive: Drive) -> None:
         gcode_program(layout, drive, MotionSpec(), 8)
 
 
-def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) -> None:
+def test_the_approach_ends_where_something_stands(
+    small_design: MirrorDesign, layout: PrototypeLayout
+) -> None:
     spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
     tight = prototype_layout(spec, small_design)
     start = stop_sequence(tight, MotionSpec(approach_deg=20)).start
     assert start == pytest.approx(np.degrees(free_base_angles(tight)[0]))
     assert start == pytest.approx(-90)
-
-
-def test_a_start_out_of_reach(layout: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
         stop_sequence(layout, MotionSpec(home_deg=170))
