@@ -30,6 +30,53 @@ from tbcad.records.prototype_drive import Phase
 LAMP_OUTPUT, LAMP = 0, "lamp"
 MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most
 DARK, LIT = "dark", "lit"
+# Two digits of each decade.
+E24 = (
+    *(10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30),
+    *(33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91),
+)
+DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
+ROUNDING = 1e-9
+COLUMNS = (
+    *("line", "signal", "part", "output", "on", "off", "connector", "pins", "supply_v"),
+    *("forward_v", "resistor", "resistor_ohm", "current_ma", "dissipation_w", "wire"),
+    *("length_mm", "path"),
+)
+MAX_FILL = 0.5  # of a bore's section by wires as squares, so that they can be pulled through
+LEAD_MM = 1000.0  # from the foot of the stage to the controller
+CHANNEL_MM = 45.0  # from the post's axis out of the foot's channel, with room for the connector
+CUT_MM = 50.0  # wires are cut to multiples of this
+METRE_MM = 1000.0
+MA_PER_A = 1000.0
+WIRES = 2  # of an LED
+SWITCH_MODULE = "MOSFET"
+PATH = "grooves of arm and crown, bore of crown and post, channel of the stage's foot, controller"
+BOARD = "board"  # connector: terminals of the controller
+CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamps, camera's release and switch
+BETWEEN_LAMPS_MM = 500.0  # of cable from one lamp to the next
+LAMP_PATH = "from lamp to lamp, all in parallel, then to the controller"
+ON_CABLE: Row = {"wire": CABLE, "length_mm": CABLE_MM, "connector": BOARD}
+RELEASE: Row = ON_CABLE | {
+    **{"signal": "release", "part": "RELAY", "output": "coolant", "on": "M8", "off": "M9"},
+    "path": "relay, camera's release",
+}
+HOME: Row = ON_CABLE | {
+    **{"signal": "home", "part": "SWITCH-SS-5GL2"},
+    "path": "common and normally closed contact of the switch, input and ground",
+}
+MOTOR: Row = {
+    "signal": "motor",
+    "connector": BOARD,
+    "pins": "A+ A- B+ B-",
+    "path": "the motor's own wires; a few ohm are between the two of a coil",
+}
+FUSE, SUPPLY_V = "FUSE-2A", 24.0
+SUPPLY: Row = ON_CABLE | {
+    **{"signal": "supply", "part": "SUPPLY-24V", "output": "supply"},
+    **{"connector": FUSE, "pins": "+ -", "supply_v": SUPPLY_V},
+    "path": "plus by the fuse to controller, lamps and resistors; minus to controller and all "
+    "switch modules: one ground",
+}
 
 
 def lights(leds: int, motion: MotionSpec) -> dict[str, int]:
@@ -62,15 +109,6 @@ def phases(leds: int, motion: MotionSpec) -> tuple[Phase, ...]:
     lit = Phase(name=LIT, output=switched.pop(LAMP))
     alone = (Phase(name=name, output=output) for name, output in switched.items())
     return (Phase(name=DARK, output=None), *alone, lit)
-
-
-# Two digits of each decade.
-E24 = (
-    *(10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30),
-    *(33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91),
-)
-DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
-ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -128,48 +166,6 @@ def _rated(watts: float, parts: Parts) -> PurchasedPart:
             "prototype.stage.led_supply_v smaller"
         )
     return min(enough, key=lambda part: part["power_w"])
-
-
-COLUMNS = (
-    *("line", "signal", "part", "output", "on", "off", "connector", "pins", "supply_v"),
-    *("forward_v", "resistor", "resistor_ohm", "current_ma", "dissipation_w", "wire"),
-    *("length_mm", "path"),
-)
-MAX_FILL = 0.5  # of a bore's section by wires as squares, so that they can be pulled through
-LEAD_MM = 1000.0  # from the foot of the stage to the controller
-CHANNEL_MM = 45.0  # from the post's axis out of the foot's channel, with room for the connector
-CUT_MM = 50.0  # wires are cut to multiples of this
-METRE_MM = 1000.0
-MA_PER_A = 1000.0
-WIRES = 2  # of an LED
-SWITCH_MODULE = "MOSFET"
-PATH = "grooves of arm and crown, bore of crown and post, channel of the stage's foot, controller"
-BOARD = "board"  # connector: terminals of the controller
-CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamps, camera's release and switch
-BETWEEN_LAMPS_MM = 500.0  # of cable from one lamp to the next
-LAMP_PATH = "from lamp to lamp, all in parallel, then to the controller"
-ON_CABLE: Row = {"wire": CABLE, "length_mm": CABLE_MM, "connector": BOARD}
-RELEASE: Row = ON_CABLE | {
-    **{"signal": "release", "part": "RELAY", "output": "coolant", "on": "M8", "off": "M9"},
-    "path": "relay, camera's release",
-}
-HOME: Row = ON_CABLE | {
-    **{"signal": "home", "part": "SWITCH-SS-5GL2"},
-    "path": "common and normally closed contact of the switch, input and ground",
-}
-MOTOR: Row = {
-    "signal": "motor",
-    "connector": BOARD,
-    "pins": "A+ A- B+ B-",
-    "path": "the motor's own wires; a few ohm are between the two of a coil",
-}
-FUSE, SUPPLY_V = "FUSE-2A", 24.0
-SUPPLY: Row = ON_CABLE | {
-    **{"signal": "supply", "part": "SUPPLY-24V", "output": "supply"},
-    **{"connector": FUSE, "pins": "+ -", "supply_v": SUPPLY_V},
-    "path": "plus by the fuse to controller, lamps and resistors; minus to controller and all "
-    "switch modules: one ground",
-}
 
 
 @dataclass(frozen=True)

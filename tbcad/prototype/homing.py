@@ -37,23 +37,6 @@ MIN_PLATE_MM = BRACKET_HIGH_MM + 2.0  # out, of the plate's end
 # Of the switch's roller from the line of its holes: when free, and when the switch trips.
 FREE_MM, TRIP_MM = 19.3, 14.5
 TAB_BEYOND_MM = 0.7  # of the tab beyond where the switch trips
-
-
-def switch_place(half_width: float) -> tuple[float, float]:
-    """Out and side of the middle of the switch's holes, beside a plate of half a width."""
-    return (BRACKET_LOW_MM + BRACKET_HIGH_MM) / 2, half_width + BRACKET_MM / 2
-
-
-def bracket_screws() -> tuple[float, float]:
-    """Out of the bracket's two screws."""
-    return BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM
-
-
-def tab_radius(half_width: float) -> float:
-    """Radius of the tab, which presses the switch beside a plate of half a width."""
-    return math.hypot(*switch_place(half_width)) - TRIP_MM + TAB_BEYOND_MM
-
-
 SWITCH = "SWITCH-SS-5GL2"
 # Of the switch, from the line of its holes: toward the axis to its body's end, outward to the
 # other, half its length; to the roller when fully pressed.
@@ -76,6 +59,21 @@ MIN_EDGE_MM = 2.0  # of the disc beyond the pin's hole
 BAR_MM = rectangle((-3.0, 40.2), (8.0, 41.2))
 HEAD_MM = np.array([[-3.0, 37.7], [-3.0, 43.7], [-9.0, 40.7]])
 PLUS_MM = rectangle((11.0, 40.2), (16.0, 41.2)), rectangle((13.0, 38.2), (14.0, 43.2))
+
+
+def switch_place(half_width: float) -> tuple[float, float]:
+    """Out and side of the middle of the switch's holes, beside a plate of half a width."""
+    return (BRACKET_LOW_MM + BRACKET_HIGH_MM) / 2, half_width + BRACKET_MM / 2
+
+
+def bracket_screws() -> tuple[float, float]:
+    """Out of the bracket's two screws."""
+    return BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM
+
+
+def tab_radius(half_width: float) -> float:
+    """Radius of the tab, which presses the switch beside a plate of half a width."""
+    return math.hypot(*switch_place(half_width)) - TRIP_MM + TAB_BEYOND_MM
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,12 @@ EXACT_MM = 0.05
 EXACT = 0.1
 CIRCLE_SIDES = 48
 MAX_SPLITS = 60
+# Columns of a cone: centre and radius where it starts, unit vector and length from there to its
+# other centre, by how much its radius grows, and how far the foot of a point that is a millimetre
+# from its axis is pushed along it.
+START, START_RADIUS, AXIS, LENGTH, GROWTH, LEAN, CONE_COLUMNS = 0, 2, 3, 5, 6, 7, 8
+# Columns of a range of azimuths, radians.
+CENTRE, HALF = 0, 1
 
 
 @dataclass(frozen=True)
@@ -168,14 +174,6 @@ def _cylindrical(frame: Floats, points: Floats) -> Floats:
     """Points (n, 3) as z, r and azimuth about the first row of a frame, (n, 3)."""
     z, out, third = (points @ frame.T).T
     return np.stack([z, np.hypot(out, third), np.arctan2(third, out)], axis=1)
-
-
-# Columns of a cone: centre and radius where it starts, unit vector and length from there to its
-# other centre, by how much its radius grows, and how far the foot of a point that is a millimetre
-# from its axis is pushed along it.
-START, START_RADIUS, AXIS, LENGTH, GROWTH, LEAN, CONE_COLUMNS = 0, 2, 3, 5, 6, 7, 8
-# Columns of a range of azimuths, radians.
-CENTRE, HALF = 0, 1
 
 
 def azimuth_ranges(azimuths: Floats) -> Floats:

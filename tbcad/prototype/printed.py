@@ -41,10 +41,20 @@ STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
 EXACT = 1e3  # weight of the sum of shares, which is one
 NO_PADS = np.zeros((0, 3))
 MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
-TOUCHING_MM = 0.05  # a facet no higher lies on the bed
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 VOLUME_ERROR = 1e-4
+LAYER_MM, INFILL = 0.2, 0.25
+SIDE_MM, FLAT_MM = 1.65, 1.0  # what is solid behind a wall, and below or above a flat face
+SUPPORT = 0.29  # share of the space below an overhang
+# mm^3 in a second, of walls, solid layers, infill and support; seconds more for each layer.
+FLOWS = (5.5, 1.5, 3.1, 2.2)
+LAYER_S = 6.2
+OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal, from which on
+FLAT = 0.5  # of the vertical part of a normal, from which on a facet counts as flat
+TOUCHING_MM = 0.05  # a facet no higher lies on the bed
+BELOW_MM = 0.02  # where rays begin, off the facet they are for
+HOUR_S = 3600.0
 
 
 def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
@@ -239,19 +249,6 @@ def _outward(body: Prism) -> Floats:
     """The corners in the order that turns the prism's faces outward."""
     a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
     return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]
-
-
-LAYER_MM, INFILL = 0.2, 0.25
-SIDE_MM, FLAT_MM = 1.65, 1.0  # what is solid behind a wall, and below or above a flat face
-SUPPORT = 0.29  # share of the space below an overhang
-# mm^3 in a second, of walls, solid layers, infill and support; seconds more for each layer.
-FLOWS = (5.5, 1.5, 3.1, 2.2)
-LAYER_S = 6.2
-OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal, from which on
-FLAT = 0.5  # of the vertical part of a normal, from which on a facet counts as flat
-TOUCHING_MM = 0.05  # a facet no higher lies on the bed
-BELOW_MM = 0.02  # where rays begin, off the facet they are for
-HOUR_S = 3600.0
 
 
 def print_estimate(mesh: Mesh) -> tuple[float, float]:

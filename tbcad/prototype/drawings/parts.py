@@ -55,6 +55,9 @@ LAMP_NOTES = {
 }
 LEVEL_MM = 8.0  # from one dimension line to the next
 CUT_MM = 1.0  # tolerance of what is sawn, to either side: feet clamp anywhere along
+LAMP = "drawing_lamp"
+STRIP_CUT_MM = 0.5  # tolerance of a cut at its mark, to either side
+BESIDE_STRIPS_MM = 8.0  # of dimension lines from the strips
 
 
 @dataclass(frozen=True)
@@ -257,11 +260,6 @@ def _hole_cells(frame: FrameLayout) -> list[tuple[str, ...]]:
     ]
 
 
-LAMP = "drawing_lamp"
-STRIP_CUT_MM = 0.5  # tolerance of a cut at its mark, to either side
-BESIDE_STRIPS_MM = 8.0  # of dimension lines from the strips
-
-
 def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
     """The strips of a lamp side by side, lying; the origin is their lower left corner."""
     part, paper = lamps.strip, A4
@@ -277,6 +275,8 @@ def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
     steps = part["cut_mm"] * np.arange(1, round(lamps.length / part["cut_mm"]))
     uncut = [Line(Layer.CENTRE, (x, 0.0), (x, lamps.width)) for x in steps.tolist()]
     drawn = placed([*strips, *uncut], origin, scale)
+    x, y = origin[0] + lamps.length * scale, origin[1]  # beside it, the width of a strip
+    of_one = upward((x, y), (x, y + wide * scale), x + BESIDE_STRIPS_MM, f"{wide:g}")
     title = "strips of a lamp"
     text = (
         f"Cut {pieces} pieces of {lamps.length:g} \u00b1 {STRIP_CUT_MM:g}, {lamps.strips} for each "
@@ -291,19 +291,10 @@ def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
         *sheet_frame(paper, scale, bill.block(title, part, "on the shining face")),
         *drawn,
         *outer(origin, (size[0] * scale, size[1] * scale), size),
-        *_one_strip(lamps, origin, scale),
+        *([of_one] if lamps.strips > 1 else []),
         *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
     ]
     return Sheet(LAMP, title, part.name, paper, scale, origin, tuple(entities))
-
-
-def _one_strip(lamps: LampLayout, origin: tuple[float, float], scale: float) -> Iterator[Entity]:
-    """Width of a strip, on the right, where a lamp has more than one."""
-    if lamps.strips == 1:
-        return
-    x, y = origin[0] + lamps.length * scale, origin[1]
-    end = y + lamps.strip["width_mm"] * scale
-    yield upward((x, y), (x, end), x + BESIDE_STRIPS_MM, f"{lamps.strip['width_mm']:g}")
 
 
 def _place_note(lamps: LampLayout) -> str:

@@ -34,6 +34,9 @@ ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 
 LIGHT_G = 0.1
 KINDS = BOUGHT, PRINTED = "bought", "printed"
 MM3_PER_CM3 = 1000.0
+SHOWN = 6  # rows without --full
+WHAT, PART = 34, 17  # columns, of the 80 of a terminal
+DAY_H, KG_G = 24.0, 1000.0
 
 
 def standard_in(what: str) -> str:
@@ -180,11 +183,6 @@ def by_currency(rows: Iterable[Row]) -> dict[str, float]:
         if row["currency"]:
             sums[str(row["currency"])] += float(row["total_price"] or 0)
     return {currency: round(amount, CENTS) for currency, amount in sorted(sums.items())}
-
-
-SHOWN = 6  # rows without --full
-WHAT, PART = 34, 17  # columns, of the 80 of a terminal
-DAY_H, KG_G = 24.0, 1000.0
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,19 @@ from tbcad.prototype.purchased.parts import Prices, load_prices
 from tbcad.records.prototype import NAME
 from tbcad.types import Progress
 
+METAL: Colour = (0.55, 0.56, 0.58, 1.0)
+FASTENER: Colour = (0.25, 0.26, 0.28, 1.0)
+STEEL: Colour = (0.78, 0.80, 0.83, 1.0)
+SEEN: Colour = (0.30, 0.60, 0.95, 0.35)
+CARD: Colour = (0.05, 0.05, 0.06, 0.12)
+LIGHT: Colour = (1.00, 0.85, 0.30, 0.15)
+COLOURS: dict[Role, Colour] = {
+    "base": (0.36, 0.45, 0.58, 1.0),
+    "cap": (0.85, 0.70, 0.40, 1.0),
+    "stage": (0.30, 0.30, 0.32, 1.0),
+    "frame": (0.85, 0.50, 0.30, 1.0),
+}
+
 
 def export_prototype(
     design: MirrorDesign,
@@ -129,20 +142,6 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
     )
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="ascii", newline="\n")
-
-
-METAL: Colour = (0.55, 0.56, 0.58, 1.0)
-FASTENER: Colour = (0.25, 0.26, 0.28, 1.0)
-STEEL: Colour = (0.78, 0.80, 0.83, 1.0)
-SEEN: Colour = (0.30, 0.60, 0.95, 0.35)
-CARD: Colour = (0.05, 0.05, 0.06, 0.12)
-LIGHT: Colour = (1.00, 0.85, 0.30, 0.15)
-COLOURS: dict[Role, Colour] = {
-    "base": (0.36, 0.45, 0.58, 1.0),
-    "cap": (0.85, 0.70, 0.40, 1.0),
-    "stage": (0.30, 0.30, 0.32, 1.0),
-    "frame": (0.85, 0.50, 0.30, 1.0),
-}
 
 
 def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:

@@ -25,10 +25,21 @@ from tbcad.types import Floats
 
 STRIP, SHORT_STRIP = "STRIP-COB-24V", "STRIP-240-24V"
 EDGE_MM = 2.0  # of a plate beyond the strips
-ACROSS, UP = np.eye(3)[1:]
 ROOM_SIDES = 12
 EDGE_POINTS = 9
 MARCHES, NEAR_MM = 48, 0.5  # steps along a line of light, and how near to the base it may come
+HOLDER_MM = 8.0  # thickness behind the strips
+COLUMN_MM = 14.0  # depth of a stand's column behind its holder's face
+COLUMN_OUT_MM = 6.0  # by which columns stand farther out than upright lamps, away from the camera
+# A stand's foot, from the column's middle: to either side along x, inward and outward along y, and
+# to its two screws.
+FOOT_HALF_MM, FOOT_IN_MM, FOOT_OUT_MM = 18.0, 10.0, 34.0
+SCREW_SIDE_MM, SCREW_OUT_MM = 10.0, 25.0
+OUT_MM = 12.0  # by which upright lamps are farther out than the uprights' middles
+TAIL_MM = 34.0  # of a holder on an upright below the strips, for its two screws
+TAIL_SCREWS_MM = (9.0, 25.0)  # below the strips
+SCREW_MM = 5.0  # thread
+LEVEL, ACROSS, UP = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -139,20 +150,6 @@ def _reaches(keep_out: KeepOut, starts: Floats, ends: Floats) -> bool:
             return True
         starts, along, at, length = starts[inside], along[inside], at[inside], length[inside]
     return False
-
-
-HOLDER_MM = 8.0  # thickness behind the strips
-COLUMN_MM = 14.0  # depth of a stand's column behind its holder's face
-COLUMN_OUT_MM = 6.0  # by which columns stand farther out than upright lamps, away from the camera
-# A stand's foot, from the column's middle: to either side along x, inward and outward along y, and
-# to its two screws.
-FOOT_HALF_MM, FOOT_IN_MM, FOOT_OUT_MM = 18.0, 10.0, 34.0
-SCREW_SIDE_MM, SCREW_OUT_MM = 10.0, 25.0
-OUT_MM = 12.0  # by which upright lamps are farther out than the uprights' middles
-TAIL_MM = 34.0  # of a holder on an upright below the strips, for its two screws
-TAIL_SCREWS_MM = (9.0, 25.0)  # below the strips
-SCREW_MM = 5.0  # thread
-LEVEL, ACROSS, UP = np.eye(3)
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,13 @@ hole_square_mm is the side of a square of holes, hole_circle_mm the diameter of 
 """
 MAX_VALUE = 1e6  # of any size or mass
 SAME_SIZE_MM = 1e-6  # sizes are equal up to rounding
+PRICE_FIELDS = ("part", "each", "per_kg", "currency", "date", "source")
+ESTIMATES = "estimates"  # tbcad's own list
+MAX_PRICE = 1e6
+CURRENCY = re.compile("[A-Z]{3}")  # ISO 4217
+DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])(-(0[1-9]|[12]\d|3[01]))?")  # ISO 8601
+CENTS = 2
+WEIGHED_DIGITS = 2  # a price by mass is an estimate whatever the list says
 
 
 @dataclass(frozen=True)
@@ -141,15 +148,6 @@ def choose_screw(parts: Parts, thread: float, length: float) -> PurchasedPart:
     hint = "make prototype.frame.flange_mm smaller"
     key = "prototype.frame.flange_mm"
     return choose_part(parts, "screws", key, hint, thread_mm=thread, length_mm=length)
-
-
-PRICE_FIELDS = ("part", "each", "per_kg", "currency", "date", "source")
-ESTIMATES = "estimates"  # tbcad's own list
-MAX_PRICE = 1e6
-CURRENCY = re.compile("[A-Z]{3}")  # ISO 4217
-DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])(-(0[1-9]|[12]\d|3[01]))?")  # ISO 8601
-CENTS = 2
-WEIGHED_DIGITS = 2  # a price by mass is an estimate whatever the list says
 
 
 @dataclass(frozen=True)
