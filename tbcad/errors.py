@@ -1,4 +1,4 @@
-"""The one error that a user can cause, and the one warning."""
+"""The error that a user can cause, the one that a system can, and the one warning."""
 
 
 def one_line(text: str) -> str:
@@ -14,6 +14,10 @@ class InputError(Exception):
     def __init__(self, text: str) -> None:
         """Keep the text, made one line: parts of it may come from a file or a path."""
         super().__init__(one_line(text))
+
+
+class ProcessLost(RuntimeError):
+    """A process of a command's own ended before its work was done, as where memory is short."""
 
 
 class PlausibilityWarning(UserWarning):

@@ -60,12 +60,28 @@ del os.fork, os.forkpty, os.register_at_fork, os.sched_getaffinity
 """
 
 
+# A cell of a notebook: no file, and an event loop that runs.
+CELL = """
+import asyncio
+
+async def cell():
+    exec(compile(SCRIPT, "<cell>", "exec"), globals())
+
+asyncio.run(cell())
+"""
+
+
 def run_script(place: Path, parts: str, builds: int, hidden: bool = False) -> None:
-    script, folder = place / "script.py", place / "path"
+    script = place / "script.py"
     script.write_text(SCRIPT, encoding="utf-8")
+    run_python([str(script)], place, parts, builds, hidden)
+
+
+def run_python(code: list[str], place: Path, parts: str, builds: int, hidden: bool = False) -> None:
+    folder = place / "path"
     folder.mkdir()
     (folder / "sitecustomize.py").write_text(HIDDEN if hidden else "", encoding="utf-8")
-    command = [sys.executable, str(script), str(place), parts, str(builds)]
+    command = [sys.executable, *code, str(place), parts, str(builds)]
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "")
@@ -83,6 +99,12 @@ def digests(folder: Path) -> dict[str, str]:
 def test_a_build_in_a_script_with_threads_changes_nothing_else(tmp_path: Path) -> None:
     """Without what only a POSIX system has; the next test has it."""
     run_script(tmp_path, "shell", 1, hidden=True)
+
+
+@pytest.mark.slow
+def test_a_build_in_a_notebook(tmp_path: Path) -> None:
+    """Its workers have no file to run again, and a loop of events is not theirs."""
+    run_python(["-c", f"SCRIPT = {SCRIPT!r}\n{CELL}"], tmp_path, "shell", 1)
 
 
 @pytest.mark.slow

@@ -7,6 +7,8 @@ from typing import Any, TypeAlias
 
 from tbcad_verify.run.processes import ProcessEnded, Processes, at_once
 
+from tbcad.errors import ProcessLost
+
 __all__ = ["Submit", "at_once", "background_processes"]
 
 Submit: TypeAlias = Callable[..., "Future[Any]"]
@@ -21,7 +23,7 @@ def background_processes(number: int = 1) -> Iterator[Submit]:
 
     Raises:
         Exception: the first that the work raised.
-        RuntimeError: a process ended before its work was done.
+        ProcessLost: a process ended before its work was done.
     """
     futures: list[Future[Any]] = []
     with Processes(number) as processes:
@@ -35,6 +37,4 @@ def background_processes(number: int = 1) -> Iterator[Submit]:
             for future in futures:
                 future.result()
         except ProcessEnded as end:
-            raise RuntimeError(
-                f"a process ended before its work was done ({end}): is memory short?"
-            ) from None
+            raise ProcessLost(f"a process ended before its work was done: {end}") from None

@@ -72,6 +72,8 @@ def replacing(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ())
         try:
             yield new
         except OSError as error:
+            if error.errno in (errno.EAGAIN, errno.ENOMEM):  # of processes, not of the disk
+                raise
             reason = error.strerror or str(error)
             raise InputError(
                 f"{out} cannot be written: {reason}: make room on the disk, or choose another "

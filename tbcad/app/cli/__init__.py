@@ -28,7 +28,7 @@ from tbcad.app.cli.commands import view as _view  # noqa: F401 - adds its comman
 from tbcad.app.cli.commands import workshop as _workshop  # noqa: F401 - adds its commands
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import add_examples, order_help
-from tbcad.app.cli.stopping import INTERRUPTED, Stopped, signals_as_interrupt
+from tbcad.app.cli.stopping import INTERRUPTED, Stopped, shortage, signals_as_interrupt
 from tbcad.app.cli.usage_errors import usage_error_text
 from tbcad.errors import InputError, PlausibilityWarning
 
@@ -66,6 +66,12 @@ def _run(arguments: list[str]) -> int:
     except Stopped as stop:
         sys.stderr.write(f"tbcad: stopped; {stop}\n")
         return INTERRUPTED
+    except (MemoryError, OSError, RuntimeError) as error:
+        reason = shortage(error)
+        if reason is None:
+            raise
+        sys.stderr.write(f"tbcad: {reason}\n")
+        return 2
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:  # as typer returns it, too

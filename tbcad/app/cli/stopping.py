@@ -1,5 +1,6 @@
 """What ends a command from outside: it cleans up first, as after Ctrl-C."""
 
+import errno
 import os
 import signal
 import threading
@@ -8,15 +9,33 @@ from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 
+from tbcad.errors import ProcessLost, one_line
+
 INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
 STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
 DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 IMPORTING = "<frozen importlib._bootstrap>"  # the code of imports
 AGAIN_S = 0.05
+USED_UP = (errno.EAGAIN, errno.ENOMEM, errno.ENOSPC)  # processes, memory, room on a disk
+NO_THREAD = "can't start new thread"  # Python's own words: it has no class for it
 
 
 class Stopped(Exception):
     """A command was stopped and has kept something; its text says what, and how to go on."""
+
+
+def shortage(error: Exception) -> str | None:
+    """What the system has no more of, in a line for the screen; None: the error is another."""
+    if isinstance(error, MemoryError | ProcessLost) or str(error) == NO_THREAD:
+        reason = str(error) or "no memory"
+    elif isinstance(error, OSError) and error.errno in USED_UP:
+        reason = error.strerror or str(error)
+    else:
+        return None
+    return one_line(
+        f"this system has too few resources ({reason}): free memory and disk, allow more processes "
+        "(ulimit -u) or ask for a smaller design, and run again"
+    )
 
 
 @contextmanager

@@ -12,11 +12,10 @@ from tbcad.light.simulate.capture.light_field import RAY_SIGMAS, CameraFrame, Li
 from tbcad.types import Bools, Floats, Ints
 
 LEAST_CHORD_MM = 0.03
-GRAZING = 0.01  # share of the rays, with the shortest way through the capture sphere
-LOWEST, SIGMAS_BETWEEN = 0.05, 0.97  # a quantile, and from there to the quartile if normal
+LEAST_PAST = 100  # rays past the capture sphere that tell of noise
 NO_FOOTPRINT: Singles = np.zeros((1, 4, 3), dtype=np.float32)
 DARKEST = 0.02  # of white: less is called dark whatever the noise
-NOISE = 4.0  # times the standard deviation is brighter than the background's noise
+NOISE = 6.0  # times the distance of the median from the mean below it: all but a few
 PATTERNS = 8  # turned against each other
 SQUARE_VARIANCE = 1 / 12  # of a pixel's square, along each side
 GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
@@ -36,6 +35,7 @@ class CapturedRays:
     # zeros where a pixel is a single ray
     footprint: Singles
     capture_mm: float  # diameter of the capture sphere
+    noise_level: float = 0.0  # brightness, 0 to 1, that the background has by noise
 
     def __len__(self) -> int:
         return len(self.length)
@@ -50,19 +50,15 @@ class CapturedRays:
         return float(2 * width * np.sqrt(2 * np.mean(np.square(places))))
 
     def dark_level(self) -> float:
-        """Brightness, 0 to 1, below which a ray sees the background.
-
-        Few of the rays that graze the capture sphere see anything else: their lower quartile, and
-        four times the standard deviation that the spread below it stands for.
-        """
-        count = max(int(GRAZING * len(self)), 1)
-        grazing = self.colour[np.argpartition(self.length, count - 1)[:count]].max(axis=1)
-        low, quarter = np.quantile(grazing, (LOWEST, 0.25))
-        return float(max(quarter + NOISE * (quarter - low) / SIGMAS_BETWEEN, DARKEST))
+        """Brightness, 0 to 1, below which a ray sees the background."""
+        return max(self.noise_level, DARKEST)
 
 
 def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
-    """The rays of a light field.
+    """The rays of a light field; what is as dark as the background's noise is black.
+
+    Noise is cut off at black in a photograph, so its mean is not zero there and a fit would show
+    it as haze.
 
     Args:
         source: the light field.
@@ -71,18 +67,38 @@ def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
     Raises:
         InputError: no ray meets the capture sphere.
     """
-    before, parts = 0, []
+    before, parts, past = 0, [], []
     for frame in source.frames.values():
-        parts.append(_of_frame(frame, before, source.capture_mm / 2, footprint))
+        columns, background = _of_frame(frame, before, source.capture_mm / 2, footprint)
+        parts.append(columns)
+        past.append(background)
         before += len(frame.u)
     entry, direction, length, colour, mirror, *prints = (
         np.concatenate(columns) for columns in zip(*parts, strict=True)
     )
     if not len(length):
         raise InputError("no ray of the light field meets its capture sphere: capture again")
+    level = noise_level(np.concatenate(past))
+    colour[colour.max(axis=1) < level] = 0
     wide = prints[0] if prints else NO_FOOTPRINT
     weight = np.ones(len(length), dtype=np.float32)
-    return CapturedRays(entry, direction, length, colour, mirror, weight, wide, source.capture_mm)
+    return CapturedRays(
+        entry, direction, length, colour, mirror, weight, wide, source.capture_mm, level
+    )
+
+
+def noise_level(background: Singles) -> float:
+    """Brightness that noise alone reaches, from that of rays past the capture sphere (n,).
+
+    Most of them see nothing: their median, and six times its distance from the mean of what is
+    darker, which is 0.6 standard deviations for the brightest of three colours. 0 where too few
+    rays are known.
+    """
+    if len(background) < LEAST_PAST:
+        return 0.0
+    middle = np.median(background)
+    darker = background[background <= middle].mean(dtype=np.float64)
+    return float(middle + NOISE * (middle - darker))
 
 
 def entries(
@@ -99,11 +115,13 @@ def entries(
 
 def _of_frame(
     frame: CameraFrame, before: int, radius: float, footprint: bool
-) -> list[NDArray[Any]]:
+) -> tuple[list[NDArray[Any]], Singles]:
+    """Columns of the rays that meet the capture sphere, and the brightness of those that do not."""
     planes = frame.read(slice(None))
     mirror, direction = planes["mirror"], planes["direction"]
     entry, length = entries(planes["origin"], direction, radius)
     seen = (mirror > 0) & (length > LEAST_CHORD_MM)
+    past = planes["colour"][(mirror > 0) & (length == 0)].max(axis=1, initial=0) / np.float32(255)
     columns = [
         entry[seen],
         direction[seen],
@@ -113,7 +131,7 @@ def _of_frame(
     ]
     if footprint:
         columns.append(_footprints(entry, direction, np.where(seen, mirror, 0))[seen])
-    return columns
+    return columns, past
 
 
 def _footprints(entry: Singles, direction: Singles, mirror: NDArray[np.uint16]) -> Singles:

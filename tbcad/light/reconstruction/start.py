@@ -31,6 +31,7 @@ HULL_NODES = (12, 64)  # along an edge: the fewest and the most
 RAYS_OF_NODE = 5  # at least, in the mean
 MOST_DARK = 0.3  # share of a voxel's rays that may see the background, past its edges
 HULL_PARTS = 8  # of the rays, whatever the number of threads
+LIGHT = 0.25  # of white: no dark background is lighter
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ def hull(rays: CapturedRays) -> Bools:
     """
     level = rays.dark_level()
     dark = rays.colour.max(axis=1) < level
-    if dark.all():
+    if dark.all() and level < LIGHT:
         raise InputError(
             f"the photographs show nothing brighter than {level:.1%} of white before a dark "
             "background: light the object, or expose longer, and capture again"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.rays import CapturedRays
+from tbcad.light.reconstruction.rays import CapturedRays, noise_level
 from tbcad.light.reconstruction.start import MOST_DARK, hull
 from tests.ray_fields import RADIUS, Ball, rays_of
 
@@ -49,8 +49,9 @@ def test_photographs_of_nothing_are_refused() -> None:
 
 def test_photographs_without_background_are_refused() -> None:
     everywhere = np.random.default_rng(0).uniform(0.3, 1, (5_000, 3)).astype(np.float32)
-    with pytest.raises(InputError, match="dark background"):
-        hull_of(replace(rays_of([], 5_000), colour=everywhere))
+    level = noise_level(everywhere.max(axis=1))
+    with pytest.raises(InputError, match="what is behind it must be black"):
+        hull_of(replace(rays_of([], 5_000), colour=everywhere, noise_level=level))
 
 
 def test_a_ball_that_almost_fills_the_capture_sphere_is_not_background() -> None:

@@ -1,16 +1,14 @@
 """Rays of a light field: where they enter the capture sphere, and what their pixels cover."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.rays import CapturedRays, captured_rays, entries
+from tbcad.light.reconstruction.rays import CapturedRays, captured_rays, entries, noise_level
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
-from tests.ray_fields import RADIUS, Ball, lines, rays_of
+from tests.ray_fields import RADIUS, lines
 
 PINHOLES = np.array([[0.0, 3.0, 50.0], [40.0, -5.0, 20.0]])
 PITCH = 0.004  # of a pixel at unit distance
@@ -110,13 +108,39 @@ def test_light_fields_that_look_past_the_object_are_refused() -> None:
 
 
 @pytest.mark.parametrize(("offset", "noise"), [(0.0, 0.0), (0.0, 0.01), (0.08, 0.01)])
-def test_background_is_below_the_dark_level_and_the_object_above(
-    offset: float, noise: float
+@pytest.mark.parametrize("lit", [0.0, 0.2])
+def test_noise_reaches_the_level_that_the_background_shows(
+    offset: float, noise: float, lit: float
 ) -> None:
-    rays = rays_of([Ball((1, 0, 0), 6, (0.5, 0.3, 0.2))], 20_000)
+    """Though light falls on some of what should be dark."""
     rng = np.random.default_rng(0)
-    seen = rays.colour.max(axis=1) > 0
-    colour = np.clip(rays.colour + offset + noise * rng.normal(size=(20_000, 3)), 0, 1)
-    dark = colour.max(axis=1) < replace(rays, colour=colour.astype(np.float32)).dark_level()
-    assert dark[~seen].mean() > 0.9
-    assert not dark[seen].any()
+    background = np.clip(offset + noise * rng.normal(size=(20_000, 3)), 0, 1).max(axis=1)
+    dark = background.copy()
+    background[: round(lit * len(dark))] += 0.3
+    level = noise_level(background.astype(np.float32))
+    assert offset - 1e-6 <= level <= offset + 7 * noise
+    assert (dark <= level).mean() > (0.9 if lit else 0.98)
+
+
+def test_background_that_noise_explains_is_black_and_the_rest_as_photographed() -> None:
+    rng = np.random.default_rng(1)
+    seen = frame()
+    shape = seen.planes["colour"].shape
+    seen.planes["colour"][...] = rng.integers(0, 4, shape)
+    seen.planes["colour"][8:12, 8:12] = (90, 40, 200)
+    outside = LightField({"a": seen}, 2 * 1.5, {})  # most rays pass a small capture sphere
+    rays = captured_rays(outside)
+    bright = rays.colour.max(axis=1) > 0
+    assert 0 < bright.sum() < len(rays)
+    assert np.unique(rays.colour[bright] * 255, axis=0) == pytest.approx(
+        np.array([[90, 40, 200]]), abs=1e-4
+    )
+
+
+def test_an_object_that_fills_the_capture_sphere_is_no_background() -> None:
+    """What is next to it is: the noise is that of rays past the sphere."""
+    seen = frame()
+    _, length = entries(seen.planes["origin"], seen.planes["direction"], 1.5)
+    seen.planes["colour"][...] = np.where(length > 0, 80, 0)[..., None]
+    rays = captured_rays(LightField({"a": seen}, 2 * 1.5, {}))
+    assert rays.dark_level() < rays.colour.min()
