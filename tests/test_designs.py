@@ -8,11 +8,8 @@ import pytest
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import dotted_fields, section_of
 from tbcad.core.spec.load import load_spec
-from tbcad.light.simulate.capture.pixel_counts import virtual_cameras
-from tbcad.optimizing.candidate import figures_of, mean_ssim, size_of
 from tbcad.light.simulate.capture.photograph import virtual_cameras
-from tbcad.optimizing.candidate import figures_of, size_of
-from tbcad.optimizing.views import mean_ssim
+from tbcad.optimizing.candidate import figures_of, mean_ssim, size_of
 from tests.mirror_arrays import designed
 
 DESIGNS = Path(__file__).parents[1] / "designs"

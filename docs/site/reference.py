@@ -17,8 +17,8 @@ import tbcad
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import HEADINGS
 from tbcad.app.reference.keys import design_template
-from tbcad.prototype.electronics import wiring
-from tbcad.prototype.files import bom_csv
+from tbcad.prototype import electronics
+from tbcad.prototype.files import bom
 from tbcad.records.calibration import CalibrationRecord, MachineRecord
 from tbcad.records.design import DesignRecord
 from tbcad.records.document import Document, Manifest
@@ -45,7 +45,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "stops.csv": StopRow,
     "rays.csv": RayRow,
 }
-PAPER = {"bom.csv": bom_csv.COLUMNS, "wiring.csv": wiring.COLUMNS}  # read by people
+PAPER = {"bom.csv": bom.COLUMNS, "wiring.csv": electronics.COLUMNS}  # read by people
 MARKUP = re.compile(r"\[/?[a-z]+\]")  # of rich, in help texts
 
 

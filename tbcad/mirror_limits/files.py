@@ -28,12 +28,8 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.mirror_limits.sensitivity import MM_PER_UM, MirrorLimits, Sensitivities
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.mirror_limits.limits import MirrorLimits
-from tbcad.mirror_limits.read_back import check_read_back
-from tbcad.mirror_limits.sensitivity import MM_PER_UM, Sensitivities
+from tbcad.mirror_limits.sensitivity import MM_PER_UM, MirrorLimits, Sensitivities
 from tbcad.shell.files import wall_names
 from tbcad.types import Floats
 

@@ -23,8 +23,8 @@ from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.picture import BY_FIELD
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels
-from tbcad.light.simulate.capture.traced_frame import traced_light_field
+from tbcad.light.simulate.capture.light_field import traced_light_field
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -36,9 +36,6 @@ from tbcad.light.simulate.views.viewpoints import (
     views_by,
 )
 from tbcad.types import Bytes, Floats, Ints
-from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
-from tbcad.optimizing.views import ViewsBy, mean_ssim
-from tbcad.types import Floats, Ints
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
 

@@ -18,8 +18,6 @@ from tbcad.core.optics.cells import Cells, cells_of
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.optics.windows import cut_images, seam_gaps
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
 from tbcad.report.section import EdgeSection, section_of
 from tbcad.report.shell_pictures import coloured

@@ -10,18 +10,16 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 
-from tbcad.cad.formats.csv_table import Row, write_table
-from tbcad.cad.formats.step_assembly import write_assembly
-from tbcad.cad.kernel.assembly import ColouredSolid, SolidGroup
+from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.kernel.solids import common, one_solid, sphere
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.windows import cell_windows
 from tbcad.errors import InputError
 from tbcad.light.simulate.image_files import write_images
-from tbcad.light.simulate.prototype.plan import Plan, read_plan
-from tbcad.light.simulate.prototype.run import PrototypeRun
-from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, read_plan
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.records.tables import RayRow
 from tbcad.rig.machine.designed import machine_runs, stops_known
 from tbcad.rig.machine.machine import RECORD, Machine, read_machine

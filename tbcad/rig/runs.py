@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.cad.formats.checked_files import parse_json
-from tbcad.cad.formats.images.pictures import PICTURE_SUFFIXES, Picture, picture_of, read_picture
+from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, picture_of, read_picture
+from tbcad.cad.formats.pixels import Picture
 from tbcad.common.atomic_files import InFolder
 from tbcad.errors import InputError
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, exposure_name

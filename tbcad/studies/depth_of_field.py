@@ -4,14 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.camera.requirements import (
     FANS,
     PLACES,
-from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
-from tbcad.core.camera.lens import (
     DepthRange,
     Lens,
     VirtualImages,

@@ -5,10 +5,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Cell, Record, Table
-from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorArray, design
 from tbcad.core.spec.design import Spec, spec_with

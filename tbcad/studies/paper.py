@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import files
 from typing import TypeVar
 
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.common.schedule import run_units
 from tbcad.core.mirrors.array import UNSTRETCHED, MirrorArray, MirrorDesign, design
 from tbcad.core.spec.design import FIT, Spec, spec_with

@@ -11,8 +11,6 @@ from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
-from tbcad.options.tolerances import ToleranceOptions
-from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerancing.montecarlo.builds import (

@@ -16,11 +16,8 @@ from tbcad.cad.formats.step_tolerances import FaceTolerances, read_tolerances, w
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.pedestals.cells import groove_walls
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.mirror_limits.files import Half, check_read_back, dowel_face, halves, tolerances
-from tbcad.core.optics.pedestals.walls import groove_walls
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
-from tbcad.mirror_limits.files import Half, dowel_face, halves, tolerances
+from tbcad.mirror_limits.files import Half, check_read_back, dowel_face, halves, tolerances
 from tbcad.mirror_limits.inspect import found_limits, minimum_at_limits
 from tbcad.mirror_limits.sensitivity import MirrorLimits, Sensitivities, sensitivities
 from tbcad.shell.files import shell_envelope, wall_names, write_shell_solids

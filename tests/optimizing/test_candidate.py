@@ -11,11 +11,10 @@ from tbcad.core.spec.load import load_spec
 from tbcad.light.reconstruction import picture
 from tbcad.light.reconstruction.picture import BY_FIELD
 from tbcad.light.reconstruction.start import Level, Settings
-from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.capture.photograph import Sensor
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
 from tbcad.optimizing import candidate
-from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.optimizing.candidate import (
     MachineLimits,
     bounds,

@@ -10,8 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import study_files
-from tbcad.common.results import SUMMARY_COLUMNS, study_files
+from tbcad.common.results import study_files
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors

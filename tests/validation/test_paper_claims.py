@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import Study
-from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.common.results import Study
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions
 from tbcad.core.spec.load import load_spec

@@ -209,7 +209,7 @@ def as_made(
     Returns:
         Their yields; None where no shell was built, or its record cannot be read.
     """
-    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.montecarlo.builds import as_made as simulated
 
     folder = Path(exports)

@@ -85,8 +85,8 @@ def tolerance(options: ToleranceOptions) -> Analysis:
         InputError: export or process cannot be read, or mirrors are planar.
     """
     process, exports = checked_process(options), Path(options.exports)
-    from tbcad.light.simulate.scene.exported import read_export
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.analysis import analyse as analyse_export
     from tbcad.tolerancing.stages import RECORD
 

@@ -15,9 +15,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from tbcad.cad.formats.checked_files import toml_text
+from tbcad.core.spec.csv_rows import Table, read_text, read_toml
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import allowed_text, section_of
-from tbcad.core.spec.files import Table, read_text, read_toml
 from tbcad.core.spec.load import PAPER, shipped_designs
 
 # Of a key, by the last word of its name, or its last two.

@@ -16,8 +16,6 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from tbcad.cad.formats.mesh_files import mesh_ply
-from tbcad.core.geometry.vectors import unit
-from tbcad.cad.formats.ply import mesh_ply
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.geodesic import triangle_grid

@@ -22,7 +22,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
-from tbcad.cad.formats.ply import points_ply
+from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.light.datasets.pictures import Pictures, crop_of

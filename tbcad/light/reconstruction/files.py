@@ -22,8 +22,6 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from tbcad.cad.formats.assembly import UPRIGHT
-from tbcad.common.srgb import srgb_light
-from tbcad.cad.formats.glb import UPRIGHT
 from tbcad.common.colours import srgb_light
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.field import Field

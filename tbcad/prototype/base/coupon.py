@@ -22,8 +22,8 @@ from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.coupon_seats import SeatPose, height, outline, seat_body, with_pads
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.printing.bed import usable_size
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.print_bed import usable_size
+from tbcad.prototype.printed import PlacedSolid
 from tbcad.types import Floats
 
 # Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.

@@ -31,7 +31,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import seat_room, with_posts
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.base.split import BaseSplit
-from tbcad.prototype.printing.placing import opening_up
+from tbcad.prototype.printed import opening_up
 from tbcad.types import Floats
 
 UPRIGHT = 1e-9  # of an axis's level part: a seat without a lean

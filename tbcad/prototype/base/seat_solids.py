@@ -20,8 +20,7 @@ from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import Maker, Ring, hole_faces
-from tbcad.cad.kernel.checks import closed_mesh
-from tbcad.cad.kernel.measures import properties
+from tbcad.cad.kernel.checks import closed_mesh, properties
 from tbcad.cad.kernel.meshing import growth, primitive_mesh
 from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, one_solid, revolved, wires
 from tbcad.core.geometry.primitives import Cylinder, Revolved
@@ -31,7 +30,7 @@ from tbcad.prototype.base.caps import cap_pocket, cap_spigot, flat_depth
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printed import PlacedSolid
 from tbcad.types import Floats
 
 # The path is narrower than the cup by this share of the cup's clearance, so that the two meet at

@@ -54,7 +54,7 @@ from tbcad.prototype.base.split_solids import (
     label_windows,
     number_solids,
 )
-from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.prototype.printed import PlacedSolid, placed_on_bed
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -15,14 +15,10 @@ import numpy as np
 from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
-from tbcad.core.geometry.rotations import unit_circle
-from tbcad.core.spec.design import PrinterSpec
-from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.base.joints import Cut, CutPlane, Joint, in_region, plan_joint
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm, perpendicular_axes
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.base.joints import (
     Cut,
     CutPlane,
@@ -34,7 +30,7 @@ from tbcad.prototype.base.joints import (
 )
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import at_azimuths, meridian
-from tbcad.prototype.printing.bed import min_bed, shortfall, size_text
+from tbcad.prototype.print_bed import min_bed, shortfall, size_text
 from tbcad.types import Bools, Floats, Ints
 
 CLEARANCE_MM = 1.0  # of a plane from any boss

@@ -23,7 +23,7 @@ from tbcad.prototype.base.joints import (
 )
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.split import BaseSplit, downward_directions
-from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.prototype.printed import PlacedSolid, placed_on_bed
 from tbcad.types import Bools, Floats
 
 FAR_MM = 2000.0  # larger than any base

@@ -20,7 +20,7 @@ from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.hub import ZERO_DISC_MM
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.homing.sizes import PIN_MM, PIN_OUT_MM
+from tbcad.prototype.homing import PIN_MM, PIN_OUT_MM
 from tbcad.records.prototype_drive import PowerOff
 from tbcad.types import Floats
 

@@ -20,13 +20,13 @@ from tbcad.prototype.drive.loads import (
     base_torques,
 )
 from tbcad.prototype.drive.travel import power_off, stop_sequence
-from tbcad.prototype.electronics.outputs import phases
+from tbcad.prototype.electronics import phases
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.files.bom_csv import totals
+from tbcad.prototype.files.bom import totals
 from tbcad.prototype.frame.camera_gauge import marks_seen
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.printing.placing import PrintedPart
+from tbcad.prototype.printed import PrintedPart
 from tbcad.prototype.stage.layout import led_poses
 from tbcad.prototype.stage.leds import calibration_estimate
 from tbcad.records import prototype as records
@@ -38,7 +38,6 @@ from tbcad.records.prototype_drive import (
     Home,
     LampPlace,
     LampsRecord,
-    PowerOff,
     ShroudRecord,
 )
 
@@ -56,14 +55,10 @@ BLACKENED = frozenset(
 
 
 def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> Prototype:
-    """What is known of the prototype, in numbers, but its steps of assembly.
-
-    Args:
-        built: the prototype.
-        bill: rows of the parts list.
-        drawings: of what is cut or drilled.
-    """
+    """What is known of the prototype, in numbers, but its steps of assembly."""
     layout, spec, frame = built.layout, built.spec.prototype, built.frame
+    angles, leds = frame.homing.angles, len(built.stage.leds)
+    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
     axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
     return Prototype(
         camera="a",
@@ -85,14 +80,14 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         controller=Controller(
             firmware=spec.motion.controller,
             axis=spec.motion.axis,
-            phases=phases(len(built.stage.leds), spec.motion),
+            phases=phases(leds, spec.motion),
         ),
         caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),
         home=Home(
-            switch_deg=frame.homing.angles.switch,
-            homed_deg=frame.homing.angles.homed,
-            travel_deg=frame.homing.angles.travel,
+            switch_deg=angles.switch,
+            homed_deg=angles.homed,
+            travel_deg=angles.travel,
             pin=frame.homing.pin,
             zero_error_deg=frame.homing.error_deg,
         ),
@@ -119,21 +114,16 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         assembly=records.AssemblyFiles(step=STEP, glb=GLB),
         drive=drive_record(built.balance, built.drive, spec.motion, layout.stops.range),
-        power_off=_power_off(built),
+        power_off=power_off(
+            built.balance, low, high, holds_itself=built.drive.efficiency < SELF_LOCKING
+        ),
     )
 
 
 def drive_record(
     balance: BaseBalance, drive: Drive, motion: MotionSpec, swing: tuple[float, float]
 ) -> DriveRecord:
-    """What the drive must bear and does, with its limits.
-
-    Args:
-        balance: masses on the base.
-        drive: chosen for them.
-        motion: of the base.
-        swing: smallest and largest base angle, radians.
-    """
+    """What the drive must bear and does over a swing (radians), with its limits."""
     torques = base_torques(balance, swing, motion)
     loads = DriveLoads(drive, torques)
     return DriveRecord(
@@ -168,13 +158,6 @@ def drive_record(
         motor_rise_k=loads.motor_rise,
         motor_rise_limit_k=MAX_RISE_K,
     )
-
-
-def _power_off(built: PrototypeModel) -> PowerOff:
-    """The base without power, between the ends of its travel."""
-    angles, drive = built.frame.homing.angles, built.drive
-    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
-    return power_off(built.balance, low, high, holds_itself=drive.efficiency < SELF_LOCKING)
 
 
 def _swing(built: PrototypeModel, motion: MotionSpec) -> tuple[float, float]:

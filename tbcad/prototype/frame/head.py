@@ -43,7 +43,7 @@ from tbcad.prototype.frame.purchased import (
     webs,
     wheel_radius,
 )
-from tbcad.prototype.homing.sizes import (
+from tbcad.prototype.homing import (
     MARK_DEPTH_MM,
     MARK_END_MM,
     MARK_MM,

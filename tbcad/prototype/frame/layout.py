@@ -29,7 +29,7 @@ from tbcad.prototype.frame.purchased import (
     frame_axes,
     plate_fasteners,
 )
-from tbcad.prototype.homing.layout import HomingLayout, homing_layout
+from tbcad.prototype.homing import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.lamps import lamp_layout

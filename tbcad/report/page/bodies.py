@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.common.srgb import shown_colour
-from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.common.colours import shown_colour
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import MeshSpec, Spec

@@ -22,7 +22,7 @@ from tbcad.output.manifest import (
     read_manifest,
 )
 from tbcad.output.single_files import refuse_member
-from tbcad.prototype.files.bom_view import read_parts_list
+from tbcad.prototype.files.bom import read_parts_list
 from tbcad.records.design import MISSING
 from tbcad.records.document import Manifest
 from tbcad.report.page import bodies, mirrors

@@ -18,11 +18,6 @@ from scipy.sparse import csr_array
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.prototype.run import HALF_TURN
-from tbcad.rig.calibration.estimate.covariance import Covariance, covariance
-from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images
-from tbcad.rig.calibration.estimate.parameters import Prior
-from tbcad.rig.calibration.estimate.reflection import reflections
-from tbcad.light.simulate.prototype.plan import HALF_TURN
 from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images, reflections
 from tbcad.rig.calibration.estimate.parameters import Covariance, Prior, covariance
 from tbcad.rig.calibration.estimate.solve import Estimate

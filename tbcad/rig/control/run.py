@@ -9,13 +9,10 @@ from time import monotonic
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.runs import Ask, RunOptions, Show
-from tbcad.output.content import refuse_inside
-from tbcad.output.inputs import refuse_inputs
-from tbcad.records.exposure import DARK_LIT, PhaseTimes
 from tbcad.options.shared import exposures
 from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs
-from tbcad.records.exposure import DARK_LIT, PhaseTimes, exposure_name
+from tbcad.records.exposure import DARK_LIT, PhaseTimes
 from tbcad.records.run import RunRecord, read_record
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.chosen_camera import (

@@ -7,12 +7,8 @@ import numpy as np
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.optics.camera import without_distortion
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, balls_at_stops, prototype_run
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME, Prototype

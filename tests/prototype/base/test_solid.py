@@ -11,8 +11,6 @@ from OCP.Geom import Geom_SphericalSurface
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.cad.kernel.checks import check_pads, check_volume, plane_faces, properties, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height, loops, relief
-from tbcad.cad.kernel.meshing import volume_by_meshes
-from tbcad.cad.kernel.measures import plane_faces, properties, volume
 from tbcad.cad.kernel.solids import cut, cylinder, faces, fused, one_solid
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.mirrors.array import MirrorDesign
@@ -44,8 +42,8 @@ from tbcad.prototype.base.solid import (
     removed_solids,
 )
 from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
-from tbcad.prototype.printing.bed import usable_size
-from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.prototype.print_bed import usable_size
+from tbcad.prototype.printed import PlacedSolid, placed_on_bed
 from tests.helpers import as_trimesh, bounds
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -11,8 +11,8 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.checks import plane_faces, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height
-from tbcad.cad.kernel.measures import plane_faces, volume
 from tbcad.cad.kernel.meshing import volume_by_meshes
 from tbcad.cad.kernel.solids import fused, solids
 from tbcad.core.geometry.vectors import norm
@@ -27,7 +27,7 @@ from tbcad.prototype.base.profile import distance_outside
 from tbcad.prototype.base.solid import added_solids, carrier_parts, carrier_solid, removed_solids
 from tbcad.prototype.base.split import UNCUT, BaseSplit, split_base
 from tbcad.prototype.base.split_solids import piece_holes
-from tbcad.prototype.printing.placing import PlacedSolid
+from tbcad.prototype.printed import PlacedSolid
 from tbcad.prototype.purchased.parts import load_parts
 from tests.helpers import as_trimesh, bounds, cylinders, manifold
 

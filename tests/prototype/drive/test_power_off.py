@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tbcad.prototype.drive.balance import GRAVITY, BaseBalance
-from tbcad.prototype.drive.travel import PowerOff, power_off
-from tbcad.prototype.homing.sizes import PIN_OUT_MM
+from tbcad.prototype.drive.travel import power_off
+from tbcad.prototype.homing import PIN_OUT_MM
+from tbcad.records.prototype_drive import PowerOff
 
 # The axis is level along y; one kilogram 100 mm above it at base angle zero.
 FRAME = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

@@ -11,7 +11,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge, marks_seen
-from tbcad.prototype.printing.placing import component_solid
+from tbcad.prototype.printed import component_solid
 from tests.helpers import as_trimesh
 from tests.prototype.conftest import CAPTURE_RADIUS
 

@@ -9,14 +9,12 @@ from OCP.TopoDS import TopoDS_Shape
 from tbcad.cad.kernel.checks import volume
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import PrinterSpec
-from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
 from tbcad.prototype.frame.purchased import CLEARANCE_HOLE_MM
-from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
+from tbcad.prototype.printed import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats

@@ -12,7 +12,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.keepout import KeepOut
-from tbcad.prototype.printing.placing import PlacedSolid, placed_component
+from tbcad.prototype.printed import PlacedSolid, placed_component
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout
 from tests.helpers import as_trimesh

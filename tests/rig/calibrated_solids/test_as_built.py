@@ -17,12 +17,6 @@ from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.rig.calibrated_solids.files import colours, deviations, round_up
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import write_machine
-from tbcad.rig.runs.images import read_image
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.rig.calibrated_solids import colours, deviations, round_up
 from tbcad.rig.machine.machine import Machine, write_machine
 from tbcad.rig.runs import read_image

@@ -8,17 +8,9 @@ import pytest
 
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.pedestals.cells import NO_WALLS
-from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.prototype.ball_rays import BallHits, ball_hits
 from tbcad.light.simulate.prototype.merge import merge_plan, merged_pixels
 from tbcad.light.simulate.prototype.run import HALF_TURN
-from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import prepared_scene
-from tbcad.core.optics.pedestals.walls import NO_WALLS
-from tbcad.light.simulate.prototype.ball_rays import BallHits, ball_hits
-from tbcad.light.simulate.prototype.merge import merge_plan, merged_pixels
-from tbcad.light.simulate.prototype.plan import HALF_TURN
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
 from tbcad.rig.machine.built import BuiltPrototype

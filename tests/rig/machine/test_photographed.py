@@ -10,12 +10,6 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import trace_balls
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, prototype_runs
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.records.exposure import Frame
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import machine_runs, stops_known
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.prototype.run import prototype_runs
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.rig.machine.designed import machine_runs, stops_known
 from tests.machine_states import frames_of, machine_of, perturbed
 

@@ -15,7 +15,6 @@ from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
-from tbcad.rig.machine.photographed import machine_run
 from tbcad.rig.machine.designed import machine_run
 from tbcad.rig.machine.shells import (
     designed_half,

@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 
 from tbcad.app.api import merge
-from tbcad.common.srgb import srgb, srgb_light
+from tbcad.common.colours import srgb, srgb_light
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
 from tbcad.light.simulate.prototype.merge import merge_run
 from tbcad.light.simulate.prototype.run import Plan, ball_reflector, prototype_runs
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.light.simulate.scene.ray_casting import prepared_scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name

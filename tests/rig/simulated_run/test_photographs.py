@@ -9,10 +9,6 @@ import pytest
 from tbcad.light.simulate.prototype.ball_rays import camera_colours, trace_balls
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import read_export
-from tbcad.rig.calibration.detection.expected import expected_highlights
-from tbcad.rig.machine.photographed import machine_runs
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.rig.calibration.detection.matching import expected_highlights
 from tbcad.rig.machine.designed import machine_runs
 from tbcad.rig.simulated_run.led_light import DOME_MM, balls_of_frame

@@ -13,7 +13,7 @@ import numpy as np
 
 from tbcad.core.mirrors.array import design as mirrors_of
 from tbcad.core.mirrors.radii import RadiusProblem
-from tbcad.core.mirrors.seam import seam_gaps
+from tbcad.core.optics.windows import seam_gaps
 from tbcad.core.spec.design import Spec
 from tbcad.output.build import write_export
 from tests.verify.corpus import part21

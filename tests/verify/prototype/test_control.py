@@ -21,9 +21,13 @@ from tbcad_verify.record.export import read_export
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.drive.travel import HomeAngles
-from tbcad.prototype.electronics.outputs import lights
-from tbcad.prototype.files.klipper import klipper_config, klipper_program
-from tbcad.prototype.files.settings import settings, settings_lines
+from tbcad.prototype.electronics import lights
+from tbcad.prototype.files.controllers import (
+    klipper_config,
+    klipper_program,
+    settings,
+    settings_lines,
+)
 from tbcad.prototype.purchased.parts import load_parts
 
 DRIVE, MOTION = load_drives(load_parts())[0], MotionSpec()

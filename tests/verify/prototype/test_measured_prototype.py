@@ -11,14 +11,9 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
-from tbcad_verify.mesh.mesh import indexed_mesh, mass_properties
+from tbcad_verify.mesh.mesh import mass_properties
 from tbcad_verify.mesh.stl import parse
-from tbcad_verify.mesh.vectors import angles_between, polar_and_azimuth, wrapped
-from tbcad_verify.prototype import swing
-from tbcad_verify.prototype.assembly import assembly_meshes
-from tbcad_verify.mesh.lines import angles_between
-from tbcad_verify.mesh.mass import mass_properties
-from tbcad_verify.mesh.stl import parse
+from tbcad_verify.mesh.vectors import angles_between
 from tbcad_verify.prototype import seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
@@ -37,7 +32,7 @@ from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
 from tests.exported_files import edit_json
-from tests.verify.prototype import synthetic_prototype
+from tests.verify.prototype.conftest import synthetic_prototype
 from tests.verify.prototype.synthetic_prototype import (
     SyntheticPrototype,
     export,

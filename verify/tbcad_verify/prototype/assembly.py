@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
 from tbcad_verify.record.export import Export

@@ -12,8 +12,6 @@ from tbcad_verify.mesh.vectors import dot, norm, polar_and_azimuth, unit, wrappe
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control.gcode_checks import program_check
 from tbcad_verify.record.poses import POSE_MM
-from tbcad_verify.record.prototype import BALLS, RECORD
-from tbcad_verify.record.prototype_sections import Balls
 from tbcad_verify.record.prototype import BALLS, PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
     Check,

@@ -41,14 +41,13 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import KLIPPER, SETTINGS, Prototype
 from tbcad_verify.record.prototype import RECORD as RECORD_FILE
 from tbcad_verify.report.checks import (
+    Check,
     attempt,
     check_names,
     finite,
     guarded,
     require,
 )
-from tbcad_verify.record.radius_rule import RULE, rule_check
-from tbcad_verify.report.checks import Check, attempt, check_names, finite, guarded, require
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.step.shell_checks import RULE, rule_check
 from tbcad_verify.step.solids_text import TextSolid

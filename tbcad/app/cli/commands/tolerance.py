@@ -71,11 +71,8 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
     from json import dumps
 
     from tbcad.common.atomic_files import replace_files
-    from tbcad.common.results.study import check_study_folder
-    from tbcad.common.results.tables import csv_text
-    from tbcad.rig.calibrated_solids import (
     from tbcad.common.results import check_study_folder, csv_text
-    from tbcad.rig.calibrated_solids.tolerance import (
+    from tbcad.rig.calibrated_solids import (
         as_built_tolerance,
         summary,
         tolerance_record,

@@ -108,8 +108,8 @@ def parts(
 
     Without --full the rows are those that cost most. Exit code 0, or 2 for bad input.
     """
-    from tbcad.prototype.files.bom_view import read_parts_list
-    from tbcad.prototype.purchased.prices import load_prices
+    from tbcad.prototype.files.bom import read_parts_list
+    from tbcad.prototype.purchased.parts import load_prices
 
     check_is_folder(folder)
     listed = read_parts_list(folder, load_prices([str(prices)]) if prices else None)

@@ -24,9 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.cad.formats.hdf5 import StoredGroup, opened_hdf5
-from tbcad.common.picture_bytes import png_bytes
-from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.common.figure_files import png_bytes
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError

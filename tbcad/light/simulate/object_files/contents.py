@@ -10,12 +10,10 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.cad.formats.pictures import Picture, picture_of
-from tbcad.common.srgb import srgb
-from tbcad.errors import InputError
-from tbcad.cad.formats.images.pictures import Picture, picture_of
+from tbcad.cad.formats.pictures import picture_of
+from tbcad.cad.formats.pixels import Picture
 from tbcad.common.colours import srgb
-from tbcad.errors import InputError, PlausibilityWarning
+from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats, Ints
 
 Up = Literal["y", "z"]

@@ -10,13 +10,14 @@ from tbcad.cad.formats.checked_files import REBUILD, Record, columns
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign, numbered_directions
 from tbcad.core.optics.camera import Camera
-from tbcad.core.optics.cells import Cells
-from tbcad.core.optics.pedestals.cells import GrooveWalls, PedestalCells, groove_walls
-from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.optics.cells import Cells, cells_of
-from tbcad.core.optics.pedestals.cells import PedestalCells, pedestal_cells
+from tbcad.core.optics.pedestals.cells import (
+    GrooveWalls,
+    PedestalCells,
+    groove_walls,
+    pedestal_cells,
+)
 from tbcad.core.optics.pedestals.plan import pedestal_plan
-from tbcad.core.optics.pedestals.walls import GrooveWalls, groove_walls
 from tbcad.core.optics.power_diagram import NotRegularError, bounded_triangulation
 from tbcad.core.optics.surfaces import Surfaces, planes
 from tbcad.core.spec.design import Spec

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.records.calibration import (
     CalibrationRecord,
     HalvesRecord,

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.light.simulate.capture.light_field import PIXEL_ARRAYS, LightField, traced_light_field
 from tbcad.light.simulate.capture.photograph import Tracer, photograph, subpixel_shifts

@@ -12,9 +12,7 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from tbcad.cad.formats.assembly import ColouredMesh, MeshGroup, write_glb
-from tbcad.cad.formats.glb import write_glb
-from tbcad.cad.formats.threemf import write_3mf
-from tbcad.cad.kernel.assembly import ColouredMesh, MeshGroup
+from tbcad.cad.formats.mesh_files import write_3mf
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import ObjectFile

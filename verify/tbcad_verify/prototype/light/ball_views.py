@@ -8,7 +8,6 @@ import numpy as np
 
 from tbcad_verify.mesh.surfaces import Surfaces, nearest_on_rays, prepare_for_rays, reflect
 from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
-from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.bodies import MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.pinhole_cells import (

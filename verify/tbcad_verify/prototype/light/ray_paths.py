@@ -9,10 +9,16 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad_verify.mesh.lines import distances_to_segments, polar_and_azimuth
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, distances_to_planes, first_hits, in_threads
 from tbcad_verify.mesh.surfaces import ReflectedRays, nearest_on_rays, reflect
-from tbcad_verify.mesh.vectors import chunks, dot, norm, unit
+from tbcad_verify.mesh.vectors import (
+    chunks,
+    distances_to_segments,
+    dot,
+    norm,
+    polar_and_azimuth,
+    unit,
+)
 from tbcad_verify.prototype.bodies import MeasuredPrototype, Obstacles
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.types import Bools, Floats, Ints

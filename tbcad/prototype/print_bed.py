@@ -20,16 +20,7 @@ def usable_size(printer: PrinterSpec) -> Floats:
 
 
 def fitting_orientation(corners: Floats, down: Floats, printer: PrinterSpec) -> Floats | None:
-    """An orientation in which a part fits, or None.
-
-    Args:
-        corners: of the part, mm, (n, 3).
-        down: unit direction that is to point down, (3,).
-        printer: with its bed.
-
-    Returns:
-        Rows that the axes become, (3, 3).
-    """
+    """Rows (3, 3) that the axes become where corners (n, 3) fit with a direction down, or None."""
     orientations = _orientations(down)
     fits = (np.ptp(corners @ orientations, axis=1) <= usable_size(printer)).all(axis=1)
     return orientations[int(fits.argmax())] if fits.any() else None

@@ -1,8 +1,4 @@
-"""The zero disc on the hub, and the switch beside the head's plate that its tab presses.
-
-A rod through disc and plate fixes angle zero. The disc bears marks and an arrow in the sense of
-positive angles. Lengths are along the axis, out from it at azimuth zero, and to the side.
-"""
+"""Sizes, mm, that zero disc, bearing head and bracket share; out: from the axis, azimuth zero."""
 
 import math
 from dataclasses import dataclass
@@ -31,29 +27,28 @@ from tbcad.prototype.frame.purchased import (
     axial_cylinder,
     hub_point,
 )
-from tbcad.prototype.homing.sizes import (
-    BRACKET_HIGH_MM,
-    BRACKET_LOW_MM,
-    BRACKET_MM,
-    FREE_MM,
-    MARK_DEPTH_MM,
-    MARK_MM,
-    PIN_HOLE_MM,
-    PIN_MM,
-    PIN_OUT_MM,
-    bracket_screws,
-    switch_place,
-    tab_radius,
-)
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
 from tbcad.types import Floats
 
+PIN_MM = 4.0  # diameter of the rod that fixes angle zero
+PIN_HOLE_MM = 4.2
+PIN_OUT_MM = 44.0  # of the pin: beyond the largest wheel, short of the motor
+MARK_MM, MARK_DEPTH_MM = 1.0, 0.8  # width and depth of what is engraved
+MARK_END_MM = 56.0  # out of the mark on the head's plate
+BRACKET_MM = 14.0  # thickness, away from the side of the head's plate
+BRACKET_LOW_MM, BRACKET_HIGH_MM = 46.0, 72.0  # out, of the bracket
+BRACKET_EDGE_MM = 4.0  # from the bracket's ends to its screws
+MIN_PLATE_MM = BRACKET_HIGH_MM + 2.0  # out, of the plate's end
+# Of the switch's roller from the line of its holes: when free, and when the switch trips.
+FREE_MM, TRIP_MM = 19.3, 14.5
+TAB_BEYOND_MM = 0.7  # of the tab beyond where the switch trips
 SWITCH = "SWITCH-SS-5GL2"
 # Of the switch, from the line of its holes: toward the axis to its body's end, outward to the
 # other, half its length; to the roller when fully pressed.
 BODY_IN_MM, BODY_OUT_MM, BODY_HALF_MM = 7.3, 2.9, 9.9
 PRESSED_MM = 13.2
 SWITCH_MM, SWITCH_HOLES_MM, SWITCH_HOLE_MM = 6.4, 9.5, 2.35  # thickness, distance, diameter
+HOLES_MM = -SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2  # around, from the middle of the switch
 ROLLER_MM, ROLLER_LENGTH_MM = 4.8, 3.4
 LEVER_FROM_MM, LEVER_TO_MM, LEVER_HALF_MM = 9.0, 7.0, 6.0
 PILOT_MM, PILOT_DEPTH_MM = 1.7, 8.0  # hole that an M2 screw cuts its thread in
@@ -69,6 +64,21 @@ MIN_EDGE_MM = 2.0  # of the disc beyond the pin's hole
 BAR_MM = rectangle((-3.0, 40.2), (8.0, 41.2))
 HEAD_MM = np.array([[-3.0, 37.7], [-3.0, 43.7], [-9.0, 40.7]])
 PLUS_MM = rectangle((11.0, 40.2), (16.0, 41.2)), rectangle((13.0, 38.2), (14.0, 43.2))
+
+
+def switch_place(half_width: float) -> tuple[float, float]:
+    """Out and side of the middle of the switch's holes, beside a plate of half a width."""
+    return (BRACKET_LOW_MM + BRACKET_HIGH_MM) / 2, half_width + BRACKET_MM / 2
+
+
+def bracket_screws() -> tuple[float, float]:
+    """Out of the bracket's two screws."""
+    return BRACKET_LOW_MM + BRACKET_EDGE_MM, BRACKET_HIGH_MM - BRACKET_EDGE_MM
+
+
+def tab_radius(half_width: float) -> float:
+    """Radius of the tab, which presses the switch beside a plate of half a width."""
+    return math.hypot(*switch_place(half_width)) - TRIP_MM + TAB_BEYOND_MM
 
 
 @dataclass(frozen=True)
@@ -154,7 +164,13 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
             f"the carrier reaches {hub.face - base.rearmost:.1f} mm behind its hub, where the zero "
             "disc is: make prototype.base.hub_boss_mm larger"
         )
-    removed: list[Primitive] = [_hole(base, hub.face, back, *hole) for hole in holes]
+    low, high = back - THROUGH_MM, hub.face + THROUGH_MM
+    removed: list[Primitive] = [
+        cylinder_between(
+            hub_point(base, low, out, side), hub_point(base, high, out, side), diameter / 2
+        )
+        for out, side, diameter in holes
+    ]
     rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
     removed.append(_prism(base, rim, back - THROUGH_MM, ZERO_DISC_MM + 2 * THROUGH_MM))
     engraved = hub.face - MARK_DEPTH_MM
@@ -164,13 +180,6 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
     ]
     what = "disc with mark, arrow and the tab of the switch, between hub and drive"
     return Component("zero_disc", what, tuple(added), tuple(removed), (-w, w), rotates=True)
-
-
-def _hole(
-    base: BaseLayout, front: float, back: float, out: float, side: float, diameter: float
-) -> Cylinder:
-    start, end = (hub_point(base, z, out, side) for z in (back - THROUGH_MM, front + THROUGH_MM))
-    return cylinder_between(start, end, diameter / 2)
 
 
 def _prism(base: BaseLayout, polygon: Floats, back: float, height: float) -> Prism:
@@ -210,7 +219,7 @@ def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Compone
         outer = hub_point(base, middle, out, far + THROUGH_MM)
         removed.append(cylinder_between(inner, outer, SCREW_MM / 2))
     axes = place.axes(base)
-    for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2):
+    for around in HOLES_MM:
         top = np.array([place.radius, around, place.low + THROUGH_MM]) @ axes
         depth = PILOT_DEPTH_MM + THROUGH_MM
         removed.append(Cylinder(top, -base.frame[0], PILOT_MM / 2, depth))
@@ -231,14 +240,10 @@ def _fasteners(
         for out in bracket_screws()
     ]
     top = place.low + SWITCH_MM
+    bodies = ("home_switch", "home_bracket")
     on_bracket = [
-        Fastener(
-            switch,
-            np.array([place.radius, around, top]) @ axes,
-            -base.frame[0],
-            ("home_switch", "home_bracket"),
-        )
-        for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2)
+        Fastener(switch, np.array([place.radius, around, top]) @ axes, -base.frame[0], bodies)
+        for around in HOLES_MM
     ]
     return (*on_head, *on_bracket)
 
@@ -260,13 +265,7 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
         ),
         Cylinder(roller, axes[2], ROLLER_MM / 2, ROLLER_LENGTH_MM),
     )
-    holes = tuple(
-        Cylinder(
-            at(0.0, around, -THROUGH_MM) @ axes,
-            axes[2],
-            SWITCH_HOLE_MM / 2,
-            SWITCH_MM + 2 * THROUGH_MM,
-        )
-        for around in (-SWITCH_HOLES_MM / 2, SWITCH_HOLES_MM / 2)
-    )
+    depth = SWITCH_MM + 2 * THROUGH_MM
+    starts = (at(0.0, around, -THROUGH_MM) @ axes for around in HOLES_MM)
+    holes = tuple(Cylinder(start, axes[2], SWITCH_HOLE_MM / 2, depth) for start in starts)
     return Component("home_switch", parts[SWITCH].what, added, holes, part=SWITCH)

@@ -16,11 +16,14 @@ from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics.wiring import wiring_layout, wiring_rows
-from tbcad.prototype.files.bom_csv import ALWAYS, PrintedItem, bom_rows, totals
-from tbcad.prototype.printing.estimate import PrintEstimate
-from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.purchased.prices import Prices, load_prices
+from tbcad.prototype.electronics import (
+    e24_at_least,
+    series_resistor,
+    wiring_layout,
+    wiring_rows,
+)
+from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
+from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices
 from tbcad.prototype.stage.layout import StageLayout
 
 PARTS = load_parts()
@@ -107,6 +110,28 @@ def test_every_line_of_the_wiring(
     }
 
 
+def test_circuits_that_there_are_not(spec: PrototypeSpec, stage: StageLayout) -> None:
+    values = [(180, 180), (181, 200), (2080, 2200), (9.1, 9.1), (92, 100), (0.99, 1), (1e5, 1e5)]
+    assert [e24_at_least(ohm) for ohm, _ in values] == pytest.approx([one for _, one in values])
+    led = PARTS["LED-3"]
+    with pytest.raises(SpecError, match="led_ma 25 is more than LED-3 bears: make it 20"):
+        series_resistor(led, 25.0, 24.0, PARTS)
+    with pytest.raises(SpecError, match="led_supply_v 3 does not light LED-3"):
+        series_resistor(led, 10.0, 3.0, PARTS)
+    none = {name: part for name, part in PARTS.items() if not name.startswith("R-")}
+    with pytest.raises(SpecError, match=r"no resistor of 0\.4 W is in resistors\.csv"):
+        series_resistor(led, 10.0, 24.0, none)
+    narrow = replace(stage, sizes=replace(stage.sizes, wire=0.9))
+    with pytest.raises(SpecError, match=r"8 wires of LEDs do not fit .* bore of 1\.8 mm"):
+        wiring_layout(spec, narrow, PARTS)
+
+
+def test_the_supply_bears_motor_and_lights() -> None:
+    """Heat of two phases with rated current, as much work, lamps and LEDs: of 24 V and 2 A."""
+    lights = 4 * 2 * 0.05 * PARTS["STRIP-COB-24V"]["watt_m"] + 24 * 0.02 * 7
+    assert all(4 * one.rated_current**2 * one.resistance + lights < 24 * 2 for one in DRIVES)
+
+
 @settings(SHARED, max_examples=30)
 @given(
     counts=st.dictionaries(st.sampled_from(sorted(PARTS)), st.integers(0, 40), max_size=30),
@@ -123,7 +148,7 @@ def test_every_row_of_the_list(
 ) -> None:
     drive, prices = DRIVES[0], load_prices(["estimates"]) if priced else Prices(())
     printed = [
-        PrintedItem(f"part_{k}", "a part", volume, PrintEstimate(volume / 2, volume / 1e4))
+        PrintedItem(f"part_{k}", "a part", volume, (volume / 2, volume / 1e4))
         for k, volume in enumerate(volumes)
     ]
     rows = bom_rows(layout, drive, counts, printed, density, PARTS, prices)

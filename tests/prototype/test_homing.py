@@ -19,9 +19,8 @@ from tbcad.prototype.drive.travel import (
     stop_sequence,
 )
 from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.prototype.homing.layout import ROLLER_MM, homing_layout
-from tbcad.prototype.homing.sizes import PIN_HOLE_MM, tab_radius
-from tbcad.prototype.printing.placing import component_solid
+from tbcad.prototype.homing import PIN_HOLE_MM, ROLLER_MM, homing_layout, tab_radius
+from tbcad.prototype.printed import component_solid
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.types import Floats
 
@@ -86,12 +85,11 @@ def test_no_room_below_the_first_stop(small_prototype: PrototypeLayout) -> None:
     assert home_angles(tight, MotionSpec(controller="grbl")).switch > low
 
 
-def test_a_swing_that_leaves_no_room_for_the_tab(frame: FrameLayout, carrier: BaseLayout) -> None:
+def test_the_parts_are_solids_and_a_swing_may_leave_no_room_for_the_tab(
+    frame: FrameLayout, carrier: BaseLayout
+) -> None:
+    for component in (frame.homing.disc, frame.homing.bracket, frame.homing.switch):
+        assert component_solid(component)
     whole = HomeAngles(-170.0, -168.0, 345.0)
     with pytest.raises(SpecError, match="no room for the tab"):
         homing_layout(carrier, frame.head.plate, whole, PARTS)
-
-
-def test_the_parts_are_solids(frame: FrameLayout) -> None:
-    for component in (frame.homing.disc, frame.homing.bracket, frame.homing.switch):
-        assert component_solid(component)

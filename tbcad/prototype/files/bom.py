@@ -2,17 +2,18 @@
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from tbcad.cad.formats.checked_files import Row
+from tbcad.core.spec.csv_rows import read_rows
 from tbcad.core.spec.errors import SpecError, short_text
+from tbcad.errors import InputError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.printing.estimate import PrintEstimate
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
-from tbcad.prototype.purchased.prices import Price, Prices
+from tbcad.prototype.purchased.parts import Parts, Price, Prices
 
 # A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
 STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
@@ -33,6 +34,9 @@ ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 
 LIGHT_G = 0.1
 KINDS = BOUGHT, PRINTED = "bought", "printed"
 MM3_PER_CM3 = 1000.0
+SHOWN = 6  # rows without --full
+WHAT, PART = 34, 17  # columns, of the 80 of a terminal
+DAY_H, KG_G = 24.0, 1000.0
 
 
 def standard_in(what: str) -> str:
@@ -48,7 +52,7 @@ class PrintedItem:
     name: str  # of the part and of its files
     what: str  # it is for
     volume: float  # mm^3
-    estimate: PrintEstimate  # of its print
+    estimate: tuple[float, float]  # of its print: filament in mm^3, hours
     material: str = PRINT_MATERIAL  # of it
 
 
@@ -63,31 +67,30 @@ def bom_rows(
 ) -> list[Row]:
     """One record for each kind of part, in the order of COLUMNS, items numbered from 1.
 
-    Balls come first, by size, then the drive, other purchased parts, and last what is printed.
-
-    Args:
-        prototype: with its balls.
-        drive: of the base.
-        purchased: quantity of each other purchased part, by its name in the lists.
-        printed: parts to print.
-        density: of their material, g/cm^3.
-        parts: the lists.
-        prices: of the parts.
+    Balls come first, by size, then the drive, other purchased parts by their quantity, and last
+    what is printed of a material of a density (g/cm^3).
 
     Raises:
         SpecError: when a part is in no list.
     """
+    counts = Counter(ALWAYS) + Counter(purchased)
+    if unknown := [name for name in counts if name not in parts]:
+        raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
+    bought = [(part, 1) for part in drive.parts]
+    bought += [(part, counts[name]) for name, part in parts.items() if counts[name]]
     rows = [
         *ball_rows(prototype, prices),
-        *(_purchased(part, 1, prices) for part in drive.parts),
-        *_other_purchased(purchased, parts, prices),
+        *(
+            _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
+            for part, quantity in bought
+        ),
         *(_printed(item, density, prices) for item in printed),
     ]
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
 
 def cap_item(
-    prototype: PrototypeLayout, j: int, volume: float, estimate: PrintEstimate
+    prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
 ) -> PrintedItem:
     """A cap of a volume (mm^3), by the number of its ball from 0: no two are alike."""
     balls = prototype.balls
@@ -114,7 +117,7 @@ def totals(rows: Iterable[Row]) -> dict[str, Any]:
 
 def _row(part: str, what: str, quantity: int, material: str, mass: float) -> Row:
     """What all rows have; mass is that of one, grams."""
-    rounded = _grams(mass)
+    rounded = round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
     return {
         "quantity": quantity,
         "part": part,
@@ -140,19 +143,16 @@ def _bought(part: str, what: str, quantity: int, material: str, mass: float, pri
     return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
 
 
-def _purchased(part: PurchasedPart, quantity: int, prices: Prices) -> Row:
-    return _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
-
-
 def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
     """Its mass is that of a solid print, and its price that of its filament."""
-    filament = item.estimate.filament_mm3 / MM3_PER_CM3 * density
+    filament_mm3, hours = item.estimate
+    filament = filament_mm3 / MM3_PER_CM3 * density
     mass = item.volume / MM3_PER_CM3 * density
     return {
         **_row(item.name, item.what, 1, item.material, mass),
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
-        "print_hours": _estimate(item.estimate.hours),
+        "print_hours": _estimate(hours),
         **price_columns(1, prices.of(item.material, filament)),
         "from": PRINTED,
     }
@@ -165,18 +165,6 @@ def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:
         ball = balls.catalogue.balls[k]
         what = f"steel ball {ball.size} {ball.standard} {grade}"
         yield _bought(f"ball {ball.size}", what, count, "steel", ball.mass_g, prices)
-
-
-def _other_purchased(purchased: Mapping[str, int], parts: Parts, prices: Prices) -> list[Row]:
-    """Parts by name, in the order of the lists; those of none are left out."""
-    counts = Counter(ALWAYS) + Counter(purchased)
-    if unknown := [name for name in counts if name not in parts]:
-        raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
-    return [_purchased(part, counts[name], prices) for name, part in parts.items() if counts[name]]
-
-
-def _grams(mass: float) -> float:
-    return round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
 
 
 def _estimate(value: float) -> float:
@@ -195,3 +183,88 @@ def by_currency(rows: Iterable[Row]) -> dict[str, float]:
         if row["currency"]:
             sums[str(row["currency"])] += float(row["total_price"] or 0)
     return {currency: round(amount, CENTS) for currency, amount in sorted(sums.items())}
+
+
+@dataclass(frozen=True)
+class PartsList:
+    """Rows of bom.csv, and their sums."""
+
+    rows: tuple[Row, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For other programs: the sums, then all rows by the columns of bom.csv."""
+        return {"totals": totals(self.rows), "rows": [*self.rows]}
+
+    def lines(self, *, full: bool) -> list[str]:
+        """At most 80 columns: the sums, and all rows or the dearest."""
+        dearest = sorted(self.rows, key=lambda row: -float(row["total_price"] or 0))
+        return [*_sums(self.rows), *_table(self.rows if full else dearest[:SHOWN])]
+
+
+def read_parts_list(folder: Path, prices: Prices | None = None) -> PartsList:
+    """The parts list of a build, with other prices where these have one.
+
+    Raises:
+        InputError: no such list, or a broken one; it names the line.
+    """
+    path = folder / NAME
+    if not path.is_file():
+        raise InputError(f"{path} is not there: name a folder with a prototype by tbcad build")
+    rows = [_read_row(where, cells) for where, cells in read_rows(path, NAME, COLUMNS, NUMBERS)]
+    return PartsList(tuple(_priced(row, prices) for row in rows) if prices else tuple(rows))
+
+
+def _read_row(where: str, cells: Mapping[str, str]) -> Row:
+    row: Row = {**cells}
+    for column in NUMBERS:
+        try:
+            number = float(cells[column]) if cells[column] else None
+        except ValueError:
+            raise SpecError(f"{where}, column {column}: no number: build again") from None
+        row[column] = int(number) if number is not None and column in WHOLE else number
+    if cells["from"] not in (BOUGHT, PRINTED):
+        raise SpecError(f"{where}, column from: allowed is bought or printed: build again")
+    return row
+
+
+def _priced(row: Row, prices: Prices) -> Row:
+    printed = row["from"] == PRINTED
+    part = PRINT_MATERIAL if printed else str(row["part"])
+    mass = float(row["filament_g" if printed else "mass_g"] or 0)
+    found = prices.of(part, mass)
+    return {**row, **price_columns(int(row["quantity"] or 0), found)} if found else row
+
+
+def _sums(rows: Sequence[Row]) -> Iterator[str]:
+    sums = totals(rows)
+    bought = [row for row in rows if row["from"] == BOUGHT]
+    without = sums["without_price"]
+    unknown = f", {without} of them without a price" if without else ""
+    yield f"{len(bought)} kinds of parts to buy: {_money(sums['bought_price'])}{unknown}"
+    kg, hours = sums["filament_g"] / KG_G, sums["print_hours"]
+    yield (
+        f"{len(rows) - len(bought)} parts to print: {kg:.1f} kg of filament, "
+        f"{_money(sums['filament_price'])}, {hours:.0f} h ({hours / DAY_H:.1f} days)"
+    )
+    yield f"{sums['mass_g'] / KG_G:.1f} kg in all, printed parts as solids; prices are estimates"
+    yield "not in the list: camera, lens, computer, tools, paint"
+
+
+def _money(prices: Mapping[str, float]) -> str:
+    return " + ".join(f"{amount:.0f} {name}" for name, amount in prices.items()) or "no prices"
+
+
+def _table(rows: Sequence[Row]) -> Iterator[str]:
+    yield f"{'item':>4} {'qty':>3} {'part':<{PART}} {'what':<{WHAT}} {'price':>8}"
+    for row in rows:
+        columns = ("part", PART), ("what", WHAT)
+        part, what = (_cut(str(row[column]), width) for column, width in columns)
+        price = "-" if row["total_price"] is None else f"{float(row['total_price']):.2f}"
+        yield (
+            f"{row['item']:>4} {row['quantity']:>3} {part:<{PART}} {what:<{WHAT}} {price:>8}  "
+            f"{row['currency'] or ''}"
+        ).rstrip()
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 3]}..."

@@ -1,28 +1,42 @@
-"""What is wired to the controller, line by line, and the way of the LEDs' cable through the rig.
+"""The electronics: outputs of the controller, resistors of LEDs, and what is wired, line by line.
 
 A light's circuit: supply, resistor, LED, switch module to ground. An LED's two wires go from its
 pocket through the grooves of arm and crown, down the post, and out of the foot's channel, to a
-connector; resistors and switch modules are beside the controller.
+connector; resistors (IEC 60063) and switch modules are beside the controller.
+
+GRBL 1.1 has two outputs only, for spindle and coolant. grblHAL, FluidNC and LinuxCNC number digital
+outputs from 0 and switch them by M64 P (on) and M65 P (off), at once when the line is read; a dwell
+before makes the line wait until the base is at rest.
+Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
 """
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
+from tbcad.core.spec.prototype import MotionSpec, PrototypeSpec, StageSpec
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.electronics.outputs import LAMP, Light, lights
-from tbcad.prototype.electronics.resistors import SeriesResistor, series_resistor
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage import crown
 from tbcad.prototype.stage.layout import StageLayout
+from tbcad.records.prototype_drive import Phase
 
+LAMP_OUTPUT, LAMP = 0, "lamp"
+MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most
+DARK, LIT = "dark", "lit"
+# Two digits of each decade.
+E24 = (
+    *(10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30),
+    *(33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91),
+)
+DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
+ROUNDING = 1e-9
 COLUMNS = (
     *("line", "signal", "part", "output", "on", "off", "connector", "pins", "supply_v"),
     *("forward_v", "resistor", "resistor_ohm", "current_ma", "dissipation_w", "wire"),
@@ -41,23 +55,13 @@ BOARD = "board"  # connector: terminals of the controller
 CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamps, camera's release and switch
 BETWEEN_LAMPS_MM = 500.0  # of cable from one lamp to the next
 LAMP_PATH = "from lamp to lamp, all in parallel, then to the controller"
-RELEASE: Row = {
-    "wire": CABLE,
-    "length_mm": CABLE_MM,
-    "signal": "release",
-    "part": "RELAY",
-    "output": "coolant",
-    "on": "M8",
-    "off": "M9",
-    "connector": BOARD,
+ON_CABLE: Row = {"wire": CABLE, "length_mm": CABLE_MM, "connector": BOARD}
+RELEASE: Row = ON_CABLE | {
+    **{"signal": "release", "part": "RELAY", "output": "coolant", "on": "M8", "off": "M9"},
     "path": "relay, camera's release",
 }
-HOME: Row = {
-    "wire": CABLE,
-    "length_mm": CABLE_MM,
-    "signal": "home",
-    "part": "SWITCH-SS-5GL2",
-    "connector": BOARD,
+HOME: Row = ON_CABLE | {
+    **{"signal": "home", "part": "SWITCH-SS-5GL2"},
     "path": "common and normally closed contact of the switch, input and ground",
 }
 MOTOR: Row = {
@@ -67,25 +71,108 @@ MOTOR: Row = {
     "path": "the motor's own wires; a few ohm are between the two of a coil",
 }
 FUSE, SUPPLY_V = "FUSE-2A", 24.0
-SUPPLY: Row = {
-    "wire": CABLE,
-    "length_mm": CABLE_MM,
-    "signal": "supply",
-    "part": "SUPPLY-24V",
-    "output": "supply",
-    "connector": FUSE,
-    "pins": "+ -",
-    "supply_v": SUPPLY_V,
+SUPPLY: Row = ON_CABLE | {
+    **{"signal": "supply", "part": "SUPPLY-24V", "output": "supply"},
+    **{"connector": FUSE, "pins": "+ -", "supply_v": SUPPLY_V},
     "path": "plus by the fuse to controller, lamps and resistors; minus to controller and all "
     "switch modules: one ground",
 }
+
+
+def lights(leds: int, motion: MotionSpec) -> dict[str, int]:
+    """Digital outputs of lamp and LEDs, rising; none with GRBL 1.1, which cannot switch them.
+
+    Raises:
+        SpecError: when no controller has so many outputs.
+    """
+    if motion.controller == "grbl":
+        return {}
+    if leds >= MAX_OUTPUTS:
+        raise SpecError(
+            f"prototype.stage.leds_mm has {leds} LEDs, but a controller switches {MAX_OUTPUTS} "
+            f"outputs, one of them for the lamp: use at most {MAX_OUTPUTS - 1} LEDs, or set "
+            "prototype.motion.controller to grbl and switch them by hand"
+        )
+    return {LAMP: LAMP_OUTPUT} | {f"led_{i}": LAMP_OUTPUT + i for i in range(1, leds + 1)}
+
+
+def phases(leds: int, motion: MotionSpec) -> tuple[Phase, ...]:
+    """The photographs of a stop in order: dark, every LED alone, the object lit.
+
+    Without outputs there is one, with the lamp on all the time.
+
+    Raises:
+        SpecError: when no controller has so many outputs.
+    """
+    if not (switched := lights(leds, motion)):
+        return (Phase(name=LIT, output=None),)
+    lit = Phase(name=LIT, output=switched.pop(LAMP))
+    alone = (Phase(name=name, output=output) for name, output in switched.items())
+    return (Phase(name=DARK, output=None), *alone, lit)
+
+
+@dataclass(frozen=True)
+class SeriesResistor:
+    """A resistor in series with an LED."""
+
+    part: PurchasedPart  # to buy; its name has value and rating
+    ohm: float  # value
+    current_ma: float  # that the LED gets, mA
+    dissipation_w: float  # of the resistor while the LED is on, W
+
+
+def e24_at_least(ohm: float) -> float:
+    """The smallest value of the series that is no smaller than a resistance (ohm)."""
+    decade = 10.0 ** (math.floor(math.log10(ohm)) - 1)
+    values = (round(digits * step, 9) for step in (decade, 10 * decade) for digits in E24)
+    return next(value for value in values if value >= ohm * (1 - ROUNDING))
+
+
+def series_resistor(
+    led: PurchasedPart, max_ma: float, supply_v: float, parts: Parts
+) -> SeriesResistor:
+    """The resistor with which an LED gets a current (mA), or a little less, from a supply (V).
+
+    Raises:
+        SpecError: when the LED bears less, the supply is too low, or no resistor is large enough.
+    """
+    forward = led["forward_v"]
+    if max_ma > led["max_ma"]:
+        raise SpecError(
+            f"prototype.stage.led_ma {max_ma:g} is more than {led.name} bears: make it "
+            f"{led['max_ma']:g} or less"
+        )
+    if supply_v <= forward:
+        raise SpecError(
+            f"prototype.stage.led_supply_v {supply_v:g} does not light {led.name} of {forward:g} "
+            f"V: make it greater than {forward:g}"
+        )
+    ohm = e24_at_least((supply_v - forward) / max_ma * 1e3)
+    current = (supply_v - forward) / ohm
+    dissipation = current**2 * ohm
+    rated = _rated(DERATING * dissipation, parts)
+    part = replace(
+        rated, name=f"{rated.name}-{ohm:g}", what=f"{rated.what}, {ohm:g} ohm of the series E24"
+    )
+    return SeriesResistor(part, ohm, current * 1e3, dissipation)
+
+
+def _rated(watts: float, parts: Parts) -> PurchasedPart:
+    """The smallest resistor that is rated for a power."""
+    enough = [part for part in of_kind(parts, "resistors") if part["power_w"] >= watts]
+    if not enough:
+        raise SpecError(
+            f"no resistor of {watts:.1f} W is in resistors.csv: make prototype.stage.led_ma or "
+            "prototype.stage.led_supply_v smaller"
+        )
+    return min(enough, key=lambda part: part["power_w"])
 
 
 @dataclass(frozen=True)
 class Wiring:
     """The electronics of a stage."""
 
-    lights: tuple[Light, ...]  # that the controller switches
+    lights: dict[str, int]  # that the controller switches, and their outputs
     leds: int  # number of LEDs
     led: PurchasedPart  # the purchased part
     supply_v: float  # of lamp and LEDs
@@ -149,23 +236,16 @@ def lamp_cable_mm(lamps: LampLayout | None) -> float:
 
 def wiring_rows(wiring: Wiring, lamps: LampLayout | None, drive: Drive) -> list[Row]:
     """One row for each line of the controller: lights by output, release, switch, motor, supply."""
-    outputs = {light.name: light.output for light in wiring.lights}
-    rows = [_row(_lamp_cells(wiring, lamps), outputs)]
-    for i in range(wiring.leds):
-        name = f"led_{i + 1}"
-        rows.append(_row({"signal": name, **_led_cells(wiring, i)}, outputs))
+    rows = [_row(_lamp_cells(wiring, lamps), wiring.lights)]
+    rows += [_row(_led_cells(wiring, i), wiring.lights) for i in range(wiring.leds)]
     if wiring.trigger:
         rows.append(RELEASE)
+    motor = {"part": drive.motor.name, "output": f"driver {wiring.axis}"}
     rows.append(HOME | {"output": f"limit {wiring.axis}"})
-    rows += [_motor_row(drive, wiring.axis), SUPPLY]
+    # A rotary stage's current is its maker's.
+    rows += [MOTOR | motor | {"current_ma": drive.rated_current * MA_PER_A or None}, SUPPLY]
     empty: Row = dict.fromkeys(COLUMNS)
     return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
-
-
-def _motor_row(drive: Drive, axis: str) -> Row:
-    """The motor's line; a rotary stage's current is its maker's."""
-    current = drive.rated_current * MA_PER_A or None
-    return MOTOR | {"part": drive.motor.name, "output": f"driver {axis}", "current_ma": current}
 
 
 def _row(cells: Row, outputs: dict[str, int]) -> Row:
@@ -182,31 +262,28 @@ def _lamp_cells(wiring: Wiring, lamps: LampLayout | None) -> Row:
     cable: Row = {"signal": LAMP, "wire": CABLE, "length_mm": lamp_cable_mm(lamps)}
     if lamps is None:
         return {**cable, "part": "lamp", "supply_v": wiring.supply_v}
-    return {
-        **cable,
-        "part": lamps.strip.name,
-        "supply_v": lamps.strip["supply_v"],
-        "current_ma": lamps.current_ma,
-        "path": LAMP_PATH,
-    }
+    strip: Row = {"part": lamps.strip.name, "supply_v": lamps.strip["supply_v"]}
+    return {**cable, **strip, "current_ma": lamps.current_ma, "path": LAMP_PATH}
 
 
 def _led_cells(wiring: Wiring, index: int) -> Row:
-    assert wiring.resistor
-    assert wiring.connector
-    assert wiring.wire
+    resistor, connector, wire = wiring.resistor, wiring.connector, wiring.wire
+    assert resistor
+    assert connector
+    assert wire
     first = WIRES * index + 1
     return {
+        "signal": f"led_{index + 1}",
         "part": wiring.led.name,
-        "connector": wiring.connector.name,
+        "connector": connector.name,
         "pins": f"{first} {first + 1}",  # anode, cathode
         "supply_v": wiring.supply_v,
         "forward_v": wiring.led["forward_v"],
-        "resistor": wiring.resistor.part.name,
-        "resistor_ohm": wiring.resistor.ohm,
-        "current_ma": wiring.resistor.current_ma,
-        "dissipation_w": wiring.resistor.dissipation_w,
-        "wire": wiring.wire.name,
+        "resistor": resistor.part.name,
+        "resistor_ohm": resistor.ohm,
+        "current_ma": resistor.current_ma,
+        "dissipation_w": resistor.dissipation_w,
+        "wire": wire.name,
         "length_mm": wiring.lengths[index],
         "path": PATH,
     }
@@ -232,8 +309,6 @@ def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Part
 
 def _lengths(spec: PrototypeSpec, stage: StageLayout) -> tuple[float, ...]:
     """Length of each LED's cable: down to its groove, inward, down the post, to the controller."""
-    leds = stage.leds
-    down = leds[:, 2] - spec.frame.floor_mm
-    inward: list[float] = norm(leds[:, :2]).tolist() if len(leds) else []
-    total = np.array(inward) + down + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
+    way = norm(stage.leds[:, :2]) + stage.leds[:, 2] - spec.frame.floor_mm
+    total = way + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
     return tuple((CUT_MM * np.ceil(total / CUT_MM)).tolist())
