@@ -16,7 +16,7 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, SCREW_MM, ZERO_DISC_MM
+from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, PIN_MM, PIN_OUT_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.fasteners import Fastener
@@ -30,9 +30,7 @@ from tbcad.prototype.frame.purchased import (
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
 from tbcad.types import Floats
 
-PIN_MM = 4.0  # diameter of the rod that fixes angle zero
 PIN_HOLE_MM = 4.2
-PIN_OUT_MM = 44.0  # of the pin: beyond the largest wheel, short of the motor
 MARK_MM, MARK_DEPTH_MM = 1.0, 0.8  # width and depth of what is engraved
 MARK_END_MM = 56.0  # out of the mark on the head's plate
 BRACKET_MM = 14.0  # thickness, away from the side of the head's plate

@@ -3,10 +3,9 @@
 import numpy as np
 
 from tbcad.prototype.assembly_steps.machine import Machine, Words, planned, when
-from tbcad.prototype.base.hub import SOCKET_MM
+from tbcad.prototype.base.hub import PIN_MM, SOCKET_MM
 from tbcad.prototype.frame.head import GAP_MM
 from tbcad.prototype.frame.purchased import PLATE_MM
-from tbcad.prototype.homing import PIN_MM
 from tbcad.records.prototype import MATT_BLACK
 
 HOLES = "plate_holes.csv"

@@ -18,6 +18,8 @@ DISC_BEYOND_BOSS_MM = 8.0  # minimum radius of the disc beyond that of the boss
 MIN_DISC_RADIUS_MM = 30.0  # with a boss
 SOCKET_MM = 9.0  # depth of the bore's free end, within the disc
 BELOW_HEAD_MM = 6.0  # material below a counterbore
+PIN_MM = 4.0  # diameter of the rod that fixes angle zero
+PIN_OUT_MM = 44.0  # of the pin: beyond the largest wheel, short of the motor
 ZERO_DISC_MM = 5.0  # thickness of the disc between hub and drive
 # Dowel that gives the disc its place about the axis, on the drive's circle between two holes.
 KEY_MM, KEY_DEPTH_MM = 3.0, 6.0

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.hub import ZERO_DISC_MM
+from tbcad.prototype.base.hub import PIN_MM, PIN_OUT_MM, ZERO_DISC_MM
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.homing import PIN_MM, PIN_OUT_MM
 from tbcad.records.prototype_drive import PowerOff
 from tbcad.types import Floats
 

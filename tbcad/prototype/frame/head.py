@@ -19,6 +19,7 @@ from tbcad.core.geometry.primitives import (
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.base.fasteners import m3_insert
+from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
@@ -49,7 +50,6 @@ from tbcad.prototype.homing import (
     MARK_MM,
     MIN_PLATE_MM,
     PIN_HOLE_MM,
-    PIN_OUT_MM,
     bracket_screws,
     tab_radius,
 )
