@@ -27,12 +27,12 @@ from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.simulate.camera_photographs import camera_photographs
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import to_bytes
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, Paint, load_or_built_in
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.options.captures import ReconstructOptions

@@ -17,10 +17,10 @@ from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.reconstruction.rays import captured_rays
 from tbcad.light.reconstruction.start import Settings
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.scene.rays import camera_around_object
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
 

@@ -24,8 +24,8 @@ from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.object_from_file import load_or_built_in
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.types import Floats
 

@@ -18,13 +18,11 @@ from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.parallel import THREADS
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.light.simulate.scene.object import GREY, SceneObject, built_in_object
 from tbcad.light.simulate.scene.object_from_file import load_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer, view_directions
+from tbcad.light.simulate.scene.reflector import Reflector, read_export
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
 from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus

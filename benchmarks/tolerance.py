@@ -17,7 +17,7 @@ from tbcad_verify.shell.optics import set_up
 from tbcad_verify.shell.recover import recover
 from timing import Figure, Row, at_least, at_most, in_turns, measured
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.cells import Cells, cells_of

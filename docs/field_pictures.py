@@ -12,9 +12,9 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 import tbcad
-from tbcad.app.cli.commands.compared_pictures import scene_of, true_picture
+from tbcad.app.cli.commands.picture_files import scene_of, true_picture
 from tbcad.light.reconstruction.field import NAME, read_field
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.scene.rays import camera_around_object
 
 PICTURES = Path(__file__).parent / "pictures"
 PLACES_DEG = ((20, 25), (140, 45), (250, 70))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tbcad_verify.report.methods import AS_BUILT, EXPORT, markdown_table
 
-from tbcad.app.reference.terms import glossary_page
+from tbcad.app.reference.entries import glossary_page
 
 ROOT = Path(__file__).parents[1]
 HEADS = {EXPORT: ("check", "method", "tolerance"), AS_BUILT: ("check", "figure", "limit")}

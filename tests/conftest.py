@@ -15,8 +15,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from tbcad.app.cli import run
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.mirrors.record import write_record
-from tbcad.light.simulate.prototype.plan import Plan, read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.prototype.run import Plan, read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.shell.envelope import Envelope
 from tbcad.shell.files import shell_envelope

@@ -12,14 +12,13 @@ import numpy as np
 from tbcad.light.simulate.capture.photograph import Samples, row_bands
 from tbcad.light.simulate.parallel import in_threads
 from tbcad.light.simulate.prototype.ball_rays import photographed_pixels
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.exposure import LIT, PHOTOGRAPHS, Exposure, Frame, exposure_name
 from tbcad.records.run import RECORD, RunRecord
+from tbcad.rig.machine.designed import machine_runs
 from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import machine_runs
 from tbcad.types import Bytes
 
 Change = Callable[[np.ndarray, Frame, str], np.ndarray]

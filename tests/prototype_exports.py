@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.cad.formats.csv_table import write_table
+from tbcad.cad.formats.checked_files import write_table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
-from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.prototype.run import Plan
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.files import tables
 from tbcad.records.tables import StopRow

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import read_export
+from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.priors import prototype_prior
 from tbcad.rig.machine.built import is_cap, random_build

@@ -14,8 +14,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import InvalidSolidError, Solid
-from tbcad.cad.kernel.checks import MAX_GAP_MM
-from tbcad.cad.kernel.measures import SolidProperties, volume
+from tbcad.cad.kernel.checks import MAX_GAP_MM, SolidProperties, volume
 
 VOLUME_ERROR = 1e-5  # as a share of the volume; the kernel integrates to some 2e-6
 MAXIMUM = 1  # of the tolerances in a shape

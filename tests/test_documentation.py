@@ -4,6 +4,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -77,6 +78,24 @@ def headings(file: Path) -> set[str]:
     """Names of a page's headings as GitHub links to them."""
     lines = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", line.lower()).replace(" ", "-") for line in lines}
+
+
+BENCHMARKS = ROOT / "benchmarks"
+
+
+def test_tables_are_made_from_the_results() -> None:
+    code = "import sys; from table import filled; sys.stdout.write(filled(sys.stdin.read()))"
+    page = (BENCHMARKS / "README.md").read_text(encoding="utf-8")
+    assert {"<!-- table: all -->", "<!-- table: commands -->"} <= set(page.splitlines())
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=BENCHMARKS,
+        input=page,
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
+    )
+    assert run.stdout == page
 
 
 def test_readme_stays_short() -> None:

@@ -9,10 +9,10 @@ import pytest
 from tbcad.app.api import build, calibrate, merge, simulate_run
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.rig.machine.record import read_machine
+from tbcad.rig.machine.machine import read_machine
 from tbcad.rig.simulated_run.photographs import OBJECT_LIGHT
 from tbcad.rig.simulated_run.simulate import run_object
 from tests.view_quality import mean_ssim

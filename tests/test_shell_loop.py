@@ -12,10 +12,10 @@ from tbcad.core.mirrors.array import design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.rig.machine.record import read_machine
+from tbcad.rig.machine.machine import read_machine
 from tbcad.rig.simulated_run.photographs import OBJECT_LIGHT
 from tbcad.rig.simulated_run.simulate import run_object
 from tests.view_quality import mean_ssim

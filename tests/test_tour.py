@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.printed_lines import same
+from tests.printed_lines import main, same
 
 ROOT = Path(__file__).parents[1]
 TOUR = ROOT / "docs" / "tour.md"
@@ -84,3 +84,23 @@ def test_what_is_left_out_is_said() -> None:
     assert follows(["a", LEFT_OUT, "c"], printed)
     assert not follows(["a", "c"], printed)
     assert not follows(["b", LEFT_OUT, "a"], printed)
+
+
+def test_rounding_is_no_difference() -> None:
+    for shown, printed, alike in (
+        ("0.078 mm (median)", "0.079 mm  (median)", True),
+        ("0.078 mm (median)", "0.080 mm (median)", False),
+        ("1585 highlights", "1586 highlights", True),
+        ("PASS: 193 cameras", "FAIL: 193 cameras", False),
+        ("5 balls", "6 balls", False),
+        ("off by 1.4e-07 mm", "off by 1.4e-06 mm", False),
+    ):
+        assert same(shown, printed) == alike
+
+
+def test_files_are_compared_but_for_seconds(tmp_path: Path) -> None:
+    shown, printed = tmp_path / "shown", tmp_path / "printed"
+    shown.write_text("12 s; done\n5 balls\n", encoding="utf-8")
+    for text, code in (("7 s; done\n5 balls\n", 0), ("7 s; done\n", 1), ("7 s\n6 balls\n", 1)):
+        printed.write_text(text, encoding="utf-8")
+        assert main(shown, printed) == code

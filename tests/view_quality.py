@@ -3,9 +3,9 @@
 import numpy as np
 
 from tbcad.light.simulate.scene.ray_casting import Scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 

@@ -11,20 +11,18 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import typer.main
 from pydantic import BaseModel
 from pydantic.json_schema import PydanticInvalidForJsonSchema
-from tbcad_verify.record.prototype_tables import PlateHoles
+from tbcad_verify.record.prototype_sections import PlateHoles
 
 import tbcad
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import HEADINGS
-from tbcad.app.reference.template import design_template
-from tbcad.prototype.electronics import wiring
-from tbcad.prototype.files import bom_csv
-from tbcad.records.calibration import CalibrationRecord
+from tbcad.app.reference.keys import design_template
+from tbcad.prototype import electronics
+from tbcad.prototype.files import bom
+from tbcad.records.calibration import CalibrationRecord, MachineRecord
 from tbcad.records.design import DesignRecord
-from tbcad.records.document import Document
+from tbcad.records.document import Document, Manifest
 from tbcad.records.exposure import Exposure
-from tbcad.records.machine import MachineRecord
-from tbcad.records.manifest import Manifest
 from tbcad.records.prototype import Prototype
 from tbcad.records.run import RunRecord
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow
@@ -47,7 +45,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "stops.csv": StopRow,
     "rays.csv": RayRow,
 }
-PAPER = {"bom.csv": bom_csv.COLUMNS, "wiring.csv": wiring.COLUMNS}  # read by people
+PAPER = {"bom.csv": bom.COLUMNS, "wiring.csv": electronics.COLUMNS}  # read by people
 MARKUP = re.compile(r"\[/?[a-z]+\]")  # of rich, in help texts
 
 

@@ -121,11 +121,7 @@ class Finding:
 
 
 def diagnose(folder: Path = Path()) -> list[Finding]:
-    """Check everything that a build needs.
-
-    Args:
-        folder: of the exports, for the free space.
-    """
+    """Check everything that a build needs, and the free space of the exports' folder."""
     needs = _requirements()
     attempts = [partial(_attempt_library, needs, *library) for library in _LIBRARIES]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
@@ -170,11 +166,7 @@ def one_of(
 ) -> Finding:
     """Check that exactly one of some distributions that own the same files is installed.
 
-    Args:
-        name: of the check.
-        rivals: the distributions.
-        installed: (name, version) of everything installed.
-        needs: tbcad's requirements, for the version in the remedy.
+    Installed are (name, version); tbcad's requirements give the version in the remedy.
     """
     present = [f"{which} {version}" for which, version in installed if which in rivals]
     detail = " and ".join(present) or "none installed"
@@ -216,11 +208,7 @@ def _is_met(need: Requirement, present: dict[str, str]) -> bool:
 def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) -> Finding:
     """Run a small Python program in a child process; what it prints last is the detail.
 
-    Args:
-        name: what is tried.
-        program: Python source that fails when it does not work.
-        remedy: what to do then.
-        before: a command in front of the interpreter.
+    It fails when what is tried does not work. `before` is a command in front of the interpreter.
     """
     command = [*before, sys.executable, "-P", "-c", _NO_CORE_DUMP + program]
     try:

@@ -28,7 +28,7 @@ class Design(MirrorDesign):
 
     def _repr_html_(self) -> str:
         """What notebooks show: main figures, and the directions of all mirrors from above."""
-        from tbcad.core.mirrors.hemisphere_map import hemisphere_map
+        from tbcad.core.mirrors.record import hemisphere_map
 
         radius = [array.mirrors.radius for array in self.arrays]
         span = f"{min(r.min() for r in radius):.1f} to {max(r.max() for r in radius):.1f} mm"
@@ -49,7 +49,7 @@ class Design(MirrorDesign):
             SpecError: flanges or holes do not fit; it says what to change.
             InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
         """
-        from tbcad.cad.kernel.part import as_part
+        from tbcad.cad.kernel.solids import as_part
         from tbcad.shell.files import camera_solid
 
         solid = camera_solid(self, self._array(camera))
@@ -62,8 +62,8 @@ class Design(MirrorDesign):
             SpecError: its holes do not fit; it says what to change.
             InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
         """
-        from tbcad.cad.kernel.part import as_part
-        from tbcad.shell.mandrel_files import mandrel_solid
+        from tbcad.cad.kernel.solids import as_part
+        from tbcad.shell.files import mandrel_solid
 
         solid = mandrel_solid(self, self._array(camera))
         return as_part(solid.name, solid.shape)
@@ -80,7 +80,7 @@ class Design(MirrorDesign):
             SpecError: the prototype cannot be laid out; it says what to change.
             InvalidSolidError: the CAD kernel fails, which is a fault of tbcad.
         """
-        from tbcad.cad.kernel.part import as_part
+        from tbcad.cad.kernel.solids import as_part
         from tbcad.prototype.arrangement import arrangements
         from tbcad.prototype.model import build_prototype_model
 

@@ -18,14 +18,7 @@ class InFolder:
 
 
 def replace_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write files into a folder that exists, each replaced as a whole; others are left alone.
-
-    Args:
-        folder: where.
-        contents: of each file, by its name.
-
-    Returns:
-        The paths of the files.
+    """Write files by name into a folder that exists, each replaced as a whole; others stay.
 
     Raises:
         InputError: the folder cannot be written; no temporary file is left in it.
@@ -40,15 +33,7 @@ def replace_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
 
 
 def refuse_existing(file: Path, force: bool) -> None:
-    """Refuse, before any work, to replace a file that the user has not given up.
-
-    Args:
-        file: to write.
-        force: whether it may be replaced.
-
-    Raises:
-        InputError: it exists.
-    """
+    """Refuse, before any work, to replace a file that the user has not given up."""
     if file.exists() and not force:
         raise InputError(f"{file} exists: choose another name, or replace it with --force")
 

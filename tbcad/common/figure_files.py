@@ -1,15 +1,34 @@
-"""Plots as PNG, SVG or PDF files: one palette, legends beside the data, bytes that repeat."""
+"""Pictures and plots as bytes of files: one palette, legends beside the data, bytes that repeat."""
 
 from collections.abc import Callable
 from io import BytesIO
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from tbcad.common.palette import CYCLE, SHADES
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.common.colours import CYCLE, SHADES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def png_bytes(picture: NDArray[np.uint8] | NDArray[np.uint16], largest_px: int = 0) -> bytes:
+    """Return a picture as a PNG file, every k-th pixel where it is too large.
+
+    Args:
+        picture: red, green, blue, 0 to 255, (h, w, 3), or grey, of 8 or 16 bits, (h, w).
+        largest_px: of the longer side; 0: any.
+    """
+    from PIL import Image
+
+    step = -(-max(picture.shape[:2]) // largest_px) if largest_px else 1
+    file = BytesIO()
+    Image.fromarray(picture[::step, ::step]).save(file, format="PNG")
+    return file.getvalue()
+
 
 DPI = 120
 LEGEND_POINTS = 36  # below the axes: numbers and label of the axis come first

@@ -27,7 +27,7 @@ from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.cad.kernel.projection import Segment
 from tbcad.drawings.export import DrawnExport
 from tbcad.prototype.assembly_steps.machine import Machine
-from tbcad.report.callouts import EDGE, RADIUS, Callout, place_callouts
+from tbcad.report.exploded import EDGE, RADIUS, Callout, place_callouts
 from tbcad.types import Bools, Floats, Ints
 
 SHARP_RAD = 0.6  # angle between faces that is drawn

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.errors import InputError
 from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.records.design import NAME as DESIGN
 from tbcad.records.design import DesignRecord
-from tbcad.records.manifest import Manifest
+from tbcad.records.document import Manifest
 from tbcad.records.prototype import NAME as PROTOTYPE
 from tbcad.records.prototype import PrintedPartRecord
 

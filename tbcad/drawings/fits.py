@@ -51,13 +51,7 @@ class SheetTable:
 
 
 def in_columns(tables: Sequence[SheetTable], first: int, others: int) -> list[list[SheetTable]]:
-    """Tables in the first column and those that follow; one longer than a column is cut.
-
-    Args:
-        tables: in their order.
-        first: rows that the first column has room for, heads too.
-        others: rows of each other column.
-    """
+    """Tables in columns, the first and the others with room for so many rows; long ones are cut."""
     columns: list[list[SheetTable]] = [[]]
     room = first
     for one in tables:

@@ -46,12 +46,7 @@ Fastener = tuple[str, Floats, Floats]
 def numbered_holes(
     cylinders: Sequence[RoundFace], fasteners: Iterable[Fastener]
 ) -> list[tuple[str, DrawnHole]]:
-    """Holes and slots with their numbers, such as B3: by view, then from left to right.
-
-    Args:
-        cylinders: of the part.
-        fasteners: that go into it, in its frame.
-    """
+    """Holes and slots with their numbers, such as B3: by view, then from left to right."""
     screws = list(fasteners)
     whole = [one for one in cylinders if one.hollow and one.turn_deg >= HOLE_DEG]
     ends = [one for one in cylinders if one.hollow and SLOT_DEG <= one.turn_deg < HOLE_DEG]
@@ -110,7 +105,8 @@ def _hole(wall: RoundFace, slot: Floats, fasteners: Iterable[Fastener]) -> Drawn
     opened = wall.open_end if near_end else wall.open_start
     back_opened = wall.open_start if near_end else wall.open_end
     mouth = front if opened or not back_opened else back
-    return DrawnHole(wall, mouth + slot / 2, view, slot, _for(wall, slot, fasteners))
+    takes = {part for part, place, along in fasteners if is_coaxial(wall, place, along, slot)}
+    return DrawnHole(wall, mouth + slot / 2, view, slot, " ".join(sorted(takes)))
 
 
 def is_coaxial(wall: RoundFace, place: Floats, along: Floats, slot: Floats | None = None) -> bool:
@@ -120,12 +116,6 @@ def is_coaxial(wall: RoundFace, place: Floats, along: Floats, slot: Floats | Non
     if slot is not None and np.any(slot):
         off = off - np.clip(off @ slot / float(slot @ slot), 0.0, 1.0) * slot
     return bool(abs(along @ axis) >= PARALLEL_COS and np.linalg.norm(off) < NEAR_MM)
-
-
-def _for(wall: RoundFace, slot: Floats, fasteners: Iterable[Fastener]) -> str:
-    """The part that lies on the axis of a hole or between a slot's ends."""
-    names = {part for part, place, along in fasteners if is_coaxial(wall, place, along, slot)}
-    return " ".join(sorted(names))
 
 
 def _slots(ends: Sequence[RoundFace]) -> list[tuple[RoundFace, Floats]]:

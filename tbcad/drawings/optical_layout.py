@@ -38,7 +38,14 @@ AROUND_MM = 12.0  # room round the drawing
 CROSS_MM, DOT_MM = 1.5, 0.7  # on paper: half a cross of a virtual camera; radius of a place
 BEYOND = 1.6  # of the capture radius: where reflected rays end
 LEVEL_MM, LEADER_MM, LEADER_DEG = 8.0, 12.0, 200.0  # of a dimension and of the leader's corner
-SCALES_NOTE = "In the plane y = 0, x to the right, z up; all is to scale."
+NOTES = (
+    "In the plane y = 0, x to the right, z up; all is to scale.",
+    "O: centre of the capture sphere and focus of both ellipses; A, B: pinholes, the others.",
+    "Crosses: virtual cameras, each at d = 2a from O in the direction u of its mirror.",
+    "Rays: from A to both edges of the first, the middle and the last whole mirror in the",
+    "plane, and as they are reflected there, traced exactly.",
+    "Symbols as in docs/glossary.md.",
+)
 
 
 @dataclass(frozen=True)
@@ -70,13 +77,7 @@ class LayoutMirrors:
 
 
 def layout_sheet(design: DesignRecord, rows: Sequence[MirrorRow], title: str) -> list[Sheet]:
-    """The sheet of a design.
-
-    Args:
-        design: design.json.
-        rows: of mirrors.csv.
-        title: the design's name for the title block.
-    """
+    """The sheet of a design and the rows of its mirrors.csv; title: its name."""
     optics = design.spec.optics
     pinhole = np.array(optics.camera_mm)[[0, 2]]
     mirrors, minor = _mirrors(rows), optics.semi_minor_mm
@@ -107,7 +108,7 @@ def layout_sheet(design: DesignRecord, rows: Sequence[MirrorRow], title: str) ->
         *_places(mirrors, pinhole, reach, middle, scale, on_paper),
         *_capture_length(capture, pinhole, middle, scale),
         *table((column, high), WIDTHS_MM, (HEAD, *_values(rows, mirrors, optics, major))),
-        *notes_beside_title(A3, _text()),
+        *notes_beside_title(A3, NOTES),
     ]
     return [Sheet(NAME, block.title, NAME, A3, scale, middle, tuple(entities))]
 
@@ -130,17 +131,6 @@ def has_layout(design: DesignRecord) -> bool:
 def _half(optics: OpticsSpec) -> float:
     """Half the distance of the foci, c, mm."""
     return float(np.linalg.norm(optics.camera_mm)) / 2
-
-
-def _text() -> tuple[str, ...]:
-    return (
-        SCALES_NOTE,
-        "O: centre of the capture sphere and focus of both ellipses; A, B: pinholes, the others.",
-        "Crosses: virtual cameras, each at d = 2a from O in the direction u of its mirror.",
-        "Rays: from A to both edges of the first, the middle and the last whole mirror in the",
-        "plane, and as they are reflected there, traced exactly.",
-        "Symbols as in docs/glossary.md.",
-    )
 
 
 def _mirrors(rows: Sequence[MirrorRow]) -> LayoutMirrors:

@@ -74,16 +74,6 @@ class _Frame:
     box: Floats
     right: float
 
-    @property
-    def low(self) -> Floats:
-        """Least coordinates of the part."""
-        return np.asarray(self.box[0])
-
-    @property
-    def high(self) -> Floats:
-        """Greatest coordinates of the part."""
-        return np.asarray(self.box[1])
-
 
 def part_sheets(
     shape: Shape,
@@ -106,7 +96,8 @@ def part_sheets(
     rows = tuple(row for number, hole in holes for row in table_rows(number, hole))
     tables = [SheetTable(HEAD, WIDTHS_MM, rows), fits_table(holes, mates), *others]
     frame = _frame(box, sum(len(one.rows) for one in tables))
-    first, pages = _pages(tables, frame.paper)
+    first, *columns = in_columns(tables, _rows(frame.paper), _rows(A4))
+    pages = [columns[k : k + 2] for k in range(0, len(columns), 2)]
     block = replace(text.block, sheet=f"1 of {1 + len(pages)}")
     lengths = [*_overall(frame, found)]
     entities = [
@@ -235,7 +226,7 @@ def _levels(shape: Shape, frame: _Frame) -> Iterator[Entity]:
 
 def _chosen(shape: Shape, frame: _Frame, axis: int) -> list[float]:
     """Levels along an axis: both ends, the datum, and those of the largest faces between."""
-    ends = [float(frame.low[axis]), float(frame.high[axis])]
+    ends = frame.box[:, axis].tolist()
     found = plane_levels(shape, np.eye(3)[axis])
     by_area = sorted(found, key=lambda one: (-round(one[1], 2), one[0]))
     chosen = [round(end, 2) + 0.0 for end in ends]
@@ -248,11 +239,12 @@ def _chosen(shape: Shape, frame: _Frame, axis: int) -> list[float]:
 
 def _overall(frame: _Frame, found: Sequence[RoundFace]) -> Iterator[Entity]:
     """Length, depth and height over all; diameters of round parts are marked."""
-    width, depth, height = (mm(value) for value in (frame.high - frame.low).tolist())
+    size = frame.box[1] - frame.box[0]
+    width, depth, height = map(mm, size.tolist())
     round_part = any(
         not one.hollow
         and abs(one.axis[2]) > 1 - SAME_MM
-        and np.allclose((frame.high - frame.low)[:2], 2 * one.radius, atol=SAME_MM)
+        and np.allclose(size[:2], 2 * one.radius, atol=SAME_MM)
         for one in found
     )
     form = "Ø<>" if round_part else "<>"
@@ -261,14 +253,6 @@ def _overall(frame: _Frame, found: Sequence[RoundFace]) -> Iterator[Entity]:
     (left, low), (right, high) = _outline(frame, "C")
     yield across((left, high), (right, high), high + LENGTH_MM, depth, form)
     yield upward((right, low), (right, high), right + LENGTH_MM, height)
-
-
-def _pages(
-    tables: Sequence[SheetTable], paper: Point
-) -> tuple[list[SheetTable], list[list[list[SheetTable]]]]:
-    """The column of the first sheet, and the columns of the sheets that follow."""
-    first, *others = in_columns(tables, _rows(paper), _rows(A4))
-    return first, [others[k : k + 2] for k in range(0, len(others), 2)]
 
 
 def _rows(paper: Point) -> int:

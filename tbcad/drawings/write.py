@@ -3,7 +3,7 @@
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -55,15 +55,9 @@ def write_drawings(
     progress: Progress = lambda _: None,
     workers: int = 1,
 ) -> list[WrittenSheet]:
-    """Draw an export.
+    """Draw an export into a folder, whose other files stay, in a number of processes.
 
-    Args:
-        folder: written by a build.
-        out: folder for the sheets; other files in it stay.
-        only: names of what is drawn; everything without names.
-        force: whether files that exist may be replaced.
-        progress: called with each sheet's name when its part is done.
-        workers: number of processes.
+    Without names in `only` everything is drawn; progress is called with each name that is done.
 
     Raises:
         InputError: no export, a file of it is not as it was written, a name is unknown, or files
@@ -78,7 +72,8 @@ def write_drawings(
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
-        drawings = _drawn(jobs, Path(place), progress, workers)
+        results = _results(jobs, Path(place), progress, min(workers, len(jobs)))
+        drawings = sorted((one for done in results for one in done), key=lambda one: one.name)
         files = sorted(Path(place).iterdir())
         for file in files:
             check_file(out / file.name, force)
@@ -133,16 +128,6 @@ def _job(export: DrawnExport, name: str) -> Job:
     return Job(name, draw_part, (part_job(export, export.parts[name]),))
 
 
-def _drawn(
-    jobs: Sequence[Job], place: Path, progress: Progress, workers: int
-) -> list[WrittenSheet]:
-    """Drawings in the order of their names."""
-    drawings = [
-        one for done in _results(jobs, place, progress, min(workers, len(jobs))) for one in done
-    ]
-    return sorted(drawings, key=lambda one: one.name)
-
-
 def _results(
     jobs: Sequence[Job], place: Path, progress: Progress, workers: int
 ) -> Iterator[list[WrittenSheet]]:
@@ -177,15 +162,4 @@ def draw(job: Job, place: Path) -> list[WrittenSheet]:
 
 def record(out: Path, drawings: Sequence[WrittenSheet]) -> dict[str, Any]:
     """What was written, for JSON."""
-    sheets = [
-        {
-            "name": one.name,
-            "title": one.title,
-            "part": one.part,
-            "paper": one.paper,
-            "scale": one.scale,
-            "files": one.files,
-        }
-        for one in drawings
-    ]
-    return {"folder": str(out), "sheets": sheets}
+    return {"folder": str(out), "sheets": [asdict(one) | {"files": one.files} for one in drawings]}

@@ -6,10 +6,16 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.mirror_limits.files import halves, write_half, write_record
-from tbcad.mirror_limits.limits import MirrorLimits, mirror_limits, whole_margin_steps
-from tbcad.mirror_limits.sensitivity import Deviation, Sensitivities, sensitivities
+from tbcad.mirror_limits.sensitivity import (
+    Deviation,
+    MirrorLimits,
+    Sensitivities,
+    mirror_limits,
+    sensitivities,
+    whole_margin_steps,
+)
 from tbcad.tolerancing.montecarlo.coverage import coverage
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
 from tbcad.types import Progress
@@ -33,8 +39,7 @@ def inspect(
 ) -> dict[str, Any]:
     """Write the limits of every mirror, for a wanted yield, into a folder, and return the record.
 
-    Raises:
-        InputError: the shell leaves no deviation, or its solids are not those of its record.
+    InputError if the shell leaves no deviation, or its solids are not those of its record.
     """
     progress("sensitivities")
     found, limits = found_limits(export, wanted)

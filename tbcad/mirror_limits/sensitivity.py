@@ -1,15 +1,17 @@
-"""What a deviation of a mirror, or of a whole half, costs the virtual cameras: finite differences.
+"""What a deviation of a mirror or half costs the virtual cameras, and limits of each mirror.
 
-Only a mirror and those that touch it see a small deviation. So mirrors that share no neighbour
-deviate in the same simulated build.
+By finite differences: only a mirror and those that touch it see a small deviation, so mirrors that
+share no neighbour deviate in the same simulated build.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm as normal
 
 from tbcad.core.geometry.vectors import unit
+from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.coverage import coverage, virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
@@ -22,6 +24,8 @@ RAD_PER_MRAD = 1e-3
 KINDS = ("offset", "tilt", "radius", "wall")
 STEP = np.array([1.0, 0.02, 0.05, 1.0])  # um, mrad, mm, um: edges move by some micrometres
 SEAT_STEP_UM = 10.0
+SMALLEST_LIMIT = 1e-3  # um, mrad or mm, where nothing is left after rounding down
+PLACES = np.array([3, 4, 5, 3])  # decimals of limits: a nanometre, or what turns or bends by less
 
 
 @dataclass(frozen=True)
@@ -84,9 +88,7 @@ class Sensitivities:
 
     camera: Ints  # number of the virtual camera, (k,)
     mirror: Ints  # number of the mirror, a's first, (k,)
-    # by each kind of deviation that there is, in the worse sense: offset (mm/um), tilt (mm/mrad),
-    # radius (mm/mm), and of pedestals the walls (mm/um), (k, kinds)
-    loss: Floats
+    loss: Floats  # of each kind, the worse way: mm/um, mm/mrad, mm/mm, mm/um, (k, kinds)
     seat: Floats  # lost when both halves sit wrong by a micrometre, mm/um, (v,)
     coverage: Floats  # of each virtual camera as designed, mm, (v,)
 
@@ -191,3 +193,72 @@ def _seat_losses(models: EdgeModels, half: int, designed: Floats) -> Floats:
             both.append(coverage(models, (draws[0], draws[1]))[0])
         total += np.sqrt((_worse(designed, both) ** 2).sum(axis=0)) / SEAT_STEP_UM
     return total
+
+
+@dataclass(frozen=True)
+class MirrorLimits:
+    """Limits of all mirrors, a first: offset (um), tilt (mrad), radius (mm), walls (um) if any."""
+
+    each: Floats  # a mirror may be off by this, whatever others do within theirs, (2 m, kinds)
+    sigma: Floats  # standard deviations with which the wanted share is good, (2 m, kinds)
+    seat_um: float  # by which each half may sit wrong, also with all mirrors at their limits
+
+    def within(self, steps: Floats, found: Sensitivities) -> "MirrorLimits":
+        """The same, no limit more than its part of the deviation whose loss is known."""
+        largest = _floor(steps / kinds_and_seat(found), PLACES[: steps.shape[1]])
+        return replace(self, each=np.minimum(self.each, largest))
+
+
+def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> MirrorLimits:
+    """Share each virtual camera's margin out to the mirrors that it depends on.
+
+    Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
+    mirror of a virtual camera the same limit; a mirror keeps the smallest limit that its virtual
+    cameras ask for. Sums are linear for `each`, and of squares for `sigma`, with which the wanted
+    share of the pairs of shells is good. InputError if a virtual camera sees too little as
+    designed.
+    """
+    margin = found.coverage - target_mm
+    if margin.min() <= 0:
+        raise InputError(
+            f"a virtual camera sees {found.coverage.min():.2f} mm as designed, of {target_mm:g} mm "
+            "that are asked for: no deviation is allowed; enlarge mirrors.margin_mm"
+        )
+    parts = kinds_and_seat(found)
+    deviations = normal.ppf(wanted ** (1 / len(margin)))
+    each = margin[:, None] / parts / _positive(found.total())
+    variance = (margin / deviations)[:, None] ** 2 / parts
+    sigma = np.sqrt(variance / _positive(found.total(power=2)))
+    seat = margin / parts / _positive(found.seat)
+    each, sigma = (_smallest(found.mirror, of[found.camera]) for of in (each, sigma))
+    places = PLACES[: found.loss.shape[1]]
+    return MirrorLimits(_floor(each, places), _floor(sigma, places), float(_floor(seat.min(), 1)))
+
+
+def whole_margin_steps(found: Sensitivities, limits: MirrorLimits, radius: Floats) -> Floats:
+    """Deviations (2 m, kinds) that would linearly take a whole margin; radii (2 m,), mm."""
+    steps = kinds_and_seat(found) * np.maximum(limits.each, SMALLEST_LIMIT)
+    column = KINDS.index("radius")
+    steps[:, column] = np.minimum(steps[:, column], radius / 2)
+    return np.asarray(steps)
+
+
+def kinds_and_seat(found: Sensitivities) -> int:
+    """Number of parts that a margin is shared out in."""
+    return int(found.loss.shape[1]) + 1
+
+
+def _positive(loss: Floats) -> Floats:
+    return np.where(loss > 0, loss, np.finfo(float).tiny)
+
+
+def _floor(limits: Floats, places: Ints | int) -> Floats:
+    """Round down to decimal places, as the files have them."""
+    scale = 10.0 ** np.asarray(places)
+    return np.asarray(np.floor(limits * scale) / scale)
+
+
+def _smallest(mirror: Ints, allowed: Floats) -> Floats:
+    result = np.full((int(mirror.max()) + 1, allowed.shape[1]), np.inf)
+    np.minimum.at(result, mirror, allowed)
+    return result

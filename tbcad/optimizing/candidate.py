@@ -1,34 +1,83 @@
-"""What is varied, and what a candidate is judged by."""
+"""What is varied, and what a candidate is judged by.
+
+The aim `ssim`, how like the truth views are, needs no file and no CAD kernel. Viewpoints, object
+and method are those of `tbcad study ssim` without options, or with `--method field`, so that both
+give the same figure.
+"""
 
 import json
 import math
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import TypeAlias
+from threading import Lock
+from typing import Literal, TypeAlias
 
 import numpy as np
 from pydantic import ValidationError
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels
-from tbcad.optimizing.views import ViewsBy, mean_ssim
-from tbcad.types import Floats, Ints
+from tbcad.light.reconstruction.picture import BY_FIELD
+from tbcad.light.simulate.capture.light_field import traced_light_field
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.viewpoints import (
+    ELEVATIONS_DEG,
+    ground_truths,
+    image_quality,
+    viewpoints_around,
+    views_by,
+)
+from tbcad.types import Bytes, Floats, Ints
 
+AZIMUTHS, DISTANCE_MM = 4, 640.0
+
+ViewsBy: TypeAlias = Literal["nearest", "field"]
+
+_one_at_a_time = Lock()  # candidates that begin together share the truth
 STEP_MM = 0.5  # of lengths: finer changes no figure that counts
 STRETCH_STEP, STRETCH_DIGITS = 0.05, 2
 STRETCH = (0.8, 2.0)  # least and largest that are tried
 LEAST = 0.4  # of what the first design has, of all lengths
 # At most, of the largest machine's longest side; a pinhole is on either side.
 CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
-
 Place = tuple[float, float, float, float, float]
 """Camera's x and z, and the semi-minor axis, mm; stretch of the directions along x and y."""
 SCHEMA = "tbcad-candidates/2"
 Record: TypeAlias = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What real cameras would see of the built-in object."""
+
+    scene: Scene
+    cameras: list[Camera]
+    pictures: list[Bytes]  # from each, (h, w, 3)
+
+
+def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:
+    """Mean SSIM of views over the frame, from the stated viewpoints."""
+    with _one_at_a_time:
+        truth = _truth(design.spec.optics.capture_diameter_mm)
+    tiles = MirrorTiles(traced_light_field(design, truth.scene))
+    picture_of = views_by(BY_FIELD if method == "field" else method, tiles, truth.scene)
+    views = zip(truth.cameras, truth.pictures, strict=True)
+    return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
+
+
+@cache
+def _truth(capture_mm: float) -> Truth:
+    scene = prepared_scene(built_in_object(capture_mm))
+    cameras = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM).cameras(capture_mm)
+    return Truth(scene, cameras, ground_truths(scene, cameras, lambda _: None))
 
 
 @dataclass(frozen=True)
@@ -151,9 +200,8 @@ def virtual_camera_pixels(array: MirrorArray, spec: Spec) -> tuple[Floats, Ints]
 def size_of(array: MirrorArray) -> float:
     """Longest side of the box round all mirrors' apices and both pinholes, mm."""
     apex = array.apex_distance[:, None] * array.u
-    points = np.abs(np.vstack([apex, array.camera.pinhole])[:, 0]).max()
-    rest = np.vstack([apex, array.camera.pinhole])[:, 1:]
-    return float(max(2 * points, *np.ptp(rest, axis=0)))
+    points = np.vstack([apex, array.camera.pinhole])
+    return float(max(2 * np.abs(points[:, 0]).max(), *np.ptp(points[:, 1:], axis=0)))
 
 
 def store_bytes(key: str, judged: dict[Place, DesignCandidate]) -> bytes:

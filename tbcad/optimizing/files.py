@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.cad.formats.toml import toml_text
-from tbcad.common.results.plots import PlotPanel, Series, plot_file
-from tbcad.common.results.tables import Table, csv_text
+from tbcad.cad.formats.checked_files import toml_text
+from tbcad.common.results import PlotPanel, Series, Table, csv_text, plot_file
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import spec_dict
 from tbcad.optimizing.candidate import DesignCandidate, Figures, placed

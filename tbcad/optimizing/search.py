@@ -56,18 +56,15 @@ class SearchResult:
     limits: MachineLimits
     best: DesignCandidate
     candidates: tuple[DesignCandidate, ...]  # all that were judged, in the order in which they were
-    # which of them no other one that keeps the limits betters in all objectives
-    on_front: tuple[bool, ...]
+    on_front: tuple[bool, ...]  # which no other within the limits betters in all objectives
 
 
 def search(spec: Spec, asked: OptimizeOptions, store: Path | None = None) -> SearchResult:
     """Search a better place of camera and ellipsoid.
 
     The store, a file of judgements (JSON lines), is read when it exists, and written after every
-    generation, so that a search that was stopped goes on.
-
-    Raises:
-        InputError: the first design cannot be made; the store is of another design.
+    generation, so that a search that was stopped goes on. InputError if the first design cannot be
+    made, or the store is of another design.
     """
     judged = read_store(store, _key(spec, asked)) if store else {}
     judge = partial(_judge, spec, asked, judged, store)
@@ -202,17 +199,12 @@ def _losses(
     candidates: Sequence[DesignCandidate],
 ) -> Floats:
     """Losses of all candidates, (k, objectives); infinite beyond the limits."""
-    none = [np.inf] * len(objectives)
-    return np.array(
-        [
-            objective_losses(objectives, start, one.figures)
-            if one.figures
-            and limits.excess(one.figures) == 0
-            and not _lacks(objectives, one.figures)
-            else none
-            for one in candidates
-        ]
-    )
+    losses = np.full((len(candidates), len(objectives)), np.inf)
+    for row, one in zip(losses, candidates, strict=True):
+        figures = one.figures
+        if figures and limits.excess(figures) == 0 and not _lacks(objectives, figures):
+            row[:] = objective_losses(objectives, start, figures)
+    return losses
 
 
 def _front(losses: Floats) -> tuple[bool, ...]:

@@ -1,4 +1,4 @@
-"""Calls about builds: made, verified, shown."""
+"""Calls about builds: what is built, verified and shown, and how exactly it must be made."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
@@ -11,7 +11,18 @@ from tbcad.errors import InputError
 from tbcad.options.call import Call
 from tbcad.options.checks import check_are_printers, check_is_folder
 from tbcad.options.designs import AnyDesign
-from tbcad.options.shared import AnyPath, Changes, Design, Exports, Force, OutReplaced
+from tbcad.options.shared import (
+    AnyPath,
+    Changes,
+    Design,
+    Exports,
+    Force,
+    ObjectFile,
+    OutReplaced,
+    Scheduler,
+    UnitOption,
+    UpOption,
+)
 
 DEFAULT_YIELD = 0.99
 
@@ -57,7 +68,7 @@ class BuildOptions(Call):
             "--process",
             metavar="NAME|FILE",
             help="Choose edges and coverage margins for a manufacturing process, and say what they "
-            "cost: fdm, sls, sla, cnc, diamond, or a TOML file; see tbcad tolerance. A design that "
+            "cost: nickel-diamond, cnc, sla ..., or a TOML file; see tbcad tolerance. A design that "
             "names its edges keeps them.",
         ),
     ] = None
@@ -107,11 +118,7 @@ class VerificationOptions(Call):
     ] = False
 
     def check(self) -> None:
-        """Refuse what cannot be, before heavy libraries are loaded.
-
-        Raises:
-            InputError: as said.
-        """
+        """Refuse what cannot be, before heavy libraries are loaded."""
         if not self.time_limit > 0:
             raise InputError(f"--time-limit must be more than 0 seconds, not {self.time_limit:g}")
         check_is_folder(Path(self.exports))
@@ -145,3 +152,73 @@ class ReportOptions(Call):
             "--force", help="Replace a file that tbcad did not write, instead of refusing."
         ),
     ] = False
+
+
+def check_yield(wanted_yield: float) -> None:
+    """Refuse a share of good builds that is not between 0 and 1."""
+    if not 0 < wanted_yield < 1:
+        raise InputError(f"--yield {wanted_yield:g}: allowed is above 0, below 1, like 0.99")
+
+
+@dataclass(frozen=True)
+class InspectionOptions(Call):
+    """The shells of an export, and how many of them must be good."""
+
+    exports: Exports[AnyPath]
+    _: KW_ONLY
+    wanted: Annotated[
+        float,
+        typer.Option(
+            "--yield", help="Share of the shells that must be good with the standard deviations."
+        ),
+    ] = 0.99
+    out: OutReplaced[AnyPath] = Path("inspection")
+    force: Force = False
+
+
+@dataclass(frozen=True)
+class ToleranceOptions(Call):
+    """An export, a process that makes it, and how its yield is simulated."""
+
+    exports: Exports[AnyPath]
+    process: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="How it is made: nickel-diamond, cnc, sla ..., or a TOML file. By default sla, and "
+            "the yields of all of them are compared.",
+        ),
+    ] = None
+    object_file: ObjectFile[AnyPath] = None
+    _: KW_ONLY
+    up: UpOption = None
+    unit: UnitOption = None
+    margins: Annotated[
+        bool,
+        typer.Option(
+            "--margins",
+            help="Also search for the minimum margin on the coverage with which each process "
+            "reaches the yield, as tbcad build --for-process does; some 10 s a process.",
+        ),
+    ] = False
+    settings: Annotated[
+        Changes,
+        typer.Option(
+            "--set", metavar="KIND=VALUE", help="Change any error of the process; repeatable."
+        ),
+    ] = ()
+    builds: Annotated[
+        int, typer.Option(min=1, max=1_000_000, help="Number of simulated builds.")
+    ] = 1000
+    wanted_yield: Annotated[
+        float,
+        typer.Option("--yield", help="Share of the simulated builds that must reach the target."),
+    ] = 0.99
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random errors.")] = 1
+    calibrated_mrad: Annotated[
+        float,
+        typer.Option(
+            min=0, max=100, help="Error of each mirror's direction after calibration, mrad."
+        ),
+    ] = 0.5
+    scheduler: Scheduler = None

@@ -1,4 +1,4 @@
-"""Records of calls, and what follows from them: Python's keywords, the command's options, JSON."""
+"""Records of calls, and what follows from them: Python's keywords and the command's options."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -54,11 +54,7 @@ class Call:
     answer: Progress = silent
 
     def __post_init__(self) -> None:
-        """Refuse values of another type, or out of range; what lies in a folder stands for it.
-
-        Raises:
-            InputError: as said.
-        """
+        """Refuse values of another type, or out of range; what lies in a folder stands for it."""
         for name, option in _annotated(type(self)).items():
             value = getattr(self, name)
             if isinstance(value, PathLike) and not isinstance(value, Path):
@@ -68,13 +64,6 @@ class Call:
     def on(self, screen: Stages) -> Self:
         """The call, with its progress on a screen."""
         return replace(self, progress=screen.stage, detail=screen.detail, answer=screen.note)
-
-    def json(self) -> dict[str, Any]:
-        """The options by name, for a file of JSON."""
-        from pydantic_core import to_jsonable_python
-
-        record = {name: getattr(self, name) for name in declared(type(self))}
-        return cast("dict[str, Any]", to_jsonable_python(record))
 
 
 class Function(Protocol[Keywords, Asked_contra, Result_co]):

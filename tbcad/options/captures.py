@@ -262,11 +262,7 @@ class CaptureOptions(Call):
     force: Force = False
 
     def check(self) -> None:
-        """Refuse what does not go together.
-
-        Raises:
-            InputError: as said.
-        """
+        """Refuse what does not go together."""
         lights, single = str(self.lights), self.samples == 1
         if self.lights is not None and not single:
             raise InputError("--lights follows one ray a pixel: leave out --samples")

@@ -113,11 +113,7 @@ class OptimizeOptions(Call):
         return out, table, out.with_suffix(f".{self.plot}")
 
     def check(self) -> None:
-        """Refuse what does not go together.
-
-        Raises:
-            InputError: as said.
-        """
+        """Refuse what does not go together."""
         for name in self.objectives:
             if name not in OBJECTIVES:
                 known = ", ".join(OBJECTIVES)

@@ -8,12 +8,13 @@ from typing import Annotated, Literal
 import typer
 
 from tbcad.options.call import Call
-from tbcad.options.lists import ExposureLeds, ExposureLit, numbers, seconds
 from tbcad.options.shared import (
     AnyPath,
     CalibrationFolder,
     Exports,
     ExportsOption,
+    ExposureLeds,
+    ExposureLit,
     Force,
     ForceFile,
     ObjectFile,
@@ -22,6 +23,7 @@ from tbcad.options.shared import (
     RunFolder,
     UnitOption,
     UpOption,
+    numbers,
 )
 
 MOST_NOISE = 100.0
@@ -235,14 +237,3 @@ class SimulateRunOptions(Call):
         if self.phases is None:
             return None
         return tuple(part.strip() for part in self.phases.split(","))
-
-    def seconds(self) -> tuple[float | None, float | None]:
-        """Exposure by LEDs and of the lit object, s; None where they are not said.
-
-        Raises:
-            InputError: one is no time of an exposure.
-        """
-        return (
-            seconds("--exposure-leds", self.exposure_leds),
-            seconds("--exposure-lit", self.exposure_lit),
-        )

@@ -12,8 +12,7 @@ import typer
 from tbcad.common.screen import Stages
 from tbcad.errors import InputError
 from tbcad.options.call import Call
-from tbcad.options.lists import ExposureLeds, ExposureLit, seconds
-from tbcad.options.shared import AnyPath, Exports
+from tbcad.options.shared import AnyPath, Exports, ExposureLeds, ExposureLit
 
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16
@@ -129,14 +128,3 @@ class RunOptions(Call):
                 "more, such as 4160x3104"
             )
         return width, height
-
-    def seconds(self) -> tuple[float | None, float | None]:
-        """Exposure by LEDs and of the lit object, s; None where they are not said.
-
-        Raises:
-            InputError: one is no time of an exposure.
-        """
-        return (
-            seconds("--exposure-leds", self.exposure_leds_s),
-            seconds("--exposure-lit", self.exposure_lit_s),
-        )

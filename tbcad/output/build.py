@@ -19,9 +19,15 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
-from tbcad.shell.files import shell_envelope, write_shell_meshes, write_shell_solids
+from tbcad.shell.files import (
+    design_mandrel,
+    mandrel_record,
+    shell_envelope,
+    write_mandrels,
+    write_shell_meshes,
+    write_shell_solids,
+)
 from tbcad.shell.mandrel import Mandrel
-from tbcad.shell.mandrel_files import design_mandrel, mandrel_record, write_mandrels
 from tbcad.types import Progress
 
 
@@ -43,15 +49,9 @@ def write_export(
     *,
     optional_prototype: bool = False,
 ) -> Export:
-    """Write an export into an empty folder.
+    """Write some of PARTS into an empty folder; `submit` takes what can be done meanwhile.
 
-    Args:
-        design: the mirrors.
-        folder: to write into.
-        parts: some of PARTS.
-        progress: called with each stage.
-        submit: takes what can be done meanwhile.
-        optional_prototype: leave the prototype out where it cannot be made, instead of refusing.
+    An optional prototype is left out where it cannot be made, instead of refusing.
 
     Raises:
         SpecError: when something does not fit; it says what to change.

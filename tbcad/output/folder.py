@@ -16,12 +16,11 @@ from pathlib import Path
 
 from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
-from tbcad.output.content import refuse_other_content
 from tbcad.output.foreign_files import foreign_files, is_always_kept, keep_files
-from tbcad.output.inputs import Source, refuse_inputs
-from tbcad.output.manifest import is_file
+from tbcad.output.manifest import is_file, refuse_other_content
+from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.output.writers import clear, discard, locked, new_folder
-from tbcad.records.manifest import Kind
+from tbcad.records.document import Kind
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
@@ -29,13 +28,10 @@ _MAX_NAMES = 3  # of foreign files in an error
 
 
 def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> None:
-    """Check, before any work, that a folder can be replaced.
+    """Check, before any work, that a folder, which need not exist, can be replaced.
 
-    Args:
-        out: the folder, which need not exist.
-        kind: of the content that is to be written.
-        force: whether content that costs hours may be in it, and files that tbcad did not write.
-        inputs: files and folders that are read for it.
+    With force also content that costs hours, and among files that tbcad did not write. Inputs are
+    files and folders that are read for it.
 
     Raises:
         InputError: it cannot; the text says why and what to do.
@@ -53,12 +49,8 @@ def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Sourc
 def replacing(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ()) -> Iterator[Path]:
     """Give a folder to write content into, which replaces out when the block ends well.
 
-    Args:
-        out: the folder to be replaced, which need not exist; missing parents are made.
-        kind: of the content.
-        force: replace content that costs hours, and keep the files that tbcad did not write;
-            without, both are refused.
-        inputs: files and folders that are read for it.
+    Missing parents are made. With force content that costs hours is replaced, and files that tbcad
+    did not write are kept; without, both are refused. Inputs are read for it.
 
     Raises:
         InputError: out cannot be replaced; it is then as before.

@@ -1,14 +1,18 @@
-"""manifest.json: what was written, and by which versions."""
+"""manifest.json: what was written, and by which versions; the kind of content of a folder."""
 
 import hashlib
+import json
 import platform
 import stat
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
-from tbcad.records.manifest import NAME, SCHEMA, Entry, Kind, Manifest
+from tbcad.errors import InputError
+from tbcad.records.document import NAME, SCHEMA, Entry, Kind, Manifest
 from tbcad.version import __version__
 
 MANIFEST, VERDICT, REPORT = NAME, "verify.json", "report.html"
@@ -78,3 +82,132 @@ def is_report(path: Path) -> bool:
 def is_file(path: Path) -> bool:
     """Tell a plain file from folders, links and devices."""
     return stat.S_ISREG(path.lstat().st_mode)
+
+
+# The record of each kind, by which a folder is known whose manifest tells no kind.
+RECORDS: dict[Kind, str] = {
+    "build": "design.json",
+    "run": "run.json",
+    "calibration": "calibration.json",
+    "capture": "capture.json",
+    "dataset": "dataset.json",
+    "inspection": "inspection.json",
+    "as-built": "as_built.json",
+}
+WORDS: dict[str, str] = {
+    "inspection": "an inspection",
+    "as-built": "solids as built",
+    "": "content of tbcad of an unknown kind",
+}
+COSTLY: tuple[Kind, ...] = ("capture", "merged run", "calibration")  # hours, and read by others
+MERGED_FROM = "based_on"  # what capture.json of a merged run has, and that of a capture has not
+RUNS = ("[!.]*/run.json", "[!.]*/[!.]*/run.json")
+_MAX_RECORD_BYTES = 64_000_000
+
+
+def kind_of(folder: Path) -> str | None:
+    """The kind of content that tbcad wrote; "" where it is unknown, None for other folders."""
+    manifest = read_manifest(folder)
+    if manifest and manifest.kind:
+        return manifest.kind
+    for kind, name in RECORDS.items():
+        record = _record(folder / name)
+        if str(record.get("schema", "")).startswith("tbcad-") or (
+            manifest and name in manifest.files
+        ):
+            return "merged run" if kind == "capture" and MERGED_FROM in record else kind
+    return "" if manifest else None
+
+
+def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> None:
+    """Refuse to replace another kind of content, and without force what cost hours.
+
+    out is the folder as the user names it, target its path with links resolved.
+
+    Raises:
+        InputError: as said, or the folder is inside a folder that tbcad wrote, or above one.
+    """
+    refuse_inside(out, target)
+    present = kind_of(target)
+    if present is None:
+        _refuse_inner(out, target)
+        return
+    if present == "run":
+        raise InputError(f"{out} is a run, and photographs are not replaced: name another folder")
+    if present != kind:
+        raise InputError(
+            f"{out} is {words(present)}, which {words(kind)} does not replace: name another "
+            "folder, or remove that one"
+        )
+    _refuse_inner(out, target)
+    if force:
+        return
+    if kind in COSTLY:
+        raise InputError(
+            f"{out} is {words(kind)} already: name another folder, or replace it with --force"
+        )
+    if kind == "build" and (run := next(_runs_of(target), None)):
+        raise InputError(
+            f"{out} is the build that {run} photographed, which is of no use without it: name "
+            "another folder, or replace it with --force"
+        )
+
+
+def refuse_inside(out: Path, target: Path) -> None:
+    """Refuse a folder inside a folder that tbcad wrote."""
+    for above in target.parents:
+        if (outer := kind_of(above)) is not None:
+            raise InputError(f"{out} is inside {above}, {words(outer)}: name a folder outside it")
+
+
+def _refuse_inner(out: Path, target: Path) -> None:
+    """Refuse a folder that has others in it which tbcad wrote."""
+    if not target.is_dir():
+        return
+    for inner in _folders(target, 2):
+        if (kind := kind_of(inner)) is not None:
+            name = inner.relative_to(target)
+            raise InputError(
+                f"{out} holds {name}, {words(kind)}: name another folder, such as {out / 'new'}"
+            )
+
+
+def _folders(folder: Path, depth: int) -> Iterator[Path]:
+    """Folders below one, as deep as is said; links are left out."""
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.is_symlink():
+            yield path
+            if depth > 1:
+                yield from _folders(path, depth - 1)
+
+
+def _runs_of(build: Path) -> Iterator[Path]:
+    """Runs beside a build, or where the user works, that photographed it as it is now."""
+    for place in dict.fromkeys((build.parent, Path.cwd())):
+        for record in (path for pattern in RUNS for path in sorted(place.glob(pattern))):
+            digests = _record(record).get("export_sha256")
+            if isinstance(digests, Mapping) and digests and _is_as(build, digests):
+                yield record.parent
+
+
+def _is_as(build: Path, digests: Mapping[str, Any]) -> bool:
+    files = {build / name: digest for name, digest in digests.items()}
+    return all(
+        path.is_file() and fingerprint(path)["sha256"] == digest for path, digest in files.items()
+    )
+
+
+def _record(path: Path) -> dict[str, Any]:
+    """Return the object of a JSON file; an empty one where there is none."""
+    try:
+        if not is_file(path) or path.lstat().st_size > _MAX_RECORD_BYTES:
+            return {}
+        record = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
+def words(kind: str) -> str:
+    """Return a kind with its article."""
+    return WORDS.get(kind, f"a {kind}")

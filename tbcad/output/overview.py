@@ -15,15 +15,14 @@ from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.arrangement import PrototypeModel, arrange
-from tbcad.prototype.files.bom_csv import PRINT_MATERIAL, ball_rows, by_currency
-from tbcad.prototype.purchased.prices import Prices, load_prices
-from tbcad.shell.files import camera_a_mesh
-from tbcad.shell.mandrel_files import design_mandrel
+from tbcad.prototype.files.bom import PRINT_MATERIAL, ball_rows, by_currency
+from tbcad.prototype.purchased.parts import Prices, load_prices
+from tbcad.shell.files import camera_a_mesh, design_mandrel
 from tbcad.types import Progress
 
 # Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a
 # share of it: the mean of 14 parts of the paper's prototype by PrusaSlicer 2.5 with the settings of
-# the parts list's estimates (tbcad.prototype.printing.estimate).
+# the parts list's estimates (tbcad.prototype.printed).
 HOURS_PER_CM3, FILLED = 0.087, 0.84
 COARSE = MeshSpec(ray_error_mm=10.0, chord_error_mm=1.0, structure_error_mm=0.5)
 MM3_PER_CM3 = 1000.0

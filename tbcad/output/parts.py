@@ -52,7 +52,7 @@ def check_lists(spec: Spec, parts: Sequence[str]) -> None:
     """
     if PROTOTYPE in parts:
         from tbcad.prototype.balls.catalogue import load_catalogue
-        from tbcad.prototype.purchased.prices import load_prices
+        from tbcad.prototype.purchased.parts import load_prices
 
         load_catalogue(spec.prototype.catalogues)
         load_prices(spec.prototype.prices)

@@ -34,11 +34,7 @@ def new_folder(target: Path) -> Path:
 
 
 def clear(out: Path, target: Path) -> None:
-    """Repair and remove what killed writers left, of whatever target, beside it and in it.
-
-    Args:
-        out: the folder as the user names it.
-        target: its path, whose parent is locked.
+    """Remove what killed writers left in the locked parent of a target, and repair a half exchange.
 
     Raises:
         InputError: another one is writing it.

@@ -33,18 +33,17 @@ from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses,
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import base_torques, choose_drive
 from tbcad.prototype.drive.travel import OVERTRAVEL_DEG, home_angles
-from tbcad.prototype.electronics.wiring import Wiring, wiring_layout
+from tbcad.prototype.electronics import Wiring, wiring_layout
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
-from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
 from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_fasteners, stage_layout
 
 if TYPE_CHECKING:
-    from tbcad.prototype.printing.placing import PrintedPart
+    from tbcad.prototype.printed import PrintedPart
 
 OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 """Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""
@@ -102,18 +101,16 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
         SpecError: at the end, when there was none; it names the cause in the preferred one, and
             what was tried.
     """
-    tried: list[int] = []
-    first_error: SpecError | None = None
-    any_arranged = False
+    tried, arranged, errors = list[int](), False, list[SpecError]()
     for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
         if isinstance(outcome, PrototypeModel):
-            any_arranged = True
+            arranged = True
             yield outcome
-        elif first_error is None:
-            first_error = outcome
-    if not any_arranged and first_error is not None:
-        raise SpecError(f"{first_error}{_remedy(design, tried)}") from None
+        else:
+            errors.append(outcome)
+    if errors and not arranged:
+        raise SpecError(f"{errors[0]}{_remedy(design, tried)}") from None
 
 
 def arrange(design: MirrorDesign) -> PrototypeModel:
@@ -173,16 +170,16 @@ def _base_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterato
 def _frame_attempts(
     spec: Spec, layout: PrototypeLayout, parts: Parts
 ) -> Generator[Outcome, None, bool]:
-    """Outcomes for a base whose seats have room.
+    """Outcomes for a base whose seats have room, and whether other pads may help.
 
-    Returns:
-        Whether other pads may help: not where the frame alone has no room.
+    They do not where the frame alone has no room.
     """
     for boss in spec.prototype.base.hub_bosses_mm:
         chosen = _with_base(spec, hub_boss_mm=boss)
         base = base_layout(chosen.prototype.base, layout, base_motion(chosen))
+        carrier = carrier_masses(base, spec.printer.density_g_cm3)
         try:
-            estimate = _estimated_drive(chosen, layout, base, parts)
+            estimate = balance_and_drive(layout, base, carrier, chosen, parts)
             keep_out = _keep_out(chosen, layout, base)
         except SpecError as error:  # whatever boss and pads
             yield chosen, error
@@ -193,9 +190,8 @@ def _frame_attempts(
             yield chosen, error
             return True
         try:
-            arrangement = _arranged(
-                chosen, layout, base, estimate, keep_out, (stage, wiring), parts
-            )
+            staged = stage, wiring
+            arrangement = _arranged(chosen, layout, base, estimate, keep_out, staged, parts)
         except SpecError as error:
             yield chosen, error
         else:
@@ -210,19 +206,13 @@ def _staged(
     """The stage, without LEDs where those in the automatic places cannot be used or wired."""
     section = spec.prototype.stage
     try:
-        return spec, *_wired(spec, layout, keep_out, parts)
+        stage = stage_layout(spec.prototype, layout, keep_out, parts)
+        return spec, stage, wiring_layout(spec.prototype, stage, parts)
     except SpecError:
-        if section.leds_mm != led_places(spec.optics.capture_diameter_mm):
+        if not section.leds_mm or section.leds_mm != led_places(spec.optics.capture_diameter_mm):
             raise
     without = _with(spec, stage=section.model_copy(update={"leds_mm": ()}))
-    return without, *_wired(without, layout, keep_out, parts)
-
-
-def _wired(
-    spec: Spec, layout: PrototypeLayout, keep_out: KeepOut, parts: Parts
-) -> tuple[StageLayout, Wiring]:
-    stage = stage_layout(spec.prototype, layout, keep_out, parts)
-    return stage, wiring_layout(spec.prototype, stage, parts)
+    return _staged(without, layout, keep_out, parts)
 
 
 def _with(spec: Spec, **values: object) -> Spec:
@@ -243,13 +233,6 @@ def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
     return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)
 
 
-def _estimated_drive(
-    spec: Spec, layout: PrototypeLayout, base: BaseLayout, parts: Parts
-) -> tuple[BaseBalance, Drive]:
-    carrier = carrier_masses(base, spec.printer.density_g_cm3)
-    return balance_and_drive(layout, base, carrier, spec, parts)
-
-
 def _arranged(
     spec: Spec,
     layout: PrototypeLayout,
@@ -262,8 +245,10 @@ def _arranged(
     (balance, drive), (stage, wiring) = estimate, staged
     frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
     shroud = shroud_round(spec, stage, frame, keep_out, parts)
+    lamp_z = float(frame.lamps.places[0, 2]) if frame.lamps else 0.0
+    light = {"lamp_z_mm": lamp_z, "shroud": shroud is not None}
     return PrototypeModel(
-        spec=_with_light(spec, frame.lamps, shroud),
+        spec=_with(spec, light=spec.prototype.light.model_copy(update=light)),
         layout=layout,
         base=base,
         split=split_base(base, spec.printer),
@@ -289,15 +274,6 @@ def shroud_round(
     static = (*stage.components, *frame.printed, *frame.purchased)
     floor = spec.prototype.frame.floor_mm - frame.plate["thickness_mm"]
     return shroud_layout(spec.prototype.light, static, keep_out, floor, parts)
-
-
-def _with_light(spec: Spec, lamps: LampLayout | None, shroud: ShroudLayout | None) -> Spec:
-    """The spec with what was chosen for lamps and shroud."""
-    values = {
-        "lamp_z_mm": float(lamps.places[0, 2]) if lamps else 0.0,
-        "shroud": shroud is not None,
-    }
-    return _with(spec, light=spec.prototype.light.model_copy(update=values))
 
 
 def _remedy(design: MirrorDesign, tried: list[int]) -> str:

@@ -21,16 +21,16 @@ from tbcad.prototype.arrangement import (
     shroud_round,
 )
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.cap_solids import cap_parts
+from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.base.seat_solids import cap_parts
 from tbcad.prototype.base.solid import carrier_parts
-from tbcad.prototype.coupon.coupon import coupon_plates
-from tbcad.prototype.coupon.seat import expected_downs, worst_pose
 from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout
-from tbcad.prototype.printing.placing import PlacedSolid, PrintedPart, Role, placed_components
+from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_components
 from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.
@@ -48,15 +48,10 @@ def build_prototype_model(
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
 ) -> PrototypeModel:
-    """Build the solids of a prototype.
+    """Build the solids of a prototype by its arrangements, the preferred first.
 
-    Where the kernel fails with the preferred arrangement, other pads and numbers of balls are
-    tried: another hub's boss would leave the same faces grazing each other.
-
-    Args:
-        arranged: its arrangements, the preferred first.
-        progress: called with each stage.
-        submit: takes what can be done meanwhile.
+    Where the kernel fails with the preferred one, other pads and numbers of balls are tried:
+    another hub's boss would leave the same faces grazing each other.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -83,13 +78,15 @@ def _model(arrangement: PrototypeModel, progress: Progress, submit: Submit) -> P
     spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
     progress("prototype: base")
     carrier, coupons, on_stage = _base_and_stage(arrangement, submit)
-    disc = _disc(arrangement)
-    masses = _masses([*carrier, disc], spec.printer.density_g_cm3)
+    disc = _placed([arrangement.frame.homing.disc], spec)[0]
+    turning = [*carrier, disc]
+    mass = np.array([part.mass_g(spec.printer.density_g_cm3) for part in turning])
+    masses = PointMasses(mass, np.array([part.properties.centroid for part in turning]))
     balance, drive = balance_and_drive(layout, base, masses, spec, arrangement.parts)
     progress("prototype: stage and frame")
     if drive != arrangement.drive:  # the mass of the solids asks for another
         arrangement = _with_drive(arrangement, drive)
-        disc = _disc(arrangement)
+        disc = _placed([arrangement.frame.homing.disc], spec)[0]
     frame, gauge = arrangement.frame, _gauge(spec, layout, base, arrangement.frame)
     half = len(frame.printed) // 2  # the other process is idle: coupons and stage are built
     rest = submit(parts_or_error, _placed, frame.printed[half:], spec)
@@ -137,10 +134,6 @@ def _with_drive(arrangement: PrototypeModel, drive: Drive) -> PrototypeModel:
     return replace(arrangement, drive=drive, frame=frame, shroud=shroud)
 
 
-def _disc(arrangement: PrototypeModel) -> PlacedSolid:
-    return _placed([arrangement.frame.homing.disc], arrangement.spec)[0]
-
-
 def _placed(components: Sequence[Component], spec: Spec) -> list[PlacedSolid]:
     return placed_components(components, spec.printer, spec.mesh.structure_error_mm)
 
@@ -176,11 +169,6 @@ def _gauge(
     camera, diameter = layout.array.camera, spec.prototype.camera_diameter_mm
     needed = camera_requirements(layout.array, spec.optics.capture_diameter_mm / 2)
     return camera_gauge(base, camera, diameter, needed, layout.stops.range)
-
-
-def _masses(parts: list[PlacedSolid], density: float) -> PointMasses:
-    mass = [part.mass_g(density) for part in parts]
-    return PointMasses(np.array(mass), np.array([part.properties.centroid for part in parts]))
 
 
 def _carrier(base: BaseLayout, pieces: list[PlacedSolid]) -> Iterator[PrintedPart]:

@@ -6,8 +6,14 @@ from pydantic import Field
 
 from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.records.document import Document, RecordSection
-from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
-from tbcad.records.prototype_light import LampsRecord, ShroudRecord
+from tbcad.records.prototype_drive import (
+    Controller,
+    DriveRecord,
+    Home,
+    LampsRecord,
+    PowerOff,
+    ShroudRecord,
+)
 
 NAME = "prototype.json"
 MATT_BLACK = "matt black"

@@ -75,15 +75,7 @@ def write_page(
     pictures: bool = True,
     force: bool = False,
 ) -> Path:
-    """Write the page of an export.
-
-    Args:
-        folder: the export.
-        out: folder to write into; other files in it stay.
-        machine: the prototype.
-        steps: of its assembly.
-        pictures: whether each step has one.
-        force: whether a page that exists may be replaced.
+    """Write the steps of an assembly as a page, with or without pictures; other files stay.
 
     Raises:
         InputError: the page exists, a file cannot be read or written, or drawing fails.
@@ -97,13 +89,7 @@ def write_page(
 
 
 def page(machine: Machine, steps: Sequence[Step], pictures: Mapping[str, bytes]) -> str:
-    """The page as HTML.
-
-    Args:
-        machine: the prototype.
-        steps: of its assembly.
-        pictures: PNG files by keys of steps.
-    """
+    """The page as HTML; pictures: PNG files by keys of steps."""
     what = {int(row["item"] or 0): str(row["what"]) for row in machine.rows}
     body = (
         "<h1>Assembly</h1>",

@@ -15,8 +15,7 @@ from scipy.ndimage import distance_transform_edt
 from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
-from tbcad.report.apart import offsets
-from tbcad.report.callouts import Callout, draw_callouts, place_callouts
+from tbcad.report.exploded import Callout, draw_callouts, offsets, place_callouts
 from tbcad.report.prototype_pictures import Drawn, assembly_bodies, placed_mesh
 from tbcad.types import Bytes, Floats, Ints
 
@@ -86,12 +85,7 @@ class _Scene:
 
 
 def draw(folder: Path, pictures: Path) -> None:
-    """Draw a PNG file for each step that has bodies, named by its key.
-
-    Args:
-        folder: an export with a prototype.
-        pictures: folder to write into.
-    """
+    """Draw a PNG file for each step that has bodies, named by its key, into a folder."""
     machine = read_machine(folder)
     bodies = _meshes(folder, machine)
     for step in assembly_steps(machine):

@@ -14,12 +14,11 @@ import pyvista
 from tbcad.common.figure_files import figure_file
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.mirrors.array import mirror_ids
-from tbcad.core.mirrors.seam import cut_images, seam_gaps
 from tbcad.core.optics.cells import Cells, cells_of
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.core.optics.windows import cut_images, seam_gaps
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
 from tbcad.report.section import EdgeSection, section_of
 from tbcad.report.shell_pictures import coloured
 from tbcad.types import Floats

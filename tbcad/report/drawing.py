@@ -21,13 +21,7 @@ MESH_SUFFIXES = (".stl", ".glb")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
-    """Draw a subject of an export to a PNG file, which is replaced as a whole.
-
-    Args:
-        folder: an export.
-        file: picture to write.
-        subject: one of SUBJECTS.
-        force: whether a picture that exists may be replaced.
+    """Draw one of SUBJECTS of an export to a PNG file, which is replaced as a whole.
 
     Raises:
         InputError: when the export or a screen is missing, a file of the export is not as it was
@@ -114,11 +108,7 @@ def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str
 
 
 def _on_screen(command: list[str]) -> list[str]:
-    """A command, under a virtual screen where needed.
-
-    Raises:
-        InputError: when there is neither a screen nor a virtual one.
-    """
+    """A command, under a virtual screen where needed; refused where there is neither."""
     if os.environ.get("DISPLAY") or sys.platform != "linux":
         return command
     virtual = shutil.which("xvfb-run")

@@ -12,7 +12,7 @@ import numpy as np
 import pyvista
 import trimesh
 
-from tbcad.common.srgb import shown_colour
+from tbcad.common.colours import shown_colour
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow
 from tbcad.types import Floats
@@ -53,13 +53,7 @@ LIFTED = 1.5
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
-    """Draw one of SUBJECTS to a PNG file.
-
-    Args:
-        folder: an export with a prototype.
-        subject: key of SUBJECTS.
-        picture: file to write.
-    """
+    """Draw one of SUBJECTS of an export with a prototype to a PNG file."""
     record = Prototype.read(folder / NAME)
     rows = ROWS.get(subject, 1)
     size = (SIZE[0], rows * SIZE[1])

@@ -8,8 +8,7 @@ import pyvista
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.types import Bools, Floats, Ints
 
 ON_MIRROR_MM = 0.005  # facets are nearer than this to the spheres

@@ -43,12 +43,7 @@ class ModelledMirrors(NamedTuple):
 
 
 def draw(folder: Path, picture: Path) -> None:
-    """Draw both shells: from outside, apart, and up into the mirrors as the cameras look.
-
-    Args:
-        folder: an export.
-        picture: PNG file to write.
-    """
+    """Draw both shells: from outside, apart, and up into the mirrors as the cameras look."""
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE, border=False)
     shells = [coloured(folder, camera) for camera in "ab"]
     size = float(np.abs(np.asarray(shells[0].bounds)).max())

@@ -16,12 +16,16 @@ from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.shell.cell_outlines import CellOutlines, cell_outlines
-from tbcad.shell.segments import segment_counts, strip_points, strip_widths
+from tbcad.shell.cell_outlines import (
+    CellOutlines,
+    cell_outlines,
+    segment_counts,
+    strip_points,
+    strip_widths,
+)
 from tbcad.types import Bools, Floats, Ints
 
-# The search is in a plane, so what it finds on a sphere is looked for again from there.
-ROUNDS = 3
+ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked for again from there
 
 
 def means(points: Floats, cell: Ints) -> Floats:
@@ -35,10 +39,7 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
 
     It is that of the outline's points, or, where these do not all see it, the point that is
     farthest inside all lines along the outline: a cell may have a side that bends inward, at the
-    foot.
-
-    Raises:
-        SpecError: when no point of a cell sees its whole outline.
+    foot. SpecError if no point of a cell sees its whole outline.
     """
     every, cell, edge = np.arange(len(mirrors)), outlines.cell, outlines.points
     middle = mirrors.projected(every, means(edge, cell))
@@ -60,14 +61,7 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
 
 
 def _deepest_step(start: Floats, axes: Floats, point: Floats, inward: Floats) -> Floats:
-    """Step (3,) along axes (2, 3) to where the smallest distance inside all lines is largest.
-
-    Args:
-        start: mm, (3,).
-        axes: of the plane, unit vectors (2, 3).
-        point: on each line, mm, (b, 3).
-        inward: unit vectors across the lines, (b, 3).
-    """
+    """Step (3,) in a plane to where the smallest distance inside all lines is largest."""
     # Unknowns: both steps and the smallest distance, which is to be largest.
     table = np.column_stack([-inward @ axes.T, np.ones(len(point))])
     solution = linprog([0, 0, -1], A_ub=table, b_ub=dot(inward, start - point), bounds=(None, None))
@@ -86,13 +80,7 @@ class Facets:
 
 
 def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
-    """Facets of all cells within the mesh tolerances.
-
-    Args:
-        spec: design with the mesh tolerances.
-        cells: camera a's, of the modelled surfaces.
-        distance: from each mirror to the object, mm, (m,).
-    """
+    """Facets of camera a's cells within the tolerances; distances (m,) to the object, mm."""
     outlines = cell_outlines(cells, segment_counts(spec, cells, distance))
     if np.all(cells.surfaces.curvature == 0):
         return _planar(outlines)
@@ -175,11 +163,10 @@ class _RingMesh:
         return self.mirrors.projected(cell, middle + share * (self.strip[place] - middle))
 
     def _quads(self, k: int, outer: _Ring, kept: Bools, inner: _Ring, points: Floats) -> list[Ints]:
-        """Two triangles for each quad.
+        """Two triangles for each quad; beyond the strip the shorter diagonal avoids obtuse angles.
 
-        In the strip the one on the outline has its right angle at the end of its segment, or at
-        the start where the end is a corner of the cell; further inside the shorter diagonal keeps
-        angles from growing obtuse.
+        In the strip the right angle on the outline is at the segment's end, or its start at a
+        corner.
         """
         a, b = outer.vertex[kept], outer.vertex[outer.following][kept]
         c, d = inner.vertex[inner.following], inner.vertex

@@ -1,14 +1,17 @@
-"""All files of both shells, from a design to a folder."""
+"""All files of both shells and of their negatives, from a design to a folder."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
+import numpy as np
+from OCP.TopoDS import TopoDS_Face
+
+from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.formats.step_mirror import mirrored_step
-from tbcad.cad.formats.stl import write_stl
-from tbcad.cad.formats.threemf import write_3mf
-from tbcad.cad.kernel.brep import Maker, Solid
-from tbcad.cad.kernel.measures import (
+from tbcad.cad.kernel.brep import Maker, Ring, Solid, hole_faces
+from tbcad.cad.kernel.checks import (
     FaceIntegrals,
     SolidProperties,
     face_integrals,
@@ -16,24 +19,29 @@ from tbcad.cad.kernel.measures import (
     properties,
 )
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.cad.kernel.solids import faces, one_solid
+from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
+from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.core.mirrors.record import shell_record
-from tbcad.core.optics.cell_moments import cell_moments
-from tbcad.core.optics.cells import Cells
-from tbcad.core.optics.pedestals.cells import PedestalCells
-from tbcad.core.optics.pedestals.walls import wall_moments
-from tbcad.shell.envelope import Envelope, closing_envelope
-from tbcad.shell.mesh import shell_mesh
-from tbcad.shell.solid import casing_faces, front_edges
-from tbcad.types import Progress
+from tbcad.core.mirrors.record import part_files
+from tbcad.core.optics.cells import Cells, cell_moments
+from tbcad.core.optics.pedestals.cells import PedestalCells, wall_moments
+from tbcad.core.spec.design import Spec
+from tbcad.records.design import MandrelRecord
+from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends, closing_envelope
+from tbcad.shell.mandrel import Mandrel, mandrel_of
+from tbcad.shell.mesh import FROM_X, FROM_Z, MeshBuilder, front_facets, shell_mesh
+from tbcad.shell.solid import FrontEdges, casing_faces, front_edges, reversed_ring
+from tbcad.types import Floats, Ints, Progress
+
+X, Y, Z = np.eye(3)
+DRAFT_DIGITS = 6
 
 
 def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -> None:
     """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half."""
     mesh = camera_a_mesh(design, envelope)
     for array in design.arrays:
-        write_half_mesh(folder, shell_record(array), mesh, array)
+        write_half_mesh(folder, part_files("shell", array), mesh, array)
 
 
 def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: MirrorArray) -> None:
@@ -46,22 +54,12 @@ def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: Mirr
 def write_shell_solids(
     design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
 ) -> None:
-    """Write both shells as STEP into a folder.
-
-    Args:
-        design: the mirrors.
-        envelope: that closes camera a's half.
-        folder: to write into.
-        progress: called with each stage.
-
-    Raises:
-        InvalidSolidError: when the kernel finds a solid invalid.
-    """
+    """Write both shells as STEP; the envelope closes camera a's half; or InvalidSolidError."""
     # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the
     # design is symmetrical about y = 0.
     known, symmetric = None, design.spec.optics.camera_mm[1] == 0
     for array in design.arrays:
-        files = shell_record(array)
+        files = part_files("shell", array)
         if known and symmetric and not design.spec.step.pcurves:
             progress(f"{files['name']}: files")
             _write_mirrored(folder, design.arrays[0], array)
@@ -79,7 +77,7 @@ def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> 
     Readers find in both the same figures to the last digit, which the kernel's own file of the
     mirrored solid would not give: it cuts numbers that are long, and a minus sign is a character.
     """
-    one, other = shell_record(original), shell_record(array)
+    one, other = part_files("shell", original), part_files("shell", array)
     names = [wall_names(some.ids, original.modelled_cells) for some in (original, array)]
     renamed = {one["name"]: other["name"], **dict(zip(original.ids, array.ids, strict=True))}
     renamed |= dict(zip(*names, strict=True))
@@ -88,11 +86,7 @@ def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> 
 
 
 def shell_envelope(design: MirrorDesign) -> Envelope:
-    """What closes camera a's half: back, flanges, holes.
-
-    Raises:
-        SpecError: when flanges or holes do not fit.
-    """
+    """What closes camera a's half: back, flanges, holes; SpecError where these do not fit."""
     array = design.arrays[0]
     return closing_envelope(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
@@ -102,11 +96,10 @@ def camera_solid(
 ) -> Solid:
     """Solid of one camera's half, face by face; without an envelope it is worked out.
 
-    Raises:
-        SpecError: when flanges or holes do not fit.
-        InvalidSolidError: when the kernel finds camera a's invalid; b's is its mirror image.
+    SpecError if flanges or holes do not fit, InvalidSolidError if the kernel finds camera a's
+    invalid; b's is its mirror image.
     """
-    name, maker = shell_record(array)["name"], Maker(mirrored=array.camera_id == "b")
+    name, maker = part_files("shell", array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
     mirrors = front_edges(maker, cells)
     casing = casing_faces(mirrors, envelope or shell_envelope(design))
@@ -150,11 +143,116 @@ def shell_properties(
 
 
 def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:
-    """Mesh of camera a's half; the envelope is worked out when it is not given.
-
-    Raises:
-        SpecError: when flanges or holes do not fit.
-    """
+    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given."""
     array = design.arrays[0]
     envelope = envelope or shell_envelope(design)
     return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)
+
+
+def mandrel_mesh(spec: Spec, cells: Cells, mandrel: Mandrel, distance: Floats) -> Mesh:
+    """Mesh of the negative of camera a's half; its mirrors' facets are those of `shell_mesh`."""
+    builder, outlines = front_facets(spec, cells, distance)
+    builder.triangles = [triangles[:, ::-1] for triangles in builder.triangles]
+    seam, foot = (
+        outlines.along(boundary_chain(cells, plane)) for plane in (cells.seam, cells.foot)
+    )
+    # Low y to high y: over the top from +x that turns right, round the front from +z left.
+    _meshed_plane(builder, seam[::-1], mandrel.seam_holes, np.stack([Y, Z]), FROM_X)
+    _meshed_plane(builder, foot, mandrel.foot_holes, np.stack([X, Y]), FROM_Z)
+    return builder.mesh()
+
+
+def _meshed_plane(
+    builder: MeshBuilder, ring: Ints, holes: Holes, axes: Floats, view: list[int]
+) -> None:
+    near, far = builder.holes(holes, axes)
+    builder.plane(view, ring, near, away=True)
+    for rim in far:
+        builder.plane(view, rim[::-1], [], away=True)
+
+
+def closing_faces(front: FrontEdges, mandrel: Mandrel) -> list[tuple[str, TopoDS_Face]]:
+    """Names and faces of everything but the mirrors and the walls of their pedestals."""
+    maker, cells = front.maker, front.cells
+    low, high = chain_ends(cells, boundary_chain(cells, cells.seam))
+    ends = cells.corners[low], cells.corners[high], front.vertices[low], front.vertices[high]
+    back = (maker.line(*ends), False)
+    seam = [*front.chain(cells.seam), back]
+    foot = reversed_ring([*front.chain(cells.foot), back])
+    base = mandrel.foot * Z
+    return [
+        *_plane_with_holes(front, "seam", 0 * X, seam, mandrel.seam_holes, (Y, Z)),
+        *_plane_with_holes(front, "foot", base, foot, mandrel.foot_holes, (X, Y)),
+    ]
+
+
+def _plane_with_holes(
+    front: FrontEdges,
+    name: str,
+    point: Floats,
+    ring: Ring,
+    holes: Holes,
+    axes: tuple[Floats, Floats],
+) -> list[tuple[str, TopoDS_Face]]:
+    """A joining plane, which looks against the holes' direction, their walls and bottoms."""
+    maker, outward = front.maker, -np.cross(*axes)
+    near, far, walls = hole_faces(maker, *holes.sizes, *axes)
+    bottoms = [
+        maker.face(maker.plane(centre + holes.direction, outward), [rim], natural=True)
+        for centre, rim in zip(holes.centre, far, strict=True)
+    ]
+    plane = maker.face(maker.plane(point, outward), [ring, *near], natural=True)
+    inner = (
+        ((f"{name}_hole_{k:02d}", wall), (f"{name}_bottom_{k:02d}", bottom))
+        for k, (wall, bottom) in enumerate(zip(walls, bottoms, strict=True), start=1)
+    )
+    return [(name, plane), *chain.from_iterable(inner)]
+
+
+def design_mandrel(design: MirrorDesign) -> Mandrel:
+    """What closes camera a's mirrors to a negative; SpecError if there is no room for its holes."""
+    array = design.arrays[0]
+    return mandrel_of(design.spec.shell, array.modelled_cells, array.ellipsoid)
+
+
+def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None:
+    """Write both negatives, the mandrel being a's, as STEP, STL and 3MF; or InvalidSolidError."""
+    mesh = camera_a_mandrel_mesh(design, mandrel)
+    for array in design.arrays:
+        files = part_files("mandrel", array)
+        write_half_mesh(folder, files, mesh, array)
+        solid = mandrel_solid(design, array, mandrel)
+        known = shell_properties(solid, array, negative=True)
+        write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
+
+
+def mandrel_solid(
+    design: MirrorDesign, array: MirrorArray, mandrel: Mandrel | None = None
+) -> Solid:
+    """Solid of one camera's negative, face by face; errors and the mandrel as of `camera_solid`."""
+    name, maker = part_files("mandrel", array)["name"], Maker(mirrored=array.camera_id == "b")
+    cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
+    front = front_edges(maker, cells)
+    closing = closing_faces(front, mandrel or design_mandrel(design))
+    names = [*array.ids, *wall_names(array.ids, cells)]
+    mirrors_and_walls = reversed_faces([*front.faces(), *front.walls()])
+    faces = [*zip(names, mirrors_and_walls, strict=True), *closing]
+    solid = maker.solid([face for _, face in faces])
+    return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))
+
+
+def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:
+    """Mesh of camera a's negative; the mandrel is worked out (or SpecError) where not given."""
+    array = design.arrays[0]
+    mandrel = mandrel or design_mandrel(design)
+    return mandrel_mesh(design.spec, array.modelled_cells, mandrel, array.apex_distance)
+
+
+def mandrel_record(array: MirrorArray, mandrel: Mandrel) -> MandrelRecord:
+    """What design.json says of one negative: its files, and how the shell comes off."""
+    draft = mandrel.draft
+    pull = draft.pull * FLIP_X if array.camera_id == "b" else draft.pull
+    degrees = round(float(np.degrees(draft.angle)), DRAFT_DIGITS)
+    return MandrelRecord(
+        **part_files("mandrel", array), pull=(pull + 0.0).tolist(), draft_deg=degrees
+    )

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from tbcad.core.geometry.conics import Spheroid
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid, Spheroid
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.cells import Cells
@@ -27,17 +26,13 @@ from tbcad.types import Floats
 # Points on each arc: between two of them a normal turns by so little that draft changes by less
 # than 0.01 degrees.
 ARC_SAMPLES = 9
-# Below any length of the shortest vector among averages of unit vectors that have a direction.
-NO_DIRECTION = 1e-9
+NO_DIRECTION = 1e-9  # below any length of the shortest average of unit vectors with a direction
 PULL_DIGITS = 9
 X, _, Z = np.eye(3)
-# Depth of a blind hole in its diameter: a thread in aluminium holds as much as its screw.
-DEPTH_DIAMETERS = 2.0
+DEPTH_DIAMETERS = 2.0  # of a blind hole: a thread in aluminium then holds as much as its screw
 INSET_STEP_MM = 1.0
-# Where the distance of a hole from the mirrors is looked at: round it, and along it.
-ROUND, ALONG = 24, 5
-# Sizes of holes that are tried for a remedy, as shares of those that do not fit.
-REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)
+ROUND, ALONG = 24, 5  # places where the distance of a hole from the mirrors is looked at
+REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)  # of holes that do not fit, tried for a remedy
 
 
 @dataclass(frozen=True)
@@ -49,11 +44,7 @@ class Draft:
 
 
 def draft_of(cells: Cells) -> Draft:
-    """The pull with the largest draft; where walls catch whatever it is, the mirrors' best pull.
-
-    Args:
-        cells: of the modelled surfaces.
-    """
+    """The pull with the largest draft; where walls catch whatever it is, the mirrors' best pull."""
     mirrors = _mirror_normals(cells)
     every = np.concatenate([mirrors, _wall_normals(cells)])
     pull = best_pull(every)
@@ -117,11 +108,7 @@ class Mandrel:
 
 
 def mandrel_of(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Mandrel:
-    """Holes and draft of the negative of camera a's half.
-
-    Raises:
-        SpecError: when there is no room for the holes; it says which would fit.
-    """
+    """Holes and draft of camera a's negative; SpecError, with what fits, if there is no room."""
     holes = _inset_holes(shell, cells, ellipsoid)
     if holes is None:
         raise SpecError(_no_room(shell, cells, ellipsoid))
@@ -137,8 +124,8 @@ def _inset_holes(
 ) -> tuple[Holes, Holes] | None:
     """Holes of seam and foot as near the mirrors as the wall allows; None where none fit."""
     found = []
-    for place in (_seam_holes, _foot_holes):
-        tried = place(shell, ellipsoid, _foot(cells))
+    for seam in (True, False):
+        tried = _holes(shell, ellipsoid, _foot(cells), seam)
         holes = next((one for one in tried if _clear(one, cells.mirror_surfaces, shell)), None)
         if holes is None:
             return None
@@ -146,31 +133,20 @@ def _inset_holes(
     return found[0], found[1]
 
 
-def _seam_holes(shell: ShellSpec, ellipsoid: Ellipsoid, foot: float) -> Iterator[Holes]:
-    flange = shell.seam_flange
-    low = foot + shell.wall_mm + _radius(flange)
-    for spheroid in _inner_spheroids(ellipsoid, shell.wall_mm + _radius(flange)):
+def _holes(shell: ShellSpec, ellipsoid: Ellipsoid, foot: float, seam: bool) -> Iterator[Holes]:
+    """Holes of seam or foot along ever smaller spheroids."""
+    flange = shell.seam_flange if seam else shell.foot_flange
+    rim = shell.wall_mm + _radius(flange)
+    for inset in np.arange(rim, ellipsoid.semi_minor, INSET_STEP_MM).tolist():
+        spheroid = Spheroid(ellipsoid, -inset)
         try:
-            line = arc_over_top(spheroid, 0.0, low)
-            yield flange_holes(flange, line, _depth(flange) * X, 0.0)
+            if seam:
+                line = arc_over_top(spheroid, 0.0, foot + rim)
+            else:
+                line = arc_around(spheroid, _depth(shell.seam_flange) + rim, foot, foot)
+            yield flange_holes(flange, line, _depth(flange) * (X if seam else Z), 0.0)
         except (ValueError, SpecError):  # the plane misses, or the line is too short
             return
-
-
-def _foot_holes(shell: ShellSpec, ellipsoid: Ellipsoid, foot: float) -> Iterator[Holes]:
-    flange = shell.foot_flange
-    behind_seam = _depth(shell.seam_flange) + shell.wall_mm + _radius(flange)
-    for spheroid in _inner_spheroids(ellipsoid, shell.wall_mm + _radius(flange)):
-        try:
-            line = arc_around(spheroid, behind_seam, foot, foot)
-            yield flange_holes(flange, line, _depth(flange) * Z, 0.0)
-        except (ValueError, SpecError):
-            return
-
-
-def _inner_spheroids(ellipsoid: Ellipsoid, first: float) -> Iterator[Spheroid]:
-    for inset in np.arange(first, ellipsoid.semi_minor, INSET_STEP_MM).tolist():
-        yield Spheroid(ellipsoid, -inset)
 
 
 def _radius(flange: FlangeSpec) -> float:

@@ -10,15 +10,13 @@ from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.spec.design import Spec
-from tbcad.shell.casing_edges import ARC_ENDS, boundary_chain, casing_lines, outline
 from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
-from tbcad.shell.envelope import Envelope, Holes
+from tbcad.shell.envelope import ARC_ENDS, Envelope, Holes, boundary_chain, casing_lines, outline
 from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.types import Floats, Ints
 
 MIN_HOLE_SEGMENTS = 24
-# Rounding noise of 1e-15 mm on the joining faces is no geometry: they are flat to the last bit.
-ROUNDED_DIGITS = 12
+ROUNDED_DIGITS = 12  # joining faces are flat to the last bit: noise of 1e-15 mm is no geometry
 X, Y, Z = np.eye(3)
 # Coordinates in which a ring that runs counter-clockwise seen from +x, or +z, turns left.
 FROM_X, FROM_Z = [1, 2], [0, 1]
@@ -44,14 +42,7 @@ def wall_facets(cells: PedestalCells, outlines: CellOutlines) -> Ints:
 
 
 def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:
-    """Mesh of camera a's half.
-
-    Args:
-        spec: design with the mesh tolerances.
-        cells: camera a's cells of the modelled surfaces.
-        envelope: what closes them.
-        distance: from each mirror to the object, mm, (m,).
-    """
+    """Mesh of camera a's half within tolerances; distances of mirrors to the object (m,), mm."""
     builder, outlines = front_facets(spec, cells, distance)
     _add_casing(builder, cells, outlines, envelope)
     return builder.mesh()
@@ -137,13 +128,9 @@ class MeshBuilder:
         return near, far
 
     def plane(self, view: list[int], ring: Ints, holes: list[Ints], away: bool = False) -> None:
-        """A planar face with holes.
+        """A planar face with holes; away: it looks away from the view.
 
-        Args:
-            view: the two coordinates in which the outer ring turns left and the holes right.
-            ring: vertices round the face.
-            holes: vertices round each hole.
-            away: whether the face looks away from that view.
+        In the two coordinates of the view the outer ring turns left and the holes right.
         """
         rings = [ring, *holes]
         polygons = [self.points[ring][:, view] for ring in rings]

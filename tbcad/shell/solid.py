@@ -15,15 +15,15 @@ from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.cells import Arcs, Cells
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
-from tbcad.shell.casing_edges import (
+from tbcad.shell.envelope import (
     ARC_ENDS,
+    Envelope,
     boundary_chain,
     casing_arcs,
     casing_lines,
     chain_ends,
     outline,
 )
-from tbcad.shell.envelope import Envelope
 from tbcad.types import Floats, Ints
 
 Edges = dict[str, list[Side]]

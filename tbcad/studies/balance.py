@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import Sensor, count_pixels, virtual_cameras
-from tbcad.light.simulate.capture.traced_frame import traced_light_field
+from tbcad.light.simulate.capture.light_field import traced_light_field
+from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -28,13 +26,16 @@ from tbcad.light.simulate.views.viewpoints import (
     viewpoints_over_hemisphere,
     views_by,
 )
-from tbcad.studies.paper import with_lens_of_table_i
-from tbcad.studies.sweep import MAX_N, try_design
+from tbcad.studies.paper import MAX_N, try_design, with_lens_of_table_i
 from tbcad.types import Bools, Bytes, Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
 NEAR, FAR = 0.3, 0.98  # radius of the ball, in that of the capture sphere
 GLOSS = 1.0  # highlights as bright as the lamps
+BEST_COLUMNS = (
+    *("surface", "radius_mm", "n", "virtual_cameras", "pixels", "cameras_per_pixel"),
+    "ssim_on_object",
+)
 COLUMNS = ("n", "virtual_cameras", "pixels", "surface", "radius_mm", "ssim_on_object", "reason")
 NOTES = (
     "ssim_on_object: mean of the local SSIM where the truth shows the object, over all views of "
@@ -67,8 +68,7 @@ class Subject:
 def parse_subdivisions(given: list[int] | None) -> tuple[int, ...]:
     """Subdivisions n in ascending order, each once; by default SUBDIVISIONS.
 
-    Raises:
-        InputError: no design has one of them.
+    InputError: no design has one of them.
     """
     ns = tuple(sorted(set(given or SUBDIVISIONS)))
     if ns[0] < 2 or ns[-1] > MAX_N:
@@ -85,16 +85,7 @@ def balance(
     method: StudyMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
-    """The study: SSIM of views over n at the design's sensor, for four objects.
-
-    Args:
-        spec: the design.
-        ns: subdivisions.
-        views: number of viewpoints, evenly over the hemisphere.
-        distance_mm: of the viewpoints.
-        method: how views are made.
-        progress: called with each step.
-    """
+    """The study: SSIM of views over n at the design's sensor, for four objects."""
     spec = with_lens_of_table_i(spec)
     viewpoints = viewpoints_over_hemisphere(views, distance_mm)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
@@ -103,7 +94,9 @@ def balance(
     table = Table.of_records("balance", records, (f"Method: {method}.", *NOTES), COLUMNS)
     best = [one for subject in seen for one in _best(table, subject)]
     panels = (_panel(table, seen, method),)
-    return Study("balance", tuple(map(_figure, best)), (table, _best_table(best)), panels)
+    figures = (Figure(f"{one['object']}: best n", "", one["n"], where="section 6") for one in best)
+    bests = Table.of_records("balance-best", best, columns=BEST_COLUMNS)
+    return Study("balance", tuple(figures), (table, bests), panels)
 
 
 def subjects(capture_mm: float, cameras: list[Camera], progress: Progress) -> list[Subject]:
@@ -133,15 +126,11 @@ def _of_n(
     if attempt.design is None:
         return [head]
     head |= _counts(attempt.design)
-    rows = []
-    for subject in seen:
-        progress(f"n = {n}: {subject.name}")
-        value = ssim_on_object(attempt.design, subject, cameras, method)
-        own: Record = {
-            "surface": subject.surface,
-            "radius_mm": subject.radius_mm,
-            "ssim_on_object": value,
-        }
+    rows: list[Record] = []
+    for one in seen:
+        progress(f"n = {n}: {one.name}")
+        value = ssim_on_object(attempt.design, one, cameras, method)
+        own: Record = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
         rows.append({**head, **own})
     return rows
 
@@ -179,15 +168,6 @@ def _best(table: Table, subject: Subject) -> list[Record]:
     best = max(rows, key=lambda row: float(row["ssim_on_object"] or 0))
     ratio = float(best["virtual_cameras"] or 0) / float(best["pixels"] or 1)
     return [{**best, "cameras_per_pixel": ratio, "object": subject.name}]
-
-
-def _best_table(best: list[Record]) -> Table:
-    columns = ("surface", "radius_mm", "n", "virtual_cameras", "pixels", "cameras_per_pixel")
-    return Table.of_records("balance-best", best, columns=(*columns, "ssim_on_object"))
-
-
-def _figure(best: Record) -> Figure:
-    return Figure(f"{best['object']}: best n", "", best["n"], where="section 6")
 
 
 def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> PlotPanel:

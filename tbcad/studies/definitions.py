@@ -4,12 +4,12 @@ from functools import cache
 
 import numpy as np
 
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Record, Table
 from tbcad.common.schedule import run_units
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions
 from tbcad.core.spec.design import Spec
-from tbcad.light.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.photograph import (
     PixelCounts,
     Sensor,
     count_pixels,
@@ -21,9 +21,9 @@ from tbcad.studies.paper import (
     BalancedSensor,
     balanced_sensors,
     is_table_i,
+    try_design,
     with_lens_of_table_i,
 )
-from tbcad.studies.sweep import try_design
 from tbcad.types import Floats, Progress
 
 NOTES = (
@@ -64,10 +64,7 @@ def definitions(
 ) -> tuple[Table, Table]:
     """Every definition for rows of Table II, and how far each is from its columns.
 
-    Args:
-        spec: the design, whose n and sensor are those of the rows, one after the other.
-        rows: of Table II.
-        progress: called with each design that is done.
+    n and sensor of the design are those of the rows, one after the other.
     """
     spec = with_lens_of_table_i(spec)
     units = [(row, radii) for row in reversed(rows) for radii in RADII]
@@ -156,23 +153,17 @@ def _fits(table: Table, *, known: bool) -> list[Record]:
         rows = table.where(definition=definition, radii=radii)
         fit: Record = {"definition": definition, "radii": radii}
         for name, column in zip(FIT_COLUMNS[2:], (NUMBER, RESOLUTION), strict=True):
-            off = _rms_percent(rows.numbers("value"), rows.numbers(f"paper_{column}"))
+            share = rows.numbers("value") / rows.numbers(f"paper_{column}")
+            off = float(100 * np.sqrt(np.mean((share - 1) ** 2)))
             fit[name] = off if known and np.isfinite(off) else None
         fits.append(fit)
     return fits
 
 
-def _rms_percent(values: Floats, columns: Floats) -> float:
-    return float(100 * np.sqrt(np.mean((values / columns - 1) ** 2)))
-
-
 def apices_in_frame(spec: Spec, n: int, pitch: float) -> int:
     """Apices of both arrays in their cameras' frames; those on the seam count for both.
 
-    Args:
-        spec: optics and lens; sensor of its shape.
-        n: subdivision.
-        pitch: from the vertical toward the object, radians; rows of pixels lie along y.
+    `pitch`: from the vertical toward the object, radians; rows of pixels lie along y.
     """
     camera = with_lens_of_table_i(spec).camera
     half_width = np.tan(np.radians(camera.hfov_deg) / 2)

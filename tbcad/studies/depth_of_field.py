@@ -4,22 +4,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
-from tbcad.core.camera.lens import (
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.core.camera.requirements import (
+    FANS,
+    PLACES,
     DepthRange,
     Lens,
+    VirtualImages,
     aperture_stop,
     aperture_stops,
     focal_length,
     lens_for,
+    virtual_images,
 )
-from tbcad.core.camera.requirements import FANS, PLACES, VirtualImages, virtual_images
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.studies.paper import claimed, claims, with_lens_of_table_i
-from tbcad.studies.sweep import try_design
+from tbcad.studies.paper import claimed, claims, try_design, with_lens_of_table_i
 from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")
@@ -82,11 +82,7 @@ class LensOptions:
     wide_open: float = 2.8  # F-number of the lens fully open
 
     def checked(self) -> "LensOptions":
-        """These, when all are above 0 to 1000.
-
-        Raises:
-            InputError: one is not.
-        """
+        """These, when all are above 0 to 1000; InputError: one is not."""
         for option, value in vars(self).items():
             if not 0 < value <= MAX_OPTION:
                 name = "--" + option.replace("_", "-")

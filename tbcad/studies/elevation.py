@@ -1,18 +1,47 @@
-"""Mirrors over their angles: radius over polar angle (section 5.1), pixels over elevation (4.2)."""
+"""Mirrors over n and over angles: sphere seen whole (Fig. 5c), radii (5.1), pixels (4.2)."""
+
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorArray, design
 from tbcad.core.spec.design import Spec, spec_with
-from tbcad.light.simulate.capture.pixel_counts import PixelCounts, Sensor, count_pixels
-from tbcad.studies.paper import with_lens_of_table_i
+from tbcad.light.simulate.capture.photograph import (
+    PixelCounts,
+    Sensor,
+    count_pixels,
+    virtual_cameras,
+)
+from tbcad.studies.paper import DesignAttempt, claims, for_each_n, try_design, with_lens_of_table_i
 from tbcad.types import Floats, Progress
 
+RULES = ("flat", "paper", "traced")
+# By more than rounding in the coverage that the search for radii leaves.
+SHORT_BY = 1e-5
+AREA_CURVES = {
+    "traced_minimum_mm": ("traced radii, minimum", "C2.-"),
+    "paper_median_mm": ("eqs. 1 and 2, median", "C1.--"),
+    "paper_minimum_mm": ("eqs. 1 and 2, minimum", "C1.-"),
+    "flat_median_mm": ("flat, median", "C0.--"),
+    "flat_minimum_mm": ("flat, minimum", "C0.-"),
+    "flat_closed_form_mm": ("flat, 2 d sin(min theta_0)", "k:"),
+    "paper_claim_flat_mm": ("the paper: flat", "k+"),
+    "paper_claim_convex_mm": ("the paper: convex", "kx"),
+}
+AREA_NOTES = (
+    "flat_closed_form_mm: 2 d sin(min theta_0), the largest sphere that every flat mirror sees "
+    "whole when its neighbours bound it on all sides.",
+    "Other figures: exact coverage diameter, twice the minimum distance from the centre of the "
+    "rays off a mirror's edge, of all mirrors of a half. Edges at the foot count, at the seam only "
+    "for mirrors that it does not halve. mirrors_short: number of mirrors below the capture "
+    "diameter.",
+    "Radii: flat: none; paper: eqs. 1 and 2; traced: exact coverage of the capture diameter and "
+    "mirrors.margin_mm, or more where a mirror is nearly flat.",
+    "Of the paper's curve of flat mirrors we know n = 4 and n = 18.",
+)
 CURVES = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}
 RADIUS_PLACE = "section 5.1"
 PIXELS_PLACE = "section 4.2, Fig. 7b"
@@ -31,6 +60,75 @@ NOTES = (
     "Correlation: Pearson's coefficient over all mirrors. The paper states correlations, no "
     "coefficient.",
 )
+
+
+def capture_area(
+    spec: Spec, ns: range, progress: Progress = lambda _: None, scheduler: str | None = None
+) -> Study:
+    """The study: coverage of flat and convex mirrors for every n."""
+    records = for_each_n(partial(_area_record, spec), ns, progress, scheduler)
+    table = Table.of_records("capture-area", records, AREA_NOTES)
+    n = table.numbers("n")
+    curves = (
+        Series(label, n, table.numbers(c), style) for c, (label, style) in AREA_CURVES.items()
+    )
+    title = f"Capture diameter, {spec.optics.capture_diameter_mm:g} mm wanted"
+    return Study(
+        "capture-area",
+        tuple(figure for record in records for figure in _area_figures(record)),
+        (table,),
+        (PlotPanel(title, "subdivision n", "diameter seen whole, mm", tuple(curves)),),
+    )
+
+
+def _area_record(spec: Spec, n: int) -> Record:
+    """One row: the figures of all radius rules at one n."""
+    attempts = {
+        rule: try_design(spec, optics={"n": n}, mirrors={"radius_rule": rule}) for rule in RULES
+    }
+    array = next((attempt.array for attempt in attempts.values() if attempt.array), None)
+    record: Record = {"n": n, "virtual_cameras": None, "flat_closed_form_mm": None}
+    if array:
+        smallest = float(np.sin(array.theta0.min()))
+        record["virtual_cameras"] = virtual_cameras(array)
+        record["flat_closed_form_mm"] = 2 * array.ellipsoid.camera_distance * smallest
+    for rule, attempt in attempts.items():
+        coverage = _coverage(attempt, spec.optics.capture_diameter_mm)
+        record |= {f"{rule}_{name}": cell for name, cell in coverage.items()}
+    flat, convex = claims().get(f"flat_capture_n{n}"), claims()["convex_capture"]
+    record["paper_claim_flat_mm"] = flat.value if flat else None
+    record["paper_claim_convex_mm"] = convex.value if n == claims()["design_n"].value else None
+    return record
+
+
+def _coverage(attempt: DesignAttempt, capture_mm: float) -> dict[str, Cell]:
+    if attempt.array is None:
+        empty = dict.fromkeys(("minimum_mm", "median_mm", "mirrors_short"))
+        return {**empty, "reason": attempt.reason}
+    coverage = attempt.array.coverage
+    return {
+        "minimum_mm": float(coverage.min()),
+        "median_mm": float(np.median(coverage)),
+        "mirrors_short": int((coverage < capture_mm * (1 - SHORT_BY)).sum()),
+        "reason": "",
+    }
+
+
+def _area_figures(record: Record) -> list[Figure]:
+    n, where = record["n"], claims()["convex_capture"].where
+    figures = {
+        f"flat, n = {n}, 2 d sin(min theta_0)": ("flat_closed_form_mm", "paper_claim_flat_mm"),
+        f"flat, n = {n}, exact minimum": ("flat_minimum_mm", "paper_claim_flat_mm"),
+    }
+    for rule in ("paper", "traced"):
+        for kind in ("minimum", "median"):
+            name = f"convex, n = {n}, {rule} radii, exact {kind}"
+            figures[name] = (f"{rule}_{kind}_mm", "paper_claim_convex_mm")
+    return [
+        Figure(name, "mm", record[ours], record[paper], where)
+        for name, (ours, paper) in figures.items()
+        if record[paper] is not None
+    ]
 
 
 def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
@@ -96,19 +194,15 @@ def _correlations(rule: str, array: MirrorArray) -> list[Record]:
 
 def _pixel_correlations(mirrors: Table) -> list[Record]:
     """What section 4.2 says of mirrors in higher positions, and section 6 of those nearby."""
-    elevation = ("elevation", mirrors.numbers("elevation_deg"))
-    to_object = ("distance from the object", mirrors.numbers("to_object_mm"))
-    area = ("area", mirrors.numbers("area_mm2"))
+    pairs = (
+        ("pixels", "seeing_px", "elevation", "elevation_deg", PIXELS_PLACE),
+        ("area", "area_mm2", "elevation", "elevation_deg", PIXELS_PLACE),
+        ("distance from the camera", "to_camera_mm", "elevation", "elevation_deg", PIXELS_PLACE),
+        ("area", "area_mm2", "distance from the object", "to_object_mm", UNEVEN_PLACE),
+    )
     return [
-        _correlated("traced", ("pixels", mirrors.numbers("seeing_px")), elevation, PIXELS_PLACE),
-        _correlated("traced", area, elevation, PIXELS_PLACE),
-        _correlated(
-            "traced",
-            ("distance from the camera", mirrors.numbers("to_camera_mm")),
-            elevation,
-            PIXELS_PLACE,
-        ),
-        _correlated("traced", area, to_object, UNEVEN_PLACE),
+        _correlated("traced", (of, mirrors.numbers(one)), (to, mirrors.numbers(other)), where)
+        for of, one, to, other, where in pairs
     ]
 
 

@@ -4,21 +4,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import Shift
-from tbcad.light.simulate.views.ground_truth import disc_points, lens_picture, pixel_points
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.simulate.views.refocus import ThinLens, refocus
+from tbcad.light.simulate.views.refocus import (
+    ThinLens,
+    disc_points,
+    lens_picture,
+    pixel_points,
+    refocus,
+)
 from tbcad.light.simulate.views.viewpoints import (
     Viewpoints,
     ground_truths,
@@ -72,11 +75,7 @@ class BlurOptions:
     samples: int = 2
 
     def checked(self) -> "BlurOptions":
-        """These, when all are above 0 to 16.
-
-        Raises:
-            InputError: one is not.
-        """
+        """These, when all are above 0 to 16; InputError: one is not."""
         for option, values in (("--filter-px", self.separations_px), ("--lens-px", self.lens_px)):
             for value in values:
                 if not 0 < value <= MAX_SPREAD_PX:
@@ -117,15 +116,7 @@ def low_pass(
 ) -> Study:
     """The study: captures with each blur, and views of each against the truth.
 
-    Args:
-        export: a design with its prototype.
-        subject: the object.
-        viewpoints: directions of all views; the distance is that of the pinholes.
-        options: the blurs.
-        progress: called with each step.
-
-    Raises:
-        InputError: there is no prototype in the export.
+    The distance of the viewpoints is that of the pinholes. InputError: the export has no prototype.
     """
     targets = _targets(export, subject, viewpoints, progress)
     records: list[Record] = []
@@ -137,7 +128,7 @@ def low_pass(
         relative = contrast / sharpest.setdefault(case.geometry, contrast)
         head: Record = {"geometry": case.geometry, "blur": case.name, "px": case.px}
         for kind, quality in _views(MirrorTiles(light_field), targets, progress).items():
-            for row in _rows(viewpoints, quality):
+            for row in Table.of_columns("", {**viewpoints.angles(), **quality}).records():
                 records.append({**head, "view": kind, **row, "photograph_contrast": relative})
     table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *NOTES))
     means = Table.of_records("low-pass-means", _means(table))
@@ -158,11 +149,6 @@ def _targets(
         lens_truths.append(to_bytes(lens_picture(scene, view, focus, TRUTH_RAYS)))
     truths = ground_truths(scene, pinholes, progress)
     return _Targets(scene, pinholes, truths, lenses, lens_truths, focus)
-
-
-def _rows(viewpoints: Viewpoints, quality: dict[str, Floats]) -> list[Record]:
-    angles = {"elevation_deg": viewpoints.elevation_deg, "azimuth_deg": viewpoints.azimuth_deg}
-    return Table.of_columns("", {**angles, **quality}).records()
 
 
 def _contrast(light_field: LightField) -> float:
@@ -227,41 +213,35 @@ def _figures(means: Table) -> tuple[Figure, ...]:
 
 
 def _panels(means: Table) -> tuple[PlotPanel, ...]:
+    names = tuple(_name(record) for record in means.where(view="pinhole").records())
+    place = np.arange(len(names), dtype=np.float64)
     labels = {
         "ssim": ("Similarity of views to the truth", "mean SSIM"),
         "blur_mm": ("Blur of views", "mean standard deviation at the object, mm"),
     }
+    kinds = (
+        ("pinhole", "pinhole at --distance", "C0o"),
+        ("aperture", "aperture of 80 mm at 160 mm", "C1s"),
+    )
+    bars = {
+        column: tuple(
+            Series(label, means.where(view=view).numbers(column), place, style)
+            for view, label, style in kinds
+        )
+        for column in labels
+    }
     return tuple(
-        PlotPanel(title, unit, "", _bars(means, column), names=tuple(_names(means)))
+        PlotPanel(title, unit, "", bars[column], names=names)
         for column, (title, unit) in labels.items()
     )
 
 
-def _names(means: Table) -> list[str]:
-    return [_name(record) for record in means.where(view="pinhole").records()]
-
-
-def _bars(means: Table, column: str) -> tuple[Series, ...]:
-    place = np.arange(len(_names(means)), dtype=np.float64)
-    series = []
-    for view, label, style in (
-        ("pinhole", "pinhole at --distance", "C0o"),
-        ("aperture", "aperture of 80 mm at 160 mm", "C1s"),
-    ):
-        series.append(Series(label, means.where(view=view).numbers(column), place, style))
-    return tuple(series)
-
-
 def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
-    """Rays of a pixel behind a birefringent low-pass filter.
+    """Rays of a pixel behind a birefringent low-pass filter: samples x samples for each image.
 
-    Two crossed plates split every point into four, at the corners of a square. Along rows and
-    columns f cycles a pixel pass by |cos(pi separation f)|, and 1 / (2 separation) not at all
-    (J. E. Greivenkamp, Applied Optics 29, 676, 1990).
-
-    Args:
-        separation_px: side of the square, pixels.
-        samples: each of the four images has samples x samples rays.
+    Two crossed plates split every point into four, at the corners of a square of this side. Along
+    rows and columns f cycles a pixel pass by |cos(pi separation f)|, and 1 / (2 separation) not at
+    all (J. E. Greivenkamp, Applied Optics 29, 676, 1990).
     """
     ends = (-separation_px / 2, separation_px / 2)
     return tuple(
@@ -273,12 +253,7 @@ def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
 
 
 def defocus_shifts(diameter_px: float, count: int) -> tuple[Shift, ...]:
-    """Rays of a pixel behind a lens out of focus, each through another point of both.
-
-    Args:
-        diameter_px: of the even blur circle, pixels.
-        count: number of rays.
-    """
+    """Rays of a pixel out of focus: points of an even blur circle and of the pixel."""
     circle = (disc_points(count) * diameter_px / 2).tolist()
     pairs = zip(circle, pixel_points(count), strict=True)
     return tuple((x + column, y + row) for (x, y), (column, row) in pairs)

@@ -1,12 +1,23 @@
-"""What the paper states: its figures in paper.csv, Table II in paper_table_ii.csv."""
+"""What the paper states (paper.csv, paper_table_ii.csv), and designs that differ in a few keys."""
 
 import csv
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import TypeVar
 
-from tbcad.core.mirrors.array import UNSTRETCHED
-from tbcad.core.spec.design import FIT, Spec
+from tbcad.common.results import Table
+from tbcad.common.schedule import run_units
+from tbcad.core.mirrors.array import UNSTRETCHED, MirrorArray, MirrorDesign, design
+from tbcad.core.spec.design import FIT, Spec, spec_with
+from tbcad.core.spec.errors import SpecError
+from tbcad.errors import InputError
+from tbcad.types import Floats, Progress
+
+Result = TypeVar("Result")
+
+MAX_N = 60
 
 
 @dataclass(frozen=True)
@@ -98,3 +109,53 @@ def has_optics_of_table_i(spec: Spec) -> bool:
 def _rows(name: str) -> list[dict[str, str]]:
     text = (files("tbcad.studies") / name).read_text(encoding="utf-8")
     return list(csv.DictReader(text.splitlines()))
+
+
+@dataclass(frozen=True)
+class DesignAttempt:
+    """A design, or why there is none."""
+
+    design: MirrorDesign | None  # None where the spec was refused
+    reason: str = ""  # what the refusal says, else ""
+
+    @property
+    def array(self) -> MirrorArray | None:
+        """Camera a with its mirrors."""
+        return self.design.arrays[0] if self.design else None
+
+
+def try_design(spec: Spec, **sections: dict[str, object]) -> DesignAttempt:
+    """The design of a spec with other values of some keys, or why there is none."""
+    try:
+        return DesignAttempt(design(spec_with(spec, **sections)))
+    except SpecError as error:
+        return DesignAttempt(None, str(error))
+
+
+def n_range(first: int, last: int) -> range:
+    """The subdivisions of a sweep, both ends included.
+
+    InputError: there are none, or no design may have them.
+    """
+    if not 1 <= first <= last <= MAX_N:
+        raise InputError(
+            f"n from {first} to {last}: allowed is 1 to {MAX_N}, the first no more than the "
+            "last: change --from or --to"
+        )
+    return range(first, last + 1)
+
+
+def for_each_n(
+    work: Callable[[int], Result], ns: range, progress: Progress, scheduler: str | None = None
+) -> list[Result]:
+    """Work for every n, results in the order of n.
+
+    With a Dask scheduler, given by its address, work must be fit for pickling; None: this machine.
+    """
+    # The largest take longest, so they are begun first.
+    return run_units(work, list(reversed(ns)), scheduler, lambda n: progress(f"n = {n}"))[::-1]
+
+
+def megapixels(table: Table) -> Floats:
+    """Millions of pixels of the sensors in a table's columns width_px and height_px, (k,)."""
+    return table.numbers("width_px") * table.numbers("height_px") / 1e6

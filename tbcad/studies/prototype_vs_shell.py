@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import ttest_rel
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Figure, PlotPanel, Series, Study, Table
 from tbcad.light.simulate.camera_photographs import photographed
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
     StudyMethod,
@@ -53,16 +51,8 @@ def prototype_vs_shell(
 ) -> Study:
     """The study: both light fields of one object, and the same views of both.
 
-    Args:
-        export: a design with its prototype.
-        subject: the object.
-        viewpoints: where the views are from.
-        method: how views are made.
-        samples: a pixel of a photograph is the mean of samples x samples rays.
-        progress: called with each step.
-
-    Raises:
-        InputError: there is no prototype in the export.
+    A pixel of a photograph is the mean of samples x samples rays. InputError: there is no prototype
+    in the export.
     """
     scene, views = prepared_scene(subject), viewpoints.cameras(export.capture_mm)
     truths = ground_truths(scene, views, progress)
@@ -74,14 +64,12 @@ def prototype_vs_shell(
     )
     facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
     columns = {
-        "elevation_deg": viewpoints.elevation_deg,
-        "azimuth_deg": viewpoints.azimuth_deg,
-        "shell_psnr_db": shell["psnr_db"],
-        "prototype_psnr_db": prototype["psnr_db"],
-        "shell_ssim": shell["ssim"],
-        "prototype_ssim": prototype["ssim"],
-        "shell_blur_mm": shell["blur_mm"],
-        "prototype_blur_mm": prototype["blur_mm"],
+        **viewpoints.angles(),
+        **{
+            f"{name}_{key}": quality[key]
+            for key in ("psnr_db", "ssim", "blur_mm")
+            for name, quality in (("shell", shell), ("prototype", prototype))
+        },
         "ssim_difference": prototype["ssim"] - shell["ssim"],
     }
     table = Table.of_columns("prototype", columns, (facts, *NOTES))

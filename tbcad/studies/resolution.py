@@ -5,12 +5,10 @@ from functools import partial
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import (
+from tbcad.light.simulate.capture.photograph import (
     PixelCounts,
     Sensor,
     allowed,
@@ -24,9 +22,11 @@ from tbcad.studies.paper import (
     RESOLUTION,
     TABLE_II,
     balanced_sensors,
+    for_each_n,
+    megapixels,
+    try_design,
     with_lens_of_table_i,
 )
-from tbcad.studies.sweep import for_each_n, megapixels, try_design
 from tbcad.types import Floats, Progress
 
 MULTIPLES = (0.5, 1, 2, 4)  # of the sides of the design's sensor: those of Table II
@@ -65,11 +65,7 @@ class Ratio:
 
 
 def parse_ratio(text: str) -> Ratio:
-    """A ratio from text like 1:4.
-
-    Raises:
-        InputError: it is none, or not of numbers above 0 to 1000.
-    """
+    """A ratio from text like 1:4; InputError: it is none, or not of numbers above 0 to 1000."""
     cameras, _, pixels = text.partition(":")
     try:
         ratio = Ratio(float(cameras), float(pixels))
@@ -92,15 +88,9 @@ def default_sensors(spec: Spec) -> tuple[Sensor, ...]:
 def balance(n: Floats, cameras: Floats, pixels: Floats, ratio: Ratio) -> tuple[float, int]:
     """Where cameras : pixels is the ratio, and where in the sweep it comes nearest to that.
 
-    Args:
-        n: subdivisions in ascending order, (k,).
-        cameras: number of virtual cameras, (k,); NaN where there was no design.
-        pixels: average pixels of one, (k,).
-        ratio: of cameras to pixels that is asked for.
-
-    Returns:
-        n on a continuous scale, NaN when it lies outside the sweep; and the place in the sweep of
-        the n whose own ratio comes nearest.
+    Of n in ascending order, virtual cameras, NaN where there was no design, and average pixels of
+    one, (k,) each: n on a continuous scale, NaN when it lies outside the sweep; and the place in
+    the sweep of the n whose own ratio comes nearest.
 
     Cameras grow and pixels shrink with n^2, so the logarithm of their ratio is nearly a straight
     line over log n: linear between two neighbours it errs by less than 0.01 in n.
@@ -128,13 +118,8 @@ def resolution(
 ) -> Study:
     """The study: counts for every n and sensor, and the n that balances them.
 
-    Args:
-        spec: the design; the table of definitions has the n of Table II.
-        ns: subdivisions to try.
-        sensors: in place of the design's.
-        ratios: of virtual cameras to average pixels.
-        progress: called with each step.
-        scheduler: address of a Dask scheduler; None for this machine's cores.
+    The table of definitions has the n of Table II. A Dask scheduler is given by its address; None:
+    this machine's cores.
     """
     spec = with_lens_of_table_i(spec)
     by_n = for_each_n(partial(_counts, spec, sensors), ns, progress, scheduler)

@@ -10,15 +10,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import linregress
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.capture.files import create_light_field, write_camera
 from tbcad.light.simulate.capture.light_field import NAME, LightField
-from tbcad.light.simulate.capture.light_field_writer import create_light_field, write_camera
-from tbcad.light.simulate.capture.photograph import photograph
-from tbcad.light.simulate.capture.pixel_counts import Sensor
+from tbcad.light.simulate.capture.photograph import Sensor, photograph
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
@@ -31,8 +28,13 @@ from tbcad.light.simulate.views.viewpoints import (
     ground_truths,
     view_quality,
 )
-from tbcad.studies.paper import balanced_sensors, claims, with_lens_of_table_i
-from tbcad.studies.sweep import megapixels, try_design
+from tbcad.studies.paper import (
+    balanced_sensors,
+    claims,
+    megapixels,
+    try_design,
+    with_lens_of_table_i,
+)
 from tbcad.types import Bytes, Progress
 
 MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim_sd")
@@ -77,16 +79,7 @@ def ssim(
     method: StudyMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
-    """The study: captures with every sensor, and views of each against the truth.
-
-    Args:
-        spec: the design; sensor and n are varied.
-        subject: the object.
-        sensors: in place of the design's.
-        viewpoints: where the views are from.
-        method: how views are made.
-        progress: called with each step.
-    """
+    """The study: captures with every sensor and its n, and views of each against the truth."""
     spec, scene = with_lens_of_table_i(spec), prepared_scene(subject)
     truths = ground_truths(scene, viewpoints.cameras(spec.optics.capture_diameter_mm), progress)
     compared = partial(_compared, spec, scene, viewpoints, truths, method, progress)
@@ -117,13 +110,8 @@ def _compared(
         with _light_field(attempt.design, scene, progress) as light_field:
             tiles = MirrorTiles(light_field)
             quality = view_quality(tiles, scene, cameras, truths, method, progress)
-    columns = {
-        "elevation_deg": viewpoints.elevation_deg,
-        "azimuth_deg": viewpoints.azimuth_deg,
-        **quality,
-    }
     head: Record = {**asdict(sensor), "n": n}
-    views = Table.of_columns("", columns).records()
+    views = Table.of_columns("", {**viewpoints.angles(), **quality}).records()
     return [{**head, **view, "reason": attempt.reason} for view in views]
 
 

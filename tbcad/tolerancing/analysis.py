@@ -7,12 +7,11 @@ from typing import Any
 
 from tbcad.common import schedule
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
-from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.options.tolerances import ToleranceOptions
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
+from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,
@@ -47,10 +46,8 @@ from tbcad.tolerancing.stages import (
 )
 from tbcad.types import Floats
 
-# Simulated builds in each step of a search; the process itself has as many as asked for.
-SEARCH_BUILDS = 100
-# Builds whose pictures are simulated.
-PHOTOGRAPHED_BUILDS = 2
+SEARCH_BUILDS = 100  # in each step of a search; the process itself has as many as asked for
+PHOTOGRAPHED_BUILDS = 2  # builds whose pictures are simulated
 
 
 @dataclass(frozen=True)
@@ -65,29 +62,19 @@ class ProcessOption:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Result of an analysis.
-
-    Attributes:
-        target: minimum coverage of a good build, mm.
-        cameras: camera a and b as designed.
-        edge_models: the same for the fast model.
-        single_errors: effect of each kind of error by itself, the largest loss first.
-        process_options: every built-in process, or this one alone.
-        margin: that this process needs; None where it was not searched for.
-        prototype: None where the export has none.
-    """
+    """Result of an analysis."""
 
     process: Process
     options: ToleranceOptions
-    target: float
-    cameras: tuple[Reflector, Reflector]
-    edge_models: EdgeModels
+    target: float  # minimum coverage of a good build, mm
+    cameras: tuple[Reflector, Reflector]  # camera a and b as designed
+    edge_models: EdgeModels  # the same for the fast model
     result: ShellResult
-    single_errors: tuple[SingleErrorEffect, ...]
-    process_options: tuple[ProcessOption, ...]
-    margin: Margin | None
+    single_errors: tuple[SingleErrorEffect, ...]  # each kind by itself, the largest loss first
+    process_options: tuple[ProcessOption, ...]  # every built-in process, or this one alone
+    margin: Margin | None  # that this process needs; None where it was not searched for
     sharpness: Sharpness
-    prototype: PrototypeResult | None
+    prototype: PrototypeResult | None  # None where the export has none
 
     def __repr__(self) -> str:
         builds = len(self.result.worst)
@@ -106,10 +93,13 @@ def analyse(
 ) -> Analysis:
     """Simulate many builds of an export by a process, and find what limits their yield.
 
-    Raises:
-        InputError: mirrors are planar, or the scheduler cannot be reached.
+    InputError if mirrors are planar, or the scheduler cannot be reached.
     """
-    _refuse_planar(export)
+    if not (export.reflectors[0].mirrors.curvature > 0).all():
+        raise InputError(
+            f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
+            "with --radius-rule traced"
+        )
     errors = process_errors(process, export.spec.mirrors.coating_um)
     simulator = _Simulator(export, options, edge_models(export.reflectors))
     options.progress(builds_stage(options.builds, process.name))
@@ -139,14 +129,6 @@ def analyse(
         process, options, export.capture_mm, export.reflectors, simulator.edge_models, result,
         single_errors, process_options, own_margin, sharp, prototype,
     )  # fmt: skip
-
-
-def _refuse_planar(export: ExportedDesign) -> None:
-    if not (export.reflectors[0].mirrors.curvature > 0).all():
-        raise InputError(
-            f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
-            "with --radius-rule traced"
-        )
 
 
 @dataclass(frozen=True)

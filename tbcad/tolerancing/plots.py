@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.common.results.plots import PlotPanel, Series
+from tbcad.common.results import PlotPanel, Series
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
@@ -12,8 +12,7 @@ from tbcad.tolerancing.montecarlo.edge_model import EdgeModel
 from tbcad.tolerancing.montecarlo.form import ray_spread
 from tbcad.types import Floats
 
-# Share of the builds whose coverage lies below what the map shows.
-LOW_SHARE = 0.05
+LOW_SHARE = 0.05  # share of the builds whose coverage lies below what the map shows
 MICROMETRE = 1e-3  # mm
 
 

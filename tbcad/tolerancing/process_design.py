@@ -9,20 +9,21 @@ from tbcad.core.mirrors.array import design
 from tbcad.core.spec.design import EdgeKind, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
-from tbcad.options.tolerances import check_yield
+from tbcad.options.builds import check_yield
 from tbcad.tolerancing.margin import (
     STEP_MM,
     SeeingPixels,
     margin,
+    own_margins,
     seeing_pixels,
     solved_designs,
     with_margin,
+    with_own_margins,
 )
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.sharpness import view_ssims
-from tbcad.tolerancing.own_margins import own_margins, with_own_margins
 from tbcad.tolerancing.process.process import Process, process_errors
 from tbcad.types import Floats, Progress
 
@@ -53,10 +54,8 @@ def design_for_process(
     """The same design but for the least margins with which a process reaches a yield.
 
     No mirror gets less than the spec's margin_mm. Margins of single mirrors are taken where they
-    are smaller on average than one for all.
-
-    Raises:
-        InputError: no margin is enough, or the radii do not follow a target.
+    are smaller on average than one for all. InputError if no margin is enough, or radii follow no
+    target.
     """
     check_margins_can_be_set(spec, wanted_yield)
     spec = spec_with(spec, mirrors={"own_margins_mm": ()})
@@ -137,12 +136,8 @@ class TriedEdges:
     """A design with one kind of edges, for a process."""
 
     edges: EdgeKind
-    # with the margins that the process needs; None where there are none, or where even without them
-    # too few pixels are left
-    made: ProcessDesign | None
-    # of a virtual camera of it, or of the most that any margins leave; None where there is no
-    # design
-    pixels: SeeingPixels | None
+    made: ProcessDesign | None  # with the margins needed; None: none, or too few pixels
+    pixels: SeeingPixels | None  # of it, or the most that margins leave; None: no design
     error: InputError | None = None  # why there is no design, or None
 
 
@@ -163,11 +158,8 @@ def edges_for_process(
     Edges that the design names stay; a process with a mandrel has valleys, as walls of pedestals
     catch, and the mandrel is built too. Else pedestals are taken where they leave a per cent more
     than valleys. Margins take pixels: where pedestals have too few even with the design's own
-    margin, none are searched for.
-
-    Raises:
-        InputError: as `design_for_process`, with neither kind of edges; or the mandrel's cutter is
-            larger than a mirror's radius.
+    margin, none are searched for. InputError as of `design_for_process`, with neither kind of
+    edges, and where the mandrel's cutter is larger than a mirror's radius.
     """
     check_margins_can_be_set(spec, wanted_yield)
     if process.mandrel_cutter_mm is not None:
@@ -193,11 +185,7 @@ def _names_edges(spec: Spec) -> bool:
 
 
 def _check_reach(spec: Spec, process: Process) -> None:
-    """Refuse a cutter that does not fit into the mandrel's pockets, which have the mirrors' radii.
-
-    Raises:
-        InputError: it does not.
-    """
+    """InputError where a cutter does not fit into the mandrel's pockets of the mirrors' radii."""
     cutter = process.mandrel_cutter_mm or 0.0
     smallest = 1 / design(spec).arrays[0].modelled_cells.surfaces.curvature.max()
     if cutter >= smallest:

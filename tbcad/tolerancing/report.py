@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Record, Table
+from tbcad.common.results import Figure, Record, Study, Table
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (

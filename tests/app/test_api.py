@@ -27,17 +27,11 @@ def test_import_loads_no_heavy_library() -> None:
     assert "tbcad.app.api" not in loaded
 
 
-@pytest.mark.parametrize("name", tbcad.__all__)
-def test_public_names_are_there_and_documented(name: str) -> None:
-    value = getattr(tbcad, name)
-    if name != "__version__":
-        assert len(inspect.getdoc(value) or "") > 40
-    assert name in dir(tbcad)
-
-
-@pytest.mark.parametrize("name", sorted({*tbcad.__all__} - {"__version__"}))
-def test_no_module_takes_the_place_of_a_public_name(name: str) -> None:
-    assert find_spec(f"tbcad.{name}") is None
+def test_public_names_are_documented_and_no_modules() -> None:
+    for name in {*tbcad.__all__} - {"__version__"}:
+        assert len(inspect.getdoc(getattr(tbcad, name)) or "") > 40, name
+        assert name in dir(tbcad)
+        assert find_spec(f"tbcad.{name}") is None
 
 
 def test_an_unknown_name_is_refused() -> None:
@@ -111,15 +105,8 @@ def test_bad_input_is_one_line() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "calibrate",
-        "dataset",
-        "intrinsics",
-        "merge",
-        "optimize",
-        "refocus",
-        "simulate_run",
-        "tolerance",
-        "view",
+        *("calibrate", "dataset", "intrinsics", "merge", "optimize", "refocus"),
+        *("simulate_run", "tolerance", "view"),
     ],
 )
 def test_a_function_says_in_one_line_what_it_wants(name: str) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.meshing import (
     SIDES,
     as_manifold,
@@ -12,7 +12,6 @@ from tbcad.cad.kernel.meshing import (
     primitive_mesh,
     volume_by_cut_mesh,
     volume_by_meshes,
-    without_degenerate,
 )
 from tbcad.cad.kernel.solids import cut, cylinder, fused, sphere
 from tbcad.core.geometry.primitives import (
@@ -20,7 +19,6 @@ from tbcad.core.geometry.primitives import (
     Primitive,
     Prism,
     Revolved,
-    Slot,
     rectangle,
     revolved_along,
 )
@@ -48,33 +46,6 @@ def test_volumes_are_those_of_closed_forms(body: Primitive) -> None:
     )  # sections are rounded to 1e-8 mm
 
 
-def test_volume_of_a_slot() -> None:
-    """The corners of its rods are a little beyond its flat sides."""
-    slot = Slot(START, 3 * unit(np.cross(TILTED, START)), 2.0, 7 * TILTED)
-    assert primitive_mesh(slot).volume() == pytest.approx(closed_volume(slot), rel=1e-5)
-
-
-def test_a_rod_is_in_its_place() -> None:
-    corners = primitive_mesh(PRIMITIVES["rod"]).to_mesh64().vert_properties[:, :3] - START
-    along = corners @ TILTED
-    assert np.sort(along) == pytest.approx(np.repeat([0.0, 7.0], SIDES))
-    radii = np.linalg.norm(corners - along[:, None] * TILTED, axis=1)
-    assert radii == pytest.approx(2.0, rel=2e-3)
-
-
-def test_a_prism_has_its_corners() -> None:
-    corners = primitive_mesh(PRIMITIVES["prism, oblique"]).to_mesh64().vert_properties[:, :3]
-    expected = np.vstack([TRIANGLE + START, TRIANGLE + START + [1.0, 2.0, 5.0]])
-    assert np.sort(corners, axis=0) == pytest.approx(np.sort(expected, axis=0))
-
-
-def test_a_ring_is_about_its_axis() -> None:
-    corners = primitive_mesh(PRIMITIVES["ring"]).to_mesh64().vert_properties[:, :3]
-    assert sorted(set(np.round(corners[:, 2], 9).tolist())) == [1.0, 5.0]
-    radii = np.linalg.norm(corners[:, :2], axis=1)
-    assert ((np.abs(radii - 3) < 0.01) | (np.abs(radii - 4) < 0.01)).all()
-
-
 ORIGIN, UP = np.zeros(3), np.array([0.0, 0.0, 1.0])
 
 
@@ -91,20 +62,6 @@ def test_facets_are_as_near_to_a_sphere_as_asked(tolerance: float) -> None:
     assert 5.0 - norm(middle).min() <= tolerance
 
 
-def test_each_edge_has_two_facets(pin: TopoDS_Shape) -> None:
-    triangles = meshed(pin, 0.1).triangles
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    directed, counts = np.unique(edges, axis=0, return_counts=True)
-    assert (counts == 1).all()
-    assert np.array_equal(directed, np.unique(edges[:, ::-1], axis=0))
-
-
-def test_facets_without_area_are_dropped() -> None:
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    mesh = without_degenerate(vertices, np.array([[0, 1, 2], [0, 1, 1], [2, 2, 0]]))
-    assert mesh.triangles.tolist() == [[0, 1, 2]]
-
-
 def test_volume_of_a_union_less_tools_agrees_with_the_kernel(pin: TopoDS_Shape) -> None:
     bodies, tools = [pin, sphere(10 * UP, 5.0)], [cylinder(-UP, UP, 1.0, 20.0)]
     by_meshes = volume_by_meshes(
@@ -117,3 +74,11 @@ def test_volume_below_a_plane(pin: TopoDS_Shape) -> None:
     planes = np.array([[0.0, 0.0, 1.0, 4.0]])
     below = volume_by_cut_mesh(pin, planes, [], 0.001)
     assert below == pytest.approx(36 * np.pi, rel=1e-3)
+
+
+def test_a_rod_is_in_its_place() -> None:
+    corners = primitive_mesh(PRIMITIVES["rod"]).to_mesh64().vert_properties[:, :3] - START
+    along = corners @ TILTED
+    assert np.sort(along) == pytest.approx(np.repeat([0.0, 7.0], SIDES))
+    radii = np.linalg.norm(corners - along[:, None] * TILTED, axis=1)
+    assert radii == pytest.approx(2.0, rel=2e-3)

@@ -1,22 +1,26 @@
 """Bodies and their booleans: closed forms, and what is refused."""
 
+import math
+import re
+import sys
+from pathlib import Path
+
+import cadquery
 import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
+import tbcad
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.measures import mean_corner, volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.solids import (
     common,
     cut,
     cylinder,
-    cylinder_radius,
-    edges,
     faces,
     from_bytes,
     fused,
-    moved,
     one_solid,
     polygon,
     polyhedron,
@@ -25,13 +29,13 @@ from tbcad.cad.kernel.solids import (
     revolved_polygon,
     sphere,
     to_bytes,
-    vertices,
     without_cavities,
 )
 from tbcad.core.geometry.primitives import rectangle
 
 BASE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 ORIGIN, UP, AWAY = np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([20.0, 0.0, 0.0])
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to.md"
 
 
 def box(width: float, height: float) -> TopoDS_Shape:
@@ -63,27 +67,6 @@ def test_sets_of_two_bodies() -> None:
     assert volume(common(one, other)) == pytest.approx(5 * np.pi)
 
 
-def test_without_tools_a_shape_is_as_it_was() -> None:
-    pin = cylinder(ORIGIN, UP, 2.0, 5.0)
-    assert cut(pin, []) is pin
-    assert fused([pin]) is pin
-
-
-def test_parts_are_listed_once() -> None:
-    solid = box(2.0, 3.0)
-    assert [len(faces(solid)), len(edges(solid)), len(vertices(solid))] == [6, 12, 8]
-
-
-def test_radius_of_cylinders_only() -> None:
-    radii = sorted(cylinder_radius(face) for face in faces(cylinder(ORIGIN, UP, 2.0, 5.0)))
-    assert radii == pytest.approx([0, 0, 2.0])
-
-
-def test_a_move_takes_axes_and_origin_to_their_places() -> None:
-    axes = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-    assert mean_corner(moved(box(2.0, 4.0), axes, AWAY)) == pytest.approx([22.0, 0.0, 0.0])
-
-
 def test_bytes_of_a_solid_give_it_again() -> None:
     ball = one_solid("ball", cut(sphere(ORIGIN, 3.0), [sphere(3 * UP, 1.0)]))
     again = from_bytes(to_bytes(ball))
@@ -112,3 +95,41 @@ def test_cavities_are_filled() -> None:
     hollow = one_solid("hollow", cut(sphere(ORIGIN, 3.0), [sphere(ORIGIN, 1.0)]))
     assert volume(hollow) == pytest.approx(4 / 3 * np.pi * 26)
     assert volume(without_cavities(hollow)) == pytest.approx(4 / 3 * np.pi * 27)
+
+
+@pytest.fixture(scope="module")
+def design() -> tbcad.Design:
+    return tbcad.design(n=3)
+
+
+def test_a_shell_in_cadquery_is_the_same_solid(design: tbcad.Design) -> None:
+    part = design.shell("a")
+    workplane = tbcad.to_cadquery(part)
+    assert workplane.solids().size() == 1
+    assert workplane.val().Volume() == part.volume
+    assert workplane.val().isValid()
+    assert workplane._getTagged("shell_a") is workplane
+
+
+def test_the_example_puts_the_shell_on_feet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = HOW_TO.read_text(encoding="utf-8")
+    example = re.search(r"<!-- test: cadquery -->\n```python\n(.*?)```", text, re.DOTALL)
+    assert example is not None
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, cadquery.Workplane] = {}
+    exec(example[1], names)
+    read = cadquery.importers.importStep(str(tmp_path / "shell_on_feet.step"))
+    assert read.solids().size() == 1
+    feet = 4 * math.pi * 8**2 * 20
+    volume = names["shell"].val().Volume()  # type: ignore[union-attr]
+    assert read.val().Volume() == pytest.approx(volume + feet, rel=1e-6)  # type: ignore[union-attr]
+
+
+def test_without_cadquery_says_how_to_install_it(
+    design: tbcad.Design, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "cadquery", None)
+    with pytest.raises(tbcad.InputError, match=r"pip install 'tbcad\[cadquery\]'"):
+        tbcad.to_cadquery(design.shell("a"))

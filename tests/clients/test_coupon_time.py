@@ -14,9 +14,9 @@ import trimesh
 import tbcad
 from tbcad.core.mirrors.array import design
 from tbcad.prototype.arrangement import arrange
-from tbcad.prototype.coupon.coupon import coupon_plates
-from tbcad.prototype.coupon.seat import expected_downs, worst_pose
-from tbcad.prototype.printing.placing import PrintedPart, part_mesh
+from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
+from tbcad.prototype.printed import PrintedPart, part_mesh
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 

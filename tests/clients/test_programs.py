@@ -10,14 +10,12 @@ from pathlib import Path
 import pytest
 from tbcad_verify.programs import (
     ExpectedPart,
-    admesh,
     check_with_programs,
-    freecad,
-    gmsh,
     is_skipped,
-    prusa,
 )
+from tbcad_verify.programs.mesh_programs import ADMESH, PRUSA_3MF, PRUSA_STL
 from tbcad_verify.programs.program_query import on_path, sandbox
+from tbcad_verify.programs.step_programs import FREECAD, GMSH
 from tbcad_verify.report.checks import Check
 from tbcad_verify.run.child import Limits
 
@@ -34,11 +32,11 @@ PROGRAMS = {
     "admesh": ["repairs", "parts", "volume"],
 }
 READERS = {
-    ("freecad", "step"): freecad.STEP,
-    ("gmsh", "step"): gmsh.STEP,
-    ("prusa", "stl"): prusa.STL,
-    ("prusa", "3mf"): prusa.THREEMF,
-    ("admesh", "stl"): admesh.STL,
+    ("freecad", "step"): FREECAD,
+    ("gmsh", "step"): GMSH,
+    ("prusa", "stl"): PRUSA_STL,
+    ("prusa", "3mf"): PRUSA_3MF,
+    ("admesh", "stl"): ADMESH,
 }
 KINDS = """
 import json, sys

@@ -5,8 +5,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from tbcad.common.colours import CYCLE, SHADES
 from tbcad.common.figure_files import PlotFormat, figure_file, legend_below
-from tbcad.common.palette import CYCLE, SHADES
 
 INCHES = (4.0, 3.0)
 BEGINNING = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}

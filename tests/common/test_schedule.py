@@ -49,19 +49,14 @@ class TestThreads:
             time.sleep(0.01 * (unit % 3))  # later units overtake
             return drawn(unit)
 
-        assert run_units(work, range(20), workers=workers) == [drawn(unit) for unit in range(20)]
-
-    def test_no_units(self) -> None:
-        assert run_units(drawn, []) == []
+        told = []
+        got = run_units(work, range(20), None, told.append, workers=workers)
+        assert got == [drawn(unit) for unit in range(20)]
+        assert sorted(told) == [*range(20)]
 
     def test_as_many_as_cores_work_at_once(self) -> None:
         together = threading.Barrier(cores(), timeout=10)
         run_units(lambda _: together.wait(), range(cores()))
-
-    def test_progress_is_told_of_each_in_this_thread(self) -> None:
-        told = []
-        run_units(drawn, range(9), progress=lambda unit: told.append((unit, threading.get_ident())))
-        assert sorted(told) == [(unit, threading.get_ident()) for unit in range(9)]
 
     def test_what_work_raises_ends_it(self) -> None:
         begun = []
@@ -276,26 +271,6 @@ class TestCluster:
         with pytest.raises(FileNotFoundError, match="3"):
             run_units(missing, [3], standing.address)
 
-    def test_what_fails_once_is_tried_again(self, standing: Cluster, tmp_path: Path) -> None:
-        mark = str(tmp_path / "mark")
-
-        def work(unit: int) -> int:
-            from pathlib import Path
-
-            if not Path(mark).exists():
-                Path(mark).touch()
-                raise MemoryError
-            return unit
-
-        assert run_units(work, [5], standing.address) == [5]
-
-    def test_the_logs_level_is_given_back(self, standing: Cluster) -> None:
-        import logging
-
-        level = logging.getLogger("distributed").level
-        run_units(drawn_there(), [1], standing.address)
-        assert logging.getLogger("distributed").level == level
-
 
 def drawn_there() -> Callable[[int], float]:
     """The same as drawn, for workers that know no tests."""
@@ -313,16 +288,12 @@ class TestRefused:
         monkeypatch.setitem(sys.modules, "distributed", None)
         assert "pip install 'tbcad[cluster]'" in refusal(drawn, [1], "tcp://host:8786")
 
-    @pytest.mark.parametrize("address", ["nonsense", "host:8786", "tcp://host", "tcp://h:99999"])
-    def test_what_is_no_address(self, address: str) -> None:
-        pytest.importorskip("distributed")
-        assert "no Dask scheduler answers there" in refusal(drawn, [1], address)
-
     def test_where_nobody_listens(self) -> None:
         pytest.importorskip("distributed")
         with socket.socket() as taken:  # bound, but not listening
             taken.bind((HOST, 0))
-            said = refusal(drawn, [1], f"tcp://{HOST}:{taken.getsockname()[1]}")
+            addresses = "nonsense", "tcp://h:99999", f"tcp://{HOST}:{taken.getsockname()[1]}"
+            (said,) = {refusal(drawn, [1], one).partition(one)[2] for one in addresses}
         assert "no Dask scheduler answers there: start `dask scheduler`" in said
 
     @pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH\r\n"])
@@ -344,6 +315,7 @@ class TestRefused:
             said = refusal(drawn, [1], f"tcp://{HOST}:{server.getsockname()[1]}")
         assert "no Dask scheduler answers there" in said
 
+    @pytest.mark.slow
     def test_without_workers_and_with_wrong_ones(self, cluster: Cluster, tmp_path: Path) -> None:
         said = refusal(drawn_there(), [1], cluster.address, patience=0.3)
         assert f"no worker for 0.3 s: start `dask worker {cluster.address}`" in said
@@ -361,6 +333,7 @@ class TestRefused:
         said = refusal(drawn_there(), [1], cluster.address)
         assert "cannot use tbcad (No module named 'tbcad.common'): install tbcad " in said
 
+    @pytest.mark.slow
     def test_a_unit_that_kills_its_workers(self, tmp_path: Path) -> None:
         cluster = Cluster(tmp_path, {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"})
 
@@ -376,6 +349,7 @@ class TestRefused:
             cluster.stop()
         assert "2 workers died over one unit of work: give the workers more memory" in said
 
+    @pytest.mark.slow
     def test_when_all_workers_die_and_when_the_scheduler_does(
         self, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.features import RoundFace, distance
@@ -27,7 +27,7 @@ from tbcad.drawings.holes import DrawnHole, numbered_holes, table_rows
 from tbcad.drawings.printed_parts import draw_part, part_job
 from tbcad.output.manifest import read_manifest, write_manifest
 from tbcad.prototype.assembly_steps.machine import Machine
-from tbcad.prototype.files.bom_csv import COLUMNS
+from tbcad.prototype.files.bom import COLUMNS
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import DesignRecord
 from tbcad.records.prototype import CapRecord, Prototype

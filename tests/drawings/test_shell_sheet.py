@@ -37,6 +37,7 @@ def test_lines_cover_the_area_but_not_the_hole(width: float, height: float, half
     assert {round(math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))) for a, b in lines} == {45}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("edges", "said"), [("valley", "The shell is drawn along"), ("pedestal", "Undercut")]
 )

@@ -1,7 +1,6 @@
 """Files of an inspection: tables, and STEP with tolerances as other readers get them."""
 
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +9,11 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 
 from tbcad.app.api import inspect
 from tbcad.app.cli import run
-from tbcad.cad.formats.step import StepError, read_named_solid
-from tbcad.cad.formats.step_tolerances import read_tolerances
+from tbcad.cad.formats.step import read_named_solid
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
-from tbcad.mirror_limits.read_back import check_read_back
 from tbcad.shell.files import shell_envelope, write_shell_solids
-from tests.helpers import read_step, volume
 
 SMALL = ["n=4", "mirrors.coating_um=20"]
 
@@ -55,14 +51,6 @@ def test_spheres_are_those_below_the_coat(written: Path, coated: MirrorDesign) -
     columns = ("centre_x_mm", "centre_y_mm", "centre_z_mm")
     centre = [[float(row[axis]) for axis in columns] for row in rows]
     assert np.array(centre) == pytest.approx(array.mirrors.centre, abs=1e-9)
-
-
-def test_the_solid_is_the_same(written: Path, exports: Path) -> None:
-    with_tolerances = read_step(written / "shell_b_tolerances.step")
-    without = read_step(exports / "shell_b.step")
-    assert with_tolerances.valid
-    assert sorted(with_tolerances.faces) == sorted(without.faces)
-    assert volume(with_tolerances.shape) == pytest.approx(volume(without.shape), rel=1e-12)
 
 
 @pytest.mark.parametrize("half", ["a", "b"])
@@ -106,36 +94,6 @@ def test_tolerances_as_a_parser_of_the_grammar_reads_them(written: Path) -> None
     assert "Rq 4.4 nm" in notes["surface finish"]
 
 
-def test_radii_are_read_with_their_limits(written: Path) -> None:
-    read = [
-        one for one in read_tolerances(written / "shell_a_tolerances.step") if one.kind == "radius"
-    ]
-    rows = sorted(table(written), key=lambda row: float(row["radius_mm"]))
-    expected = [(float(row["radius_mm"]), float(row["radius_limit_mm"])) for row in rows]
-    found = sorted((one.nominal, one.value) for one in read)
-    assert np.array(found) == pytest.approx(np.array(expected), abs=1e-9)
-
-
-def test_a_file_that_lost_a_zone_is_found(written: Path, tmp_path: Path) -> None:
-    """Read back against what should be there: one mirror more than the file has."""
-    from tbcad.cad.formats.step_tolerances import FaceTolerances
-
-    rows = table(written)
-    profile = {row["id"]: float(row["profile_mm"]) for row in rows} | {"a9999": 1.0}
-    axes = ("centre_x_mm", "centre_y_mm", "centre_z_mm")
-    centres = {row["id"]: np.array([float(row[axis]) for axis in axes]) for row in rows}
-    seat = json.loads((written / "inspection.json").read_text())["limits"]["seat_um"] / 1000
-    given = FaceTolerances({"A": "", "B": "", "C": ""}, {"f": seat, "s": seat}, profile, {}, {})
-    with pytest.raises(StepError, match=f"{len(rows)} zones are read, {len(profile)}"):
-        check_read_back(written / "shell_a_tolerances.step", given, centres)
-
-
-def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:
-    inspect(exports, out=tmp_path / "again")
-    for file in sorted(written.iterdir()):
-        assert file.read_bytes() == (tmp_path / "again" / file.name).read_bytes(), file.name
-
-
 class TestRefused:
     def test_no_shells(self, record: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert run(["inspection", str(record)]) == 2
@@ -151,3 +109,9 @@ class TestRefused:
     def test_a_share_that_is_none(self, exports: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert run(["inspection", str(exports), "--yield", "1.5"]) == 2
         assert "--yield 1.5: allowed is" in capsys.readouterr().err
+
+
+def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:
+    inspect(exports, out=tmp_path / "again")
+    for file in sorted(written.iterdir()):
+        assert file.read_bytes() == (tmp_path / "again" / file.name).read_bytes(), file.name

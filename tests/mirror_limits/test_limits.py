@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.light.simulate.scene.reflector import reflectors
+from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.mirror_limits.inspect import minimum_at_limits
-from tbcad.mirror_limits.limits import MirrorLimits, mirror_limits
 from tbcad.mirror_limits.sensitivity import (
     Deviation,
+    MirrorLimits,
     Sensitivities,
     independent_classes,
+    mirror_limits,
     sensitivities,
     tilt_axes,
     touching,
@@ -60,13 +60,6 @@ def test_an_offset_moves_the_apex_along_the_normal(small_design: MirrorDesign) -
     expected = designed[:, APEX] + 7 * UM * designed[:, 3:6]
     assert built[:, APEX] == pytest.approx(expected, abs=1e-12)
     assert built[:, CURVATURE] == pytest.approx(designed[:, CURVATURE], rel=1e-12)
-
-
-def test_a_radius_leaves_the_apex_in_its_place(small_design: MirrorDesign) -> None:
-    m = len(small_design.arrays[0])
-    designed, built = moved(small_design, radius=np.full((1, m), 0.2))
-    assert built[:, APEX] == pytest.approx(designed[:, APEX], abs=1e-12)
-    assert 1 / built[:, CURVATURE] == pytest.approx(1 / designed[:, CURVATURE] + 0.2, rel=1e-12)
 
 
 def test_a_tilt_turns_the_normal_at_the_apex(small_design: MirrorDesign) -> None:
@@ -157,3 +150,10 @@ def test_margins_are_never_overdrawn(seed: int) -> None:
 def test_a_design_without_margin_is_refused(found: Sensitivities) -> None:
     with pytest.raises(InputError, match=r"sees 60.* as designed, of 61 mm .*margin_mm"):
         mirror_limits(found, 61.0, 0.99)
+
+
+def test_a_radius_leaves_the_apex_in_its_place(small_design: MirrorDesign) -> None:
+    m = len(small_design.arrays[0])
+    designed, built = moved(small_design, radius=np.full((1, m), 0.2))
+    assert built[:, APEX] == pytest.approx(designed[:, APEX], abs=1e-12)
+    assert 1 / built[:, CURVATURE] == pytest.approx(1 / designed[:, CURVATURE] + 0.2, rel=1e-12)

@@ -69,13 +69,6 @@ def test_limits_hold() -> None:
     assert all(one.figures and one.figures.size_mm <= 300 for one in kept)
 
 
-def test_the_start_where_none_is_better() -> None:
-    places = ["camera_mm=[123, 0, -140]", "semi_minor_mm=111.5", "stretch=[1.3, 1.15]"]
-    spec = load_spec(None, ["n=4", *places])
-    result = search(spec, OptimizeOptions(objectives=("minimum",), candidates=80))
-    assert result.best == result.start
-
-
 def test_a_search_that_was_stopped_ends_like_one_that_was_not(tmp_path: Path) -> None:
     whole, parted = tmp_path / "whole.jsonl", tmp_path / "parted.jsonl"
     expected = search(SPEC, asked(280), whole)
@@ -86,18 +79,6 @@ def test_a_search_that_was_stopped_ends_like_one_that_was_not(tmp_path: Path) ->
     assert search_files(expected, SPEC, OptimizeOptions()) == search_files(
         search(SPEC, asked(280)), SPEC, OptimizeOptions()
     )
-
-
-def test_judgements_are_not_made_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = search(SPEC, asked(120), tmp_path / "store.jsonl")
-
-    def never(
-        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
-    ) -> DesignCandidate:
-        raise AssertionError(place)
-
-    monkeypatch.setattr(search_module, "evaluate", never)
-    assert search(SPEC, asked(120), tmp_path / "store.jsonl") == expected
 
 
 def test_a_store_of_another_design_is_refused(tmp_path: Path) -> None:
@@ -124,11 +105,6 @@ def test_a_first_design_that_cannot_be_made() -> None:
     spec = load_spec(None, ["n=4", "capture_diameter_mm=10", "semi_minor_mm=50"])
     with pytest.raises(InputError, match="cannot be made: the ellipsoid is too small"):
         search(spec, OptimizeOptions(objectives=("size",), candidates=80))
-
-
-def test_objectives_once_and_in_one_order() -> None:
-    assert OptimizeOptions(objectives=["size", "minimum", "size"]).aims == ("minimum", "size")
-    assert OptimizeOptions().aims == ("minimum", "pixels", "evenness")
 
 
 @given(arrays(float, st.tuples(st.integers(1, 8), st.integers(1, 3)), elements=st.floats(-2, 2)))
@@ -192,21 +168,3 @@ def test_weights_of_a_front() -> None:
     assert every.sum(axis=1) == pytest.approx(np.ones(4))
     assert every.argmax(axis=1).tolist() == [0, 0, 1, 2]
     assert every[1:].max(axis=1) == pytest.approx(np.full(3, 0.8))
-
-
-def test_a_front_reaches_farther_towards_each_aim() -> None:
-    """Pixels are most at x = 123, the machine is smallest at the smallest x."""
-    one = OptimizeOptions(objectives=("minimum", "size"), max_size_mm=600.0)
-    searches = [
-        search(SPEC, each)
-        for each in (one, replace(one, candidates=3 * one.candidates, front=True))
-    ]
-    fronts = [
-        [c.figures for c, on in zip(r.candidates, r.on_front, strict=True) if on and c.figures]
-        for r in searches
-    ]
-    assert len(fronts[1]) > len(fronts[0])
-    assert min(f.size_mm for f in fronts[1]) <= min(f.size_mm for f in fronts[0])
-    assert max(f.minimum_px for f in fronts[1]) >= max(f.minimum_px for f in fronts[0])
-    shared = {c.place for c in searches[0].candidates}
-    assert shared <= {c.place for c in searches[1].candidates}

@@ -1,7 +1,6 @@
-"""One record a command: keywords of Python, options of the command, JSON, and one-line refusals."""
+"""One record a command: keywords of Python, options of the command, and one-line refusals."""
 
 import inspect
-import json
 from dataclasses import KW_ONLY, dataclass, replace
 from itertools import repeat
 from pathlib import Path
@@ -17,7 +16,7 @@ from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
 from tbcad.rig.calibration.run import WrittenCalibration
-from tbcad.rig.runs.photographs import Run
+from tbcad.rig.runs import Run
 
 ONLY_WRITTEN = {
     *("json", "all_frames", "mesh", "prototype"),
@@ -99,11 +98,6 @@ def test_wrong_values_are_one_line(given: dict[str, object], message: str) -> No
     with pytest.raises(InputError) as caught:
         polish(**values)  # type: ignore[call-overload]
     assert str(caught.value) == message
-
-
-def test_a_call_is_json() -> None:
-    record = json.loads(json.dumps(Polish(Path("m.step"), grits=(3.0, 1.0)).json()))
-    assert record == {"mirror": "m.step", "passes": 2, "grits": [3.0, 1.0]}
 
 
 def test_a_command_takes_paths_and_its_own_options() -> None:

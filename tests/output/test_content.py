@@ -2,7 +2,6 @@
 
 import json
 import os
-from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import get_args
@@ -10,10 +9,9 @@ from typing import get_args
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.output.content import COSTLY, RECORDS, kind_of
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.manifest import fingerprint, write_manifest
-from tbcad.records.manifest import Kind
+from tbcad.output.manifest import COSTLY, RECORDS, fingerprint, kind_of, write_manifest
+from tbcad.records.document import Kind
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ASKED = ("capture", "merged run", "calibration")
@@ -108,26 +106,16 @@ def test_a_foreign_record_is_no_content_of_tbcad(tmp_path: Path) -> None:
 
 class TestInputs:
     @pytest.mark.parametrize("kind", KINDS)
-    @pytest.mark.parametrize(
-        "called",
-        [
-            lambda path: path,
-            lambda path: path.parent / "work" / ".." / path.name,
-            lambda path: Path(os.path.relpath(path)),
-            lambda path: link(path),  # noqa: PLW0108 - defined below
-        ],
-        ids=["absolute", "dots", "relative", "link"],
-    )
-    def test_are_not_replaced(
-        self, tmp_path: Path, kind: Kind, called: Callable[[Path], Path]
-    ) -> None:
-        source = fake(tmp_path / "it", kind)
+    def test_are_not_replaced(self, tmp_path: Path, kind: Kind) -> None:
+        source, alias = fake(tmp_path / "it", kind), tmp_path / "alias"
+        alias.symlink_to(source)
         before = tree(tmp_path)
-        for out in (called(source), called(source) / "inner", called(source) / "a" / "b"):
-            with pytest.raises(InputError, match="this command"):
-                check_replaceable(out, kind, True, (None, "", tmp_path / "none", source))
-            with pytest.raises(InputError, match="this command"):
-                check_replaceable(out, kind, True, (called(source),))
+        dotted = source.parent / "work" / ".." / source.name
+        for called in (source, dotted, Path(os.path.relpath(source)), alias):
+            for out in (called, called / "inner", called / "a" / "b"):
+                for inputs in ((None, "", tmp_path / "none", source), (called,)):
+                    with pytest.raises(InputError, match="this command"):
+                        check_replaceable(out, kind, True, inputs)
         with pytest.raises(InputError, match=r"work.*holds|folder you are in|above your work"):
             check_replaceable(source.parent, kind, True, (source,))
         assert tree(tmp_path) == before
@@ -147,13 +135,6 @@ class TestInputs:
         source = fake(tmp_path / "captures" / "knot", "capture")
         check_replaceable(tmp_path / "captures" / "knot2", "capture", False, (source,))
         check_replaceable(tmp_path / "new" / "deep", "capture", False, (source,))
-
-
-def link(path: Path) -> Path:
-    alias = path.parent / "alias"
-    if not alias.is_symlink():
-        alias.symlink_to(path)
-    return alias
 
 
 class TestBuildOfARun:

@@ -89,17 +89,19 @@ def out(tmp_path: Path) -> Path:
 
 @pytest.mark.usefixtures("swap")
 class TestReplacing:
-    def test_makes_and_replaces(self, out: Path) -> None:
+    def test_makes_and_replaces(self, tmp_path: Path) -> None:
+        """With parents, and what a checkout has in its folder of exports as it was, unasked."""
+        out = tmp_path / "a" / "b" / "exports"
         for version in (1, 2, 3):
             export(out, version)
             assert version_of(out) == version
             assert hidden(out.parent) == []
-
-    def test_leaves_no_file_of_the_old_export(self, out: Path) -> None:
-        export(out, 1)
+            for name in ALWAYS_KEPT:
+                (out / name).write_text(name)
         with replacing(out, "build", force=False) as new:
             (new / "other.txt").write_text("new")
-        assert [path.name for path in out.iterdir()] == ["other.txt"]
+        assert {path.name for path in out.iterdir()} == {"other.txt", *ALWAYS_KEPT}
+        assert all((out / name).read_text() == name for name in ALWAYS_KEPT)
 
     def test_an_error_leaves_the_old_export(self, out: Path) -> None:
         export(out, 1)
@@ -135,14 +137,6 @@ class TestReplacing:
         assert (tmp_path / "far.txt").read_text() == "far"
         assert hidden(out.parent) == []
 
-    def test_folders_of_an_export_are_replaced_with_it(
-        self, out: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        export_with_folders(out, monkeypatch, "first")
-        export_with_folders(out, monkeypatch, "other")
-        assert (out / "images" / "deep" / "a.png").read_text() == "other"
-        assert sorted(path.name for path in out.iterdir()) == ["images", "manifest.json"]
-
     @pytest.mark.parametrize("content", ["file", "change", "link", "empty folder"])
     def test_a_folder_with_something_of_the_user_is_the_users(
         self, out: Path, monkeypatch: pytest.MonkeyPatch, content: str
@@ -167,28 +161,6 @@ class TestReplacing:
             for name, data in before.items()
             if name.startswith("images/")
         }
-
-    def test_keeps_what_a_checkout_has_in_its_folder_of_exports(self, out: Path) -> None:
-        """Nobody has to ask for it, before the first export or later; as it was, to the byte."""
-        out.mkdir()
-        for name in ALWAYS_KEPT:
-            (out / name).write_bytes((ROOT / "exports" / name).read_bytes())
-        for version in (1, 2):
-            export(out, version)
-            assert version_of(out) == version
-        assert sorted(path.name for path in out.iterdir()) == sorted(
-            [*ALWAYS_KEPT, *NAMES, "manifest.json", "verify.json"]
-        )
-        for name in ALWAYS_KEPT:
-            assert (out / name).read_bytes() == (ROOT / "exports" / name).read_bytes()
-
-    @pytest.mark.parametrize("name", ["readme.md", "README.txt", ".gitattributes", "sub/README.md"])
-    def test_keeps_no_other_name_unasked(self, out: Path, name: str) -> None:
-        (out / name).parent.mkdir(parents=True)
-        (out / name).write_text("mine")
-        with pytest.raises(InputError, match="--force"):
-            export(out, 1)
-        assert tree(out)[name] == b"mine"
 
     def test_changed_files_are_the_users_and_kept_beside_the_new(self, out: Path) -> None:
         export(out, 1)
@@ -266,26 +238,7 @@ def test_a_failed_second_move_puts_the_old_export_back(
     assert hidden(out.parent) == []
 
 
-def test_a_checkout_has_a_folder_of_exports() -> None:
-    """git keeps these two files and no export."""
-    done = subprocess.run(
-        ["git", "ls-files", "exports"], cwd=ROOT, capture_output=True, encoding="utf-8", check=False
-    )
-    if done.returncode:
-        pytest.skip("no checkout of git")
-    assert done.stdout.split() == [f"exports/{name}" for name in ALWAYS_KEPT]
-    ignored = subprocess.run(
-        ["git", "check-ignore", *(f"exports/{name}" for name in (*NAMES, *ALWAYS_KEPT))],
-        cwd=ROOT, capture_output=True, encoding="utf-8", check=False,
-    )  # fmt: skip
-    assert ignored.stdout.split() == [f"exports/{name}" for name in NAMES]
-
-
 class TestParents:
-    def test_are_made(self, tmp_path: Path) -> None:
-        export(tmp_path / "a" / "b" / "exports", 1)
-        assert version_of(tmp_path / "a" / "b" / "exports") == 1
-
     def test_are_removed_again_on_failure(self, tmp_path: Path) -> None:
         (tmp_path / "a").mkdir()
         with (
@@ -302,73 +255,46 @@ class TestParents:
 
 @pytest.mark.parametrize("refuse", [check_replaceable, export], ids=["check", "replace"])
 class TestRefused:
-    def test_a_file(self, out: Path, refuse: Callable[..., None]) -> None:
-        out.write_text("mine", encoding="utf-8")
-        self.refused(out, refuse, "is a file")
-        assert out.read_text(encoding="utf-8") == "mine"
-
-    def test_a_file_above(self, out: Path, refuse: Callable[..., None]) -> None:
-        out.write_text("mine", encoding="utf-8")
-        self.refused(out / "deeper" / "still", refuse, "is a file")
-
-    def test_where_the_user_is(
+    def test_places_that_are_no_folder_to_replace(
         self, tmp_path: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        (tmp_path / "work" / "deep").mkdir(parents=True)
+        for name in ("work/deep", "homes/me", "mount", "shut"):
+            (tmp_path / name).mkdir(parents=True)
+        (tmp_path / "file").write_text("mine", encoding="utf-8")
+        (tmp_path / "loop").symlink_to(tmp_path / "loop")
         monkeypatch.chdir(tmp_path / "work" / "deep")
-        self.refused(Path(), refuse, "the folder you are in")
-        self.refused(Path(".."), refuse, "a folder above")
-        self.refused(Path("/"), refuse, "a folder above")
-
-    def test_home(
-        self, tmp_path: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        (tmp_path / "homes" / "me").mkdir(parents=True)
         monkeypatch.setenv("HOME", str(tmp_path / "homes" / "me"))
-        self.refused(tmp_path / "homes" / "me", refuse, "your home")
-        self.refused(tmp_path / "homes", refuse, "your home")
+        monkeypatch.setattr(os.path, "ismount", lambda path: path == tmp_path / "mount")
+        monkeypatch.setattr(os, "access", lambda path, _mode: path != tmp_path / "shut")
+        for out, words in {
+            Path(): "the folder you are in",
+            Path(".."): "a folder above",
+            Path("/"): "a folder above",
+            tmp_path / "homes" / "me": "your home",
+            tmp_path / "homes": "your home",
+            tmp_path / "file": "is a file",
+            tmp_path / "file" / "deeper" / "still": "is a file",
+            tmp_path / "mount": "mount point",
+            tmp_path / "shut": "read-only",
+            tmp_path / "shut" / "new": "read-only",
+            tmp_path / "loop": "loop",
+            tmp_path / "a\0b": "cannot be written",
+            tmp_path / ("a" * 300): "cannot be written",
+        }.items():
+            self.refused(out, refuse, words)
 
-    def test_a_mount_point(
-        self, out: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        out.mkdir()
-        monkeypatch.setattr(os.path, "ismount", lambda path: path == out.resolve())
-        self.refused(out, refuse, "mount point")
-
-    @pytest.mark.parametrize("read_only", ["exports", ""])
-    def test_read_only(
-        self,
-        out: Path,
-        refuse: Callable[..., None],
-        monkeypatch: pytest.MonkeyPatch,
-        read_only: str,
-    ) -> None:
-        out.mkdir()
-        shut = out.parent / read_only
-        monkeypatch.setattr(os, "access", lambda path, _mode: path != shut)
-        self.refused(out, refuse, "read-only")
-
-    def test_a_loop_of_links(self, out: Path, refuse: Callable[..., None]) -> None:
-        out.symlink_to(out)
-        self.refused(out, refuse, "exports")
-
-    def test_a_name_no_file_can_have(self, out: Path, refuse: Callable[..., None]) -> None:
-        self.refused(out.parent / "a\0b", refuse, "cannot be written")
-        self.refused(out.parent / ("a" * 300), refuse, "cannot be written")
-
-    @pytest.mark.parametrize("content", ["folder", "fifo", "link", "file"])
-    def test_what_tbcad_did_not_write(
-        self, out: Path, refuse: Callable[..., None], content: str
-    ) -> None:
+    def test_what_tbcad_did_not_write(self, out: Path, refuse: Callable[..., None]) -> None:
         export(out, 1)
-        mine = out / "mine"
-        {
-            "folder": mine.mkdir,
-            "fifo": lambda: os.mkfifo(mine),
-            "link": lambda: mine.symlink_to("design.json"),
-            "file": mine.touch,
-        }[content]()
-        self.refused(out, refuse, "mine")
+        mine = out / "readme.md"
+        for make, remove in (
+            (mine.mkdir, mine.rmdir),
+            (lambda: os.mkfifo(mine), mine.unlink),
+            (lambda: mine.symlink_to("design.json"), mine.unlink),
+            (mine.touch, mine.unlink),
+        ):
+            make()
+            self.refused(out, refuse, "readme.md")
+            remove()
 
     @pytest.mark.parametrize(
         "manifest",
@@ -380,16 +306,17 @@ class TestRefused:
             b"[]",
             b'{"name": "a web page", "files": {}}',
             b'{"schema": "tbcad-manifest/1", "files": []}',
-            b'{"schema": "tbcad-manifest/1", "files": {"../a": {"sha256": "%s", "size": 1}}}'
-            % (b"0" * 64),
-            b'{"schema": "tbcad-manifest/1", "files": {"a/../../b": {"sha256": "%s", "size": 1}}}'
-            % (b"0" * 64),
-            b'{"schema": "tbcad-manifest/1", "files": {"/a": {"sha256": "%s", "size": 1}}}'
-            % (b"0" * 64),
-            b'{"schema": "tbcad-manifest/1", "files": {"a": {"sha256": "%s", "size": true}}}'
-            % (b"0" * 64),
-            b'{"schema": "tbcad-manifest/1", "files": {"a": {"sha256": "%s", "size": 1}}}'
-            % (b"0" * 63),
+            *(
+                b'{"schema": "tbcad-manifest/1", "files": {"%s": {"sha256": "%s", "size": %s}}}'
+                % (name, digest, size)
+                for name, digest, size in (
+                    (b"../a", b"0" * 64, b"1"),
+                    (b"a/../../b", b"0" * 64, b"1"),
+                    (b"/a", b"0" * 64, b"1"),
+                    (b"a", b"0" * 64, b"true"),
+                    (b"a", b"0" * 63, b"1"),
+                )
+            ),
             b'{"schema": "tbcad-manifest/1", "files": {}}' + b" " * 4_000_000,
         ],
     )
@@ -479,11 +406,13 @@ print(limit, sorted(map(str, seen)))
 '''
 
 
-@pytest.mark.parametrize(("moves", "seen"), [(False, ["1", "2"]), (True, ["1", "2", "missing"])])
+@pytest.mark.parametrize(
+    ("moves", "seen", "step"), [(False, ["1", "2"], 41), (True, ["1", "2", "missing"], 11)]
+)
 def test_a_kill_at_any_call_leaves_one_whole_export(
-    out: Path, moves: bool, seen: list[str]
+    out: Path, moves: bool, seen: list[str], step: int
 ) -> None:
-    script = KILLED.format(root=str(ROOT), out=str(out), moves=moves, step=11)
+    script = KILLED.format(root=str(ROOT), out=str(out), moves=moves, step=step)
     run = subprocess.run(
         [sys.executable, "-c", script],
         capture_output=True,

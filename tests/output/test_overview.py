@@ -79,9 +79,6 @@ class TestWithoutPrototype:
         with pytest.raises(InputError, match="a prototype needs cameras"):
             overview(design(load_spec(None, ["n=3", "camera_mm=[100, 5, -100]"])), ["prototype"])
 
-    def test_of_shells_alone(self, small_design: MirrorDesign) -> None:
-        assert overview(small_design, ["shell"]).prototype is None
-
 
 def test_a_mandrel_without_room_is_refused_before_a_build() -> None:
     settings = ["n=3", "shell.negative=true", "shell.wall_mm=50"]

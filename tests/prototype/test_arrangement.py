@@ -33,26 +33,17 @@ class TestChoice:
     def test_leaves_no_key_open(self, small: PrototypeModel) -> None:
         prototype = spec_dict(small.spec)["prototype"]
         assert "auto" not in [*prototype.values(), *prototype["base"].values()]
-
-    def test_everything_keeps_its_clearance(self, small: PrototypeModel) -> None:
+        assert prototype["base"]["hold"] == "magnet"
         clearance = small.spec.prototype.frame.clearance_mm
         assert min(*small.frame.light.values(), *small.frame.swept.values()) >= clearance
         assert small.stage.swept >= clearance
         assert small.layout.fit.coverage.min() >= 60 - 1e-6
-
-    def test_is_the_same_every_time(
-        self, small: PrototypeModel, small_design: MirrorDesign
-    ) -> None:
-        assert arrange(small_design).spec == small.spec
 
     def test_keeps_what_the_spec_sets(self) -> None:
         options = ["n=6", "prototype.k=3", "base.hold=glue", "pad_angle_deg=35", "hub_boss_mm=30"]
         chosen = arrange(design(load_spec(None, options))).spec.prototype
         base = chosen.base
         assert (chosen.k, base.hold, base.pad_angle_deg, base.hub_boss_mm) == (3, "glue", 35, 30)
-
-    def test_magnets_are_preferred(self, small: PrototypeModel) -> None:
-        assert small.spec.prototype.base.hold == "magnet"
 
     @pytest.mark.parametrize(("k", "hold"), [(1, "glue"), (3, "magnet")])
     def test_glue_only_where_no_magnet_holds(
@@ -65,7 +56,9 @@ class TestChoice:
         held = [angle for angle in PAD_ANGLES_DEG if magnets_hold(every[0], angle)]
         assert bool(held) == (hold == "magnet")
 
-    @pytest.mark.parametrize("n", [2, 3, 5, 8])
+    @pytest.mark.parametrize(
+        "n", [2, pytest.param(3, marks=pytest.mark.slow), pytest.param(8, marks=pytest.mark.slow)]
+    )
     def test_few_mirrors(self, n: int) -> None:
         chosen = arrange(design(load_spec(None, [f"n={n}"])))
         assert chosen.layout.fit.coverage.min() >= 60 - 1e-6
@@ -78,6 +71,7 @@ class TestChoice:
 
 
 class TestMass:
+    @pytest.mark.slow
     def test_estimate_agrees_with_the_solid(self, small: PrototypeModel) -> None:
         """Flanges, numbers and overlaps of ribs are left out: some per cent."""
         printer = small.spec.printer
@@ -89,7 +83,7 @@ class TestMass:
 
 class TestRefused:
     def test_the_cause_and_what_was_tried(self) -> None:
-        spec = load_spec(None, ["n=6", "camera_diameter_mm=500", "camera_length_mm=1000"])
+        spec = load_spec(None, ["n=3", "camera_diameter_mm=500", "camera_length_mm=1000"])
         with pytest.raises(SpecError, match=r"camera_diameter_mm smaller \(tried: \d+, .* balls\)"):
             arrange(design(spec))
 

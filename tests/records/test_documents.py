@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from tbcad.errors import InputError
+from tbcad.records.calibration import MachineRecord
 from tbcad.records.document import Document
 from tbcad.records.exposure import Frame
-from tbcad.records.machine import MachineRecord
 from tbcad.records.prototype import Prototype
 from tbcad.records.run import RunRecord
 from tests.prototype_records import prototype_document

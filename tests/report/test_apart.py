@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from tbcad.prototype.assembly_steps.machine import read_machine
-from tbcad.report.apart import offsets
+from tbcad.report.exploded import offsets
 from tests.prototype.assembly_steps.test_steps import LOOSE, belt_design, write
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tbcad.report.callouts import RADIUS, Callout, cross, place_callouts
+from tbcad.report.exploded import RADIUS, Callout, cross, place_callouts
 
 SIZE = (1500, 950)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tbcad.core.mirrors.seam import seam_gaps
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.core.optics.windows import seam_gaps
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.report import close_ups
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
 from tbcad.report.section import section_of

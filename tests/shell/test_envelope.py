@@ -3,11 +3,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tbcad.core.geometry.vectors import norm
-from tbcad.core.mirrors.array import MirrorArray, design
+from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.shell.envelope import Envelope, closing_envelope
-from tbcad.shell.files import shell_envelope
 
 
 def test_wall_behind_the_deepest_valley(small_half: MirrorArray, small_envelope: Envelope) -> None:
@@ -44,18 +43,8 @@ def test_holes_stay_inside_their_flange(small_envelope: Envelope, which: str) ->
             assert norm(line[:, plane] - centre[plane]).min() > radius + 1.0
 
 
-def test_holes_by_kind(small_envelope: Envelope) -> None:
-    assert sorted(small_envelope.seam_holes.radius) == [2.0] * 2 + [2.15] * 6
-    assert sorted(small_envelope.foot_holes.radius) == [2.0] * 2 + [2.15] * 5
-
-
 def test_too_many_holes_are_refused(small_half: MirrorArray) -> None:
     spec = load_spec(None, ["shell.seam_flange.bolts=60"])
     with pytest.raises(SpecError, match="holes") as caught:
         closing_envelope(spec.shell, small_half.modelled_cells, small_half.ellipsoid)
     assert "lower bolts" in str(caught.value)
-
-
-@pytest.mark.parametrize("n", [2, 3, 5, 30])
-def test_every_n_gets_an_envelope(n: int) -> None:
-    assert shell_envelope(design(load_spec(None, [f"n={n}"]))).back.offset > 0

@@ -8,11 +8,12 @@ from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.errors import SpecError
-from tbcad.shell.files import camera_a_mesh, camera_solid
+from tbcad.shell.files import (
+    design_mandrel,
+    mandrel_solid,
+)
 from tbcad.shell.mandrel import Mandrel, best_pull, distances, draft_of
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh, design_mandrel, mandrel_solid
-from tbcad.shell.mesh import front_facets
-from tests.helpers import area, bounds
+from tests.helpers import bounds
 from tests.mirror_arrays import mirror_design
 
 EDGES = ["valley", "pedestal"]
@@ -22,44 +23,9 @@ def made(edges: str, *options: str) -> MirrorDesign:
     return mirror_design(f"shell.edges={edges}", "shell.negative=true", *options)
 
 
-def test_mandrel_and_shell_fill_the_inside_together() -> None:
-    """Each mirror's face is the shell's, with its area, the material on the other side."""
-    mirrors = made("valley", "n=5")
-    for array in mirrors.arrays:
-        shell, mandrel = camera_solid(mirrors, array), mandrel_solid(mirrors, array)
-        for (name, face), (same, turned) in zip(shell.faces, mandrel.faces, strict=False):
-            if name not in array.ids:
-                break
-            assert name == same
-            assert face.Orientation() != turned.Orientation()
-            one, two = (BRepAdaptor_Surface(f).Sphere() for f in (face, turned))
-            assert one.Location().Coord() == two.Location().Coord()
-            assert one.Radius() == two.Radius()
-            assert area(face) == pytest.approx(area(turned), rel=1e-12)
-
-
-@pytest.mark.parametrize("edges", EDGES)
-def test_facets_are_the_shells_turned(edges: str) -> None:
-    """Corner by corner: all of the shell's mirrors and walls, and nothing else of it."""
-    mirrors = made(edges, "n=4")
-    array = mirrors.arrays[0]
-    builder, _ = front_facets(mirrors.spec, array.modelled_cells, array.apex_distance)
-    shell, mandrel = camera_a_mesh(mirrors), camera_a_mandrel_mesh(mirrors)
-    own = {facet(mandrel.vertices[one[::-1]]) for one in mandrel.triangles}
-    shared = own & {facet(shell.vertices[one]) for one in shell.triangles}
-    assert len(shared) == sum(map(len, builder.triangles))
-
-
-def facet(corners: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The corners in their order, the least first."""
-    points = [tuple(one) for one in corners.tolist()]
-    first = points.index(min(points))
-    return tuple(points[first:] + points[:first])
-
-
 @pytest.mark.parametrize("edges", EDGES)
 def test_faces_are_named_and_lie_in_the_joining_planes(edges: str) -> None:
-    mirrors = made(edges, "n=5")
+    mirrors = made(edges, "n=3")
     for array, side in zip(mirrors.arrays, (1, -1), strict=True):
         solid = mandrel_solid(mirrors, array)
         names = [name for name, _ in solid.faces]
@@ -93,19 +59,11 @@ def hole_distance(mirrors: MirrorDesign, mandrel: Mandrel) -> float:
     return least
 
 
-@pytest.mark.parametrize("n", [4, 6, 11])
+@pytest.mark.parametrize("n", [4, 6])
 def test_holes_leave_a_wall_and_lie_near_it(n: int) -> None:
     mirrors = made("valley", f"n={n}", "shell.wall_mm=4.5")
     mandrel = design_mandrel(mirrors)
     assert 4.5 <= hole_distance(mirrors, mandrel) < 4.5 + 2
-
-
-def test_holes_do_not_meet() -> None:
-    mandrel = design_mandrel(made("valley", "n=4"))
-    seam, foot = mandrel.seam_holes, mandrel.foot_holes
-    assert foot.centre[:, 0].min() - foot.radius.max() >= seam.direction[0] + 3 - 1e-9
-    assert seam.centre[:, 2].min() - seam.radius.max() >= mandrel.foot + 3 - 1e-9
-    assert np.array_equal(seam.direction, [8.6, 0, 0])
 
 
 def test_distances_are_those_of_spheres_and_planes() -> None:
@@ -197,3 +155,11 @@ class TestNoRoom:
 
     def test_or_says_that_the_wall_is_thick(self) -> None:
         assert "make shell.wall_mm smaller" in self.refused("shell.wall_mm=50")
+
+
+def test_holes_do_not_meet() -> None:
+    mandrel = design_mandrel(made("valley", "n=4"))
+    seam, foot = mandrel.seam_holes, mandrel.foot_holes
+    assert foot.centre[:, 0].min() - foot.radius.max() >= seam.direction[0] + 3 - 1e-9
+    assert seam.centre[:, 2].min() - seam.radius.max() >= mandrel.foot + 3 - 1e-9
+    assert np.array_equal(seam.direction, [8.6, 0, 0])

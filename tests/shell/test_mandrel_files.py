@@ -10,7 +10,7 @@ from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.output.build import Export, write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.mandrel_files import design_mandrel
+from tbcad.shell.files import design_mandrel
 from tests.exported_files import contents
 
 KINDS = ("step", "stl", "3mf")

@@ -22,17 +22,6 @@ def test_each_face_has_its_cells_area(rule: str) -> None:
         assert [area(face) for _, face in faces] == pytest.approx(array.area, rel=1e-6)
 
 
-def test_faces_are_named_after_mirrors_and_parts(small_design: MirrorDesign) -> None:
-    names = [name for name, _ in camera_solid(small_design, small_design.arrays[1]).faces]
-    count = len(small_design.arrays[1])
-    assert names[:count] == small_design.arrays[1].ids
-    assert names[0] == "b0001"
-    assert {"back", "seam", "foot", "seam_flange", "foot_flange"} <= set(names[count:])
-    assert sum(name.startswith("seam_hole") for name in names) == 8
-    assert sum(name.startswith("foot_hole") for name in names) == 7
-    assert len(set(names)) == len(names)
-
-
 def test_holes_go_through(small_design: MirrorDesign) -> None:
     """Area of each hole's wall: circumference times thickness of its flange."""
     envelope = shell_envelope(small_design)

@@ -9,29 +9,29 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.common import schedule
-from tbcad.common.results.study import (
+from tbcad.common.results import (
     SUMMARY_COLUMNS,
     Study,
+    Table,
     check_study_folder,
+    csv_text,
     study_files,
     write_study,
 )
-from tbcad.common.results.tables import Table, csv_text
 from tbcad.core.mirrors import radii
 from tbcad.core.spec.design import FIT
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate import parallel
-from tbcad.light.simulate.capture.pixel_counts import Sensor
-from tbcad.studies.capture_area import capture_area
+from tbcad.light.simulate.capture.photograph import Sensor
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
-from tbcad.studies.elevation import elevation
+from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import (
     is_table_i,
+    n_range,
     with_lens_of_table_i,
 )
 from tbcad.studies.resolution import COUNTED, Ratio, resolution
-from tbcad.studies.sweep import n_range
 from tests.mirror_arrays import mirror_array
 
 SMALL = ("n=4", "width_px=208", "height_px=155")
@@ -39,14 +39,18 @@ SMALL = ("n=4", "width_px=208", "height_px=155")
 HOPELESS = ("camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
 
 
+@pytest.fixture(scope="module")
+def small() -> Study:
+    return small_resolution()
+
+
 def small_resolution() -> Study:
     sensors, ratios = (Sensor(208, 155), Sensor(416, 310)), (Ratio(1, 1), Ratio(1, 4))
     return resolution(load_spec(None, SMALL), range(3, 8), sensors, ratios)
 
 
-def test_resolution_finds_what_its_rows_say() -> None:
-    study = small_resolution()
-    swept, balanced, defined, fits = study.tables
+def test_resolution_finds_what_its_rows_say(small: Study) -> None:
+    swept, balanced, defined, fits = small.tables
     assert len(swept.rows) == 10
     for at in swept.records():
         assert at["virtual_cameras"] == 5 * at["n"] ** 2 + 2 * at["n"] + 1
@@ -66,14 +70,14 @@ def test_resolution_finds_what_its_rows_say() -> None:
     assert defined.rows == fits.rows == ()  # Table II has none of these sensors
 
 
-def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    files = []
-    for threads in (1, 3):
-        monkeypatch.setattr(parallel, "THREADS", threads)
-        monkeypatch.setattr(schedule, "cores", lambda k=threads: k)
-        files.append(study_files(small_resolution()))
-    assert files[0] == files[1]
-    assert len(files[0]) == 7
+def test_any_number_of_threads_gives_the_same_files(
+    small: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = study_files(small)
+    monkeypatch.setattr(parallel, "THREADS", 1)
+    monkeypatch.setattr(schedule, "cores", lambda: 1)
+    assert study_files(small_resolution()) == files
+    assert len(files) == 7
 
 
 def test_capture_area_has_the_paper_beside_it() -> None:

@@ -1,22 +1,29 @@
-"""Studies of views: SSIM by sensor, and the prototype against the shell."""
+"""Studies of views: by sensor, by object, by blur, and the prototype against the shell."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import ttest_rel
 
-from tbcad.common.results.study import Study, study_files
+from tbcad.common.results import Study, study_files
 from tbcad.core.mirrors import radii
 from tbcad.core.mirrors.array import design
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.pixel_counts import Sensor
-from tbcad.light.simulate.scene.exported import read_export
-from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.views.viewpoints import Viewpoints, viewpoints_around
+from tbcad.light.simulate.capture.photograph import Sensor
+from tbcad.light.simulate.scene.object import built_in_object, patterned_ball
+from tbcad.light.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
+from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.light.simulate.views.viewpoints import (
+    Viewpoints,
+    viewpoints_around,
+    viewpoints_over_hemisphere,
+)
+from tbcad.studies.balance import SUBDIVISIONS, balance, parse_subdivisions
 from tbcad.studies.low_pass import BlurOptions, low_pass
 from tbcad.studies.paper import balanced_sensors
 from tbcad.studies.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
@@ -49,27 +56,20 @@ class SmallViews(Viewpoints):
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 2, 640.0)))
+    viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 1, 640.0)))
     return ssim(
         load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest", quiet
     )
 
 
-def test_more_pixels_make_better_views(study: Study) -> None:
-    means = study.tables[1]
-    every = means.where(elevation_deg="all").numbers("ssim")
-    assert len(every) == 3
-    assert every[0] < every[1] < every[2] < 1
-
-
-def test_more_pixels_make_sharper_views(study: Study) -> None:
+def test_more_pixels_make_better_and_sharper_views(study: Study) -> None:
     rows = study.tables[1].where(elevation_deg="all")
-    blur, share = rows.numbers("blur_mm"), rows.numbers("object_share")
+    every, blur, share = (rows.numbers(name) for name in ("ssim", "blur_mm", "object_share"))
+    assert every[0] < every[1] < every[2] < 1
     assert blur[0] > blur[1] > blur[2] > 0
     assert len(np.unique(share)) == 1  # the same viewpoints
     assert 0.01 < share[0] < 0.8
-    on_object, all_over = rows.numbers("ssim_on_object"), rows.numbers("ssim")
-    assert (on_object < all_over).all()  # the background is even
+    assert (rows.numbers("ssim_on_object") < every).all()  # the background is even
 
 
 def test_elevations_of_the_sharpest_and_most_similar_views(study: Study) -> None:
@@ -167,3 +167,63 @@ def test_viewpoints_around_the_object() -> None:
     assert at[4:, 2] == pytest.approx(np.full(4, 500 * np.sqrt(0.5)))
     with pytest.raises(InputError, match="--azimuths 0"):
         viewpoints_around((0.0,), 0, 500.0)
+
+
+@pytest.mark.slow
+def test_balance_of_every_object_at_every_n() -> None:
+    """A matt surface near the reference plane needs pixels, one far from it directions."""
+    small = load_spec(None, ["camera.width_px=416", "camera.height_px=310"])
+    table, best = balance(small, (4, 8), 3, 640.0, "nearest").tables
+    assert len(table.rows) == 2 * 4
+    assert table.column("virtual_cameras") == [89] * 4 + [337] * 4
+    pixels = table.numbers("pixels")
+    assert (pixels[:4] > 2 * pixels[4:]).all()
+    assert ((table.numbers("ssim_on_object") > 0) & (table.numbers("ssim_on_object") < 1)).all()
+    assert len(best.rows) == 4
+    for row in best.records():
+        own = table.where(surface=row["surface"], radius_mm=row["radius_mm"])
+        assert row["ssim_on_object"] == own.numbers("ssim_on_object").max()
+    rows = [table.where(surface="matt", n=n).numbers("ssim_on_object") for n in (4, 8)]
+    gain = rows[1] - rows[0]
+    assert gain[1] > gain[0]
+
+
+def test_a_highlight_moves_with_the_viewpoint_and_is_where_light_is_mirrored() -> None:
+    matt = prepared_scene(patterned_ball(20.0))
+    glossy = replace(matt, gloss=1.0)
+    rng = np.random.default_rng(1)
+    toward = rng.normal(size=(4000, 3))
+    toward[:, 2] = np.abs(toward[:, 2])
+    toward /= np.linalg.norm(toward, axis=1)[:, None]
+    aim = rng.uniform(-10, 10, size=toward.shape)
+    origin = aim + 200 * toward
+    plain, glint = (cast_rays(scene, origin, -toward) for scene in (matt, glossy))
+    assert np.array_equal(plain.depth, glint.depth)
+    brighter = (glint.colour - plain.colour).max(axis=1) > 20
+    normal = (origin - plain.depth[:, None] * toward) / 20
+    half = [(toward + lamp) / np.linalg.norm(toward + lamp, axis=1)[:, None] for lamp in LAMPS]
+    hit = np.isfinite(plain.depth)
+    angle = np.min([np.arccos(np.clip((normal * h).sum(1), -1, 1)) for h in half], axis=0)
+    assert 20 < brighter.sum() < hit.sum() / 2
+    assert angle[hit & brighter].max() < np.radians(22)
+    assert brighter[hit & (angle < np.radians(3)) & (plain.colour.min(axis=1) < 150)].all()
+
+
+def test_subdivisions() -> None:
+    assert parse_subdivisions(None) == SUBDIVISIONS
+    assert parse_subdivisions([9, 4, 9]) == (4, 9)
+    for wrong in (1, 61):
+        with pytest.raises(InputError, match=f"--n is {wrong}, allowed is 2 to 60"):
+            parse_subdivisions([4, wrong])
+
+
+def test_viewpoints_are_even_over_the_hemisphere() -> None:
+    """As many on each belt of equal area: of equal height (Archimedes)."""
+    views = viewpoints_over_hemisphere(200, 640.0)
+    height = np.sin(np.radians(views.elevation_deg))
+    assert np.histogram(height, 10, (0, 1))[0].tolist() == [20] * 10
+    quarter, _ = np.histogram(views.azimuth_deg, 4, (0, 360))
+    assert np.ptp(quarter) <= 4
+    assert np.abs(np.sin(2 * np.radians(views.azimuth_deg[:50]))).min() > 0.01
+    with pytest.raises(InputError, match="--views 0: allowed is 1 to 1000"):
+        viewpoints_over_hemisphere(0, 640.0)

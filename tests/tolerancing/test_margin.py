@@ -2,29 +2,38 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil
+from math import sqrt
+from statistics import NormalDist
 
 import numpy as np
 import pytest
 
+from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.design import MAX_MARGIN, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.margin import (
+    FLIP_Y,
     STEP_MM,
     Margin,
+    MirrorLosses,
     margin,
+    mirror_losses,
+    needed_margins,
+    own_margins,
+    solved_designs,
     with_margin,
+    with_own_margins,
 )
-from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.process.process import load_process, process_errors
 
-TARGET = 60.0
 Loss = Callable[[float], np.ndarray]
+TARGET = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -71,12 +80,6 @@ def brute(lost: np.ndarray, wanted: float) -> float:
 
 @pytest.mark.usefixtures("without_mirrors")
 class TestMadeUpLosses:
-    @pytest.mark.parametrize("loss", [0.004, 0.123, 0.597, 0.603, 1.234, 7.7777, 19.985])
-    def test_least_margin_in_steps(self, spec: Spec, loss: float) -> None:
-        found = margin(spec, Errors(), 0.99, losing(steady(loss)))
-        assert found.mm == pytest.approx(ceil(loss / STEP_MM) * STEP_MM, abs=1e-9)
-        assert (found.share, found.reason) == (1, "")
-
     @pytest.mark.parametrize("start", [0.0, 0.6, 3.0, 20.0])
     def test_wherever_the_design_starts(self, start: float) -> None:
         spec = load_spec(None, ["n=4", f"mirrors.margin_mm={start}"])
@@ -91,8 +94,8 @@ class TestMadeUpLosses:
         found = margin(spec, Errors(), 0.99, losing(lambda m: np.full(10, 1 + 0.1 * m)))
         assert found.mm == pytest.approx(1.12, abs=1e-9)
 
-    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.95, 0.975, 0.985, 0.99, 0.995, 0.999])
-    @pytest.mark.parametrize("seed", range(4))
+    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.985, 0.999])
+    @pytest.mark.parametrize("seed", range(2))
     def test_random_losses_against_brute_force(self, spec: Spec, seed: int, wanted: float) -> None:
         """Also with shares between those that 100 builds can have."""
         lost = np.random.default_rng(seed).normal(1.5, 0.4, 100).clip(0.05)
@@ -100,7 +103,7 @@ class TestMadeUpLosses:
         assert found.mm == pytest.approx(brute(lost, wanted), abs=1e-9)
         assert found.share == (found.mm >= lost).mean() >= wanted
 
-    @pytest.mark.parametrize("seed", range(10))
+    @pytest.mark.parametrize("seed", range(3))
     def test_never_a_margin_with_too_small_a_share(self, spec: Spec, seed: int) -> None:
         """Losses that change with the margin without any rule."""
         generator = np.random.default_rng(seed)
@@ -129,10 +132,6 @@ class TestMadeUpLosses:
         assert (found.mm, found.share) == (None, 0)
         assert found.reason
 
-    def test_some_good_but_too_few(self, spec: Spec) -> None:
-        found = margin(spec, Errors(), 0.99, losing(steady(np.array([0.1, 30.0]))))
-        assert (found.mm, found.share) == (None, 0.5)
-
 
 def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
     def refusing(spec: Spec) -> OnlySpec:
@@ -145,17 +144,6 @@ def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch
     found = margin(spec, Errors(), 0.99, losing(steady(np.array([0.5, 2.0, 2.0, 2.0]))))
     assert (found.mm, found.share) == (None, 0.25)
     assert found.reason == "mirrors of margin 2.00 mm: mirrors overlap"
-
-
-def test_spec_with_another_margin() -> None:
-    flat = load_spec(None, ["n=4", "radius_rule=paper"])
-    other = with_margin(flat, 0.1 + 0.2)
-    assert (other.mirrors.margin_mm, other.mirrors.radius_rule) == (0.3, "traced")
-    assert flat.mirrors.radius_rule == "paper"
-    assert other.optics == flat.optics
-    assert with_margin(other, flat.mirrors.margin_mm).mirrors == flat.mirrors.model_copy(
-        update={"radius_rule": "traced"}
-    )
 
 
 class TestRealDesigns:
@@ -178,8 +166,164 @@ class TestRealDesigns:
         assert share(found.mm) == found.share >= wanted
         assert share(found.mm - 2 * STEP_MM) < wanted
 
-    def test_loss_that_is_known(self, spec: Spec) -> None:
-        """Facets are taken off the coverage; radii are solved for, so a step may be needed more."""
-        found = margin(spec, Errors(facets=Error(0, 0.36)), 0.99, self.worst)
-        assert found.mm is not None
-        assert 0.36 <= found.mm <= 0.37 + 1e-9
+
+def unsymmetric(loss: np.ndarray) -> MirrorLosses:
+    """Losses (s, 2, m) of mirrors of which none is nearly flat nor another's image."""
+    m = loss.shape[2]
+    return MirrorLosses(loss, np.full(m, -np.inf), np.arange(m))
+
+
+def normal_losses(builds: int, mean: np.ndarray, deviation: np.ndarray, seed: int) -> np.ndarray:
+    drawn = np.random.default_rng(seed).standard_normal((builds, 2, len(mean)))
+    return np.asarray(mean + deviation * drawn)
+
+
+class TestKnownLosses:
+    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.99])
+    def test_independent_normal_losses(self, wanted: float) -> None:
+        """All 2 m losses stay below m + z s with the probability Phi(z)^(2 m)."""
+        generator = np.random.default_rng(1)
+        mean, deviation = generator.uniform(0, 2, 25), generator.uniform(0.2, 1, 25)
+        margins = needed_margins(
+            unsymmetric(normal_losses(40_000, mean, deviation, seed=2)), wanted
+        )
+        z = NormalDist().inv_cdf(wanted ** (1 / 50))
+        assert (margins - mean) / deviation == pytest.approx(np.full(25, z), abs=0.15)
+        assert np.mean((margins - mean) / deviation) == pytest.approx(z, abs=0.04)
+
+    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.985, 0.99])
+    @pytest.mark.parametrize("seed", range(3))
+    def test_least_level_by_brute_force(self, wanted: float, seed: int) -> None:
+        """Of all common levels the least that is enough, but for the rounding of margins."""
+        mean, deviation = np.linspace(0.5, 2, 6), np.linspace(0.3, 0.6, 6)
+        both = normal_losses(400, mean, deviation, seed)
+        margins = needed_margins(unsymmetric(both), wanted)
+        loss, other = both[:200], both[200:]
+
+        def share(of: np.ndarray) -> float:
+            return float((loss <= of).all(axis=(1, 2)).mean())
+
+        every = other.reshape(-1, 6)
+        middle = every.mean(axis=0)
+        above = np.sqrt((np.maximum(every - middle, 0) ** 2).mean(axis=0))
+        levels = np.arange(0, 12, 1e-3)
+        enough = next(k for k in levels if share(middle + k * above) >= wanted)
+        assert share(margins) >= wanted
+        assert (margins >= middle + (enough - 1e-3) * above - 1e-12).all()
+        assert (margins <= middle + enough * above + STEP_MM).all()
+
+    def test_skew_losses_count_by_their_upper_side(self) -> None:
+        """Of the unit variance of exponential losses 2 / e lies above the mean."""
+        drawn = np.random.default_rng(3).exponential(1.0, (40_000, 2, 2)) - 1
+        drawn[..., 1] *= -1
+        up, down = needed_margins(unsymmetric(2 + drawn), 0.9) - 2
+        assert up / down == pytest.approx(sqrt(2 / (np.e - 2)), rel=0.03)
+
+    def test_gains_need_nothing(self) -> None:
+        assert needed_margins(unsymmetric(np.full((10, 2, 3), -1.0)), 0.99).tolist() == [0, 0, 0]
+
+    def test_images_have_the_same(self) -> None:
+        loss = normal_losses(100, np.array([1.0, 1, 2]), np.array([0.3, 0.3, 0.3]), seed=4)
+        partner = np.array([1, 0, 2])
+        margins = needed_margins(MirrorLosses(loss, np.full(3, -np.inf), partner), 0.9)
+        assert margins[0] == margins[1] < margins[2]
+
+    def test_nearly_flat_mirrors_need_none(self) -> None:
+        """Nor do they drive the level of the others, unless they lose all that they have spare."""
+        loss = normal_losses(500, np.array([1.0, 1.0]), np.array([0.1, 2.0]), seed=5)
+        spare = np.array([-np.inf, 50.0])
+        margins = needed_margins(MirrorLosses(loss, spare, np.arange(2)), 0.9)
+        alone = needed_margins(unsymmetric(loss[..., :1]), 0.9)
+        assert margins.tolist() == [alone[0], 0]
+        tight = np.array([-np.inf, 1.0])
+        both = needed_margins(MirrorLosses(loss, tight, np.arange(2)), 0.9)
+        assert both == pytest.approx(needed_margins(unsymmetric(loss), 0.9))
+
+
+def models_of(*options: str) -> EdgeModels:
+    return edge_models(reflectors(design(load_spec(None, options))))
+
+
+def test_losses_of_halves_and_images() -> None:
+    """Losses of made-up coverages come back at both halves; images are images in y = 0."""
+    models = models_of("n=4")
+    m, halved = len(models[0]), models[0].halved
+    cameras = 2 * m - int(halved.sum())
+    designed = np.full(cameras, TARGET + 1)
+    seen = designed - np.arange(cameras)
+    losses = mirror_losses(models, designed, seen[None], TARGET, np.ones(1))
+    assert losses.loss[0, 0].tolist() == list(range(m))
+    assert losses.loss[0, 1, ~halved].tolist() == list(range(m, cameras))
+    assert losses.loss[0, 1, halved].tolist() == np.flatnonzero(halved).tolist()
+    assert not losses.nearly_flat.any()
+    u = models[0].screen[:, 2]
+    assert norm(u[losses.partner] - u * FLIP_Y).max() < 1e-12
+
+
+def test_no_images_where_the_camera_is_off_the_plane() -> None:
+    models = models_of("n=3", "camera_mm=[100, 5, -100]")
+    m = len(models[0])
+    designed = np.full(2 * m - int(models[0].halved.sum()), TARGET)
+    losses = mirror_losses(models, designed, designed[None], TARGET, np.zeros(1))
+    assert losses.partner.tolist() == list(range(m))
+
+
+class TestRealOwnMargins:
+    BUILDS = 60  # that are judged
+
+    def coverage(self, errors: Errors, models: EdgeModels) -> np.ndarray:
+        return simulate(CoverageCase(models, errors, 1), 2 * self.BUILDS).coverage
+
+    def test_margins_give_the_yield_and_less_does_not(self) -> None:
+        spec, wanted = load_spec(None, ["n=4", "margin_mm=0"]), 0.9
+        errors = process_errors(load_process("sla"))
+        found = own_margins(spec, errors, wanted, 1.0, self.coverage)
+        assert found is not None
+
+        def share(margins: np.ndarray) -> float:
+            text = f"mirrors.own_margins_mm={margins.tolist()}"
+            models = models_of("n=4", "margin_mm=0", text)
+            worst = simulate(MonteCarloCase(models, errors, 1), self.BUILDS).worst
+            return float((worst >= TARGET).mean())
+
+        assert share(found.mm) == found.share >= wanted
+        assert share(np.maximum(found.mm - 0.1, 0)) < wanted
+        assert np.ptp(found.mm) > 0.1
+
+    def test_no_mirror_gets_less_than_the_margin_of_the_spec(self) -> None:
+        spec = load_spec(None, ["n=4", "margin_mm=1.45"])
+        found = own_margins(spec, process_errors(load_process("sla")), 0.9, 2.0, self.coverage)
+        assert found is not None
+        assert found.mm.min() == 1.45 < found.mm.max()
+
+    def test_known_loss_of_all_is_the_margin_of_all(self) -> None:
+        """Facets are taken off the coverage: each mirror that is not nearly flat needs as much."""
+        spec = load_spec(None, ["n=5", "margin_mm=0"])
+        found = own_margins(spec, Errors(facets=Error(0, 0.505)), 0.99, 1.0, self.coverage)
+        assert found is not None
+        assert set(found.mm.tolist()) <= {0.0, 0.51}
+        assert found.average_mm == pytest.approx(0.51)
+
+    def test_too_large_margins_are_none(self) -> None:
+        errors = Errors(facets=Error(0, 21.0))
+        spec = load_spec(None, ["n=4"])
+        assert own_margins(spec, errors, 0.99, 1.0, self.coverage) is None
+
+    def test_mirrors_that_cannot_be_made_are_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        designs = solved_designs()
+        spec = load_spec(None, ["n=4"])
+        designs(with_margin(spec, 1.0))
+
+        def refusing(_: Spec) -> None:
+            raise SpecError("mirrors overlap")
+
+        monkeypatch.setattr("tbcad.tolerancing.margin.design", refusing)
+        errors = process_errors(load_process("sla"))
+        found = own_margins(spec, errors, 0.9, 1.0, self.coverage, designs=designs)
+        assert found is None
+
+
+def test_spec_with_margins_of_single_mirrors() -> None:
+    spec = with_own_margins(load_spec(None, ["n=2"]), np.array([0.7, 0.1 + 0.7]))
+    assert spec.mirrors.own_margins_mm == (0.7, 0.8)
+    assert with_margin(spec, 1.0).mirrors.own_margins_mm == ()

@@ -1,6 +1,7 @@
 """tbcad build --for-process: the margins that a process needs, in the design that is built."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,19 +9,20 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.core.mirrors.array import design
-from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing import process_design as process_module
-from tbcad.tolerancing.margin import pixels_of_cameras
+from tbcad.tolerancing.margin import OwnMargins, SeeingPixels, pixels_of_cameras, seeing_pixels
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
-from tbcad.tolerancing.own_margins import OwnMargins
-from tbcad.tolerancing.process.process import load_process, process_errors
+from tbcad.tolerancing.process.process import Process, load_process, process_errors
 from tbcad.tolerancing.process_design import (
     ProcessDesign,
     costs_text,
     design_for_process,
+    edges_for_process,
+    edges_text,
     margins_text,
     pixel_costs,
     ssim_costs,
@@ -29,6 +31,9 @@ from tbcad.tolerancing.process_design import (
 
 SMALL = ["n=4", "mirrors.margin_mm=0"]
 BUILDS = 60
+WANTED = 0.9
+# Mirrors set one by one, each smooth: what one of them is off should cost its neighbours nothing.
+INSERTS = ["sphere_centre_um=60", "sphere_radius_um=60", "waviness_um=0.1", "groove_wall_um=1"]
 
 
 @pytest.fixture(autouse=True)
@@ -40,27 +45,9 @@ def without_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_module, "own_margins", lambda *_: None)
 
 
-def test_the_margin_is_enough_and_a_little_less_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    without_own(monkeypatch)
-    process, wanted = load_process("cnc"), 0.9
-    made = design_for_process(load_spec(None, SMALL), process, wanted)
-    found = made.spec.mirrors.margin_mm
-    assert made.is_even
-    assert found == made.even_mm > 0
-    shares = []
-    for margin in (found, found - 0.03):
-        tried = load_spec(None, ["n=4", f"mirrors.margin_mm={margin}"])
-        models = edge_models(reflectors(design(tried)))
-        worst = simulate(
-            MonteCarloCase(models, process_errors(process), process_module.SEED), BUILDS
-        ).worst
-        shares.append((worst >= 60).mean())
-    assert shares[0] >= wanted > shares[1]
-
-
 def test_own_margins_where_they_are_smaller() -> None:
     """At the same yield, and with more pixels that see the object."""
-    spec, process, wanted = load_spec(None, ["n=6", "margin_mm=0"]), load_process("cnc"), 0.9
+    spec, process, wanted = load_spec(None, ["n=4", "margin_mm=0"]), load_process("cnc"), 0.9
     made = design_for_process(spec, process, wanted)
     own = made.spec.mirrors.own_margins_mm
     assert not made.is_even
@@ -71,7 +58,7 @@ def test_own_margins_where_they_are_smaller() -> None:
     assert (simulate(case, BUILDS).worst >= 60).mean() >= wanted
     even, best = (
         pixels_of_cameras(design(one).arrays[0], 30.0).sum()
-        for one in (load_spec(None, ["n=6", f"margin_mm={made.even_mm}"]), made.spec)
+        for one in (load_spec(None, ["n=4", f"margin_mm={made.even_mm}"]), made.spec)
     )
     assert best > even
 
@@ -94,7 +81,7 @@ def test_a_margin_that_is_enough_stays(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_margins_cost() -> None:
     """A mirror's pixels are shared by the object and what its margin shows around it."""
-    spec = load_spec(None, ["n=8", "margin_mm=3"])
+    spec = load_spec(None, ["n=5", "margin_mm=3"])
     costs = pixel_costs(ProcessDesign(spec, 3.0))
     assert list(costs) == ["with these margins", "with none"]
     ratio = costs["with these margins"].median / costs["with none"].median
@@ -159,3 +146,110 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def options_of(mirrors: dict[str, object]) -> list[str]:
     return [f"mirrors.{key}={mirrors[key]}" for key in ("margin_mm", "own_margins_mm")]
+
+
+def inserts() -> Process:
+    return load_process("cnc", INSERTS)
+
+
+def named(edges: str) -> list[str]:
+    return [*SMALL, f"shell.edges={edges}"]
+
+
+@pytest.mark.slow
+def test_pedestals_where_mirrors_err_by_themselves() -> None:
+    choice = edges_for_process(load_spec(None, SMALL), inserts(), WANTED)
+    valley, pedestal = (
+        design_for_process(load_spec(None, named(edges)), inserts(), WANTED)
+        for edges in ("valley", "pedestal")
+    )
+    assert spec_dict(choice.made.spec) == spec_dict(pedestal.spec)
+    assert choice.pixels == seeing_pixels(pedestal.spec)
+    assert choice.other is not None
+    assert (choice.other.edges, choice.other.pixels) == ("valley", seeing_pixels(valley.spec))
+    assert choice.pixels.median > 1.05 * seeing_pixels(valley.spec).median
+
+
+@pytest.mark.slow
+def test_valleys_where_pedestals_cannot_leave_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No margins are searched for that could change nothing; those that there are leave less."""
+    process, searched = load_process("diamond"), []
+
+    def search(spec, *rest):  # type: ignore[no-untyped-def]
+        searched.append(spec.shell.edges)
+        return design_for_process(spec, *rest)
+
+    monkeypatch.setattr(process_module, "design_for_process", search)
+    choice = edges_for_process(load_spec(None, SMALL), process, WANTED)
+    assert searched == [choice.made.spec.shell.edges] == ["valley"]
+    assert choice.other is not None
+    assert choice.other.made is None
+    assert choice.other.pixels is not None
+    assert choice.other.pixels.median <= choice.pixels.median
+    pedestal = design_for_process(load_spec(None, named("pedestal")), process, WANTED)
+    assert seeing_pixels(pedestal.spec).median <= choice.other.pixels.median
+
+
+@pytest.mark.parametrize("edges", ["valley", "pedestal"])
+def test_edges_that_the_design_names_stay(edges: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        process_module, "design_for_process", lambda spec, *_: ProcessDesign(spec, 0.0)
+    )
+    monkeypatch.setattr(process_module, "seeing_pixels", lambda _: SeeingPixels(1000, 100))
+    process = {"valley": inserts(), "pedestal": load_process("diamond")}[edges]
+    choice = edges_for_process(load_spec(None, named(edges)), process, WANTED)
+    assert (choice.made.spec.shell.edges, choice.other) == (edges, None)
+    assert choice.pixels == SeeingPixels(1000, 100)
+    assert edges_text(choice) == f"edges: {edges}, as the design says"
+
+
+@pytest.mark.parametrize(
+    ("more", "taken"), [(1.0, "valley"), (1.009, "valley"), (1.01, "pedestal")]
+)
+def test_pedestals_must_leave_a_per_cent_more(
+    monkeypatch: pytest.MonkeyPatch, more: float, taken: str
+) -> None:
+    def pixels(spec):  # type: ignore[no-untyped-def]
+        return SeeingPixels(1000 * (more if spec.shell.edges == "pedestal" else 1.0), 100)
+
+    monkeypatch.setattr(process_module, "seeing_pixels", pixels)
+    monkeypatch.setattr(
+        process_module, "design_for_process", lambda spec, *_: ProcessDesign(spec, 0.0)
+    )
+    choice = edges_for_process(load_spec(None, SMALL), inserts(), WANTED)
+    assert choice.made.spec.shell.edges == taken
+
+
+def test_one_kind_without_margins_leaves_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    def search(spec, *rest):  # type: ignore[no-untyped-def]
+        if spec.shell.edges in impossible:
+            raise InputError(f"no {spec.shell.edges}")
+        return ProcessDesign(spec, 0.0)
+
+    monkeypatch.setattr(process_module, "design_for_process", search)
+    spec = load_spec(None, SMALL)
+    impossible: Sequence[str] = ("valley",)
+    choice = edges_for_process(spec, inserts(), WANTED)
+    assert choice.made.spec.shell.edges == "pedestal"
+    assert edges_text(choice).endswith("; valley: no margin is enough")
+    impossible = ("valley", "pedestal")
+    with pytest.raises(InputError, match="no valley"):
+        edges_for_process(spec, inserts(), WANTED)
+
+
+def test_pedestals_that_cannot_be_made_are_not_taken() -> None:
+    """A coat thicker than the grooves fills them."""
+    spec = load_spec(None, [*SMALL, "mirrors.coating_um=200", "shell.groove_mm=0.02"])
+    choice = edges_for_process(spec, load_process("diamond"), WANTED)
+    assert choice.made.spec.shell.edges == "valley"
+    assert choice.other is not None
+    assert "coat thinner or shell.groove_mm larger" in str(choice.other.error)
+    assert edges_text(choice).endswith("; pedestal: cannot be made")
+
+
+def test_what_cannot_be_asked_is_refused_before_anything_is_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(process_module, "seeing_pixels", lambda _: pytest.fail("tried"))
+    with pytest.raises(InputError, match="rule paper"):
+        edges_for_process(load_spec(None, [*SMALL, "radius_rule=paper"]), inserts(), WANTED)

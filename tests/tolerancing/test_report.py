@@ -6,16 +6,15 @@ import json
 import math
 import re
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import SUMMARY_COLUMNS, study_files
+from tbcad.common.results import study_files
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.options.tolerances import ToleranceOptions
+from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.analysis import Analysis, ProcessOption
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
@@ -28,9 +27,9 @@ from tbcad.tolerancing.montecarlo.edge_model import edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerancing.montecarlo.sharpness import Sharpness
-from tbcad.tolerancing.process.process import ErrorSpec, load_process
+from tbcad.tolerancing.process.process import load_process
 from tbcad.tolerancing.prototype.windows import PrototypeResult
-from tbcad.tolerancing.report import UNITS, json_text, report_dict, summary_text, tolerance_study
+from tbcad.tolerancing.report import json_text, report_dict, summary_text, tolerance_study
 
 BUILDS, TARGET = 25, 60.0
 ALONE = (
@@ -117,10 +116,6 @@ class TestWords:
         assert report_dict(smooth)["ray_spread_mm"]["largest"] == 0
         assert "Waviness" not in summary_text(smooth)
 
-    def test_every_kind_has_a_unit(self, analysis: Analysis) -> None:
-        assert {key.rpartition("_")[2] for key, value in analysis.process
-                if isinstance(value, ErrorSpec)} == set(UNITS)  # fmt: skip
-
     def test_margin(self, analysis: Analysis) -> None:
         said = summary_text(analysis)
         command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
@@ -140,37 +135,12 @@ class TestWords:
         names = {str(row[0]) for row in tolerance_study(plain).summary.rows}
         assert "margin needed" not in names
 
-    def test_changed_process_is_not_advised_under_the_old_name(self, analysis: Analysis) -> None:
-        """The built-in process of that name would get another margin."""
-        changed = load_process("sla", ["sphere_radius_um=0"])
-        said = summary_text(replace(analysis, process=changed, margin=Margin(1.82, 0.99)))
-        assert "--for-process sla --yield" not in said
-
     def test_worst_kind_of_error(self, analysis: Analysis) -> None:
         """In the unit of the process: 0.375 times the 5 micrometres of sla."""
         assert (
             "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
             "of the builds are good above 1.88 micrometres (sla has 5)."
         ) in summary_text(analysis)
-
-    @pytest.mark.parametrize(
-        ("factor", "words"),
-        [(1.01, "at 5 micrometres it is at its limit"), (1.5, "above 7.5 micrometres")],
-    )
-    def test_how_large_the_worst_may_be(
-        self, analysis: Analysis, factor: float, words: str
-    ) -> None:
-        worst = replace(ALONE[0], tolerable_factor=factor)
-        said = summary_text(replace(analysis, single_errors=(worst,)))
-        assert words in said
-        assert " times " not in said
-
-    def test_design_that_falls_short(self, analysis: Analysis) -> None:
-        said = summary_text(
-            replace(analysis, single_errors=(replace(ALONE[0], tolerable_factor=0.0),))
-        )
-        assert "the design itself falls short" in said
-        assert "may be" not in said
 
     def test_processes(self, analysis: Analysis) -> None:
         assert (
@@ -200,15 +170,6 @@ class TestJson:
         assert read["ssim"]["calibration_residual_mrad"] == 0.5
         assert read["prototype"] is None
 
-    def test_pointing(self, analysis: Analysis) -> None:
-        told, offset = report_dict(analysis)["pointing_mm"], analysis.result.offset
-        assert told["rms"] == pytest.approx(np.linalg.norm(offset) / np.sqrt(offset.size))
-        assert told["largest_median"] == np.median(offset.max(axis=1))
-        some = offset.copy()
-        some[::2, 3] = np.nan  # rays that pass their mirrors by
-        patchy = replace(analysis, result=replace(analysis.result, offset=some))
-        assert 0 < json.loads(json_text(patchy))["pointing_mm"]["rms"] < offset.max()
-
     def test_what_may_be_anything_has_no_number(self, analysis: Analysis) -> None:
         assert not re.search("NaN|Infinity", json_text(analysis))
         told = {
@@ -228,57 +189,6 @@ class TestJson:
 
 
 class TestTables:
-    def test_summary(self, analysis: Analysis) -> None:
-        table = tolerance_study(analysis).summary
-        assert table.columns == SUMMARY_COLUMNS
-        assert summary_text(analysis) in table.notes
-        told = {str(row[0]): row[2] for row in table.rows}
-        read: dict[str, Any] = report_dict(analysis)
-        assert told["good builds"] == 100 * read["yield"]["share"]
-        assert told["worst camera, median"] == read["worst_camera_mm"]["0.5"]
-        assert told["worst camera, 1 % cover less"] == read["worst_camera_mm"]["0.01"]
-        assert told["margin needed"] == 3.71
-        for one in read["single_errors"]:
-            kind = one["kind"].rpartition("_")[0].replace("_", " ")
-            assert told[f"loss by {kind} alone"] == one["loss_mm"]
-        for one in read["processes"]:
-            assert told[f"good builds by {one['process']}"] == 100 * one["yield"]
-
-    def test_builds(self, analysis: Analysis) -> None:
-        rows, result = rows_of(analysis, "builds"), analysis.result
-        assert [int(row["build"]) for row in rows] == list(range(BUILDS))
-        assert [float(row["worst_coverage_mm"]) for row in rows] == result.worst.tolist()
-        for k, row in enumerate(rows):
-            at = result.coverage[k, int(row["worst_camera"])]
-            assert at == float(row["worst_coverage_mm"])
-        squares = [float(row["pointing_rms_mm"]) ** 2 for row in rows]
-        assert np.mean(squares) == pytest.approx(report_dict(analysis)["pointing_mm"]["rms"] ** 2)
-
-    def test_sensitivity(self, analysis: Analysis) -> None:
-        rows = rows_of(analysis, "sensitivity")
-        names = ["sphere_centre_um", "facets_mm", "camera_tilt_mrad"]
-        assert [row["kind"] for row in rows] == names
-        for row, one, key in zip(rows, report_dict(analysis)["single_errors"], names, strict=True):
-            assert float(row["loss_mm"]) == one["loss_mm"]
-            assert float(row["loss_at_yield_mm"]) == one["loss_at_yield_mm"]
-            assert float(row["magnitude"]) == getattr(analysis.process, key).magnitude
-            times = one["tolerable_factor"]
-            assert row["tolerable_factor"] == ("" if times is None else str(times))
-        assert [float(row["mean"]) for row in rows] == [0, 0.36, 0]
-        # Facets of sla: 0.36 mm in every build and no spread; 1.5 times that is no zero.
-        may = [(row["tolerable_magnitude"], row["tolerable_mean"]) for row in rows]
-        assert may == [(str(0.375 * 5), "0.0"), ("0.0", str(1.5 * 0.36)), ("", "")]
-
-    def test_processes(self, analysis: Analysis) -> None:
-        rows = rows_of(analysis, "processes")
-        assert [row["process"] for row in rows] == [one.name for one in PROCESS_OPTIONS]
-        for row, one in zip(rows, PROCESS_OPTIONS, strict=True):
-            assert float(row["yield"]) == one.estimate.share
-            assert float(row["yield_low"]) == one.estimate.low
-            assert float(row["yield_high"]) == one.estimate.high
-            assert row["margin_needed_mm"] == ("" if one.margin.mm is None else str(one.margin.mm))
-            assert row["reason"] == one.margin.reason
-
     def test_cameras(self, analysis: Analysis, little: MirrorDesign) -> None:
         rows, coverage = rows_of(analysis, "cameras"), analysis.result.coverage
         assert len(rows) == coverage.shape[1]
@@ -296,15 +206,3 @@ class TestTables:
         apart = np.linalg.norm(every[:, None] - u, axis=2)
         assert apart.min(axis=1) == pytest.approx(0, abs=1e-9)
         assert (np.linalg.norm(u[:, None] - u, axis=2) + np.eye(len(u))).min() > 0.1
-
-    def test_plot_has_a_bar_for_each_kind(self, analysis: Analysis) -> None:
-        curve, bars, sky = tolerance_study(analysis).panels
-        assert curve.series[0].y[0] == 100
-        reached = np.interp(TARGET, curve.series[0].x, curve.series[0].y)
-        step = 100 / BUILDS
-        assert reached == pytest.approx(100 * analysis.estimate.share, abs=step + 1e-9)
-        assert bars.names == ("sphere centre", "facets", "camera tilt")
-        assert bars.series[0].x.tolist() == [1.25, 0.36, 0]
-        away = np.hypot(sky.series[0].x, sky.series[0].y)
-        u = np.concatenate([at.u for at in analysis.cameras])
-        assert away.max() == pytest.approx(np.degrees(np.arccos(u[:, 2].min())), abs=1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import norm, unit
-from tbcad.rig.calibration.estimate.reflection import reflections
+from tbcad.rig.calibration.estimate.jacobian import reflections
 
 PINHOLE = np.array([100.0, 0.0, -100.0])
 CENTRE = np.array([[140.0, 35.0, 60.0], [90.0, -70.0, 120.0]])

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import Study
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.common.results import Study
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorArray, numbered_directions
 from tbcad.core.spec.load import load_spec
@@ -247,20 +247,3 @@ def test_page_has_every_claim(key: str) -> None:
     wanted = f"{claim.value:g}"
     rows = [row for row in page_rows() if len(row) > 2 and claim.where in row[1]]
     assert any(wanted in row[2].replace(",", "") for row in rows), (claim.where, wanted)
-
-
-@pytest.mark.parametrize("row", ROWS, ids=str)
-def test_page_has_every_row_of_table_ii(row: BalancedSensor) -> None:
-    printed = [str(value) for value in row.printed]
-    sensor = f"{row.width_px} x {row.height_px}"
-    rows = [cells for cells in page_rows() if sensor in cells[0]]
-    (cells,) = [cells for cells in rows if printed[0] in " ".join(cells)]
-    assert printed[1] in " ".join(cells)
-
-
-def test_page_states_each_claim_once() -> None:
-    claimed_in = ("Table ", "Fig. ", "section ")
-    first = [row[0] for row in page_rows() if len(row) > 1 and row[1].startswith(claimed_in)]
-    assert len(first) > len(claims())
-    assert len(first) == len(set(first))
-    assert "not known to us" not in PAGE.read_text(encoding="utf-8")

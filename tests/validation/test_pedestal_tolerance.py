@@ -14,17 +14,20 @@ from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.manifest import write_manifest
-from tbcad.tolerancing.as_made import as_made
-from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.sensitivity import scaled, shell_kinds
+from tbcad.tolerancing.montecarlo.sensitivity import scaled
 from tbcad.tolerancing.montecarlo.warp import pivots, smooth_field
 from tests.pedestal_designs import pedestal_design
-from tests.tolerancing.exact_builds import traced_coverage, verified_coverage, write_meshes
-from tests.tolerancing.exact_fields import displaced_coverage
+from tests.tolerancing.exact_builds import (
+    displaced_coverage,
+    traced_coverage,
+    verified_coverage,
+    write_meshes,
+)
 from tests.tolerancing.montecarlo.every_edge import every_edge
 
 COARSE = Errors(
@@ -56,7 +59,7 @@ def drawn(halves: EdgeModels, errors: Errors, builds: range) -> tuple[ShellDraws
 
 @pytest.mark.parametrize(
     "settings",
-    [("n=2",), ("n=9",), ("n=6", "shell.groove_mm=0.5"), ("n=4", "radius_rule=flat")],
+    [("n=2",), ("n=5", "shell.groove_mm=0.5"), ("n=4", "radius_rule=flat")],
 )
 def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
     made = pedestal_design(*settings)
@@ -143,23 +146,7 @@ def test_moved_walls_and_uneven_scale_against_brute_force(halves: EdgeModels) ->
     assert abs(found - mirror_coverage(halves[1], one).diameter[0, mirror]) > 0.02
 
 
-def test_walls_have_an_error_of_their_own(halves: EdgeModels) -> None:
-    """Normal, of no other's numbers; where spheres meet there is none to study."""
-    errors = Errors(groove_wall=Error(0.01))
-    a, b = drawn(halves, errors, range(4))
-    assert a.wall.shape == (4, len(halves[0].walls))
-    every = np.concatenate([a.wall.ravel(), b.wall.ravel()])
-    assert len(np.unique(every)) == len(every)
-    assert every.std() == pytest.approx(0.01, rel=4 / np.sqrt(2 * len(every)))
-    assert abs(every.mean()) < 4 * 0.01 / np.sqrt(len(every))
-    still = draw(Errors(), 7, range(4), len(halves[0]), None, len(halves[0].walls))[0]
-    moved = mirror_coverage(halves[0], replace(still, wall=a.wall)).diameter
-    assert np.array_equal(moved, mirror_coverage(halves[0], a).diameter)
-    assert shell_kinds(errors, len(halves[0].walls)) == ["groove_wall"]
-    assert shell_kinds(errors, 0) == []
-
-
-@pytest.mark.parametrize("size", [0.0, 1e-3, 0.1])
+@pytest.mark.parametrize("size", [1e-3, 0.1])
 def test_same_bits_as_with_every_edge(halves: EdgeModels, size: float) -> None:
     """Faces and parts of edges that are passed over change nothing."""
     errors = Errors(
@@ -207,24 +194,13 @@ def test_random_builds_against_the_verification_of_their_meshes(
     halves: EdgeModels, small: MirrorDesign, record: Export
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured by rays: within 0.05 mm."""
-    draws = drawn(halves, scaled(COARSE, 0.5), range(2))
+    draws = drawn(halves, scaled(COARSE, 0.5), range(1))
     fast, _ = coverage(halves, draws)
-    for k in range(2):
+    for k in range(1):
         write_meshes(small, draws, k, record.folder)
         shifts = {name: one.camera_shift[k] for name, one in zip("ab", draws, strict=True)}
         assert np.abs(fast[k] - verified_coverage(record, shifts)).max() < 0.05
     assert fast.min(axis=1).max() < 60.6 - 0.3  # the meshes are not the design's
-
-
-def test_a_build_is_the_same_alone_or_among_others(halves: EdgeModels) -> None:
-    errors = replace(SLA, waviness=Error(5e-4), sphere_centre=Error(0.005))
-    case = MonteCarloCase(halves, errors, 5)
-    together, alone = case(range(4)), case(range(2, 3))
-    for name in ("coverage", "pixels", "angle"):
-        assert np.array_equal(getattr(together, name)[2:3], getattr(alone, name)), name
-    assert np.array_equal(
-        CoverageCase(halves, errors, 5, worst_only=True)(range(4)).worst, together.worst
-    )
 
 
 def test_errors_of_neighbours_cost_less_than_where_spheres_meet(

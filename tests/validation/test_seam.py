@@ -62,7 +62,7 @@ def unseen(made: MirrorDesign, diameter: float) -> Iterator[np.ndarray]:
         yield points[~(shown(a, i, points) | shown(b, i, points))]
 
 
-@pytest.mark.parametrize("options", [["n=3"], ["n=8"], ["n=5", "mirrors.margin_mm=0.01"]])
+@pytest.mark.parametrize("options", [["n=3"], ["n=5", "mirrors.margin_mm=0.01"]])
 def test_every_point_is_seen_in_a_half(options: list[str]) -> None:
     made = design(load_spec(None, options))
     missing = list(unseen(made, made.spec.optics.capture_diameter_mm))
@@ -80,8 +80,8 @@ def test_every_point_is_seen_at_18() -> None:
 
 def test_halves_that_are_not_aimed_leave_a_gap() -> None:
     """So the rays can fail: with the paper's poses, well inside what each outline surrounds."""
-    made = design(load_spec(None, ["n=8", "mirrors.radius_rule=paper"]))
+    made = design(load_spec(None, ["n=6", "mirrors.radius_rule=paper"]))
     missing = list(unseen(made, 40.0))
-    assert sum(len(points) > 0 for points in missing) > 8
+    assert sum(len(points) > 0 for points in missing) > 6
     widest = max(np.ptp(points[:, 0]) for points in missing if len(points))
     assert widest < 4  # a wedge along the seam, nothing else

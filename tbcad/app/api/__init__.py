@@ -8,16 +8,16 @@ from tbcad.app.api.builds import Build, as_made, build, report_page
 from tbcad.app.api.captures import (
     Photographs,
     capture,
+    dataset,
+    export,
     photograph,
     relight,
     write_photographs,
 )
-from tbcad.app.api.datasets import dataset, export
 from tbcad.app.api.designs import design, optimize, to_cadquery
 from tbcad.app.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.app.api.reconstructions import reconstruct
-from tbcad.app.api.tolerances import analyse, inspect, tolerance
-from tbcad.app.api.verification import verify, verify_as_built
+from tbcad.app.api.verification import analyse, inspect, tolerance, verify, verify_as_built
 from tbcad.app.api.views import Views, refocus, view
 
 __all__ = [

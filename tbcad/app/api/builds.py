@@ -7,16 +7,15 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from tbcad.app.api.arguments import chosen_spec
+from tbcad.app.api.designs import chosen_spec
 from tbcad.app.api.verification import verify as verification
 from tbcad.common.atomic_files import InFolder
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import option_texts
 from tbcad.errors import InputError
-from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions
+from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions, check_yield
 from tbcad.options.call import keywords, silent
 from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
-from tbcad.options.tolerances import check_yield
 
 if TYPE_CHECKING:
     from tbcad_verify.report.as_made import AsMade
@@ -68,14 +67,10 @@ class Plan:
 
 
 def planned(options: BuildOptions) -> Plan:
-    """Refuse, before any work, what cannot be built or replaced.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse, before any work, what cannot be built or replaced."""
     from tbcad.output.folder import check_replaceable
-    from tbcad.output.inputs import design_files, files_named
     from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
+    from tbcad.output.single_files import design_files, files_named
 
     asked = parse_parts(options.parts) if isinstance(options.parts, str) else options.parts
     changes = option_texts(options.settings)
@@ -193,13 +188,13 @@ def _build_files(plan: Plan, options: BuildOptions) -> Build:
 
 def _load_libraries() -> None:
     """Load what the background process works with."""
-    import tbcad.tolerancing.as_made  # noqa: F401
+    import tbcad.tolerancing.montecarlo.builds  # noqa: F401
 
 
 def _as_made(mirrors: MirrorDesign) -> AsMade:
     """Simulate a few builds of a design by every built-in process."""
     from tbcad.light.simulate.scene.reflector import reflectors
-    from tbcad.tolerancing.as_made import as_made
+    from tbcad.tolerancing.montecarlo.builds import as_made
 
     spec = mirrors.spec
     target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
@@ -214,8 +209,8 @@ def as_made(
     Returns:
         Their yields; None where no shell was built, or its record cannot be read.
     """
-    from tbcad.light.simulate.scene.exported import read_export
-    from tbcad.tolerancing.as_made import as_made as simulated
+    from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.tolerancing.montecarlo.builds import as_made as simulated
 
     folder = Path(exports)
     if not (folder / "shell_a.stl").is_file():

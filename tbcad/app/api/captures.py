@@ -1,4 +1,4 @@
-"""Simulated photographs of both cameras."""
+"""Simulated photographs of both cameras, and captures as data of other programs."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.options.call import keywords
-from tbcad.options.captures import CaptureOptions
-from tbcad.options.checks import check_is_export, check_is_object
+from tbcad.options.captures import CaptureOptions, ExportOptions
+from tbcad.options.checks import check_is_capture, check_is_export, check_is_object
 from tbcad.options.shared import AnyPath
 
 if TYPE_CHECKING:
@@ -58,12 +58,12 @@ def photograph(options: CaptureOptions) -> Photographs:
     check_is_export(exports)
     check_is_object(None if file is None else Path(file), options.up, options.unit)
     from tbcad.light.simulate.camera_photographs import camera_photographs
-    from tbcad.light.simulate.prototype.lamps import lit_by, read_lamps
-    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
     from tbcad.light.simulate.scene.ray_casting import prepared_scene
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.folder import check_replaceable
-    from tbcad.output.inputs import files_named
+    from tbcad.output.single_files import files_named
 
     sources = (exports, file, *files_named(options.lights))
     if options.out is not None:
@@ -184,7 +184,7 @@ def relight(
     from math import radians
 
     from tbcad.light.reflectance.environment import read_environment
-    from tbcad.light.reflectance.field_file import open_reflectance, relit
+    from tbcad.light.reflectance.transport import open_reflectance, relit
     from tbcad.light.simulate.capture.light_field import LightField
 
     folder, environment = (
@@ -193,3 +193,44 @@ def relight(
     )
     with open_reflectance(folder) as reflectance:
         return relit(LightField.read(folder), reflectance, environment).field
+
+
+@keywords(ExportOptions)
+def dataset(options: ExportOptions) -> dict[str, Any]:
+    """Write the light field of a capture as data that another program reads.
+
+    Returns:
+        What is in dataset.json: also how far the rays are from those of pinholes; of scenes the
+        numbers of facets.
+
+    Raises:
+        InputError: the capture cannot be read, an option does not fit it, or out cannot be
+            replaced.
+    """
+    options.check()
+    place, out, exports = Path(options.capture), Path(options.out), options.exports
+    check_is_capture(place)
+    from tbcad.light.datasets.export import write_dataset, write_scene
+    from tbcad.light.simulate.capture.files import OBJECT, read_object
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.scene.ray_casting import prepared_scene
+    from tbcad.output.folder import check_replaceable, replacing
+    from tbcad.output.manifest import write_manifest
+
+    inputs = (place if place.is_dir() else place.parent, exports)
+    check_replaceable(out, "dataset", options.force, inputs)
+    known = (place / OBJECT).is_file()
+    with (
+        LightField.open(place) as source,
+        replacing(out, "dataset", options.force, inputs) as folder,
+    ):
+        scene = prepared_scene(read_object(place)) if known else None
+        if exports is not None:
+            record = write_scene(folder, source, scene, Path(exports), options.progress)
+        else:
+            record = write_dataset(folder, source, scene, options)
+        write_manifest(folder, "dataset")
+    return record
+
+
+export = dataset  # as it was called at first

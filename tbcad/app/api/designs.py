@@ -1,15 +1,17 @@
-"""Mirrors from a spec."""
+"""Mirrors of a spec, and a search for better ones."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tbcad.app.api.arguments import Settings, chosen_spec
 from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import short_text
+from tbcad.core.spec.load import load_spec, option_texts
 from tbcad.errors import InputError
 from tbcad.options.call import keywords, silent
-from tbcad.options.designs import OptimizeOptions
+from tbcad.options.designs import AnyDesign, OptimizeOptions
 
 if TYPE_CHECKING:
     from build123d import Part
@@ -18,6 +20,28 @@ if TYPE_CHECKING:
     from tbcad.app.whole_design import Design
     from tbcad.optimizing.search import SearchResult
     from tbcad.types import Progress
+
+
+Settings = Mapping[str, str] | Sequence[str]
+
+
+def chosen_spec(spec: AnyDesign | None, n: int | str | None, settings: Settings) -> Spec:
+    """Return a spec as it is, or read a design file; None: the design of the paper.
+
+    Raises:
+        InputError: a spec comes with settings, or the file is not allowed.
+    """
+    if isinstance(spec, Spec):
+        if settings or n is not None:
+            raise InputError("n and settings go with a design file: give them to load_spec")
+        return spec
+    if spec is not None and not isinstance(spec, Path | str):
+        raise InputError(
+            f"design is {short_text(spec)}, allowed is a spec, a design file (TOML) or the name of "
+            "a design: change it"
+        )
+    options = option_texts(settings) + ([f"optics.n={n}"] if n is not None else [])
+    return load_spec(None if spec is None else Path(spec), options)
 
 
 def design(
@@ -108,6 +132,6 @@ def to_cadquery(part: Part) -> Workplane:
     Raises:
         InputError: cadquery is not installed.
     """
-    from tbcad.cad.kernel.part import as_workplane
+    from tbcad.cad.kernel.solids import as_workplane
 
     return as_workplane(part)

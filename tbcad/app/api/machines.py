@@ -22,12 +22,13 @@ from tbcad.options.machines import (
     SimulateRunOptions,
 )
 from tbcad.options.runs import RunOptions
+from tbcad.options.shared import exposures
 
 if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
     from tbcad.rig.calibration.run import WrittenCalibration
-    from tbcad.rig.control.outcome import Outcome
-    from tbcad.rig.runs.photographs import Run
+    from tbcad.rig.control.selection import Outcome
+    from tbcad.rig.runs import Run
 
 
 @keywords(RunOptions)
@@ -60,11 +61,12 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     check_is_object(None if file is None else Path(file), options.up, options.unit)
     if options.bits not in (8, 16):
         raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
-    options.stop_numbers(), options.seconds()  # refused before what is heavy is loaded
-    from tbcad.light.simulate.scene.exported import read_export
+    options.stop_numbers()  # refused before what is heavy is loaded
+    exposures(options.exposure_leds, options.exposure_lit)
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions
-    from tbcad.output.inputs import files_named
-    from tbcad.rig.runs.photographs import read_run
+    from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.output.single_files import files_named
+    from tbcad.rig.runs import read_run
     from tbcad.rig.simulated_run.simulate import check_is_free, prepare_run, run_object, write_run
     from tbcad.tolerancing.process.process import load_process, process_errors
 
@@ -151,8 +153,7 @@ def merge(options: MergeOptions) -> dict[str, Any]:
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
     from tbcad.rig.machine.shells import export_of
-    from tbcad.rig.merged_run.files import write_merge
-    from tbcad.rig.merged_run.merge import prepared_merge
+    from tbcad.rig.merged_run.merge import prepared_merge, write_merge
 
     built = export_of(known) if options.exports is None else Path(options.exports)
     out, inputs = options.folder, (run, known, built, *options.flat)
@@ -187,7 +188,7 @@ def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     built = export_of(known) if options.exports is None else Path(options.exports)
     check_replaceable(out, "as-built", options.force, (known, built))
     options.progress("solids")
-    from tbcad.rig.calibrated_solids.files import as_built as write_files
+    from tbcad.rig.calibrated_solids import as_built as write_files
 
     with replacing(out, "as-built", options.force, (known, built)) as folder:
         record = write_files(known, built, folder)

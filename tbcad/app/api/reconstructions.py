@@ -147,11 +147,7 @@ def _reconstructed(
 
 
 def checked_frames(options: ReconstructOptions) -> list[int | None]:
-    """Refuse, before any work, what cannot be read or written; the frames, None for the capture.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse, before any work, what cannot be read or written; the frames, None for the capture."""
     capture, folder = Path(options.capture), _folder(options)
     check_is_capture(capture)
     if options.blur_px and options.rays == 1:
@@ -236,11 +232,7 @@ def pixels(source: LightField) -> int:
 
 
 def check_memory(source: LightField, options: ReconstructOptions) -> None:
-    """Refuse what this computer has no memory for.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse what this computer has no memory for."""
     from tbcad.app.doctor import available_memory_gb
 
     count = pixels(source)

@@ -103,7 +103,7 @@ class Views:
         from math import radians
 
         from tbcad.light.reconstruction.field import Field
-        from tbcad.light.simulate.scene.viewpoint import camera_around_object
+        from tbcad.light.simulate.scene.rays import camera_around_object
 
         made = self._field if method is None or isinstance(self._source, Field) else None
         angles = radians(azimuth_deg), radians(elevation_deg)
@@ -207,7 +207,7 @@ def refocus(
     """
     from math import radians
 
-    from tbcad.light.simulate.scene.viewpoint import camera_around_object
+    from tbcad.light.simulate.scene.rays import camera_around_object
     from tbcad.light.simulate.views.refocus import ThinLens
 
     views = Views(source)

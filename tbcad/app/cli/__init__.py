@@ -12,24 +12,27 @@ from functools import partial
 import typer
 
 from tbcad.app.cli.commands import build as _build  # noqa: F401 - adds its commands
+from tbcad.app.cli.commands import captures as _captures  # noqa: F401 - adds its commands
 from tbcad.app.cli.commands import designs as _designs  # noqa: F401 - adds its commands
 from tbcad.app.cli.commands import explain as _explain  # noqa: F401 - adds its command
-from tbcad.app.cli.commands import export as _export  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import machines as _machines  # noqa: F401 - adds its commands
 from tbcad.app.cli.commands import reconstruct as _reconstruct  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import refocus as _refocus  # noqa: F401 - adds its command
-from tbcad.app.cli.commands import report as _report  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import run_command as _run_command  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import show as _show_command  # noqa: F401 - adds its command
-from tbcad.app.cli.commands import simulate as _simulate  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import study as _study  # noqa: F401 - adds its commands
 from tbcad.app.cli.commands import tolerance as _tolerance  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import view as _view  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import workshop as _workshop  # noqa: F401 - adds its commands
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import add_examples, order_help
-from tbcad.app.cli.stopping import INTERRUPTED, Stopped, shortage, signals_as_interrupt
-from tbcad.app.cli.usage_errors import usage_error_text
+from tbcad.app.cli.endings import (
+    INTERRUPTED,
+    Stopped,
+    shortage,
+    signals_as_interrupt,
+    usage_error_text,
+)
 from tbcad.errors import InputError, PlausibilityWarning
 
 order_help(app)

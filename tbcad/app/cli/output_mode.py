@@ -16,15 +16,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON; s
 
 
 def output_mode(full: bool, quiet: bool, json: bool) -> "Output":
-    """What is to be printed.
-
-    Raises:
-        InputError: more than one thing.
-    """
-    chosen: list[Output] = []
-    chosen += ["full"] if full else []
-    chosen += ["quiet"] if quiet else []
-    chosen += ["json"] if json else []
+    """What is to be printed; more than one thing is refused."""
+    asked: dict[Output, bool] = {"full": full, "quiet": quiet, "json": json}
+    chosen = [name for name, wanted in asked.items() if wanted]
     if len(chosen) > 1:
         given = " and ".join(f"--{name}" for name in chosen)
         raise InputError(f"{given} exclude each other: give only one of them")

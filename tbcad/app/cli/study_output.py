@@ -15,7 +15,7 @@ from tbcad.options.shared import Design, Exports, JsonResult, Out, PlotFormatOpt
 
 if TYPE_CHECKING:
     from tbcad.common.figure_files import PlotFormat
-    from tbcad.common.results.study import Study
+    from tbcad.common.results import Study
     from tbcad.core.spec.design import Spec
     from tbcad.types import Progress
 
@@ -26,20 +26,12 @@ STUDIES = Path("studies")
 
 
 def of_design(prepare: Callable[..., Work]) -> Callable[..., int]:
-    """A command for a study of a design.
-
-    Args:
-        prepare: takes the design's Spec, then options of its own; returns what makes the study.
-    """
+    """A command for a study of a design: takes its Spec, then options of its own."""
     return _command(prepare, _spec)
 
 
 def of_export(prepare: Callable[..., Work]) -> Callable[..., int]:
-    """A command for a study of an export.
-
-    Args:
-        prepare: takes the export's folder, then options of its own; returns what makes the study.
-    """
+    """A command for a study of an export: takes its folder, then options of its own."""
     return _command(prepare, _folder)
 
 
@@ -78,7 +70,7 @@ def _command(prepare: Callable[..., Work], subject: Callable[..., object]) -> Ca
 
 def _run_study(out: Path, json: bool, plot: "PlotFormat", work: Work) -> int:
     """Make a study, write its files, and show its figures next to the paper's."""
-    from tbcad.common.results.study import check_study_folder, write_study
+    from tbcad.common.results import check_study_folder, write_study
     from tbcad.output.single_files import check_tables
 
     check_tables(out)

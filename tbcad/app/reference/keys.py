@@ -1,10 +1,12 @@
-"""The keys of a design, told from the models: type, default, unit, allowed values, description."""
+"""The keys of a design with type, default, range and text, and a design file with all of them."""
 
 import ast
 import inspect
+import re
 import sys
+import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 from typing import Any, Literal, get_args, get_origin
@@ -12,9 +14,11 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tbcad.cad.formats.toml import toml_text
+from tbcad.cad.formats.checked_files import toml_text
+from tbcad.core.spec.csv_rows import Table, read_text, read_toml
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import allowed_text, section_of
+from tbcad.core.spec.load import PAPER, shipped_designs
 
 # Of a key, by the last word of its name, or its last two.
 UNITS = {
@@ -65,23 +69,23 @@ def key_sections() -> tuple[KeySection, ...]:
 def _sections(model: type[BaseModel], name: str, description: str) -> Iterator[KeySection]:
     prefix = f"{name}." if name else ""
     texts = _descriptions(model)
-    fields = {field.alias or own: (own, field) for own, field in model.model_fields.items()}
+    fields = {info.alias or own: (own, info) for own, info in model.model_fields.items()}
     keys = [
-        _key(prefix + key, field, texts[own])
-        for key, (own, field) in fields.items()
-        if section_of(field) is None
+        _key(prefix + key, info, texts[own])
+        for key, (own, info) in fields.items()
+        if section_of(info) is None
     ]
     yield KeySection(name, description, tuple(keys))
-    for key, (own, field) in fields.items():
-        if section := section_of(field):
+    for key, (own, info) in fields.items():
+        if section := section_of(info):
             about = texts.get(own) or inspect.cleandoc(section.__doc__ or "")
             yield from _sections(section, prefix + key, about)
 
 
-def _key(name: str, field: FieldInfo, description: str) -> Key:
-    allowed = allowed_text(field.annotation, field.metadata)
-    default = toml_text(field.default)
-    return Key(name, _type(field.annotation), default, unit_of(name), allowed, description)
+def _key(name: str, info: FieldInfo, description: str) -> Key:
+    allowed = allowed_text(info.annotation, info.metadata)
+    default = toml_text(info.default)
+    return Key(name, _type(info.annotation), default, unit_of(name), allowed, description)
 
 
 def unit_of(name: str) -> str:
@@ -124,3 +128,110 @@ def _texts(section: ast.ClassDef) -> Iterator[tuple[str, str]]:
                 value=ast.Constant(value=str(words))
             ):
                 yield name, " ".join(words.split())
+
+
+WIDTH = 100
+# Set in the file, so that they are seen; all others are comments until a user takes the # away.
+MAIN = ("name", "schema", "optics", "camera", "mirrors.radius_rule", "mirrors.margin_mm")
+HEAD = """\
+Every key of a design, with what it may be. A key that begins with # has its default, which is
+shown: take the # away to set it. "auto": tbcad chooses, and design.json says what.
+  tbcad build FILE                 builds and verifies it
+  tbcad explain mirrors.margin_mm  explains a key, or any other word"""
+
+# What a design says of keys that it leaves out; here they are all.
+ELSEWHERE = "All keys, with units and ranges: tbcad init. What is not set here has its default."
+
+
+@dataclass
+class Remarks:
+    """Comments of a design: of the whole, and by the dotted name of a key or section."""
+
+    whole: list[str] = field(default_factory=list)
+    by_name: dict[str, list[str]] = field(default_factory=dict)
+
+
+def design_template(name: str = PAPER) -> str:
+    """A TOML file that gives the design of a name, with every key of a design.
+
+    Args:
+        name: of a design that comes with tbcad.
+    """
+    file = shipped_designs()[name]
+    values = _dotted(read_toml(file, name, "design"))
+    remarks = _remarks(read_text(file, name, "design"))
+    whole = "\n".join(remarks.whole).removesuffix(ELSEWHERE).rstrip()
+    lines = [f"# {line}".rstrip() for line in (*whole.splitlines(), "", *HEAD.splitlines())]
+    for section in key_sections():
+        lines += _section_lines(section, values, remarks)
+    return "\n".join(lines) + "\n"
+
+
+def _section_lines(section: KeySection, values: Table, remarks: Remarks) -> Iterator[str]:
+    if section.name:
+        yield ""
+        yield from _comment(section.description)
+        yield from (f"# {line}" for line in remarks.by_name.get(section.name, ()))
+        yield f"[{section.name}]"
+    for key in section.keys:
+        yield ""
+        yield from _key_lines(key, values, remarks.by_name.get(key.name, []))
+
+
+def _key_lines(key: Key, values: Table, remarks: list[str]) -> Iterator[str]:
+    unit = f", {key.unit}" if key.unit else ""
+    yield from _comment(key.description)
+    yield from _comment(f"Allowed: {key.allowed}{unit}. Default: {key.default}.")
+    yield from (f"# {line}" for line in remarks)
+    value = toml_text(values[key.name]) if key.name in values else key.default
+    mark = "" if key.name in values or _is_main(key.name) else "# "
+    yield from _fitting(f"{mark}{key.name.rpartition('.')[2]} = {value}")
+
+
+def _fitting(line: str) -> Iterator[str]:
+    """A line, or several where it ends with a list that does not fit."""
+    start, bracket, items = line.partition("[")
+    if len(line) <= WIDTH or not bracket:
+        yield line
+        return
+    yield start + bracket
+    yield from textwrap.wrap(
+        items.removesuffix("]"), WIDTH, initial_indent="    ", subsequent_indent="    "
+    )
+    yield "]"
+
+
+def _is_main(key: str) -> bool:
+    return any(key == main or key.startswith(main + ".") for main in MAIN)
+
+
+def _comment(text: str) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ")
+
+
+def _dotted(table: Table, prefix: str = "") -> Table:
+    """The values of a table by dotted key."""
+    values: Table = {}
+    for key, value in table.items():
+        values |= _dotted(value, f"{prefix}{key}.") if isinstance(value, dict) else {}
+        values |= {} if isinstance(value, dict) else {prefix + key: value}
+    return values
+
+
+def _remarks(text: str) -> Remarks:
+    """The comments of a design: a block belongs to the line below it, else to the whole."""
+    remarks, section, block = Remarks(), "", list[str]()
+    for line in [*text.splitlines(), ""]:
+        if line.startswith("#"):
+            block.append(line.removeprefix("#").removeprefix(" "))
+            continue
+        if header := re.fullmatch(r"\[(.+)\]", line):
+            section = header[1] + "."
+        key = re.match(r"(\w+) = ", line)
+        name = header[1] if header else section + key[1] if key else ""
+        if name and block:
+            remarks.by_name[name] = block
+        elif block:
+            remarks.whole += ["", *block] if remarks.whole else block
+        block = []
+    return remarks

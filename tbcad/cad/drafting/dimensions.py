@@ -1,7 +1,7 @@
 """Dimensions, leaders, centre lines and labels on paper (ISO 129-1); all lengths in mm."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -34,29 +34,22 @@ LEAST_MM = 1e-9  # lines across x or y are taken for as much oblique
 
 def across(start: Point, end: Point, level: float, size: str, form: str = "<>") -> Dimension:
     """A horizontal dimension between two points, its line at a level; <> stands for the size."""
-    feet = [_extended(point, (point[0], level)) for point in (start, end)]
-    line = (end[0], level)
-    measured = _measured((start[0], level), line, form.replace("<>", size), 0.0)
-    return _length(start, end, line, 0.0, (size, form), (*feet, *measured))
+    return _length(start, end, lambda point: (point[0], level), 0.0, size, form)
 
 
 def upward(start: Point, end: Point, level: float, size: str, form: str = "<>") -> Dimension:
     """A vertical dimension between two points, its line at a level; <> stands for the size."""
-    feet = [_extended(point, (level, point[1])) for point in (start, end)]
-    line = (level, end[1])
-    measured = _measured((level, start[1]), line, form.replace("<>", size), 90.0)
-    return _length(start, end, line, 90.0, (size, form), (*feet, *measured))
+    return _length(start, end, lambda point: (level, point[1]), 90.0, size, form)
 
 
 def _length(
-    start: Point,
-    end: Point,
-    line: Point,
-    turn: float,
-    text: tuple[str, str],
-    drawn: tuple[Simple, ...],
+    start: Point, end: Point, at: Callable[[Point], Point], turn: float, size: str, form: str
 ) -> Dimension:
-    return Dimension(Layer.DIMENSIONS, Measured.LENGTH, start, end, line, turn, *text, drawn)
+    """A dimension between two points, each with its place on the line."""
+    feet = [_extended(point, at(point)) for point in (start, end)]
+    measured = _measured(at(start), at(end), form.replace("<>", size), turn)
+    kind, layer, drawn = Measured.LENGTH, Layer.DIMENSIONS, (*feet, *measured)
+    return Dimension(layer, kind, start, end, at(end), turn, size, form, drawn)
 
 
 def _extended(point: Point, line: Point) -> Line:
@@ -138,13 +131,9 @@ def labels(
     lines: Sequence[tuple[Point, Point]] = (),
     taken: Sequence[Box] = (),
 ) -> Iterator[Simple]:
-    """A label beside each circle, clear of all circles and other labels where there is room.
+    """A label beside each circle on paper, clear of all circles and other texts if there is room.
 
-    Args:
-        circles: on paper.
-        texts: one a circle.
-        lines: that labels should not lie on, by their ends.
-        taken: other texts on paper.
+    Nor does it lie on lines, given by their ends.
     """
     boxes = [*map(_round, circles), *taken]
     ends = np.array(lines).reshape(-1, 2, 2)
@@ -194,13 +183,10 @@ def _meet(one: Box, other: Box) -> bool:
 def ruler_across(
     levels: Sequence[tuple[float, str]], zero: float, edge: float, row: float
 ) -> Iterator[Dimension]:
-    """Running dimensions below an edge: a text for each x, turned, in a row (ISO 129-1).
+    """Running dimensions below an edge (y): a turned text for each x on paper, in rows (ISO 129-1).
 
-    Args:
-        levels: x on paper and text.
-        zero: x on paper of the datum.
-        edge: y where extension lines begin.
-        row: y of the row of texts; they go down from it.
+    Extension lines begin at the edge, texts go down from the row (y); zero is the datum's x on
+    paper.
     """
     places = spread([x for x, _ in levels], RULER_MM)
     for (x, text), place in zip(levels, places, strict=True):

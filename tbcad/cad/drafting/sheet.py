@@ -1,8 +1,7 @@
 """A sheet: border, title block, notes, and a part drawn to scale (ISO 5455, 5457, 7200)."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import singledispatch
 from pathlib import Path
 from typing import TypeAlias
 
@@ -16,8 +15,8 @@ from tbcad.cad.formats.entities import (
     Line,
     Point,
     Polyline,
-    Simple,
     Text,
+    simple,
 )
 from tbcad.cad.formats.pdf import text_width, write_pdf
 from tbcad.version import __version__
@@ -187,37 +186,18 @@ def moved(entity: Entity, start: Point, scale: float) -> Entity:
     def new(point: Point) -> Point:
         return (point[0] - start[0]) * scale, (point[1] - start[1]) * scale
 
-    if isinstance(entity, Dimension):
-        begin, end, line = map(new, (entity.start, entity.end, entity.line))
-        drawn = tuple(_moved(one, new, scale) for one in entity.drawn)
-        return replace(entity, start=begin, end=end, line=line, drawn=drawn)
-    return _moved(entity, new, scale)
-
-
-@singledispatch
-def _moved(entity: Simple, new: Callable[[Point], Point], scale: float) -> Simple:
-    raise TypeError(entity)
-
-
-@_moved.register
-def _(entity: Line, new: Callable[[Point], Point], scale: float) -> Simple:
-    return replace(entity, start=new(entity.start), end=new(entity.end))
-
-
-@_moved.register
-def _(entity: Polyline, new: Callable[[Point], Point], scale: float) -> Simple:
-    return replace(entity, corners=tuple(map(new, entity.corners)))
-
-
-@_moved.register(Circle)
-@_moved.register(Arc)
-def _(entity: Circle | Arc, new: Callable[[Point], Point], scale: float) -> Simple:
-    return replace(entity, centre=new(entity.centre), radius=entity.radius * scale)
-
-
-@_moved.register
-def _(entity: Text, new: Callable[[Point], Point], scale: float) -> Simple:
-    return replace(entity, place=new(entity.place), height=entity.height * scale)
+    match entity:
+        case Dimension(start=begin, end=end, line=line, drawn=drawn):
+            parts = tuple(simple(moved(one, start, scale) for one in drawn))
+            return replace(entity, start=new(begin), end=new(end), line=new(line), drawn=parts)
+        case Line(_, begin, end):
+            return replace(entity, start=new(begin), end=new(end))
+        case Polyline(_, corners):
+            return replace(entity, corners=tuple(map(new, corners)))
+        case Circle(_, centre, radius) | Arc(_, centre, radius):
+            return replace(entity, centre=new(centre), radius=radius * scale)
+        case Text(_, place, height):
+            return replace(entity, place=new(place), height=height * scale)
 
 
 def table(

@@ -1,10 +1,10 @@
-"""JSON and CSV files of an export, checked against pydantic models before they are used."""
+"""JSON and CSV files of an export, checked against pydantic models; tables and TOML written."""
 
 import csv
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -23,6 +23,9 @@ MAX_BYTES = 200_000_000  # n = 60 takes 12 million
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
+Model = TypeVar("Model", bound=BaseModel)
+Cell = str | int | float | None
+Row = dict[str, Cell]
 
 
 class Record(BaseModel):
@@ -31,20 +34,11 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
-Model = TypeVar("Model", bound=BaseModel)
-
-
 def read_json(path: Path, model: type[Model], schema: str | None, missing: str) -> Model:
-    """The JSON object in a file.
+    """The JSON object in a file, which must fit a model and name a schema (None: it names none).
 
-    Args:
-        path: the file.
-        model: that the object must fit.
-        schema: that the object must name; None: it names none.
-        missing: what to do if there is no such file, for the error.
-
-    Raises:
-        InputError: the file is missing, too large, not JSON, of another schema, or does not fit.
+    InputError if the file is missing (the error says what to do), too large, not JSON, or does not
+    fit.
     """
     text = _text(path, missing)
     try:
@@ -63,11 +57,7 @@ def read_json(path: Path, model: type[Model], schema: str | None, missing: str) 
 
 
 def parse_json(text: str | bytes) -> Any:
-    """The value of a JSON text with finite numbers, each key once, and whole characters.
-
-    Raises:
-        ValueError: it is no such text.
-    """
+    """The value of a JSON text with finite numbers, keys once, whole characters; or ValueError."""
     try:
         value = json.loads(
             text,
@@ -107,15 +97,10 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def read_csv(path: Path, model: type[Model], missing: str) -> list[Model]:
-    """The rows of a CSV file with a header line.
+    """The rows of a CSV file with a header line, each of which must fit a model.
 
-    Args:
-        path: the file.
-        model: that every row must fit.
-        missing: what to do if there is no such file, for the error.
-
-    Raises:
-        InputError: the file is missing, too large, not CSV, or a row does not fit.
+    InputError if the file is missing (the error says what to do), too large, not CSV, or does not
+    fit.
     """
     text = _text(path, missing)
     try:
@@ -155,3 +140,21 @@ def _text(path: Path, missing: str) -> str:
         return path.read_text(encoding="utf-8")
     except (ValueError, OSError) as error:
         raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+
+
+def write_table(path: Path, columns: tuple[str, ...], rows: Iterable[Row]) -> None:
+    """Write rows under a header line, None as an empty cell; ValueError if a key is no column."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def toml_text(value: object) -> str:
+    """A value as TOML, whose lists are tuples here."""
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(toml_text, value)) + "]"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    return str(value).lower() if isinstance(value, bool) else repr(value)

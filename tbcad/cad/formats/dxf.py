@@ -8,7 +8,6 @@ anew, as LibreCAD and FreeCAD do, find a style that gives nearly the same.
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import singledispatch
 from io import StringIO
 from pathlib import Path
 from threading import RLock
@@ -32,7 +31,8 @@ if TYPE_CHECKING:
     from ezdxf.entities import Dimension as DxfDimension
     from ezdxf.layouts import BaseLayout, BlockLayout
 
-ARROW, GAP, BEYOND, ABOVE = 1.0, 1 / 3, 2 / 3, 1 / 3  # of the height of the text
+# Height of text, arrow, gap, beyond and above, of the height of the text.
+LENGTHS = {"dimtxt": 1.0, "dimasz": 1.0, "dimexo": 1 / 3, "dimexe": 2 / 3, "dimgap": 1 / 3}
 MEASURED = "<>"  # stands for what the program measures
 PLACED = 128  # of a dimension's type: its text stays where it is
 DECIMAL, DECIMAL_POINT = 2, ord(".")  # of $DIMLUNIT and $DIMDSEP
@@ -79,10 +79,7 @@ def add_dimension(entity: Dimension, space: "BaseLayout") -> "BlockLayout":
 
 
 def dimension_text(entity: Dimension) -> str:
-    """Its text, with <> where a program that measures writes the same number.
-
-    Programs write the sign of a diameter by themselves.
-    """
+    """Its text, with <> where a program that measures writes the number, or a diameter's sign."""
     if f"{entity.measured:.{_digits(entity.size)}f}" != entity.size:
         return entity.form.replace(MEASURED, entity.size)
     is_diameter = entity.kind is Measured.DIAMETER
@@ -112,29 +109,12 @@ def _style(entity: Dimension, space: "BaseLayout", height: float) -> str:
     running = entity.kind is Measured.RUNNING
     name = f"{'running' if running else 'text'} {height:g} digits {digits}"
     if name not in styles:
-        lengths = {
-            "dimtxt": height,
-            "dimasz": ARROW * height,
-            "dimexo": GAP * height,
-            "dimexe": BEYOND * height,
-            "dimgap": ABOVE * height,
-        }
-        styles.new(
-            name,
-            dxfattribs={
-                **lengths,
-                **_numbers(digits),
-                **ALONG_LINE,
-                "dimtad": AT_END if running else ABOVE_LINE,
-            },
-        )
+        # Numbers are rounded, because ezdxf takes 0, no rounding, for whole numbers.
+        numbers = {"dimlunit": DECIMAL, "dimdsep": DECIMAL_POINT, "dimzin": 0, "dimdec": digits}
+        place = {"dimrnd": 10.0**-digits, "dimtad": AT_END if running else ABOVE_LINE}
+        sizes = {key: share * height for key, share in LENGTHS.items()}
+        styles.new(name, dxfattribs={**sizes, **numbers, **place, **ALONG_LINE})
     return name
-
-
-def _numbers(digits: int) -> dict[str, float]:
-    """How numbers are written; rounded, because ezdxf takes 0, no rounding, for whole numbers."""
-    form = {"dimlunit": DECIMAL, "dimdsep": DECIMAL_POINT, "dimzin": 0}
-    return {**form, "dimdec": digits, "dimrnd": 10.0**-digits}
 
 
 def _digits(size: str) -> int:
@@ -150,10 +130,6 @@ def _middle(text: Text) -> Point:
         text.place[0] + along * math.cos(turn) - up * math.sin(turn),
         text.place[1] + along * math.sin(turn) + up * math.cos(turn),
     )
-
-
-if TYPE_CHECKING:
-    from ezdxf.layouts import BaseLayout
 
 
 def write_dxf(path: Path, entities: Iterable[Entity]) -> None:
@@ -191,46 +167,23 @@ def _fixed_dates() -> Iterator[None]:
             ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-@singledispatch
 def _add(entity: Entity, space: "BaseLayout") -> None:
-    raise TypeError(entity)
-
-
-@_add.register(Line)
-def _(entity: Line, space: "BaseLayout") -> None:
-    space.add_line(entity.start, entity.end, {"layer": entity.layer})
-
-
-@_add.register(Circle)
-def _(entity: Circle, space: "BaseLayout") -> None:
-    space.add_circle(entity.centre, entity.radius, {"layer": entity.layer})
-
-
-@_add.register(Arc)
-def _(entity: Arc, space: "BaseLayout") -> None:
-    angles = entity.start_deg, entity.end_deg
-    space.add_arc(entity.centre, entity.radius, *angles, dxfattribs={"layer": entity.layer})
-
-
-@_add.register(Polyline)
-def _(entity: Polyline, space: "BaseLayout") -> None:
     attributes = {"layer": entity.layer}
-    space.add_lwpolyline(entity.corners, close=entity.closed, dxfattribs=attributes)
+    match entity:
+        case Line(_, start, end):
+            space.add_line(start, end, attributes)
+        case Circle(_, centre, radius):
+            space.add_circle(centre, radius, attributes)
+        case Arc(_, centre, radius, first, last):
+            space.add_arc(centre, radius, first, last, dxfattribs=attributes)
+        case Polyline(_, corners, closed):
+            space.add_lwpolyline(corners, close=closed, dxfattribs=attributes)
+        case Text(_, place, height, words, align, turn):
+            from ezdxf.enums import TextEntityAlignment
 
-
-@_add.register(Text)
-def _(entity: Text, space: "BaseLayout") -> None:
-    from ezdxf.enums import TextEntityAlignment
-
-    attributes = {"layer": entity.layer}
-    text = space.add_text(
-        entity.text, height=entity.height, rotation=entity.turn_deg, dxfattribs=attributes
-    )
-    text.set_placement(entity.place, align=TextEntityAlignment[ALIGNMENTS[entity.align]])
-
-
-@_add.register(Dimension)
-def _(entity: Dimension, space: "BaseLayout") -> None:
-    block = add_dimension(entity, space)
-    for one in entity.drawn:
-        _add(one, block)
+            text = space.add_text(words, height=height, rotation=turn, dxfattribs=attributes)
+            text.set_placement(place, align=TextEntityAlignment[ALIGNMENTS[align]])
+        case Dimension():
+            block = add_dimension(entity, space)
+            for one in entity.drawn:
+                _add(one, block)

@@ -97,9 +97,7 @@ class Dimension:
     kind: Measured  # of it
     start: Point  # of what is measured, or the datum
     end: Point  # of what is measured
-    # where the dimension line meets the extension line from the end; of a running dimension the end
-    # of its line, of a diameter that of its leader
-    line: Point
+    line: Point  # where the dimension line ends; of a diameter the end of its leader
     turn_deg: float  # direction that is measured along, from the x axis: 0 or 90
     size: str  # the number that is written
     form: str  # of the text, with <> for the number

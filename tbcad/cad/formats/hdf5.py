@@ -50,11 +50,7 @@ class StoredArray:
         return self.shape[0]
 
     def __getitem__(self, part: Any) -> Any:
-        """Read a part.
-
-        Raises:
-            InputError: the file is damaged there, or closed.
-        """
+        """Read a part; InputError where the file is damaged there, or closed."""
         if not self._data:
             raise InputError("the file is closed: read its arrays within the block that opened it")
         try:
@@ -90,19 +86,11 @@ class StoredGroup:
         return self._group.get(name, getlink=True) is not None
 
     def group(self, name: str) -> "StoredGroup":
-        """A group in this one.
-
-        Raises:
-            ValueError: it is none of this file, or has another name too.
-        """
+        """A group in this one; ValueError if it is none of this file, or has another name too."""
         return StoredGroup(self._member(name, h5py.Group), self._damaged, self._seen)
 
     def array(self, name: str) -> StoredArray:
-        """An array in this group.
-
-        Raises:
-            ValueError: it is none of this file, has another name too, or is none that tbcad writes.
-        """
+        """An array in this group; ValueError as of `group`, or if it is none that tbcad writes."""
         data = self._member(name, h5py.Dataset)
         if reason := _refused(data):
             raise ValueError(f"array {name} of {self._group.name} {reason}")
@@ -134,17 +122,11 @@ def open_hdf5(
 def opened_hdf5(
     file: Path, schema: str, what: str, again: str, read: Callable[[StoredGroup], Found]
 ) -> tuple[h5py.File, Found]:
-    """Open a file for reading, and read what is asked for; it is open while an array is kept.
+    """Open a file that exists, and read what is asked for; it is open while an array is kept.
 
-    Args:
-        file: that exists.
-        schema: that its attribute must name.
-        what: it is, such as "light field".
-        again: what to do about a file that cannot be used.
-        read: makes the value from the file's outermost group.
-
-    Raises:
-        InputError: it is no such file, has another schema, or is damaged.
+    Its attribute schema must name the schema. What it is ("light field"), and what to do about a
+    file that cannot be used, are for errors: InputError if it is no such file, has another schema,
+    or is damaged.
     """
     try:
         store = h5py.File(file, "r", rdcc_nbytes=CHUNK_CACHE)

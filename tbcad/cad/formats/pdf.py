@@ -6,7 +6,7 @@ Written here because importing a plotting library takes as long as ten drawings.
 import csv
 import math
 from collections.abc import Iterable, Sequence
-from functools import cache, singledispatch
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -45,25 +45,14 @@ def _widths() -> dict[str, float]:
 
 
 def text_width(text: str, height: float) -> float:
-    """Width of a text in mm, for a height of its capital letters in mm.
-
-    Raises:
-        KeyError: a character that drawings have not.
-    """
+    """Width of a text by the height of its capitals, mm; KeyError if drawings lack a character."""
     return sum(_widths()[character] for character in text) / EM * height / CAPITAL
 
 
 def write_pdf(
     path: Path, title: str, size: tuple[float, float], entities: Iterable[Entity]
 ) -> None:
-    """Write one page.
-
-    Args:
-        path: to write.
-        title: of the document.
-        size: of the page, mm.
-        entities: in mm from the page's lower left corner.
-    """
+    """Write one page of a size (mm) with a title; entities are in mm from its lower left corner."""
     scale = _number(POINTS_PER_MM)
     drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, simple(entities))])
     box = " ".join(_number(side * POINTS_PER_MM) for side in size)
@@ -126,33 +115,18 @@ def _text(entity: Text) -> str:
     return f"BT /F1 {size} Tf {matrix} ({_escaped(entity.text)}) Tj ET"
 
 
-@singledispatch
-def _path(entity: object) -> str:
-    raise TypeError(entity)
-
-
-@_path.register
-def _(entity: Line) -> str:
-    return f"{_point(entity.start)} m {_point(entity.end)} l"
-
-
-@_path.register
-def _(entity: Polyline) -> str:
-    first, *others = map(_point, entity.corners)
-    return " ".join([f"{first} m", *(f"{one} l" for one in others), *("h" * entity.closed)])
-
-
-@_path.register
-def _(entity: Circle) -> str:
-    return _curve(entity.centre, entity.radius, 0.0, 2 * math.pi)
-
-
-@_path.register
-def _(entity: Arc) -> str:
-    start = math.radians(entity.start_deg)
-    return _curve(
-        entity.centre, entity.radius, start, math.radians((entity.end_deg - entity.start_deg) % 360)
-    )
+def _path(entity: Line | Polyline | Circle | Arc) -> str:
+    match entity:
+        case Line(_, start, end):
+            return f"{_point(start)} m {_point(end)} l"
+        case Polyline(_, corners, closed):
+            first, *others = map(_point, corners)
+            return " ".join([f"{first} m", *(f"{one} l" for one in others), *("h" * closed)])
+        case Circle(_, centre, radius):
+            return _curve(centre, radius, 0.0, 2 * math.pi)
+        case Arc(_, centre, radius, first_deg, last_deg):
+            turn = math.radians((last_deg - first_deg) % 360)
+            return _curve(centre, radius, math.radians(first_deg), turn)
 
 
 def _curve(centre: Point, radius: float, start: float, turn: float) -> str:

@@ -1,7 +1,7 @@
 """STEP: the exact solid, its faces named, the same bytes for the same design."""
 
 import errno
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -25,14 +25,16 @@ from OCP.STEPControl import (
 )
 from OCP.StepGeom import StepGeom_Plane, StepGeom_SphericalSurface
 from OCP.StepShape import StepShape_AdvancedFace, StepShape_ManifoldSolidBrep
-from OCP.TCollection import TCollection_HAsciiString
+from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
+from OCP.XCAFApp import XCAFApp_Application
 from scipy.spatial import cKDTree
 
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.measures import SolidProperties, properties
+from tbcad.cad.kernel.checks import SolidProperties, properties
 from tbcad.cad.kernel.solids import faces
 from tbcad.errors import InputError
 from tbcad.types import Floats, Ints
@@ -41,8 +43,7 @@ TAIL_BYTES = 64  # of a file, in which its last mark must be
 SURFACE_CURVES = "write.surfacecurve.mode"
 _SETTINGS = RLock()
 END = b"END-ISO-10303-21;"  # of every STEP file
-# A fixed time stamp: the file's bytes then depend on the design alone.
-TIME_STAMP = "2022-11-01T00:00:00"
+TIME_STAMP = "2022-11-01T00:00:00"  # fixed: the file's bytes depend on the design alone
 Place: TypeAlias = tuple[float, ...]
 """Kind, location (mm) and axis of a surface."""
 PLANE, SPHERE = 1.0, 2.0
@@ -57,15 +58,7 @@ def incomplete(path: Path) -> OSError:
 
 
 def check_complete(path: Path, mark: bytes) -> None:
-    """Check that a file is there and ends as its format demands.
-
-    Args:
-        path: of the file.
-        mark: that is among its last bytes.
-
-    Raises:
-        OSError: it is missing or cut.
-    """
+    """Raise OSError unless a file is there with a mark, such as END, among its last bytes."""
     if not path.is_file():
         raise incomplete(path)
     with path.open("rb") as file:
@@ -83,16 +76,10 @@ def write_step(
 ) -> None:
     """Write one solid as AP214 in millimetres.
 
-    Args:
-        path: file to write.
-        solid: with the names of its faces, which become the names of the advanced faces; its
-            volume, area and centroid go along as validation properties.
-        pcurves: write curves in the surfaces' parameters too; readers make their own.
-        known: the solid's properties; None: they are worked out.
-
-    Raises:
-        StepError: when the kernel fails.
-        OSError: when the file cannot be written in full.
+    The names of its faces become those of the advanced faces; volume, area and centroid, worked out
+    where they are not known, go along as validation properties. With pcurves curves in the
+    surfaces' parameters are written too; readers make their own. StepError if the kernel fails,
+    OSError if the file cannot be written in full.
     """
     with kernel_settings(pcurves):
         _write(path, solid, known or properties(solid.shape))
@@ -184,6 +171,22 @@ def _name_product(writer: STEPControl_Writer, name: str) -> None:
     raise StepError(f"the kernel wrote no product or no solid of {name}")
 
 
+def new_document() -> TDocStd_Document:
+    """An empty document of the kernel."""
+    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
+    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    return document
+
+
+def finish(path: Path, writer: STEPControl_Writer, entities: Callable[[str], str]) -> None:
+    """Write a file, and at its end what entities are for its text; OSError if not in full."""
+    if writer.Write(str(path)) != IFSelect_RetDone:
+        raise incomplete(path)
+    check_complete(path, END)
+    text, end, rest = path.read_text(encoding="ascii").rpartition("ENDSEC;\nEND-ISO-10303-21;")
+    path.write_text(text + entities(text) + end + rest, encoding="ascii")
+
+
 def write_header(writer: STEPControl_Writer, name: str) -> None:
     """Name the file; its time stamp is fixed."""
     header = APIHeaderSection_MakeHeader(writer.Model())
@@ -196,11 +199,7 @@ def write_header(writer: STEPControl_Writer, name: str) -> None:
 
 @kernel_settings()
 def read_named_solid(path: Path) -> Solid:
-    """Read a file of one solid.
-
-    Raises:
-        InputError: it cannot be read, or is not one solid.
-    """
+    """Read a file of one solid; InputError if it cannot be read, or is not one."""
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() != 1:
         raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")

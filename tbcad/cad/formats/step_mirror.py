@@ -28,14 +28,10 @@ class NoMirrorImageError(ValueError):
 
 
 def mirrored_step(text: str, names: Mapping[str, str]) -> str:
-    """The text of a file, mirrored.
+    """The text of a file, as the kernel writes one solid without pcurves, mirrored.
 
-    Args:
-        text: as the kernel writes one solid, without curves in the surfaces' parameters.
-        names: those of the mirror image, by those in the text; others stay.
-
-    Raises:
-        NoMirrorImageError: the solid has geometry that the rules here do not reflect.
+    Names become those given for them, others stay. NoMirrorImageError if the solid has geometry
+    that the rules here do not reflect.
     """
     if unknown := UNKNOWN.search(text):
         raise NoMirrorImageError(f"no rule for the mirror image of {unknown[0]}")

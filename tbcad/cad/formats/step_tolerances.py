@@ -22,7 +22,6 @@ from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopoDS import TopoDS
-from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDimTolObjects import (
     XCAFDimTolObjects_DatumObject,
     XCAFDimTolObjects_DimensionObject,
@@ -40,15 +39,7 @@ from OCP.XCAFDoc import (
 )
 from OCP.XSControl import XSControl_WorkSession
 
-from tbcad.cad.formats.step import END as STEP_END
-from tbcad.cad.formats.step import (
-    StepError,
-    check_complete,
-    incomplete,
-    kernel_settings,
-    write_header,
-)
-from tbcad.cad.formats.step_assembly import END
+from tbcad.cad.formats.step import StepError, finish, kernel_settings, new_document, write_header
 from tbcad.cad.kernel.brep import Solid
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -62,13 +53,10 @@ RADIUS = XCAFDimTolObjects_DimensionType.XCAFDimTolObjects_DimensionType_Size_Sp
 class FaceTolerances:
     """What some faces of a solid may be off."""
 
-    # name of each datum ("A" ...) and its face, in the order of their precedence
-    datums: Mapping[str, str]
+    datums: Mapping[str, str]  # name ("A" ...) and face, in the order of their precedence
     flatness: Mapping[str, float]  # of faces, mm
-    # width of the zone about each face, in the frame of all datums, mm
-    profile: Mapping[str, float]
-    # of spherical faces and what it may be off either way, mm
-    radius: Mapping[str, tuple[float, float]]
+    profile: Mapping[str, float]  # width of the zone about faces, in the frame of datums, mm
+    radius: Mapping[str, tuple[float, float]]  # of spheres, and what it may be off, mm
     notes: Mapping[str, str]  # what each is about, and its text
     # the same for each of some faces that have one zone's width in common, mm
     common_profile: Mapping[tuple[str, ...], float] = field(default_factory=dict)
@@ -78,9 +66,7 @@ class FaceTolerances:
 def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
     """Write a solid with named faces and its tolerances as AP242 in millimetres.
 
-    Raises:
-        StepError: when the kernel fails.
-        OSError: when the file cannot be written in full.
+    StepError if the kernel fails, OSError if the file cannot be written in full.
     """
     writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
     writer.SetDimTolMode(True)
@@ -92,16 +78,11 @@ def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
     for name, face in solid.faces:
         STEPConstruct.FindEntity_s(finder, face).SetName(TCollection_HAsciiString(name))
     write_header(writer.ChangeWriter(), solid.name)
-    if writer.Write(str(path)) != IFSelect_RetDone:
-        raise incomplete(path)
-    check_complete(path, STEP_END)
-    text, end, rest = path.read_text(encoding="ascii").rpartition(END)
-    path.write_text(text + _notes(text, given.notes) + end + rest, encoding="ascii")
+    finish(path, writer, lambda text: _notes(text, given.notes))
 
 
 def _document(solid: Solid, given: FaceTolerances) -> TDocStd_Document:
-    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    document = new_document()
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     tool = XCAFDoc_DocumentTool.DimTolTool_s(document.Main())
     part = shapes.AddShape(solid.shape, False)
@@ -169,10 +150,7 @@ def _sequence(*labels: TDF_Label) -> TDF_LabelSequence:
 
 
 def _notes(text: str, notes: Mapping[str, str]) -> str:
-    """Entities of notes on the product.
-
-    Source: CAx-IF, Recommended Practices for User Defined Attributes.
-    """
+    """Entities of notes on the product (CAx-IF, Recommended Practices, User Defined Attributes)."""
     number = max(map(int, re.findall(r"^#(\d+) ?=", text, re.MULTILINE))) + 1
     product = _entity(r"^(#\d+) = PRODUCT_DEFINITION\(", text)
     context = _entity(r"ADVANCED_BREP_SHAPE_REPRESENTATION\('[^']*',\([^)]*\),(#\d+)\)", text)
@@ -204,20 +182,14 @@ class ReadTolerance:
     kind: str  # "flatness", "profile" or "radius"
     value: float  # width of the zone, or what the radius may be off, mm
     centre: Triple | None  # of the sphere that its face is on, mm; None on other faces
-    # that its faces are on, a point (mm) and a unit normal each, either way
-    planes: tuple[tuple[Triple, Triple], ...] = ()
+    planes: tuple[tuple[Triple, Triple], ...] = ()  # of its faces, a point (mm) and a unit normal
     datums: tuple[str, ...] = ()  # names of the datums of its frame, in their order
     nominal: float = 0.0  # radius, mm; 0 for tolerances
 
 
 def read_tolerances(path: Path) -> list[ReadTolerance]:
-    """All tolerances and dimensions of a file, as the kernel reads them.
-
-    Raises:
-        StepError: it cannot be read.
-    """
-    document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
-    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    """All tolerances and dimensions of a file, as the kernel reads them; StepError if it cannot."""
+    document = new_document()
     reader = STEPCAFControl_Reader()
     reader.SetGDTMode(True)
     if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):

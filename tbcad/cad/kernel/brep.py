@@ -51,8 +51,7 @@ class Solid:
 
     name: str  # of the part
     shape: TopoDS_Solid  # the closed solid
-    # name and face, mirrors first in the order of their ids
-    faces: tuple[tuple[str, TopoDS_Face], ...]
+    faces: tuple[tuple[str, TopoDS_Face], ...]  # name and face, mirrors first by id
 
 
 class InvalidSolidError(RuntimeError):
@@ -67,9 +66,9 @@ class Maker:
     builder: BRep_Builder = field(default_factory=BRep_Builder)
     pcurves: ShapeFix_Edge = field(default_factory=ShapeFix_Edge)
 
-    def __post_init__(self) -> None:
-        """Note the sign of x."""
-        self._sign = -1.0 if self.mirrored else 1.0
+    @property
+    def _sign(self) -> float:
+        return -1.0 if self.mirrored else 1.0
 
     def point(self, p: Floats) -> gp_Pnt:
         """Kernel point."""
@@ -183,13 +182,10 @@ class Maker:
         return wire
 
     def face(self, surface: Geom_Surface, rings: Sequence[Ring], natural: bool) -> TopoDS_Face:
-        """Face on a surface.
+        """Face on a surface on which all edges lie.
 
-        Args:
-            surface: on which all edges lie.
-            rings: edges round the face, counter-clockwise seen from outside the solid (camera
-                a's coordinates), the outer ring first.
-            natural: whether the surface's natural normal points out of the solid.
+        Rings run counter-clockwise seen from outside the solid (camera a's coordinates), the outer
+        ring first; natural: whether the surface's natural normal points out of the solid.
         """
         face = TopoDS_Face()
         self.builder.MakeFace(face, surface, TOLERANCE)
@@ -237,58 +233,33 @@ class Maker:
         return solid
 
 
-@dataclass(frozen=True)
-class _Circle:
-    """A whole circle as an edge, with the point and vertex where it starts and ends."""
-
-    edge: TopoDS_Edge
-    vertex: TopoDS_Vertex
-    point: Floats
-
-
 def hole_faces(
     maker: Maker, centre: Floats, direction: Floats, radius: Floats, x: Floats, y: Floats
 ) -> tuple[list[Ring], list[Ring], list[TopoDS_Face]]:
-    """Holes whose direction is x cross y.
+    """Holes from centres (k, 3) on, with radii (k,), mm; their direction x cross y has their depth.
 
-    Args:
-        maker: of kernel shapes.
-        centre: where they begin, mm, (k, 3).
-        direction: into the material, length their depth, mm, (3,).
-        radius: mm, (k,).
-        x: unit vector across.
-        y: unit vector across.
-
-    Returns:
-        Inner rings of the face where they begin, those where they end, and the cylinders.
+    x and y are unit vectors across. Inner rings of the face where they begin, those where they end,
+    and the cylinders.
     """
-    sizes = list(zip(centre, radius, strict=True))
-    near = [_circle(maker, start, x, y, radius) for start, radius in sizes]
-    far = [_circle(maker, start + direction, x, y, radius) for start, radius in sizes]
-    cylinders = [maker.cylinder(start, x, y, radius) for start, radius in sizes]
-    height = float(np.linalg.norm(direction))
-    return (
-        [[(circle.edge, True)] for circle in near],
-        [[(circle.edge, False)] for circle in far],
-        [_wall(maker, *wall, height) for wall in zip(cylinders, near, far, strict=True)],
-    )
-
-
-def _circle(maker: Maker, centre: Floats, x: Floats, y: Floats, radius: float) -> _Circle:
-    point = centre + radius * x
-    vertex = maker.vertex(point)
-    return _Circle(maker.circle(centre, x, y, radius, 2 * np.pi, vertex, vertex), vertex, point)
-
-
-def _wall(
-    maker: Maker, cylinder: Geom_CylindricalSurface, near: _Circle, far: _Circle, height: float
-) -> TopoDS_Face:
-    seam = maker.line(near.point, far.point, near.vertex, far.vertex)
-    ring = [(seam, True), (far.edge, True), (seam, False), (near.edge, False)]
-    face = maker.face(cylinder, [ring], natural=False)
+    near: list[Ring] = []
+    far: list[Ring] = []
+    walls = []
     # A mirrored cylinder's axis points the other way.
-    v = -height if maker.mirrored else height
-    maker.straight_pcurve(near.edge, face, (0.0, 0.0), (1.0, 0.0))
-    maker.straight_pcurve(far.edge, face, (0.0, v), (1.0, 0.0))
-    maker.seam_pcurves(seam, face)
-    return face
+    v = float(np.linalg.norm(direction)) * (-1 if maker.mirrored else 1)
+    for start, size in zip(centre, radius, strict=True):
+        middles = start, start + direction
+        vertices = [maker.vertex(middle + size * x) for middle in middles]
+        rims = [
+            maker.circle(middle, x, y, size, 2 * np.pi, vertex, vertex)
+            for middle, vertex in zip(middles, vertices, strict=True)
+        ]
+        seam = maker.line(middles[0] + size * x, middles[1] + size * x, *vertices)
+        ring = [(seam, True), (rims[1], True), (seam, False), (rims[0], False)]
+        face = maker.face(maker.cylinder(start, x, y, size), [ring], natural=False)
+        maker.straight_pcurve(rims[0], face, (0.0, 0.0), (1.0, 0.0))
+        maker.straight_pcurve(rims[1], face, (0.0, v), (1.0, 0.0))
+        maker.seam_pcurves(seam, face)
+        near.append([(rims[0], True)])
+        far.append([(rims[1], False)])
+        walls.append(face)
+    return near, far, walls

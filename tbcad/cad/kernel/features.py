@@ -82,30 +82,19 @@ def cylinders(shape: TopoDS_Shape) -> list[RoundFace]:
     """All cylindrical faces, those with one axis and radius that meet as one."""
     walls = [wall for face in faces(shape) if (wall := _wall(face))]
     found = [_joined(group) for group in _groups(walls)]
-    holes = [one for one in found if one.hollow]
-    if not holes:
-        return found
-    ends = np.array([_beyond(one) for one in holes]).reshape(-1, 3)
-    is_open = ~_inside(meshed(shape, MESH_MM), ends).reshape(-1, 2)
-    opened = {id(one): row for one, row in zip(holes, is_open.tolist(), strict=True)}
-    return [
-        replace(one, open_start=opened[id(one)][0], open_end=opened[id(one)][1])
-        if one.hollow
-        else one
-        for one in found
-    ]
-
-
-def _beyond(one: RoundFace) -> tuple[Floats, Floats]:
-    """Points of the axis beyond both ends."""
-    return one.start - PROBE_MM * one.axis, one.end + PROBE_MM * one.axis
+    holes = [k for k, one in enumerate(found) if one.hollow]
+    if holes:
+        reach = np.array([PROBE_MM * found[k].axis for k in holes])
+        ends = np.array([[found[k].start, found[k].end] for k in holes])
+        beyond = ends + np.stack([-reach, reach], axis=1)
+        is_open = ~_inside(meshed(shape, MESH_MM), beyond.reshape(-1, 3)).reshape(-1, 2)
+        for k, (start, end) in zip(holes, is_open.tolist(), strict=True):
+            found[k] = replace(found[k], open_start=start, open_end=end)
+    return found
 
 
 def _inside(mesh: Mesh, points: Floats) -> Bools:
-    """Whether points are inside a closed mesh: it goes once round them.
-
-    By the solid angles of its triangles (van Oosterom and Strackee, 1983).
-    """
+    """Whether points are inside a closed mesh, by solid angles (van Oosterom, Strackee, 1983)."""
     inside = []
     for point in points:
         corner = mesh.vertices[mesh.triangles] - point

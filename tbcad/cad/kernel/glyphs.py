@@ -39,15 +39,10 @@ def text_width(text: str) -> int:
 def relief(
     text: str, height: float, raised: float, sunk: float, axes: Floats, at: Floats
 ) -> list[TopoDS_Shape]:
-    """Solids of a text about a point of a plane face.
+    """Solids of a text of the signs above, of a height (mm), about a point of a plane face (3,).
 
-    Args:
-        text: of the signs above.
-        height: of the signs, mm.
-        raised: height above the face, mm.
-        sunk: depth in the part, mm.
-        axes: rows to the right, up and out of the face, (3, 3).
-        at: middle of the text on the face, mm, (3,).
+    They are raised above the face and sunk into the part by lengths, mm; rows of axes (3, 3) are to
+    the right, up and out of the face.
     """
     square, start, solids = height / ROWS, -text_width(text) / 2, []
     for sign in text:

@@ -26,8 +26,7 @@ from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.types import Floats, Ints
 
 SIDES = 48
-# Facets of cylinders and cones: no coarser than a turn of this angle (radians).
-ANGLE = 0.2
+ANGLE = 0.2  # facets of cylinders and cones: no coarser than a turn of this angle (radians)
 # The kernel's mesher sometimes merges the ends of an edge shorter than this on one side only.
 MERGE_MM = 2e-5
 
@@ -101,10 +100,8 @@ def as_manifold(shape: TopoDS_Shape, tolerance: float) -> Manifold:
 def meshed(shape: TopoDS_Shape, tolerance: float, angle: float = ANGLE) -> Mesh:
     """Mesh by the kernel's mesher; corners that faces share are one, degenerate facets dropped.
 
-    Args:
-        shape: a solid; its own facets are left alone.
-        tolerance: largest distance of facets from the surface, mm.
-        angle: largest turn of the surface along a facet's edge, radians.
+    Facets are within a tolerance (mm) of the surface, and turn by at most an angle (radians) along
+    an edge. A solid's own facets are left alone.
     """
     copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
     BRepMesh_IncrementalMesh(copy, tolerance, False, angle, False)

@@ -67,13 +67,7 @@ class Projection:
 
 
 def project(shape: TopoDS_Shape, axes: Floats, *, hidden: bool = True) -> Projection:
-    """Project a shape.
-
-    Args:
-        shape: mm.
-        axes: right, up and toward the eye in the shape's frame, as rows, (3, 3).
-        hidden: whether hidden edges are wanted.
-    """
+    """Project a shape (mm) on axes: right, up and toward the eye in its frame, as rows, (3, 3)."""
     algorithm = HLRBRep_Algo()
     algorithm.Add(shape, 0)
     plane = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(*axes[2].tolist()), gp_Dir(*axes[0].tolist()))
@@ -81,27 +75,18 @@ def project(shape: TopoDS_Shape, axes: Floats, *, hidden: bool = True) -> Projec
     algorithm.Update()
     algorithm.Hide()
     drawn = HLRBRep_HLRToShape(algorithm)
-    front = _curves((drawn.VCompound(), drawn.OutLineVCompound()))
-    behind = _curves((drawn.HCompound(), drawn.OutLineHCompound())) if hidden else ()
+    front = _unique(_of_shapes((drawn.VCompound(), drawn.OutLineVCompound())))
+    other = (drawn.HCompound(), drawn.OutLineHCompound()) if hidden else ()
+    behind = _unique(_of_shapes(other))
     return Projection(front, tuple(one for one in behind if one not in set(front)))
 
 
 def section(shape: TopoDS_Shape, axes: Floats, level: float) -> tuple[Curve, ...]:
-    """The edges in which a plane cuts a shape.
-
-    Args:
-        shape: mm.
-        axes: right, up and toward the eye, as rows, (3, 3).
-        level: of the plane along the third, mm.
-    """
+    """The edges in which a plane cuts a shape at a level (mm) on the last axis, as of `project`."""
     normal = gp_Dir(*axes[2].tolist())
     tool = BRepAlgoAPI_Section(shape, gp_Pln(gp_Pnt(*(level * axes[2]).tolist()), normal), False)
     tool.Build()
     return _unique(_flat(edge, axes) for edge in edges(tool.Shape()))
-
-
-def _curves(shapes: Iterable[TopoDS_Shape | None]) -> tuple[Curve, ...]:
-    return _unique(_of_shapes(shapes))
 
 
 def _of_shapes(shapes: Iterable[TopoDS_Shape | None]) -> Iterator[Curve | None]:

@@ -6,6 +6,7 @@ Booleans take lists: one general fuse of many bodies is faster than one after th
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import TYPE_CHECKING
 
 import numpy as np
 from OCP.BinTools import BinTools
@@ -60,11 +61,15 @@ from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.core.geometry.vectors import unit
+from tbcad.errors import InputError
 from tbcad.types import Floats
 
+if TYPE_CHECKING:
+    from build123d import Part
+    from cadquery import Workplane
+
 ORIGIN, UP = gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)
-# With the kernel's own 1e-7 a fuse of many bodies loses some of them now and then, silently.
-SAME_MM = 1e-6
+SAME_MM = 1e-6  # with the kernel's own 1e-7 a fuse of many bodies loses some of them silently
 
 
 def polygon(points: Floats) -> TopoDS_Face:
@@ -258,11 +263,7 @@ def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape
 
 
 def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
-    """The one closed solid that a shape must be.
-
-    Raises:
-        InvalidSolidError: when it is several, or the kernel's check finds it invalid.
-    """
+    """The one closed, valid solid that a shape must be; else InvalidSolidError."""
     bodies = solids(shape)
     if len(bodies) != 1:
         raise InvalidSolidError(f"{name}: {len(bodies)} solids where one should be")
@@ -272,8 +273,24 @@ def one_solid(name: str, shape: TopoDS_Shape) -> TopoDS_Solid:
 
 
 def without_cavities(solid: TopoDS_Solid) -> TopoDS_Solid:
-    """The solid within the outermost faces.
-
-    Bodies that touch can close in a crumb of air between them, which no printer could empty.
-    """
+    """The solid within the outermost faces: no printer could empty crumbs of air between bodies."""
     return BRepBuilderAPI_MakeSolid(BRepClass3d.OuterShell_s(solid)).Solid()
+
+
+def as_part(label: str, shape: TopoDS_Shape) -> "Part":
+    """Return a solid of the kernel as a build123d part with a label; both share the geometry."""
+    from build123d import Part, Solid  # takes a second, and nothing else here needs it
+
+    part = Part([Solid(shape)])
+    part.label = label
+    return part
+
+
+def as_workplane(part: "Part") -> "Workplane":
+    """A part as a cadquery workplane, tagged with its label; InputError without cadquery."""
+    try:
+        from cadquery import Shape, Workplane
+    except ImportError:
+        raise InputError("cadquery is not installed: pip install 'tbcad[cadquery]'") from None
+    shapes = [Shape.cast(solid.wrapped) for solid in part.solids()]
+    return Workplane().newObject(shapes).tag(part.label or "part")

@@ -65,26 +65,13 @@ class RectilinearLens:
 
 
 def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
-    """Cameras of the list that comes with tbcad, then those of a user's.
-
-    Raises:
-        InputError: a list cannot be read; it names the line and column.
-    """
-    return [
-        _camera(where, row)
-        for where, row in _rows("cameras.csv", user_list, CAMERA_COLUMNS, CAMERA_SIZES)
-    ]
+    """Cameras of the built-in list, then of a user's; InputError names the line and column."""
+    return [_camera(*one) for one in _rows("cameras.csv", user_list, CAMERA_COLUMNS, CAMERA_SIZES)]
 
 
 def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
-    """Lenses of the list that comes with tbcad, then those of a user's.
-
-    Raises:
-        InputError: a list cannot be read; it names the line and column.
-    """
-    return [
-        _lens(where, row) for where, row in _rows("lenses.csv", user_list, LENS_COLUMNS, LENS_SIZES)
-    ]
+    """Lenses of the built-in list, then of a user's; errors as of `load_cameras`."""
+    return [_lens(*one) for one in _rows("lenses.csv", user_list, LENS_COLUMNS, LENS_SIZES)]
 
 
 def _camera(where: str, row: Row) -> CameraBody:

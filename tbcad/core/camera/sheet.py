@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.core.camera.catalogue import CameraBody, RectilinearLens, load_cameras, load_lenses
-from tbcad.core.camera.lens import aperture_stop, lens_for
 from tbcad.core.camera.requirements import (
     WIDE_OPEN,
     CameraRequirements,
+    aperture_stop,
     camera_requirements,
     exposure_seconds,
+    lens_for,
 )
 from tbcad.core.mirrors.array import MirrorArray
 
@@ -124,13 +125,7 @@ def _faults(needed: CameraRequirements, one: Candidate, image: float) -> Iterato
 
 
 def write_camera_sheet(folder: Path, array: MirrorArray, radius: float) -> None:
-    """Write camera.json: the requirements, and cameras with lenses of the built-in lists.
-
-    Args:
-        folder: of the export.
-        array: camera a and its mirrors.
-        radius: of the capture sphere, mm.
-    """
+    """Write camera.json: camera a's requirements, cameras with lenses of the built-in lists."""
     needed = camera_requirements(array, radius)
     best = best_lenses(needed, load_cameras(), load_lenses())
     text = json.dumps(sheet_record(needed, best), indent=1) + "\n"
@@ -153,25 +148,21 @@ def sheet_record(needed: CameraRequirements, found: Iterable[Candidate]) -> dict
         "schema": SCHEMA,
         "requirements": _rounded(asdict(needed)),
         "exposure": {"illuminance_lux": LUX, "iso": ISO},
-        "candidates": [
-            {
-                "camera": one.camera.name,
-                "lens": one.lens.name,
-                **_rounded(
-                    {
-                        "focal_mm": one.focal_mm,
-                        "pixels_across": one.pixels_across,
-                        "f_number": one.f_number,
-                        "blur_px": one.total_px,
-                        "close_up_dpt": one.close_up_dpt,
-                        "exposure_s": _exposure(one),
-                    }
-                ),
-                "faults": list(one.faults),
-            }
-            for one in found
-        ],
+        "candidates": [_candidate_record(one) for one in found],
     }
+
+
+def _candidate_record(one: Candidate) -> dict[str, Any]:
+    figures = {
+        "focal_mm": one.focal_mm,
+        "pixels_across": one.pixels_across,
+        "f_number": one.f_number,
+        "blur_px": one.total_px,
+        "close_up_dpt": one.close_up_dpt,
+        "exposure_s": _exposure(one),
+    }
+    named = {"camera": one.camera.name, "lens": one.lens.name}
+    return {**named, **_rounded(figures), "faults": list(one.faults)}
 
 
 def sheet_lines(needed: CameraRequirements, found: Sequence[Candidate]) -> list[str]:

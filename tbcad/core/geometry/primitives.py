@@ -13,8 +13,7 @@ from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.types import Floats
 
-# Clearances of round primitives are measured on circumscribed polygons of so many sides.
-SIDES = 32
+SIDES = 32  # of circumscribed polygons that clearances of round primitives are measured on
 
 
 @dataclass(frozen=True)
@@ -37,10 +36,7 @@ class Prism:
 
 @dataclass(frozen=True)
 class Revolved:
-    """A polygon (n, 2) of (z, r) revolved about the last row of axes (3, 3) through start, mm.
-
-    By default that is the z axis of the shell's frame.
-    """
+    """A polygon (n, 2) of (z, r) revolved about the last of axes (3, 3), z, through start, mm."""
 
     profile: Floats
     axes: Floats = field(default_factory=lambda: np.eye(3))
@@ -68,8 +64,7 @@ class Component:
     what: str  # what it is, for lists of parts
     added: tuple[Primitive, ...]  # primitives it is the union of
     removed: tuple[Primitive, ...] = ()  # primitives that are cut out of it
-    # unit directions (3,) that may point down when it is printed; none: it is bought
-    downs: tuple[Floats, ...] = ()
+    downs: tuple[Floats, ...] = ()  # unit directions (3,) down when printed; none: it is bought
     part: str | None = None  # its name in the lists of purchased parts; None: it is printed
     rotates: bool = False  # whether it rotates with the base
 
@@ -96,14 +91,10 @@ def revolved_along(profile: Floats, start: Floats, along: Floats) -> Revolved:
 
 
 def slot(middle: Floats, along: Floats, travel: float, radius: float, depth: Floats) -> Primitive:
-    """A slot in which a screw can be moved.
+    """A slot in which a screw can be moved, from the middle of its near face by its depth (3,), mm.
 
-    Args:
-        middle: of the slot's near face, mm, (3,).
-        along: unit vector of the travel, (3,).
-        travel: length by which a screw can be moved, mm; zero or less makes a plain hole.
-        radius: of the slot's ends, mm.
-        depth: vector from the near face to the far one, mm, (3,).
+    It has ends of a radius; the travel (mm) is along a unit vector, and zero or less makes a plain
+    hole.
     """
     if travel <= 0:
         return cylinder_between(middle, middle + depth, radius)

@@ -7,10 +7,7 @@ from tbcad.types import Floats
 
 
 def rotated(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
-    """Vectors (..., 3) rotated about unit axes by angles (...), radians (Rodrigues' formula).
-
-    Axes and angles are broadcast against the vectors.
-    """
+    """Vectors (..., 3) rotated about unit axes by angles (...), radians (Rodrigues), broadcast."""
     axis = np.broadcast_to(axis, vectors.shape)
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = dot(axis, vectors)[..., None] * axis

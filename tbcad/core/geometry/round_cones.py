@@ -7,10 +7,14 @@ half-plane and nowhere else, so the forbidden angles are always one symmetric in
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from tbcad.types import Floats
+
+MOST_STEPS = 1000
+ROUNDING = 1e-12  # of the radius
 
 
 @dataclass(frozen=True)
@@ -41,18 +45,12 @@ def spheres(centre: Floats, radius: Floats) -> RoundCones:
 def contact_angle(centre: Floats, radius: Floats, cones: RoundCones) -> Floats:
     """Angles within which balls that rotate about the axis meet round cones, radians, (m, k).
 
-    Args:
-        centre: of the balls, along the axis and out from it, mm, (k, 2).
-        radius: of the balls, mm, (k,).
-        cones: in the half-plane from which the angle counts, (m,).
+    Centres of balls (k, 2) are along the axis and out from it, mm; cones (m,) lie in the half-plane
+    from which the angle counts. It is 0 where they never meet, pi where they meet at every angle.
 
-    Returns:
-        0 where they never meet, pi where they meet at every angle.
-
-    At angle t the ball meets the sphere at share s of the hull when
-    |C|^2 + |c|^2 - 2 C_along c_along - 2 C_out c_out cos t <= (r(s) + radius)^2, so when cos t is
-    at least a quadratic in s over a linear one, whose minimum is at an end or where its
-    derivative is zero.
+    At angle t the ball meets the sphere at share s of the hull when |C|^2 + |c|^2 - 2 C_along
+    c_along - 2 C_out c_out cos t <= (r(s) + radius)^2, so when cos t is at least a quadratic in s
+    over a linear one, whose minimum is at an end or where its derivative is zero.
     """
     over, under = _quadratic(centre, radius, cones), _linear(centre, cones)
     with np.errstate(over="ignore"):  # next to the axis the ratio may be infinite
@@ -100,3 +98,44 @@ def _stationary(over: tuple[Floats, ...], under: tuple[Floats, ...]) -> list[Flo
     # On the axis the ratio is infinite by the quadratic's sign, so the quadratic's vertex decides.
     vertex = np.divide(-b, 2 * a, out=np.zeros_like(larger), where=a > 0)
     return [np.clip(share, 0, 1) for share in (first, second, vertex)]
+
+
+def smallest_sphere(points: Floats) -> tuple[Floats, float]:
+    """Middle (3,) and radius of the smallest sphere that holds points (n, 3).
+
+    Two to four of them lie on it. The farthest point outside of the smallest sphere about those
+    few is added to them until there is none; the radius grows with each step.
+
+    Source: E. Welzl, Smallest enclosing disks, LNCS 555, 1991.
+    """
+    few = points[:1]
+    middle, radius = few[0], 0.0
+    for _ in range(MOST_STEPS):
+        distance = np.linalg.norm(points - middle, axis=1)
+        farthest = int(distance.argmax())
+        if distance[farthest] <= radius * (1 + ROUNDING):
+            break
+        few = np.vstack([few, points[farthest]])
+        middle, radius, few = _smallest_of_few(few)
+    return middle, float(np.linalg.norm(points - middle, axis=1).max())
+
+
+def _smallest_of_few(points: Floats) -> tuple[Floats, float, Floats]:
+    """Middle and radius for up to five points, and the fewest of them that it follows from."""
+    best = points[0], np.inf, points[:1]
+    for count in range(2, min(len(points), 4) + 1):
+        for chosen in combinations(range(len(points)), count):
+            on = points[list(chosen)]
+            middle = _equally_far(on)
+            reach = float(np.linalg.norm(points - middle, axis=1).max())
+            if reach < best[1] * (1 - ROUNDING):
+                best = middle, reach, on
+    return best
+
+
+def _equally_far(points: Floats) -> Floats:
+    """The point equally far from points (k, 3), in the plane, line or space that they span."""
+    along = points[1:] - points[0]
+    square = (along**2).sum(axis=1) / 2
+    weights = np.linalg.lstsq(along @ along.T, square, rcond=None)[0]
+    return np.asarray(points[0] + weights @ along)

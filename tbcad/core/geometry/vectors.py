@@ -34,9 +34,6 @@ def unit(v: Floats) -> Floats:
 
 
 def perpendicular_axes(axis: Floats) -> Floats:
-    """Two unit vectors perpendicular to unit axes (..., 3) and to each other, (..., 2, 3).
-
-    First, second and axis are a right-handed frame.
-    """
+    """Two unit vectors (..., 2, 3) that are a right-handed frame with unit axes (..., 3)."""
     first = unit(np.cross(np.eye(3)[np.argmin(np.abs(axis), axis=-1)], axis))
     return np.stack([first, np.cross(axis, first)], axis=-2)

@@ -4,11 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.clearance import check_clearance
-from tbcad.core.mirrors.radii import RadiusProblem, solve_radii
-from tbcad.core.optics import flat
+from tbcad.core.mirrors.radii import (
+    RadiusProblem,
+    half_angles,
+    half_widths,
+    paper_curvatures,
+    required_angles,
+    solve_radii,
+)
 from tbcad.core.optics.camera import Camera, fitted_camera, fitting_view_angle_deg
 from tbcad.core.optics.cells import Cells, cell_areas, cells_of
 from tbcad.core.optics.geodesic import geodesic, stretched
@@ -19,8 +25,7 @@ from tbcad.core.spec.design import FIT, MAX_HFOV, CameraSpec, MirrorsSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints, Progress
 
-# Directions that differ by less than rounding have equal heights or azimuths.
-DIRECTION_DIGITS = 9
+DIRECTION_DIGITS = 9  # directions that differ by less than rounding have equal heights or azimuths
 HFOV_DIGITS = 12
 UNSTRETCHED = (1.0, 1.0)
 
@@ -34,37 +39,22 @@ def mirror_ids(camera_id: str, mirrors: int) -> list[str]:
 class MirrorArray:
     """One camera with its m mirrors, as arrays over mirrors in the order of their ids.
 
-    Attributes:
-        camera_id: "a" or "b".
-        camera: its pinhole, axes and sensor.
-        ellipsoid: that its mirrors are tangent to; the foci are the origin and the pinhole.
-        u: unit vectors from the origin to the virtual cameras, (m, 3); a virtual camera is at
-            u times ellipsoid.camera_distance, a mirror's apex on the line to it.
-        theta0: half angle that the virtual camera sees in the flat mirror, radians, (m,)
-            (section 3.2 of the paper).
-        theta1: half angle in which it sees the whole capture sphere (eq. 1), radians, (m,).
-        half_width: of the flat mirror, the paper's l, mm, (m,).
-        polar: angle of u from the ellipsoid's axis, radians, (m,).
-        azimuth: of u about the axis from the side of the zenith, radians, (m,).
-        cells: of the reflecting surfaces, with the coat.
-        modelled_cells: of the modelled surfaces, under the coat.
-        area: of the cells, mm^2, (m,).
-        coverage: coverage diameter by exact rays, mm, (m,) (optics.windows).
+    A virtual camera is at u times ellipsoid.camera_distance, a mirror's apex on the line to it.
     """
 
-    camera_id: str
-    camera: Camera
-    ellipsoid: Ellipsoid
-    u: Floats
-    theta0: Floats
-    theta1: Floats
-    half_width: Floats
-    polar: Floats
-    azimuth: Floats
-    cells: Cells
-    modelled_cells: Cells
-    area: Floats
-    coverage: Floats
+    camera_id: str  # "a" or "b"
+    camera: Camera  # its pinhole, axes and sensor
+    ellipsoid: Ellipsoid  # that the mirrors are tangent to; foci are the origin and the pinhole
+    u: Floats  # unit vectors from the origin to the virtual cameras, (m, 3)
+    theta0: Floats  # half angle seen in the flat mirror, radians, (m,) (section 3.2 of the paper)
+    theta1: Floats  # half angle that holds the whole capture sphere, radians, (m,) (eq. 1)
+    half_width: Floats  # of the flat mirror, the paper's l, mm, (m,)
+    polar: Floats  # angle of u from the ellipsoid's axis, radians, (m,)
+    azimuth: Floats  # of u about the axis from the side of the zenith, radians, (m,)
+    cells: Cells  # of the reflecting surfaces, with the coat
+    modelled_cells: Cells  # of the modelled surfaces, under the coat
+    area: Floats  # of the cells, mm^2, (m,)
+    coverage: Floats  # coverage diameter by exact rays, mm, (m,) (optics.windows)
 
     def __len__(self) -> int:
         return len(self.u)
@@ -137,9 +127,8 @@ def numbering_order(u: Floats) -> Ints:
 def numbered_directions(n: int, stretch: tuple[float, float] = UNSTRETCHED) -> tuple[Floats, Ints]:
     """Directions and faces of a geodesic polyhedron of frequency n, stretched along x and y.
 
-    Returns:
-        Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and the
-        outward triangles over them, (20 n^2, 3).
+    Unit vectors (10 n^2 + 2, 3), those of camera a's mirrors in the order of their ids, and the
+    outward triangles over them, (20 n^2, 3).
     """
     vertices, faces = geodesic(n)
     u = stretched(vertices, *stretch)
@@ -161,14 +150,14 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
     every, faces = numbered_directions(optics.n, optics.stretch)
     u = every[_in_half_a(every)]
-    theta0 = flat.half_angles(ellipsoid, u, every)
-    half_width = flat.half_widths(ellipsoid, u, theta0)
-    theta1 = flat.required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
+    theta0 = half_angles(ellipsoid, u, every)
+    half_width = half_widths(ellipsoid, u, theta0)
+    theta1 = required_angles(ellipsoid, u, half_width, optics.capture_diameter_mm / 2)
     problem = RadiusProblem(
         mirrors=Surfaces(
             ellipsoid.apices(u),
             ellipsoid.normals(u),
-            flat.paper_curvatures(theta0, theta1, half_width),
+            paper_curvatures(theta0, theta1, half_width),
         ),
         planes=_bounding_planes(u, half_width),
         triangles=bounded_triangulation(faces, every, _in_half_a(every)),
@@ -200,11 +189,7 @@ def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
 
 
 def mirror_margins(spec: MirrorsSpec, mirrors: int) -> Floats:
-    """Margin of each of m mirrors of a camera, mm, (m,).
-
-    Raises:
-        SpecError: the spec has margins of its own for another number of mirrors.
-    """
+    """Margin of each of m mirrors of a camera, mm, (m,); SpecError if there are more or fewer."""
     own = np.array(spec.own_margins_mm)
     if len(own) not in (0, mirrors):
         raise SpecError(
@@ -220,11 +205,7 @@ def _camera(sensor: CameraSpec, pinhole: Floats, corners: Floats) -> Camera:
 
 
 def _view_angle_deg(sensor: CameraSpec, pinhole: Floats, points: Floats) -> float:
-    """The spec's angle of view, or the smallest that holds points (k, 3), mm.
-
-    Raises:
-        SpecError: no lens has it.
-    """
+    """The spec's angle of view, or the smallest that holds points (k, 3), mm; or SpecError."""
     if sensor.hfov_deg != FIT:
         return float(sensor.hfov_deg)
     hfov = fitting_view_angle_deg(pinhole, points, sensor.width_px, sensor.height_px)

@@ -4,15 +4,93 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
 from scipy.optimize import brentq
 
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
+from tbcad.core.geometry.vectors import dot, norm
 from tbcad.core.optics.cells import Cells
-from tbcad.core.optics.object_light import closest_passage, passing_distances
+from tbcad.core.optics.reflection import miss_distances
+from tbcad.core.optics.windows import (
+    cell_sides,
+    minima_by_mirror,
+    parabola_minima,
+    samples_about_minima,
+)
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.sizes import MAX_SEMI_MINOR, OpticsSpec
-from tbcad.types import Floats
+from tbcad.types import Floats, Ints
+
+# Light in use ends at a share of the way from the apex to the edge of the cell, found to 2^-16 of
+# it: micrometres on a cell of a hand's width.
+BISECTIONS = 16
+ROUNDS = 2  # after two rounds the samples are a 32nd of the side apart; a parabola does the rest
+TRIES = 5  # sizes are tried until one clears: the first that is computed mostly does
+STEPS_PER_MM = 10  # of the sizes tried
+
+
+def closest_passage(cells: Cells, pinhole: Floats, capture: float) -> tuple[float, int]:
+    """Smallest distance (mm) from the origin at which light passes, and its mirror.
+
+    Light is in use where its mirror shows the capture sphere of a radius (mm). If it passes closer,
+    the object stands in it. Apices show the origin, and in the picture a mirror's part in use does
+    not contain it, so what passes closest is at the edge of that part: where rays graze the capture
+    sphere, or at the edge of the cell.
+    """
+    mirror, arc = cell_sides(cells)
+
+    def passing(point: Floats) -> Floats:
+        return passing_distances(pinhole, point)
+
+    def in_use(edge: Floats) -> Floats:
+        mirrors = np.broadcast_to(mirror[:, None], edge.shape[:-1])
+        return passing(_last_in_use(cells, mirrors, edge, pinhole, capture))
+
+    # An apex is in use: a mirror all of whose cell is farther off than one needs no closer look.
+    at_edge = minima_by_mirror(mirror, _minima(cells, arc, passing), cells.mirrors)
+    enough = max(passing(cells.mirror_surfaces.apex).min(), at_edge.min())
+    close = at_edge[mirror] <= enough
+    mirror, arc = mirror[close], arc[close]
+    distance = _minima(cells, arc, in_use)
+    return float(distance.min()), int(mirror[distance.argmin()])
+
+
+def passing_distances(pinhole: Floats, point: Floats) -> Floats:
+    """Distances (...) from the origin of straight ways from a pinhole to points (..., 3), mm."""
+    ray = point - pinhole
+    share = np.clip(-(ray @ pinhole) / dot(ray, ray), 0, 1)
+    return norm(pinhole + share[..., None] * ray)
+
+
+def _minima(cells: Cells, arc: Ints, function: Callable[[Floats], Floats]) -> Floats:
+    """Smallest value (k,) on each arc (k,) of a function of points (k, s, 3)."""
+
+    def values(t: Floats) -> Floats:
+        return function(cells.arcs.at(np.broadcast_to(arc[:, None], t.shape), t))
+
+    return parabola_minima(samples_about_minima(values, len(arc), ROUNDS))
+
+
+def _last_in_use(
+    cells: Cells, mirror: Ints, edge: Floats, pinhole: Floats, capture: float
+) -> Floats:
+    """Points (..., 3) on mirrors (...) where light in use ends from the apex toward an edge."""
+    apex = cells.surfaces.apex[mirror]
+    low, high = np.zeros(mirror.shape), np.ones(mirror.shape)
+    for _ in range(BISECTIONS):
+        share = (low + high) / 2
+        point = _seen_at(cells, mirror, apex + share[..., None] * (edge - apex), pinhole)
+        normal = cells.surfaces.gradient(mirror, point)
+        used = miss_distances(pinhole, point, normal) <= capture
+        low, high = np.where(used, share, low), np.where(used, high, share)
+    return _seen_at(cells, mirror, apex + low[..., None] * (edge - apex), pinhole)
+
+
+def _seen_at(cells: Cells, mirror: Ints, chord: Floats, pinhole: Floats) -> Floats:
+    """Points (..., 3) on mirrors (...) that a pinhole sees in line with points of their chords."""
+    ray = chord - pinhole
+    return pinhole + cells.surfaces.first_reach(mirror, pinhole, ray)[..., None] * ray
 
 
 class LitMirrors(Protocol):
@@ -31,16 +109,11 @@ class LitMirrors(Protocol):
 Solve = Callable[[Spec], LitMirrors]
 Size = Callable[[OpticsSpec, LitMirrors, float], float | None]
 
-# Sizes are tried until one clears: the first that is computed mostly does.
-TRIES = 5
-STEPS_PER_MM = 10  # of the sizes tried
-
 
 def check_clearance(spec: Spec, array: LitMirrors, solve: Solve) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
-    Raises:
-        SpecError: with the mirror, and sizes with which the light passes the object.
+    SpecError names the mirror, and sizes with which the light passes the object.
     """
     radius = spec.optics.capture_diameter_mm / 2
     distance, mirror = _passage(spec.optics, array)

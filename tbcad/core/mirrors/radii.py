@@ -1,47 +1,94 @@
-"""Radius rules: what curvature each mirror gets."""
+"""Radius rules: what curvature each mirror gets.
+
+First flat mirrors, and the paper's paraxial radii that widen their field (section 3.2).
+"""
 
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from tbcad.core.mirrors.seam import aimed, cut_positions, seam_gaps
+from tbcad.core.geometry.conics import Ellipsoid
+from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.cells import Cells, cells_of
 from tbcad.core.optics.pedestals.cells import pedestal_cells
 from tbcad.core.optics.pedestals.plan import PedestalPlan, pedestal_plan
 from tbcad.core.optics.power_diagram import NotRegularError
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.core.optics.windows import coverage_diameters
+from tbcad.core.optics.windows import aimed, coverage_diameters, cut_positions, seam_gaps
 from tbcad.core.spec.errors import SpecError
 from tbcad.types import Floats, Ints, Progress
 
-# A hundredth of a millimetre would do; verification's figures are steadier with an exact design.
-CONVERGED_MM = 1e-4
+# A geodesic vertex has at most six neighbours; it and two rings of them bound every flat mirror.
+NEIGHBOURS = 19
+CONVERGED_MM = 1e-4  # 1e-2 would do; verification's figures are steadier with an exact design
 MAX_ITERATIONS = 400
 MAX_STALLED = 40  # of them in which the least error so far does not fall
 # Designs that settle need none; each costs as much as a step, and further ones have never helped.
 MAX_HALVINGS = 4
-# How often a groove that is too wide is halved in search of one that is not.
-GROOVE_HALVINGS = 5
-# Mirrors that an error names at most.
-NAMED_MIRRORS = 5
+GROOVE_HALVINGS = 5  # how often a groove that is too wide is halved in search of one that is not
+NAMED_MIRRORS = 5  # mirrors that an error names at most
+
+
+def half_angles(ellipsoid: Ellipsoid, u: Floats, all_u: Floats) -> Floats:
+    """Half angle theta_0 of each flat mirror's field of view, radians, (m,) (the paper's figure 3).
+
+    It is that of the largest cone, at the virtual camera about its direction u to the origin, that
+    fits in the mirror's polygon. The polygon is cut out by the tangent planes at all directions (k,
+    3), u included; a plane that does not bound it never gives the smallest angle, so the nearest
+    ones suffice.
+    """
+    near: Ints = np.asarray(cKDTree(all_u).query(u, k=min(NEIGHBOURS, len(all_u)))[1])
+    apex, normal = ellipsoid.apices(all_u), ellipsoid.normals(all_u)
+    camera = ellipsoid.camera_distance * u
+    mirror, others = near[:, :1], near[:, 1:]
+    # From the virtual camera's heights over two tangent planes follows the plane through it and
+    # the edge that they share.
+    height = dot(normal[mirror], camera[:, None] - apex[mirror])
+    other_height = dot(normal[others], camera[:, None] - apex[others])
+    plane = other_height[:, :, None] * normal[mirror] - height[:, :, None] * normal[others]
+    sines: Floats = np.abs(dot(unit(plane), u[:, None])).min(axis=1)
+    return np.arcsin(sines)
+
+
+def half_widths(ellipsoid: Ellipsoid, u: Floats, theta0: Floats) -> Floats:
+    """Half width l = (d - rho) tan(theta_0) of flat mirrors in directions u (m, 3), mm, (m,)."""
+    return (ellipsoid.camera_distance - ellipsoid.radial_distance(u)) * np.tan(theta0)
+
+
+def required_angles(
+    ellipsoid: Ellipsoid, u: Floats, half_width: Floats, sphere_radius: float
+) -> Floats:
+    """Half angle theta_1 = atan((R - l) / rho) that sees the capture sphere, radians, (m,) (eq. 1).
+
+    Directions u (m, 3), half widths l of flat mirrors (m,) and the sphere's radius R in mm.
+    """
+    return np.arctan2(sphere_radius - half_width, ellipsoid.radial_distance(u))
+
+
+def paper_curvatures(theta0: Floats, theta1: Floats, half_width: Floats) -> Floats:
+    """Curvatures 1 / r with r = l / sin((theta_1 - theta_0) / 2), 1/mm, (m,) (eq. 2).
+
+    Zero or negative where the flat mirror already sees enough. The equation is paraxial: with
+    these radii mirrors hit at an angle cover less than the capture sphere (rule traced).
+    """
+    return np.sin((theta1 - theta0) / 2) / half_width
 
 
 @dataclass(frozen=True)
 class RadiusProblem:
     """What a radius rule starts from: poses, bounding planes and a first dual triangulation."""
 
-    # surfaces with the curvatures of eq. 2, zero or less where flat is enough, (m,).
-    mirrors: Surfaces
+    mirrors: Surfaces  # curved by eq. 2, zero or less where flat is enough, (m,)
     planes: Surfaces  # the seam and the foot plane
     triangles: Ints  # dual triangulation, (t, 3)
     pinhole: Floats  # of the camera, mm, (3,)
     min_curvature: Floats  # smallest curvature a sphere may have, 1/mm, (m,)
     diameter: float  # of the capture sphere, mm
     margin: Floats  # that the rule traced adds to it for each mirror, mm, (m,)
-    # width of the grooves between mirrors on pedestals, mm; None: neighbouring spheres meet
-    groove: float | None = None
+    groove: float | None = None  # width between pedestals, mm; None: neighbouring spheres meet
 
     @property
     def target(self) -> Floats:
@@ -53,9 +100,7 @@ class RadiusProblem:
     ) -> Cells:
         """Cells for curvatures (m,) and aims (m,), from the given triangulation or the first.
 
-        Raises:
-            NotRegularError: the mirrors bound no proper cells.
-            SpecError: the grooves leave nothing of a mirror.
+        NotRegularError if mirrors bound no proper cells, SpecError if grooves leave nothing of one.
         """
         mirrors = self.mirrors.with_curvature(curvature)
         mirrors = mirrors if aim is None else aimed(mirrors, self.pinhole, aim)
@@ -116,10 +161,8 @@ def solve_radii(
     """Cells of the mirrors with radii by a rule, and their coverage diameters (m,), mm.
 
     Rules are "traced" (exact rays), "paper" (eqs. 1 and 2 of the paper; nearly flat where those
-    give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.).
-
-    Raises:
-        SpecError: when the mirrors do not close to one array, or rule traced finds no radii.
+    give no curvature or hardly any) or "flat" (planar mirrors, Mukaigawa et al.). SpecError if the
+    mirrors do not close to one array, or rule traced finds no radii.
     """
     try:
         if rule == "traced":
@@ -138,9 +181,9 @@ def _traced(problem: RadiusProblem, progress: Progress) -> tuple[Cells, Floats]:
     """Radii with which every mirror's exact coverage is the target, or more where nearly flat.
 
     Coverage grows about in proportion to curvature and hardly depends on the neighbours, so each
-    curvature is scaled by target / coverage, all together, until none is off; the mirrors that the
-    seam halves are aimed farther beyond it by what they miss. Where a step goes so far that spheres
-    no longer meet it is halved: flat mirrors always close.
+    curvature is scaled by target / coverage until none is off; halved mirrors are aimed farther
+    beyond the seam by what they miss. A step with which spheres no longer meet is halved: flat
+    mirrors close.
     """
     curvature, lowest = problem.paper_curvature, problem.min_curvature
     aim = np.zeros(len(curvature))

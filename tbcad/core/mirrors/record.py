@@ -1,4 +1,4 @@
-"""The record of a design: mirrors.csv, and design.json with the resolved spec and the cameras."""
+"""The record of a design: mirrors.csv, design.json with spec and cameras, and a map as SVG."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,13 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.cad.formats.csv_table import Row, write_table
+from tbcad.cad.formats.checked_files import Row, write_table
+from tbcad.common.colours import shades
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import CameraRecord, DesignRecord, MandrelRecord, ShellFiles
 from tbcad.records.tables import MirrorRow
+from tbcad.types import Floats
 
 COLUMNS = MirrorRow.columns()
+SIZE_PX = 320
+EDGE_PX = 8
+DOT_SHARE = 0.8  # of the distance of neighbours that lie evenly
 
 
 def mirror_rows(array: MirrorArray) -> list[Row]:
@@ -61,7 +66,7 @@ def design_record(
         coating_mm=spec.mirrors.coating_um / 1000,
         foot_z_mm=a.foot,
         cameras=(_camera(a), _camera(b)),
-        parts=tuple(ShellFiles(**shell_record(one)) for one in (a, b) if shells),
+        parts=tuple(ShellFiles(**part_files("shell", one)) for one in (a, b) if shells),
         mandrels=tuple(mandrels),
         mirrors=MirrorRow.FILE,
     )
@@ -80,17 +85,36 @@ def _camera(array: MirrorArray) -> CameraRecord:
     )
 
 
-def shell_record(array: MirrorArray) -> dict[str, Any]:
-    """Name, camera and files of one shell."""
-    return _part_files("shell", array)
-
-
-def mandrel_files(array: MirrorArray) -> dict[str, Any]:
-    """Name, camera and files of one shell's negative."""
-    return _part_files("mandrel", array)
-
-
-def _part_files(part: str, array: MirrorArray) -> dict[str, Any]:
+def part_files(part: str, array: MirrorArray) -> dict[str, Any]:
+    """Name, camera and files of one half's "shell", or of its negative, the "mandrel"."""
     name = f"{part}_{array.camera_id}"
     files = {kind: f"{name}.{kind}" for kind in ("step", "stl", "3mf")}
     return {"name": name, "camera": array.camera_id, **files}
+
+
+def hemisphere_map(arrays: tuple[MirrorArray, MirrorArray]) -> str:
+    """SVG with a dot for each mirror at its direction, coloured by the logarithm of its radius.
+
+    Lambert's azimuthal projection: equal areas, the zenith in the middle, x to the right. Planar
+    mirrors, which have no radius, have all one colour.
+    """
+    u = np.concatenate([array.u for array in arrays])
+    radius = np.concatenate([array.mirrors.radius for array in arrays])
+    logarithm = np.log(radius) if np.isfinite(radius).all() else np.zeros(len(u))
+    half = SIZE_PX / 2 - EDGE_PX
+    x, y = SIZE_PX / 2 + half * equal_area(u).T * [[1], [-1]]
+    dot = DOT_SHARE * half / np.sqrt(len(u))
+    dots = "".join(
+        f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="{dot:.2f}" fill="{colour}"/>'
+        for cx, cy, colour in zip(x, y, shades(logarithm), strict=True)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIZE_PX}" height="{SIZE_PX}" '
+        f'viewBox="0 0 {SIZE_PX} {SIZE_PX}" role="img" aria-label="directions of all mirrors">'
+        f"{dots}</svg>"
+    )
+
+
+def equal_area(u: Floats) -> Floats:
+    """Lambert's projection of unit vectors (m, 3), z >= 0, to the unit disc, (m, 2)."""
+    return np.asarray(u[:, :2] / np.sqrt(1 + u[:, 2:]))

@@ -11,7 +11,7 @@ from math import cos, radians, sin, sqrt
 import numpy as np
 
 from tbcad.common.compiled import compiled_loop
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.loop_vectors import (
     Vector,
     dot,
@@ -29,8 +29,7 @@ from tbcad.core.geometry.vectors import unit as unit_vectors
 from tbcad.core.optics.camera import Camera
 from tbcad.types import Floats
 
-# Points of an outline: it is so smooth that its area by Fourier series is exact to 10^-6.
-OUTLINE_POINTS = 24
+OUTLINE_POINTS = 24  # so smooth that the area by Fourier series is exact to 10^-6
 # A tilt of the mirror turns the ray by twice as much, or less across the plane of incidence, so
 # no ray at this tilt meets the capture sphere.
 MAX_TILT = radians(70)
@@ -57,13 +56,8 @@ def used_outlines(poses: BallPoses, radius: Floats, pinhole: float, capture: flo
     """Outline on each ball of the part that shows the capture sphere, mm, (k, OUTLINE_POINTS, 3).
 
     Outside the outline rays from the camera miss the sphere. The tilt of the ball's surface at
-    which they touch it is found by bisection, in OUTLINE_POINTS directions about the apex.
-
-    Args:
-        poses: of the balls, (k,).
-        radius: of the balls, mm, (k,).
-        pinhole: distance of the pinhole along the axis, mm.
-        capture: radius of the capture sphere, mm.
+    which they touch it is found by bisection, in OUTLINE_POINTS directions about the apex. The
+    pinhole is given by its distance along the axis, capture is the sphere's radius, mm.
     """
     camera, circle = np.array([pinhole, 0.0, 0.0]), unit_circle(even_angles(OUTLINE_POINTS))
     tangent = _tangents(poses.normal, circle)
@@ -84,16 +78,7 @@ def _tangents(normal: Floats, circle: Floats) -> Floats:
 def _touching_tilts(
     apex: Floats, normal: Floats, tangent: Floats, radius: Floats, camera: Floats, capture: float
 ) -> Floats:
-    """Tilts (k, s) of balls at which rays from the camera touch the capture sphere, radians.
-
-    Args:
-        apex: of the balls, mm, (k, 3).
-        normal: there, (k, 3).
-        tangent: unit vectors toward which the normals tilt, (k, s, 3).
-        radius: of the balls, mm, (k,).
-        camera: its pinhole, mm, (3,).
-        capture: radius of the capture sphere, mm.
-    """
+    """Tilts (k, s) toward unit vectors (k, s, 3) at which camera rays touch the sphere, radians."""
     result, pinhole = np.empty(tangent.shape[:2]), vector(camera)
     for k in range(len(apex)):
         top, up = vector(apex[k]), vector(normal[k])
@@ -121,13 +106,8 @@ def _hits_sphere(point: Vector, normal: Vector, camera: Vector, capture: float) 
 def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundCones, RoundCones]:
     """Hulls that hold all light of each ball: capture sphere to ball, ball to pinhole, (k,).
 
-    The part in use lies in the ball about the middle of its outline, so every ray lies in the hull
-    of that ball and the capture sphere, or of that ball and the pinhole.
-
-    Args:
-        outline: on the balls, mm, (k, s, 3).
-        pinhole: distance along the axis, mm.
-        capture: radius of the capture sphere, mm.
+    The part in use, with outlines (k, s, 3), lies in the ball about the outline's middle, so every
+    ray lies in the hull of that ball and the capture sphere, or of that ball and the pinhole.
     """
     middle = (outline.min(axis=1) + outline.max(axis=1)) / 2
     radius = norm(outline - middle[:, None]).max(axis=1) / np.cos(np.pi / outline.shape[1])
@@ -140,13 +120,9 @@ def light_hulls(outline: Floats, pinhole: float, capture: float) -> tuple[RoundC
 
 
 def pixel_counts(camera: Camera, frame: Floats, outline: Floats, azimuth: Floats) -> Floats:
-    """Number of pixels inside outlines (m, s, 3) at azimuths (m,), exact, (m,).
+    """Number of pixels inside outlines at azimuths (m,), radians, exact, (m,).
 
-    Args:
-        camera: that sees them.
-        frame: rows of the ellipsoid's frame, (3, 3).
-        outline: at azimuth zero, mm, (m, s, 3).
-        azimuth: radians, (m,).
+    Outlines (m, s, 3), mm, are at azimuth zero in the ellipsoid's frame, rows (3, 3).
     """
     ray = rotated_about_x(outline, azimuth[:, None]) @ frame - camera.pinhole
     across = ray @ camera.axes[:2].T

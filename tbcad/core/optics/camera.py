@@ -8,16 +8,13 @@ from scipy.optimize import minimize
 from tbcad.core.geometry.vectors import FLIP_X, unit
 from tbcad.types import Bools, Floats
 
-# A tilt with points behind the camera has an infinite fill, which the search cannot use.
-MAX_FILL = 1e3
-# Digits beyond are noise of the search: a symmetric array gets a symmetric camera.
-TILT_DIGITS = 8
+MAX_FILL = 1e3  # a tilt with points behind the camera has an infinite fill, of no use to a search
+TILT_DIGITS = 8  # digits beyond are noise of the search: a symmetric array gets a symmetric camera
 RIGHT_ANGLE = np.pi / 2
 # A fitting frame is filled to this share of its width and height: 2 % of them stay free on each
 # side for the errors of a lens and of its mounting.
 FITTED_FILL = 0.96
-# Of the search for undistorted places; each gains about two digits where distortion is small.
-ITERATIONS = 30
+ITERATIONS = 30  # for undistorted places; each gains about two digits where distortion is small
 ROOT_ROUNDING = 1e-9  # imaginary part of a real root of a polynomial
 
 
@@ -55,10 +52,7 @@ class Camera:
         return np.asarray(image[..., :2] / image[..., 2:] / self.pixel_pitch + (size - 1) / 2)
 
     def fill(self, points: Floats) -> float:
-        """How far points (k, 3) fill the frame: 1 when the outermost is on its edge.
-
-        Infinite when a point is not in front of the camera.
-        """
+        """Share of the frame that points (k, 3) fill, 1 on its edge; infinite behind the camera."""
         return _fill(self.forward, self.right, self.half_sizes, points - self.pinhole)
 
     def mirrored(self) -> "Camera":
@@ -80,16 +74,10 @@ def _fill(forward: Floats, right: Floats, half_sizes: Floats, rays: Floats) -> f
 def fitted_camera(
     pinhole: Floats, points: Floats, width_px: int, height_px: int, hfov: float
 ) -> Camera:
-    """The camera whose orientation leaves the widest margin round points (k, 3) in its frame.
+    """The camera whose orientation leaves the widest margin round points (k, 3), mm, in its frame.
 
     The rows lie across the plane of the ellipsoid's axis and z, along which the array is widest.
-
-    Args:
-        pinhole: mm, (3,).
-        points: that must be in the frame, mm, (k, 3).
-        width_px: columns.
-        height_px: rows.
-        hfov: angle of view across the columns, radians.
+    The angle of view hfov (radians) is across the columns.
     """
     rays = unit(points - pinhole)
     middle = unit(rays.mean(axis=0))

@@ -15,6 +15,8 @@ from tbcad.types import Bools, Floats, Ints
 # Corners nearer to each other than this are one: far below any tolerance of manufacture, far above
 # rounding.
 MERGED_MM = 1e-4
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+PARAMETER, STEP = (NODES + 1) / 2, WEIGHTS / 2  # from 0 to 1
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,8 @@ class Cells:
     def rings(self) -> tuple[Ints, Ints]:
         """Sides of each mirror's cell, counter-clockwise from outside.
 
-        Returns:
-            Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell
-            follows it from start to end, 2 a + 1 where it goes back along it.
+        Offsets (m + 1,) into the list of sides, and the sides: arc a as 2 a where the cell follows
+        it from start to end, 2 a + 1 where it goes back along it.
         """
         return rings_of(self.triangles, self.mirrors, self.arcs.side_of_half_edge)
 
@@ -114,12 +115,10 @@ class Arcs:
 
 
 def rings_of(triangles: Ints, mirrors: int, side_of_half_edge: Ints) -> tuple[Ints, Ints]:
-    """Sides round each mirror's cell, as `Cells.rings` has them.
+    """Sides round each of m mirrors' cells, as `Cells.rings` has them.
 
-    Args:
-        triangles: the three faces at each corner, counter-clockwise from outside, (t, 3).
-        mirrors: number of mirrors m, the first of the faces.
-        side_of_half_edge: side for each directed edge of the triangles, -1 for none, (3 t,).
+    Triangles (t, 3) are counter-clockwise from outside, the mirrors being the first faces; each
+    directed edge of them has a side, -1 for none, (3 t,).
     """
     ends, twin = half_edges(triangles)
     _, first = np.unique(ends[:, 0], return_index=True)
@@ -135,10 +134,7 @@ def rings_of(triangles: Ints, mirrors: int, side_of_half_edge: Ints) -> tuple[In
 
 
 def _arcs(cells: Cells) -> Arcs:
-    """Arcs in closed form from the corners and the faces' gradients there.
-
-    Corners nearer to each other than MERGED_MM become one.
-    """
+    """Arcs in closed form from corners and gradients there; nearer than MERGED_MM are one."""
     ends, twin = half_edges(cells.triangles)
     edge = np.flatnonzero((np.arange(len(ends)) < twin) & (ends.min(axis=1) < cells.mirrors))
     between = np.column_stack([twin[edge] // 3, edge // 3])
@@ -176,14 +172,9 @@ def _curves(
 def plane_sections(
     surfaces: Surfaces, p: Ints, plane: Floats, start: Floats, end: Floats
 ) -> tuple[Floats, Floats]:
-    """Control polygon (e, 3, 3) and weight (e,) of arcs in which planes cut surfaces.
+    """Control polygon (e, 3, 3) and weight (e,) of arcs in which planes cut surfaces p (e,).
 
-    Args:
-        surfaces: spheres or planes.
-        p: index of the surface, (e,).
-        plane: unit normal of the plane, (e, 3).
-        start: of the arc, on both, mm, (e, 3).
-        end: of the arc, on both, mm, (e, 3).
+    Planes have unit normals (e, 3); arcs start and end on both, mm, (e, 3).
     """
     chord = end - start
     half = norm(chord) / 2
@@ -199,14 +190,10 @@ def plane_sections(
 
 
 def cells_of(surfaces: Surfaces, triangles: Ints) -> Cells:
-    """Cells of m mirrors between the seam and the foot plane.
+    """Cells of m mirrors between seam and foot; surfaces are the mirrors, then the two planes.
 
-    Args:
-        surfaces: the m mirrors, then the two planes.
-        triangles: a dual triangulation that is right or nearly so, (t, 3).
-
-    Raises:
-        NotRegularError: when the mirrors bound no proper cells.
+    The dual triangulation (t, 3) is right or nearly so; NotRegularError if there are no proper
+    cells.
     """
     return Cells(surfaces, *flip_until_regular(surfaces, triangles))
 
@@ -250,3 +237,74 @@ def _turning_angles(cells: Cells, mirror: Ints, points: Floats, offsets: Ints) -
     rotation = 2 * np.arctan2(norm(control - (start + end) / 2), norm(end - start) / 2)
     axis = unit(np.cross(control - start, end - control))
     return exterior + rotation * dot(axis, outside)
+
+
+@dataclass(frozen=True)
+class CellMoments:
+    """Integrals over m cells on spheres, with n the unit normal away from the sphere's centre."""
+
+    centre: Floats  # of the sphere from the origin, mm, (m, 3)
+    radius: Floats  # mm, (m,)
+    area: Floats  # integral of 1, mm^2, (m,)
+    first: Floats  # integral of n, mm^2, (m, 3)
+    second: Floats  # integral of n n^T, mm^2, (m, 3, 3)
+
+    @property
+    def volume(self) -> float:
+        """Between the origin and all cells, mm^3: a third of the integral of x.n."""
+        return float((self._heights + self.radius * self.area).sum()) / 3
+
+    @property
+    def volume_moment(self) -> Floats:
+        """Integral of x over that volume, mm^4, (3,): a quarter of the integral of x (x.n)."""
+        radius = self.radius[:, None]
+        around = np.einsum("mij,mj->mi", self.second, self.centre) + radius * self.first
+        along = (self._heights + self.radius * self.area)[:, None] * self.centre
+        return np.asarray((along + radius * around).sum(axis=0)) / 4
+
+    @property
+    def _heights(self) -> Floats:
+        return np.asarray(np.einsum("mi,mi->m", self.centre, self.first))
+
+
+def cell_moments(cells: Cells, origin: Floats) -> CellMoments:
+    """Moments of the cells of mirrors that are all spherical, about an origin (3,), mm."""
+    m = cells.mirrors
+    mirrors, arcs = cells.mirror_surfaces, cells.arcs
+    radius = mirrors.radius
+    centre = mirrors.apex - radius[:, None] * mirrors.normal
+    area, first, second = cell_areas(cells), np.zeros((m, 3)), np.zeros((m, 3, 3))
+    # Arcs run counter-clockwise about the cell on their left seen from behind the mirrors.
+    for face, sign in ((arcs.left, -1.0), (arcs.right, 1.0)):
+        mine = np.flatnonzero(face < m)
+        of = face[mine]
+        n, turning = _along(arcs, mine, centre[of], radius[of])
+        np.add.at(first, of, sign * turning.sum(axis=1) / 2)
+        np.add.at(second, of, sign * np.einsum("eki,ekj->eij", n, turning))
+    square = radius[:, None] ** 2
+    second = (area[:, None, None] * np.eye(3) + square[:, None] * second) / 3
+    return CellMoments(centre - origin, radius, area, square * first, second)
+
+
+def _along(arcs: Arcs, arc: Ints, centre: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    """Unit normals (e, k, 3) at the nodes of arcs, and n x dn there, by the weights."""
+    x, dx = _places(arcs, arc)
+    n = (x - centre[:, None]) / radius[:, None, None]
+    return n, np.cross(n, dx / radius[:, None, None]) * STEP[:, None]
+
+
+def arc_steps(arcs: Arcs, arc: Ints) -> tuple[Floats, Floats]:
+    """Points (e, k, 3) on arcs (e,), mm, and the steps along the arcs that each stands for."""
+    x, dx = _places(arcs, arc)
+    return x, dx * STEP[:, None]
+
+
+def _places(arcs: Arcs, arc: Ints) -> tuple[Floats, Floats]:
+    """Points (e, k, 3) at the nodes of arcs (e,), and their derivatives by the parameter."""
+    t, weight = PARAMETER, arcs.weight[arc][:, None]
+    points = arcs.points[arc]
+    basis = np.stack(np.broadcast_arrays((1 - t) ** 2, 2 * t * (1 - t) * weight, t**2), axis=-1)
+    slope = np.stack(np.broadcast_arrays(2 * t - 2, (2 - 4 * t) * weight, 2 * t), axis=-1)
+    above, below = basis @ points, basis.sum(axis=-1)[..., None]
+    x = above / below
+    return x, (slope @ points - slope.sum(axis=-1)[..., None] * x) / below

@@ -8,8 +8,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.types import Floats, Ints
 
-# Directions closer than this to a symmetry plane lie on it; splitting leaves errors of 1e-16.
-ON_PLANE = 1e-12
+ON_PLANE = 1e-12  # directions this close to a symmetry plane lie on it; splitting errs by 1e-16
 
 
 def icosahedron() -> tuple[Floats, Ints]:
@@ -80,8 +79,7 @@ def split(vertices: Floats, faces: Ints, m: int) -> tuple[Floats, Ints]:
 def geodesic(n: int) -> tuple[Floats, Ints]:
     """Geodesic polyhedron of frequency n, the paper's edge separation frequency.
 
-    Returns:
-        Unit vectors to the vertices (10 n^2 + 2, 3), and outward triangles over them (20 n^2, 3).
+    Unit vectors to the vertices (10 n^2 + 2, 3), and outward triangles over them (20 n^2, 3).
     """
     vertices, faces = icosahedron()
     for factor in prime_factors(n):

@@ -28,28 +28,19 @@ class DomeImages:
     place: Floats  # column and row of the dome's centre, (n, 2)
     direction: Floats  # unit vectors from the pinhole in which it appears, (n, 3)
     centroid: Floats  # of the lit part's image, from there, pixels, (n, 2)
-    # mean square of the lit part's image about its centroid, square pixels, (n, 2, 2)
-    spread: Floats
+    spread: Floats  # mean square of that image about its centroid, square pixels, (n, 2, 2)
     area: Floats  # of the lit part's image, square pixels, (n,)
 
 
 @dataclass(frozen=True)
 class DiscImages:
-    """Images in spheres of the discs that fill domes square to the line of sight, over n of them.
+    """Images in spheres of discs that fill domes square to the line of sight, over n of them."""
 
-    Attributes:
-        point: of reflection of the disc's centre, mm, (n, 3).
-        axes: level, upward and forward unit vectors of the eyes, (n, 3, 3).
-        place: column and row of the disc's centre, (n, 2).
-        slope: pixels for a radius along level and upward, (n, 2, 2).
-        bend: second derivatives by both, pixels, (n, 2, 2, 2).
-    """
-
-    point: Floats
-    axes: Floats
-    place: Floats
-    slope: Floats
-    bend: Floats
+    point: Floats  # of reflection of the disc's centre, mm, (n, 3)
+    axes: Floats  # level, upward and forward unit vectors of the eyes, (n, 3, 3)
+    place: Floats  # column and row of the disc's centre, (n, 2)
+    slope: Floats  # pixels for a radius along level and upward, (n, 2, 2)
+    bend: Floats  # second derivatives by both, pixels, (n, 2, 2, 2)
 
     @property
     def area(self) -> Floats:
@@ -87,18 +78,11 @@ def disc_images(
 def dome_images(
     camera: LensCamera, centre: Floats, radius: Floats, led: Floats, dome: float
 ) -> DomeImages:
-    """Images of whole domes, to second order in their size.
+    """Images of whole domes of a radius about centres (n, 3) in spheres (n,), mm, to second order.
 
     The part of the disc that is lit is as bright everywhere in its image too. Where the image is
     larger, there is more light: with derivatives J and H of the image, a growth g of its area, the
     mean m and the mean square Q of the part, its centroid is J m + H : Q / 2 + J (Q - m m^T) g.
-
-    Args:
-        camera: that sees them.
-        centre: of the spheres, mm, (n, 3).
-        radius: of the spheres, mm, (n,).
-        led: centres of the domes, mm, (n, 3).
-        dome: radius of a dome, mm.
     """
     disc = disc_images(camera, centre, radius, led, dome)
     rise = disc.axes[:, 2] @ UP
@@ -127,17 +111,11 @@ def sight_axes(toward: Floats) -> Floats:
 
 
 def dome_samples(axes: Floats) -> tuple[Floats, Floats]:
-    """Points of the lit halves of unit domes, and the share of a whole disc that each stands for.
+    """Points (n, s, 3) of the lit halves of unit domes, and shares (n, s) of a disc they stand for.
 
     Points are the centroids of pieces of a disc that have the same area. Those of the lower half
     are brought nearer to its middle, up to the edge of the lit half, which an eye in elevation e
-    sees as half an ellipse.
-
-    Args:
-        axes: of the eyes, from `sight_axes`, (n, 3, 3).
-
-    Returns:
-        Points (n, s, 3) from the centres, and shares (n, s).
+    sees as half an ellipse. Axes are those of the eyes, from `sight_axes`.
     """
     ring, spoke = (index.ravel() for index in np.indices((RINGS, SPOKES)))
     width = 2 * np.pi / SPOKES

@@ -12,18 +12,14 @@ from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# The seam and the foot plane bound the array; they follow the mirrors.
-PLANES = 2
+PLANES = 2  # the seam and the foot plane bound the array; they follow the mirrors
 # An edge is flipped when a corner lies deeper than this inside the mirror across it. It only keeps
 # rounding from flipping an edge to and fro; arcs this short are merged later.
 FLIP_DEPTH_MM = 1e-9
-# Flips end within some ten rounds; a search that runs on is going in circles.
-MAX_ROUNDS = 200
+MAX_ROUNDS = 200  # flips end within some ten rounds; a search that runs on is going in circles
 MAX_STEPS = 64
-# Rounding in the test of all corners against all mirrors.
-ROUNDING_MM = 1e-7
-# Pairs of point and surface that are tested at a time: bounds the memory.
-MAX_PAIRS = 4_000_000
+ROUNDING_MM = 1e-7  # rounding in the test of all corners against all mirrors
+MAX_PAIRS = 4_000_000  # pairs of point and surface that are tested at a time: bounds the memory
 
 
 class NotRegularError(ArithmeticError):
@@ -31,15 +27,10 @@ class NotRegularError(ArithmeticError):
 
 
 def bounded_triangulation(triangles: Ints, u: Floats, kept: Bools) -> Ints:
-    """Part of a triangulation on m kept directions, closed by a seam (m) and a foot (m + 1).
+    """A triangulation of m kept directions, closed by a seam (m) and a foot (m + 1).
 
-    Args:
-        triangles: outward triangles over all directions, (t, 3).
-        u: all directions, (k, 3).
-        kept: which directions are kept, (k,); their new indices count them in order.
-
-    Returns:
-        Triangles over the m kept directions and the two planes.
+    Triangles (t, 3) are outward, over directions u (k, 3), of which some are kept, (k,); new
+    indices count these in order.
     """
     new = np.cumsum(kept) - 1
     inner = new[triangles[kept[triangles].all(axis=1)]]
@@ -63,11 +54,7 @@ def _plane_ends(rim: Ints, plane: Ints) -> Ints:
 
 
 def half_edges(triangles: Ints) -> tuple[Ints, Ints]:
-    """Directed edges (3 t, 2), edge 3 t + k running from corner k to k + 1 of t, and their twins.
-
-    Returns:
-        Ends (3 t, 2) and the index (3 t,) of the opposite directed edge.
-    """
+    """Directed edges (3 t, 2), 3 t + k from corner k of triangle t, and their twins (3 t,)."""
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     low, high = ends.min(axis=1), ends.max(axis=1)
     order = np.lexsort((high, low))
@@ -77,17 +64,11 @@ def half_edges(triangles: Ints) -> tuple[Ints, Ints]:
 
 
 def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
-    """Points where three surfaces meet on the light's side, in closed form, mm, (t, 3).
+    """Points where three surfaces (t, 3) meet on the light's side, in closed form, mm, or NaN.
 
     Two planes of equal power (radical planes) meet in a line, and the line meets the sphere of the
-    largest curvature: the corner is the intersection nearer to the mirrors' apices.
-
-    Args:
-        surfaces: the mirrors, followed by the two bounding planes.
-        triangles: indices of three surfaces each, (t, 3).
-
-    Returns:
-        NaN where three surfaces have no point in common.
+    largest curvature: the corner is the intersection nearer to the mirrors' apices. The two
+    bounding planes follow the mirrors.
     """
     pivot = np.argmax(surfaces.curvature[triangles], axis=1)
     row = np.arange(len(triangles))
@@ -111,10 +92,7 @@ def corners(surfaces: Surfaces, triangles: Ints) -> Floats:
 
 
 def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats]:
-    """Radical planes g . x + h = 0 of surfaces p and q (k,), curvature of p >= that of q.
-
-    They contain all points that the two surfaces have in common.
-    """
+    """Planes g . x + h = 0 of equal power of p and q (k,), p's curvature no less than q's."""
     kp, kq = surfaces.curvature[p], surfaces.curvature[q]
     ratio = np.divide(kq, kp, out=np.zeros_like(kp), where=kp > 0)
     g, h = surfaces.gradient_at_origin, surfaces.value_at_origin
@@ -124,15 +102,9 @@ def radical_planes(surfaces: Surfaces, p: Ints, q: Ints) -> tuple[Floats, Floats
 def flip_until_regular(surfaces: Surfaces, triangles: Ints) -> tuple[Ints, Floats]:
     """Flip edges until no corner is covered by the mirror across an edge.
 
-    Args:
-        surfaces: the mirrors, followed by the two bounding planes, between which no edge is added.
-        triangles: a triangulation to start from, (t, 3).
-
-    Returns:
-        Triangles (t, 3) and their corners (t, 3).
-
-    Raises:
-        NotRegularError: when no sequence of flips was found.
+    From triangles (t, 3), over mirrors followed by the two bounding planes, between which no edge
+    is added, to triangles and their corners (t, 3). NotRegularError if no sequence of flips was
+    found.
     """
     steps = 1
     while steps <= MAX_STEPS:
@@ -227,13 +199,8 @@ def opposite(triangles: Ints, edge: Ints) -> Ints:
 def flip_edges(triangles: Ints, edge: Ints, twin: Ints) -> Ints:
     """Replace triangles (i, j, k) and (j, i, l) by (k, i, l) and (l, j, k), in place.
 
-    Args:
-        triangles: of which edges are flipped, (t, 3).
-        edge: directed edges i to j, at most one in any triangle, (e,).
-        twin: the same edges from j to i, (e,).
-
-    Returns:
-        The triangles that changed: those with i, then those with j, (2 e,).
+    Edges (e,) run from i to j, at most one in any triangle, their twins from j to i. Returned are
+    the triangles that changed: those with i, then those with j, (2 e,).
     """
     t, s = edge // 3, twin // 3
     i, j = triangles[t, edge % 3], triangles[t, (edge + 1) % 3]

@@ -21,24 +21,12 @@ def reflect(ray: Floats, normal: Floats) -> Floats:
 
 
 def reflected_rays(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
-    """Unit directions (..., 3) of rays from a pinhole after mirrors.
-
-    Args:
-        pinhole: mm, (3,).
-        point: where the rays meet the mirrors, mm, (..., 3).
-        normal: unit normals of the mirrors there, (..., 3).
-    """
+    """Unit directions (..., 3) of rays from a pinhole after mirrors, at points, with normals."""
     return reflect(unit(point - pinhole), normal)
 
 
 def miss_distances(pinhole: Floats, point: Floats, normal: Floats) -> Floats:
-    """Distances (...) of the lines of the reflected rays from the origin, mm.
-
-    Args:
-        pinhole: mm, (3,).
-        point: where the rays meet the mirrors, mm, (..., 3).
-        normal: unit normals of the mirrors there, (..., 3).
-    """
+    """Distances (...) from the origin of the lines of rays, as of `reflected_rays`, mm."""
     return norm(np.cross(point, reflected_rays(pinhole, point, normal)))
 
 

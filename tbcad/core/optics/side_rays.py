@@ -21,8 +21,7 @@ from tbcad.core.geometry.loop_vectors import (
 )
 from tbcad.types import Floats, Ints
 
-# Columns of a mirror.
-APEX, NORMAL, CURVATURE = 0, 3, 6
+APEX, NORMAL, CURVATURE = 0, 3, 6  # columns of a mirror
 # Columns of a ball in a window: its centre, its radius, and the axis that the window is turned
 # about, with cosine and sine of the angle.
 CENTRE, RADIUS, AXIS, COSINE, SINE = 0, 3, 4, 7, 8
@@ -34,13 +33,9 @@ def misses_of_mirrors(
 ) -> Floats:
     """Distances from the origin of rays from a pinhole after mirrors, mm, (e, s).
 
-    Args:
-        points: control points of the sides, see tbcad.core.optics.cells.Arcs, mm, (e, 3, 3).
-        weight: of their middle points, (e,).
-        mirror: of each side, (e,).
-        mirrors: apex, normal and curvature, (m, 7).
-        pinhole: mm, (3,).
-        t: parameters of points on the sides, in [0, 1], (e, s).
+    Sides of mirrors have control points (e, 3, 3) and weights (e,), see
+    tbcad.core.optics.cells.Arcs, and points at parameters t in [0, 1], (e, s); mirrors are apex,
+    normal and curvature, (m, 7).
     """
     result, start = np.empty(t.shape), vector(pinhole)
     for e in range(len(t)):
@@ -65,16 +60,9 @@ def misses_of_balls(
 ) -> Floats:
     """Distances from the origin of rays after balls, through sides that are turned, mm, (e, s).
 
-    Args:
-        points: control points of the sides, see tbcad.core.optics.cells.Arcs, mm, (e, 3, 3).
-        weight: of their middle points, (e,).
-        mirror: of each side, (e,).
-        balls: for each mirror the ball, and how its sides are turned about their pinhole, (m, 9).
-        pinholes: of the sides, and of the camera that sees the balls, mm, (2, 3).
-        t: parameters of points on the sides, in [0, 1], (e, s).
-
-    Returns:
-        Infinite where the ray misses the ball, or leaves it away from the origin.
+    Infinite where the ray misses the ball, or leaves it away from the origin. Sides as of
+    `misses_of_mirrors`; balls (m, 9) in the columns above, for each mirror one; pinholes of the
+    sides, and of the camera that sees the balls, mm, (2, 3).
     """
     result, place, camera = np.empty(t.shape), vector(pinholes[0]), vector(pinholes[1])
     for e in range(len(t)):

@@ -1,4 +1,10 @@
-"""What each mirror covers, by exact rays; and cells as windows, and what a ball shows in them."""
+"""What each mirror covers, by exact rays; and cells as windows, and what a ball shows in them.
+
+The halves of a mirror that the seam halves are two spheres. The seam's plane cuts both, and
+astigmatism turns the image of the cut at the object, the other way in each half: at one end each
+half sees beyond x = 0, at the other neither sees what is next to it. So each half is aimed at a
+point beyond x = 0.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,16 +14,19 @@ import numpy as np
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.optics.side_rays import misses_of_balls, misses_of_mirrors
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# Samples of each arc: first over all of it, then between the neighbours of the smallest one.
-SAMPLES = 9
-# After three rounds the samples are a 128th of the arc apart; a parabola does the rest.
-ROUNDS = 3
+SAMPLES = 9  # of each arc: over all of it, then between the neighbours of the smallest
+ROUNDS = 3  # after three rounds the samples are a 128th of the arc apart; a parabola does the rest
 # After four rounds the samples are a 512th of the side apart, and the smallest miss distance is
 # right to a micrometre.
 WINDOW_ROUNDS = 4
+X = np.array([1.0, 0.0, 0.0])
+CUT_SAMPLES = 65  # of an arc of the cut: the image is less than 1 um off the chords between them
+ROUNDING_MM = 1e-9  # the image of the cut through a planar mirror is the plane x = 0 itself
 
 
 def cell_sides(cells: Cells) -> tuple[Ints, Ints]:
@@ -44,10 +53,6 @@ def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
     It is twice the smallest distance from the origin of all rays camera -> edge of the cell ->
     reflected. The virtual camera sees the whole capture sphere of the paper's section 3 when its
     coverage diameter is at least that of the sphere.
-
-    Args:
-        cells: of one camera's m mirrors.
-        pinhole: of the camera, mm, (3,).
     """
     mirror, arc = limiting_sides(cells)
 
@@ -62,12 +67,9 @@ def coverage_diameters(cells: Cells, pinhole: Floats) -> Floats:
 
 
 def samples_about_minima(function: Callable[[Floats], Floats], curves: int, rounds: int) -> Floats:
-    """Values (k, SAMPLES) about the minimum on [0, 1] of each of k curves.
+    """Values (k, SAMPLES) about the minimum on [0, 1] of a function of parameters (k, SAMPLES).
 
-    Args:
-        function: takes parameters (k, SAMPLES), one row a curve, and returns the values there.
-        curves: number of curves, k.
-        rounds: each samples evenly between the neighbours of the last round's smallest sample.
+    Each round samples evenly between the neighbours of the last round's smallest sample.
     """
     low, high = np.zeros(curves), np.ones(curves)
     row = np.arange(curves)
@@ -138,18 +140,9 @@ class Windows:
         """Coverage diameter (m,) of one ball for each mirror within its rotated window, mm.
 
         It is twice the smallest distance from the origin of all rays through the window's edge
-        after the ball. Whether the ball shows the origin inside the window is a question to
-        `contains`.
-
-        Args:
-            centre: centres of the balls, mm, (m, 3).
-            radius: of the balls, mm, (m,).
-            axis: unit vectors that the windows are rotated about, (m, 3).
-            angle: radians, (m,).
-            pinhole: of the camera that sees the balls, mm, (3,); by default the windows' own.
-
-        Returns:
-            Infinite for mirrors without sides.
+        after the ball, infinite without sides. Whether the ball shows the origin inside the window
+        is a question to `contains`. Windows are turned about unit axes (m, 3) by angles (m,); the
+        camera that sees the balls is at the windows' own pinhole unless another is given.
         """
         pinholes = np.stack([self.pinhole, self.pinhole if pinhole is None else pinhole])
         balls = np.column_stack([centre, radius, axis, np.cos(angle), np.sin(angle)])
@@ -182,3 +175,60 @@ class Windows:
 def cell_windows(cells: Cells, pinhole: Floats) -> Windows:
     """The windows of all mirrors as a camera with this pinhole (3,) sees them."""
     return Windows(cells, pinhole, *limiting_sides(cells))
+
+
+def aimed(mirrors: Surfaces, pinhole: Floats, aim: Floats) -> Surfaces:
+    """Camera a's mirrors, turned to send the ray at the apex to x = -aim, mm, (m,) each."""
+    to_point = -aim[:, None] * X - mirrors.apex
+    normal = unit(unit(pinhole - mirrors.apex) + unit(to_point))
+    normal = np.where((aim == 0)[:, None], mirrors.normal, normal)
+    return Surfaces(mirrors.apex, normal, mirrors.curvature)
+
+
+def cut_positions(cells: Cells, pinhole: Floats, radius: float | Floats) -> Floats:
+    """Largest x of the image of each halved mirror's cut over the object, mm, (m,).
+
+    The image is where the rays camera -> cut -> reflected pierce the plane through the origin that
+    faces the virtual camera. Camera a's half sees what lies at larger x, camera b's, its mirror
+    image, what lies at smaller -x. Above zero neither sees a stretch twice as wide. It counts
+    within a radius along the seam, () or (m,), and is minus infinity for whole mirrors.
+    """
+    mirror, x, along = cut_images(cells, pinhole)
+    largest = np.full(cells.mirrors, -np.inf)
+    within = np.broadcast_to(radius, cells.mirrors)[mirror, None]
+    np.maximum.at(largest, mirror, _largest_within(x, along, within))
+    return largest
+
+
+def seam_gaps(cells: Cells, pinhole: Floats, radius: float) -> Floats:
+    """Widest stretch of the object that neither half of each mirror sees, mm, (m,); or zero."""
+    position = cut_positions(cells, pinhole, radius)
+    return np.where(position > ROUNDING_MM, 2 * position, 0.0)
+
+
+def cut_images(cells: Cells, pinhole: Floats) -> tuple[Ints, Floats, Floats]:
+    """Images of the cuts of camera a's mirrors, in the plane through the origin.
+
+    The mirror of each arc on a cut, (e,), x and place along the seam of its image, mm, (e,
+    CUT_SAMPLES).
+    """
+    mirror, arc = cell_sides(cells)
+    cut = cells.halved[mirror] & (cells.arcs.faces[arc] == cells.seam).any(axis=1)
+    mirror, arc = (
+        np.broadcast_to(one[cut, None], (cut.sum(), CUT_SAMPLES)) for one in (mirror, arc)
+    )
+    point = cells.arcs.at(arc, np.broadcast_to(np.linspace(0, 1, CUT_SAMPLES), arc.shape))
+    ray = reflected_rays(pinhole, point, cells.surfaces.gradient(mirror, point))
+    u = unit(cells.surfaces.apex[mirror])
+    image = point - (dot(point, u) / dot(ray, u))[..., None] * ray
+    return mirror[:, 0], image[..., 0], dot(image, np.cross(u, X))
+
+
+def _largest_within(x: Floats, along: Floats, radius: Floats) -> Floats:
+    """Largest x (e,) of polylines (e, s) as far as they lie within radii (e, 1) along the seam."""
+    start, end = along[:, :-1], along[:, 1:]
+    step = np.where(start == end, 1.0, end - start)
+    ends = (np.clip(one, -radius, radius) - start for one in (start, end))
+    within = (np.minimum(start, end) <= radius) & (np.maximum(start, end) >= -radius)
+    at_ends = np.max([x[:, :-1] + np.diff(x) * end / step for end in ends], axis=0)
+    return np.asarray(np.where(within, at_ends, -np.inf).max(axis=1))

@@ -11,14 +11,31 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.core.spec.section import OrWord, Section, as_tuple
 from tbcad.core.spec.sizes import OpticsSpec, with_sizes
 
+_Side: TypeAlias = Annotated[float, Field(ge=20, le=2000)]
+Bed: TypeAlias = Annotated[tuple[_Side, _Side, _Side], BeforeValidator(as_tuple)]
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
 FIT: Any = "fit"  # value of camera.hfov_deg that follows from the mirrors
 MAX_HFOV = 170  # degrees
+EdgeKind: TypeAlias = Literal["valley", "pedestal"]
+RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
+MAX_MARGIN = 20.0
+MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
+Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
+
+
+class PrinterSpec(Section):
+    """The printer and its material, for all printed parts of the prototype."""
+
+    bed_mm: Bed = (256.0, 256.0, 256.0)
+    """Width, depth and height of what the printer can make."""
+    bed_margin_mm: float = Field(3.0, ge=0, le=50)
+    """Width of the bed's border that stays free, also below the printer's full height."""
+    density_g_cm3: float = Field(1.27, gt=0, le=20)
+    """Density of the printed material (PETG 1.27, PLA 1.24, PA12 1.01)."""
 
 
 def _current(value: object) -> object:
@@ -30,13 +47,6 @@ def _current(value: object) -> object:
             "density_g_cm3 from [prototype.base] to [printer] if they are set, and set schema to 2"
         )
     return value
-
-
-EdgeKind: TypeAlias = Literal["valley", "pedestal"]
-RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
-MAX_MARGIN = 20.0
-MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
-Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
 
 
 class CameraSpec(Section):

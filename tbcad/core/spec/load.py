@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from tbcad.core.spec.csv_rows import Table, read_toml, toml_value
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import (
     SpecError,
@@ -19,7 +20,6 @@ from tbcad.core.spec.errors import (
     unknown_key,
     validation_error,
 )
-from tbcad.core.spec.files import Table, read_toml, toml_value
 
 PAPER = "turtleback"  # equal to the defaults of all keys
 LIKENESS = 0.8
@@ -42,8 +42,7 @@ def _folder() -> Traversable:
 def design_source(path: Path) -> Path | Traversable:
     """The file that a user means: the name of a design that comes with tbcad, or a path.
 
-    Raises:
-        SpecError: there is no such file, and the name is nearly that of a design.
+    SpecError if there is no such file, and the name is nearly that of a design.
     """
     known = shipped_designs()
     near = get_close_matches(str(path), known, 1, LIKENESS)
@@ -55,15 +54,11 @@ def design_source(path: Path) -> Path | Traversable:
 
 
 def load_spec(path: Path | None, overrides: Mapping[str, str] | Sequence[str] = ()) -> Spec:
-    """Return the design in a TOML file, or the built-in one, with options on top.
+    """Return the design in a TOML file or of a name, or (None) the built-in one, with options.
 
-    Args:
-        path: a TOML file, or the name of a design that comes with tbcad; None for the built-in one.
-        overrides: "key=value" texts, or a mapping of them, the later over the earlier. A key is
-            dotted, or the end of exactly one dotted key; a value is TOML, or else text.
-
-    Raises:
-        SpecError: anything that cannot be read, is unknown, or is not allowed.
+    Options are "key=value" texts, or a mapping of them, the later over the earlier. A key is
+    dotted, or the end of exactly one dotted key; a value is TOML, or else text. SpecError for
+    anything that cannot be read, is unknown, or is not allowed.
     """
     table = {} if path is None else read_toml(design_source(path), str(path), "design")
     options = [_option(text) for text in option_texts(overrides)]

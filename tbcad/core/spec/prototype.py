@@ -19,8 +19,7 @@ Picture: TypeAlias = Literal["moved", "fixed"]
 Drive: TypeAlias = Literal["nema17-belt", "nema17-direct", "stage-60"]
 Hold: TypeAlias = Literal["magnet", "glue"]
 HOLDS: tuple[Hold, ...] = get_args(Hold)
-# Tried in turn: flatter pads set a seat deeper, out of the light.
-PAD_ANGLES_DEG = (50.0, 40.0, 30.0)
+PAD_ANGLES_DEG = (50.0, 40.0, 30.0)  # tried in turn: flatter pads set a seat deeper, out of light
 # Tried in turn: a longer boss sets the frame farther back from what the base sweeps.
 HUB_BOSSES_MM = (20.0, 35.0, 50.0, 65.0)
 Lock: TypeAlias = Literal["set-screws", "clamp"]

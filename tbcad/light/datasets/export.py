@@ -1,27 +1,39 @@
 """A capture as a folder for another program, with the figures of how well it fits."""
 
 import json
+import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.colmap import SparseModel
-from tbcad.cad.formats.csv_table import Row, write_table
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import chosen_mirrors
 from tbcad.light.datasets.machine_scene import write_machine_scene
-from tbcad.light.datasets.nerfstudio import write_nerfstudio, write_pictures
-from tbcad.light.datasets.ngp_rays import write_ngp_rays
-from tbcad.light.datasets.pictures import Pictures, default_size, taken_pictures
-from tbcad.light.datasets.pinholes import pinhole_of
-from tbcad.light.datasets.ray_table import write_ray_table
-from tbcad.light.datasets.seed_points import SeedPoints, seed_points
-from tbcad.light.datasets.virtual_cameras import FittedCameras, virtual_cameras
+from tbcad.light.datasets.pictures import Pictures, crop_of, default_size, taken_pictures
+from tbcad.light.datasets.pinholes import (
+    SeedPoints,
+    pinhole_of,
+    seed_points,
+    write_nerfstudio,
+    write_ngp_rays,
+    write_pictures,
+)
+from tbcad.light.datasets.virtual_cameras import (
+    FittedCameras,
+    chosen_mirrors,
+    reading_order,
+    virtual_cameras,
+)
+from tbcad.light.simulate.capture.files import chunked
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.captures import ExportOptions
 from tbcad.types import Floats, Progress
 
@@ -32,24 +44,25 @@ COLUMNS = ("name", "x", "y", "z", "rays", "pitch_mm", "rms_mm", "worst_mm", "cen
 MODEL = Path("sparse", "0")
 # COLMAP looks for the mask of a0001.png as a0001.png.png.
 MASK_SUFFIX = ".png.png"
+RAYS, RAYS_H5 = "rays.npz", "rays.h5"
+RAYS_PER_CHUNK = 1 << 16
+# Zip files have times; a fixed one gives the same bytes each time.
+NO_TIME = (1980, 1, 1, 0, 0, 0)
+RAY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "origin": ("<f4", (3,)),
+    "direction": ("<f4", (3,)),
+    "colour": ("|u1", (3,)),
+    "camera": ("<u2", ()),
+}
 
 
 def write_dataset(
-    folder: Path,
-    source: LightField,
-    scene: Scene | None,
-    options: ExportOptions,
+    folder: Path, source: LightField, scene: Scene | None, options: ExportOptions
 ) -> dict[str, Any]:
-    """Write all files of an export into a folder, and return its record.
+    """Write all files of an export into an empty folder, and return its record.
 
-    Args:
-        folder: exists, is empty, and is the caller's to replace.
-        source: the light field.
-        scene: the object of a simulated capture; None where it is not known.
-        options: what is wanted, and what is told of it.
-
-    Raises:
-        InputError: a mirror is not in the capture, or none gives a camera.
+    `scene` is the object of a simulated capture. InputError: a mirror is not in the capture, or
+    none gives a camera.
     """
     options.progress("virtual cameras")
     mirrors = chosen_mirrors(source, options.cameras, options.every)
@@ -75,17 +88,10 @@ def write_dataset(
 def write_scene(
     folder: Path, source: LightField, scene: Scene | None, exports: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Write scenes of the machine into a folder, and return their record.
+    """Write scenes of the machine into an empty folder, and return their record.
 
-    Args:
-        folder: exists, is empty, and is the caller's to replace.
-        source: the light field.
-        scene: its object.
-        exports: the export that it was captured with.
-        progress: called with each stage.
-
-    Raises:
-        InputError: the capture names no object, or the export has other cameras or no shells.
+    `exports` is the export that the light field was captured with. InputError: the capture names no
+    object, or the export has other cameras or no shells.
     """
     if scene is None:
         raise InputError("the capture names no object, so there is none in the scene: capture one")
@@ -210,3 +216,62 @@ def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> Spa
         seeds.points,
         seeds.colours,
     )
+
+
+def write_ray_table(
+    folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
+) -> int:
+    """Write origin, direction, colour and virtual camera of each ray that meets the sphere.
+
+    Returns:
+        The number of rays.
+    """
+    total = int(virtual.rays.sum())
+    with zipfile.ZipFile(folder / RAYS, "w") as packed:
+        for name, (kind, last) in RAY_COLUMNS.items():
+            progress(name)
+            header = {"descr": kind, "fortran_order": False, "shape": (total, *last)}
+            with packed.open(_entry(name), "w", force_zip64=True) as file:
+                npy.write_array_header_1_0(file, header)
+                for values in _values(source, virtual, name):
+                    file.write(values.astype(kind).tobytes())
+        for name, table in _tables(virtual).items():
+            with packed.open(_entry(name), "w") as file:
+                npy.write_array(file, table, allow_pickle=False)
+    progress(RAYS_H5)
+    _write_h5(folder / RAYS_H5, source, virtual, total)
+    return total
+
+
+def _write_h5(path: Path, source: LightField, virtual: FittedCameras, total: int) -> None:
+    """The same arrays, of which programs read parts."""
+    with h5py.File(path, "w", libver=("v110", "v110")) as store:
+        stored = {
+            name: chunked(store, name, kind, (total, *last), (min(RAYS_PER_CHUNK, total), *last))
+            for name, (kind, last) in RAY_COLUMNS.items()
+        }
+        for name in RAY_COLUMNS:
+            first = 0
+            for values in _values(source, virtual, name):
+                stored[name][first : first + len(values)] = values
+                first += len(values)
+        tables = _tables(virtual)
+        store.create_dataset("name", data=tables["name"].astype("S"))
+        store.create_dataset("centre", data=tables["centre"])
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(f"{name}.npy", NO_TIME)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    return entry
+
+
+def _values(source: LightField, virtual: FittedCameras, name: str) -> Iterator[NDArray[np.generic]]:
+    for k in reading_order(source, virtual.mirrors).tolist():
+        crop = crop_of(source, virtual.mirrors[k])
+        yield np.full(crop.meets.sum(), k) if name == "camera" else getattr(crop, name)[crop.meets]
+
+
+def _tables(virtual: FittedCameras) -> dict[str, NDArray[np.generic]]:
+    names = np.array([one.name for one in virtual.mirrors], dtype="<U8")
+    return {"name": names, "centre": virtual.centre}

@@ -7,6 +7,7 @@ conductors without loss, `mesh_attribute` takes colours from the corners.
 """
 
 import json
+from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,15 +15,14 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from tbcad.cad.formats.ply import mesh_ply
-from tbcad.core.geometry.vectors import unit
+from tbcad.cad.formats.mesh_files import mesh_ply
+from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.geodesic import triangle_grid
 from tbcad.light.simulate.object_files.normals import is_closed
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, SurfaceHits
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.light.simulate.scene.shell_meshes import facet_owners, read_facets
 from tbcad.types import Floats, Ints, Progress
 
@@ -39,8 +39,7 @@ def write_machine_scene(
 ) -> dict[str, Any]:
     """Write meshes and scenes into a folder that exists, and return what is in it.
 
-    Raises:
-        InputError: the export has no shells.
+    InputError: the export has no shells.
     """
     (folder / MESHES).mkdir()
     facets, cameras = {}, {}
@@ -64,59 +63,52 @@ def write_machine_scene(
 
 def mitsuba_scene(camera: Camera, parts: list[str]) -> bytes:
     """The scene file of a camera (XML)."""
-    scene = Xml.Element("scene", version="3.0.0")
     # What a capture sees: from the camera, by one mirror at most. The object is no lamp: Mitsuba
     # 3.9 crashes when it chooses points on one whose colours are those of its corners.
-    integrator = _child(scene, "integrator", type="direct")
-    _child(integrator, "integer", name="emitter_samples", value="0")
-    _child(integrator, "integer", name="bsdf_samples", value="1")
-    _add_sensor(scene, camera)
+    samples = [("integer", "emitter_samples", "0"), ("integer", "bsdf_samples", "1")]
+    scene = Xml.Element("scene", version="3.0.0")
+    _add(scene, "integrator", samples, type="direct")
+    lens = [("string", "fov_axis", "x"), ("float", "fov", repr(float(np.degrees(camera.hfov)))),
+            ("float", "near_clip", "1"), ("float", "far_clip", "10000")]  # fmt: skip
+    sensor = _add(scene, "sensor", lens, type="perspective")
+    target, up = camera.pinhole + 100 * camera.forward, -camera.axes[1]
+    places = {"origin": camera.pinhole, "target": target, "up": up}
+    place = {name: ", ".join(repr(float(x)) for x in at) for name, at in places.items()}
+    _add(_add(sensor, "transform", name="to_world"), "lookat", (), **place)
+    size = [
+        ("integer", "width", str(camera.width_px)),
+        ("integer", "height", str(camera.height_px)),
+    ]
+    _add(_add(sensor, "film", size, type="hdrfilm"), "rfilter", type="box")
+    _add(sensor, "sampler", [("integer", "sample_count", str(SAMPLES))], type="stratified")
     for part in parts:
-        shape = _child(scene, "shape", type="ply", id=part)
-        _child(shape, "string", name="filename", value=f"{MESHES}/{part}.ply")
-        _add_material(shape, part)
+        file = [("string", "filename", f"{MESHES}/{part}.ply")]
+        _add_material(_add(scene, "shape", file, type="ply", id=part), part)
     Xml.indent(scene)
     return bytes(Xml.tostring(scene, encoding="utf-8", xml_declaration=True)) + b"\n"
-
-
-def _add_sensor(scene: Xml.Element, camera: Camera) -> None:
-    sensor = _child(scene, "sensor", type="perspective")
-    _child(sensor, "string", name="fov_axis", value="x")
-    _child(sensor, "float", name="fov", value=repr(float(np.degrees(camera.hfov))))
-    _child(sensor, "float", name="near_clip", value="1")
-    _child(sensor, "float", name="far_clip", value="10000")
-    view = _child(_child(sensor, "transform", name="to_world"), "lookat")
-    view.set("origin", _text(camera.pinhole))
-    view.set("target", _text(camera.pinhole + 100 * camera.forward))
-    view.set("up", _text(-camera.axes[1]))
-    film = _child(sensor, "film", type="hdrfilm")
-    _child(film, "integer", name="width", value=str(camera.width_px))
-    _child(film, "integer", name="height", value=str(camera.height_px))
-    _child(film, "rfilter", type="box")
-    sampler = _child(sensor, "sampler", type="stratified")
-    _child(sampler, "integer", name="sample_count", value=str(SAMPLES))
 
 
 def _add_material(shape: Xml.Element, part: str) -> None:
     """Mirrors reflect all light, walls none; the object sends out its colours."""
     if part.startswith("mirrors"):
-        sides = _child(shape, "bsdf", type="twosided")
-        _child(_child(sides, "bsdf", type="conductor"), "string", name="material", value="none")
+        sides = _add(shape, "bsdf", type="twosided")
+        _add(sides, "bsdf", [("string", "material", "none")], type="conductor")
         return
-    black = _child(shape, "bsdf", type="diffuse")
-    _child(black, "rgb", name="reflectance", value="0")
+    _add(shape, "bsdf", [("rgb", "reflectance", "0")], type="diffuse")
     if part == "object":
-        emitter = _child(shape, "emitter", type="area")
-        colour = _child(emitter, "texture", type="mesh_attribute", name="radiance")
-        _child(colour, "string", name="name", value="vertex_color")
+        colours = [("string", "name", "vertex_color")]
+        light = _add(shape, "emitter", type="area")
+        _add(light, "texture", colours, type="mesh_attribute", name="radiance")
 
 
-def _child(parent: Xml.Element, tag: str, **attributes: str) -> Xml.Element:
-    return Xml.SubElement(parent, tag, attributes)
-
-
-def _text(values: Floats) -> str:
-    return ", ".join(repr(float(value)) for value in values)
+def _add(
+    parent: Xml.Element, tag: str, values: Iterable[tuple[str, str, str]] = (), **attributes: str
+) -> Xml.Element:
+    """An element with values in it, each by its type, name and text."""
+    added = Xml.SubElement(parent, tag, attributes)
+    for kind, name, value in values:
+        Xml.SubElement(added, kind, name=name, value=value)
+    return added
 
 
 def blender_script(cameras: dict[str, Camera], parts: list[str]) -> str:
@@ -161,8 +153,7 @@ def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[SceneMes
     A facet reflects like a flat mirror, but renderers reflect at normals that they interpolate
     between its corners, and there these are exact.
 
-    Raises:
-        InputError: the shell's STL file is not there, or cannot be read.
+    InputError: the shell's STL file is not there, or cannot be read.
     """
     corners = read_facets(export.folder / f"shell_{reflector.camera_id}.stl")
     bare = reflector.mirrors.offset(-export.spec.mirrors.coating_um / 1000)
@@ -170,27 +161,19 @@ def shell_meshes(export: ExportedDesign, reflector: Reflector) -> tuple[SceneMes
     mirrors, walls = corners[owner >= 0], corners[owner < 0]
     number = np.repeat(owner[owner >= 0], 3)
     normals = unit(bare.gradient(number, mirrors.reshape(-1, 3)))
-    return _outward(mirrors, normals), _flat(walls)
-
-
-def _outward(corners: Floats, normals: Floats) -> SceneMesh:
-    """Facets (f, 3, 3) and normals at their corners (3 f, 3), turned as the facets are."""
-    across = np.repeat(_facet_normals(corners), 3, axis=0)
-    turned = np.where((normals * across).sum(axis=1, keepdims=True) < 0, -normals, normals)
-    return SceneMesh(corners.reshape(-1, 3), turned, _separate(len(corners)))
-
-
-def _flat(corners: Floats) -> SceneMesh:
-    normals = np.repeat(_facet_normals(corners), 3, axis=0)
-    return SceneMesh(corners.reshape(-1, 3), normals, _separate(len(corners)))
+    across = np.repeat(_facet_normals(mirrors), 3, axis=0)
+    outward = np.where(dot(normals, across)[:, None] < 0, -normals, normals)
+    flat = np.repeat(_facet_normals(walls), 3, axis=0)
+    return _separate(mirrors, outward), _separate(walls, flat)
 
 
 def _facet_normals(corners: Floats) -> Floats:
     return unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
-def _separate(count: int) -> Ints:
-    return np.arange(3 * count).reshape(-1, 3)
+def _separate(corners: Floats, normals: Floats) -> SceneMesh:
+    """Facets (f, 3, 3), each with corners of its own, whose normals are (3 f, 3)."""
+    return SceneMesh(corners.reshape(-1, 3), normals, np.arange(3 * len(corners)).reshape(-1, 3))
 
 
 def object_mesh(scene: Scene) -> SceneMesh:

@@ -9,8 +9,16 @@ from tbcad.common.compiled import compiled
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import Crop, MirrorId, chosen_mirrors, read_crop, reading_order
-from tbcad.light.datasets.virtual_cameras import FittedCameras, at_middle, virtual_cameras
+from tbcad.light.datasets.virtual_cameras import (
+    Crop,
+    FittedCameras,
+    MirrorId,
+    at_middle,
+    chosen_mirrors,
+    read_crop,
+    reading_order,
+    virtual_cameras,
+)
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.parallel import in_batches
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
@@ -33,16 +41,10 @@ def places(crop: Crop, camera: Camera) -> Floats:
 
 
 def resampled(crop: Crop, camera: Camera, radius: float) -> tuple[Bytes, Bools]:
-    """The picture of a pinhole camera from the rays of a crop.
+    """The picture of a pinhole camera, square, from the rays of a crop.
 
-    Args:
-        crop: pixels of a mirror.
-        camera: stands for the mirror; square pictures.
-        radius: of the capture sphere, mm.
-
-    Returns:
-        Picture (h, w, 3), black where nothing is known, and its mask (h, w): pixels inside the
-        cell whose rays meet the capture sphere.
+    Picture (h, w, 3), black where nothing is known, and its mask (h, w): pixels inside the cell
+    whose rays meet the capture sphere of this radius, mm.
     """
     place = places(crop, camera)
     samples = _samples(place, crop.meets)
@@ -147,17 +149,9 @@ def taken_pictures(
     scene: Scene | None,
     progress: Progress = lambda _: None,
 ) -> Pictures:
-    """Resample the crops of all virtual cameras.
+    """Resample the crops of all virtual cameras, to pictures of `size_px` x `size_px` pixels.
 
-    Args:
-        source: the light field.
-        virtual: its virtual cameras, m of them.
-        size_px: width and height of the pictures.
-        scene: the object, where it is known.
-        progress: called with each step.
-
-    Raises:
-        InputError: so many pictures of this size do not fit into memory.
+    InputError: so many pictures of this size do not fit into memory.
     """
     cameras, radius = virtual.pinhole_cameras(source.capture_mm, size_px), source.capture_mm / 2
     if len(cameras) * size_px**2 * 4 > MOST_BYTES:

@@ -1,22 +1,57 @@
-"""Pinhole cameras as the files of radiance fields have them (transforms.json)."""
+"""Pinhole cameras in the files of radiance fields: nerfstudio's, and instant-ngp's with all rays.
 
+After "Data conventions" of nerfstudio's documentation (docs.nerf.studio/quickstart/
+data_conventions.html): matrices are from camera to world, cameras look along -z with +y up, and the
+world's +z is up. After instant-ngp's loader of data sets (src/nerf_loader.cu): beside the image
+NAME.png lie rays_NAME.dat, origin and direction of each pixel, row by row, six 32-bit floats in the
+axes of transforms.json, and dynamic_mask_NAME.png, not black where a pixel is not used.
+
+Splats and other point-based methods grow from points: seed points are in the visual hull of the
+object in the exported pictures. A point of the capture sphere that several virtual cameras see
+dark, as background, is not on the object (A. Laurentini, The visual hull concept, IEEE PAMI 16,
+150, 1994). Where the background is not dark, or all of the object is, the points fill the sphere.
+"""
+
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import qmc
 
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.cad.formats.mesh_files import points_ply
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.crops import Crop
-from tbcad.light.datasets.virtual_cameras import at_middle
-from tbcad.types import Floats
+from tbcad.light.datasets.pictures import Pictures, crop_of
+from tbcad.light.datasets.virtual_cameras import Crop, FittedCameras, at_middle
+from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.image_files import png_bytes
+from tbcad.light.simulate.parallel import in_batches
+from tbcad.types import Bools, Bytes, Floats, Progress
 
 # As many rays, evenly out of all, fix seven numbers as well as thousands.
 FITTED_RAYS = 150
 # Steps of the search that matter alike: radians and shares of the focal lengths, and pixels.
 SCALES = np.array([0.01] * 5 + [1.0] * 2)
+TRANSFORMS, POINTS = "transforms.json", "points.ply"
+IMAGES, MASKS = "images", "masks"
+NO_DISTORTION = {"k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0}
+CANDIDATES = 1 << 16  # in the cube around the capture sphere; half of them are in the sphere
+MOST_CAMERAS = 96
+DARK = 10  # of 255: background, but for noise
+# A point is carved away where more of the cameras that see it see it dark than this.
+DARK_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class SeedPoints:
+    """Points on and in the object."""
+
+    points: Floats  # mm, (n, 3)
+    colours: Bytes  # median of what the virtual cameras see there, (n, 3)
 
 
 @dataclass(frozen=True)
@@ -58,11 +93,8 @@ def fitted_pinhole(crop: Crop, centre: Floats) -> Pinhole:
     """The pinhole camera in whose picture the rays of a crop are nearest to their pixels.
 
     A crop is distorted, so some pixels remain: training follows the rays. Poses tell the loader
-    what no camera sees, and the viewer where to draw them.
-
-    Args:
-        crop: right way round; some of its rays meet the capture sphere.
-        centre: best common point of these rays, mm, (3,).
+    what no camera sees, and the viewer where to draw them. The crop is the right way round, and
+    `centre` is the best common point, mm, (3,), of those of its rays that meet the capture sphere.
     """
     rows, columns = np.nonzero(crop.meets)
     origin, direction = crop.rays
@@ -106,3 +138,136 @@ def _linear_fit(points: Floats, pixels: Floats, centre: Floats, size: tuple[int,
     return Pinhole(
         centre, np.stack([x, y, forward]), focal, -focal * (rotation.T @ linear[:, 2]), size
     )
+
+
+def write_nerfstudio(folder: Path, names: list[str], pictures: Pictures, seeds: SeedPoints) -> None:
+    """Write all files into a folder that exists."""
+    write_pictures(folder, names, pictures, ".png")
+    (folder / POINTS).write_bytes(points_ply(seeds.points, seeds.colours))
+    text = json.dumps(transforms(names, pictures), indent=1) + "\n"
+    (folder / TRANSFORMS).write_text(text, encoding="utf-8")
+
+
+def transforms(names: list[str], pictures: Pictures) -> dict[str, object]:
+    """The document of all cameras.
+
+    Focal lengths differ and are given by frame; what all share is given once.
+    """
+    pinholes = [pinhole_of(camera) for camera in pictures.cameras]
+    shared = {name: pinholes[0].intrinsics()[name] for name in ("cx", "cy", "w", "h")}
+    frames = [
+        {
+            "file_path": f"{IMAGES}/{name}.png",
+            "mask_path": f"{MASKS}/{name}.png",
+            **{key: one.intrinsics()[key] for key in ("fl_x", "fl_y")},
+            "transform_matrix": one.camera_to_world,
+        }
+        for name, one in zip(names, pinholes, strict=True)
+    ]
+    return {
+        "camera_model": "OPENCV",
+        **shared,
+        **NO_DISTORTION,
+        "orientation_override": "none",
+        "ply_file_path": POINTS,
+        "frames": frames,
+    }
+
+
+def write_pictures(folder: Path, names: list[str], pictures: Pictures, mask_suffix: str) -> None:
+    """Write images/NAME.png and masks/NAME with a suffix: white where the picture is known."""
+    (folder / IMAGES).mkdir()
+    (folder / MASKS).mkdir()
+    for name, picture, mask in zip(names, pictures.picture, pictures.mask, strict=True):
+        (folder / IMAGES / f"{name}.png").write_bytes(png_bytes(picture))
+        (folder / MASKS / f"{name}{mask_suffix}").write_bytes(mask_png(mask))
+
+
+def mask_png(mask: Bools) -> bytes:
+    """A mask (h, w) as a grey picture: white where it is true."""
+    return png_bytes(np.where(mask, 255, 0).astype(np.uint8))
+
+
+def write_ngp_rays(
+    folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
+) -> None:
+    """Write the crop of each mirror, right way round, with its rays, masks and about its pose."""
+    images = folder / IMAGES
+    images.mkdir()
+
+    def write(k: int) -> dict[str, Any]:
+        name = virtual.mirrors[k].name
+        crop = crop_of(source, virtual.mirrors[k]).flipped()
+        pinhole = fitted_pinhole(crop, virtual.centre[k])
+        (images / f"{name}.png").write_bytes(
+            png_bytes(np.where(crop.meets[..., None], crop.colour, 0))
+        )
+        (images / f"dynamic_mask_{name}.png").write_bytes(mask_png(~crop.meets))
+        (images / f"rays_{name}.dat").write_bytes(rays_file(crop, pinhole))
+        return {
+            "file_path": f"{IMAGES}/{name}.png",
+            **pinhole.intrinsics(),
+            "transform_matrix": pinhole.camera_to_world,
+        }
+
+    every = range(len(virtual))
+    frames = list(in_batches(write, every, lambda k: progress(virtual.mirrors[k].name)))
+    half = source.capture_mm / 2
+    document = {"aabb": [[-half] * 3, [half] * 3], "aabb_scale": 1, "frames": frames}
+    text = json.dumps(document, indent=1) + "\n"
+    (folder / TRANSFORMS).write_text(text, encoding="utf-8")
+
+
+def rays_file(crop: Crop, pinhole: Pinhole) -> bytes:
+    """24 bytes a pixel; a pixel that is not used has the ray of the pinhole."""
+    known = crop.meets[..., None]
+    origin = np.where(known, crop.origin, pinhole.centre)
+    direction = np.where(known, crop.direction, _central_rays(pinhole))
+    return np.concatenate([origin, direction], axis=2).astype("<f4").tobytes()
+
+
+def _central_rays(pinhole: Pinhole) -> Floats:
+    width, height = pinhole.size_px
+    x = (np.arange(width) + 0.5 - pinhole.principal_px[0]) / pinhole.focal_px[0]
+    y = (np.arange(height) + 0.5 - pinhole.principal_px[1]) / pinhole.focal_px[1]
+    right, down, forward = pinhole.axes
+    return unit(forward + x[None, :, None] * right + y[:, None, None] * down)
+
+
+def seed_points(
+    cameras: list[Camera], pictures: Bytes, masks: Bools, capture_mm: float
+) -> SeedPoints:
+    """Points inside the visual hull; the same each time.
+
+    Cameras (m,), what they see (m, h, w, 3), and where that is known (m, h, w).
+    """
+    points = _candidates(capture_mm / 2)
+    step = -(-len(cameras) // MOST_CAMERAS)
+    seen = [
+        _colours(camera, picture, mask, points)
+        for camera, picture, mask in zip(
+            cameras[::step], pictures[::step], masks[::step], strict=True
+        )
+    ]
+    colours, known = np.stack([one[0] for one in seen]), np.stack([one[1] for one in seen])
+    dark = known & (colours.max(axis=2) < DARK)
+    seen_at_all = known.any(axis=0)
+    hull = seen_at_all & (dark.sum(axis=0) <= DARK_SHARE * known.sum(axis=0))
+    kept = hull if hull.any() else seen_at_all
+    values = np.where(known[:, kept, None], colours[:, kept].astype(np.float32), np.nan)
+    median = np.nanmedian(values, axis=0)
+    return SeedPoints(points[kept], np.rint(median).astype(np.uint8))
+
+
+def _candidates(radius: float) -> Floats:
+    cube = qmc.Halton(3, scramble=False).random(CANDIDATES)
+    points = radius * (2 * cube - 1)
+    return np.asarray(points[norm(points) < radius])
+
+
+def _colours(camera: Camera, picture: Bytes, mask: Bools, points: Floats) -> tuple[Bytes, Bools]:
+    """Colours (n, 3) of the pixels in which points (n, 3) appear, and whether they are known."""
+    column, row = np.rint(camera.project(points)).astype(np.int64).T
+    inside = (column >= 0) & (column < camera.width_px) & (row >= 0) & (row < camera.height_px)
+    column, row = np.where(inside, column, 0), np.where(inside, row, 0)
+    return picture[row, column], inside & mask[row, column]

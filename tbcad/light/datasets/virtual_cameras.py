@@ -1,22 +1,25 @@
 """Virtual cameras as central ones: the best common point of each mirror's rays, and its errors.
 
-The rays after a curved mirror pass no common point. Nearest to all of them is one point, the centre
-of the pinhole camera that stands for the mirror. A pixel is given the place where its ray meets the
-plane through the middle of the capture sphere: there the pinhole is right, and before and behind
-that plane it is off by the ray's distance from the centre times depth over distance.
+A crop of the photographs, the pixels of one mirror, is one virtual camera's picture. The rays after
+a curved mirror pass no common point. Nearest to all of them is one point, the centre of the pinhole
+camera that stands for the mirror. A pixel is given the place where its ray meets the plane through
+the middle of the capture sphere: there the pinhole is right, and before and behind that plane it is
+off by the ray's distance from the centre times depth over distance.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.crops import Crop, MirrorId, read_crop, reading_order
+from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.parallel import in_batches
-from tbcad.light.simulate.views.mirror_tiles import convergence_point
-from tbcad.types import Floats, Progress
+from tbcad.light.simulate.scene.rays import meets_sphere
+from tbcad.light.simulate.views.mirror_tiles import convergence_point, mirror_pixels
+from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
 UP = np.array([0.0, 0.0, 1.0])
 # Straight down, where "up" says nothing about the rows, they run along this.
@@ -26,6 +29,113 @@ MIN_UP = 1e-6
 MIN_RAYS = 16
 # A centre in the capture sphere or at its border is none of a camera that looks at all of it.
 MIN_DISTANCE = 1.05
+
+
+@dataclass(frozen=True)
+class MirrorId:
+    """A mirror of a light field."""
+
+    frame: str  # "a" or "b"
+    index: int  # its place in the frame, from 0
+
+    @property
+    def name(self) -> str:
+        """As mirrors.csv names it: a0001."""
+        return f"{self.frame}{self.index + 1:04d}"
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A rectangle of h x w pixels that holds all of a mirror's."""
+
+    colour: Bytes  # (h, w, 3)
+    origin: Floats  # where rays leave the mirror, mm, (h, w, 3)
+    direction: Floats  # unit vectors, (h, w, 3)
+    valid: Bools  # whether a pixel is of this mirror, (h, w)
+    meets: Bools  # whether it is, and its ray meets the capture sphere, (h, w)
+
+    @property
+    def rays(self) -> tuple[Floats, Floats]:
+        """Origins and directions of the rays that meet the capture sphere, (n, 3) each."""
+        return self.origin[self.meets], self.direction[self.meets]
+
+    def flipped(self) -> "Crop":
+        """The crop with its columns reversed: a mirror shows everything the wrong way round."""
+        return Crop(
+            self.colour[:, ::-1],
+            self.origin[:, ::-1],
+            self.direction[:, ::-1],
+            self.valid[:, ::-1],
+            self.meets[:, ::-1],
+        )
+
+
+def read_crop(source: LightField, mirror: MirrorId) -> Crop | None:
+    """Read the pixels of a mirror; None where it has none."""
+    found = mirror_pixels(source.frames[mirror.frame], mirror.index)
+    if found is None:
+        return None
+    valid, (colour, *rays) = found
+    origin, direction = (one.astype(np.float64) for one in rays)
+    flat = origin.reshape(-1, 3), direction.reshape(-1, 3)
+    meets = meets_sphere(*flat, source.capture_mm / 2).reshape(valid.shape)
+    return Crop(colour, origin, direction, valid, valid & meets)
+
+
+def chosen_mirrors(source: LightField, wanted: str | None, every: int) -> list[MirrorId]:
+    """The mirrors to export, in the order of their names.
+
+    `wanted` has cameras and mirrors by name, apart by commas, as "a" or "a0001,b0007"; None: all.
+    Of `every` so many virtual cameras one is kept, the kept ones spread evenly. InputError: a name
+    is of no mirror of the light field.
+    """
+    mirrors = list(_all_mirrors(source)) if wanted is None else _named(source, wanted)
+    if every == 1:
+        return mirrors
+    u = np.array([source.frames[one.frame].u[one.index] for one in mirrors])
+    return [mirrors[k] for k in spread_evenly(u, -(-len(mirrors) // every))]
+
+
+def _all_mirrors(source: LightField) -> Iterator[MirrorId]:
+    for name, frame in source.frames.items():
+        yield from (MirrorId(name, index) for index in range(len(frame.u)))
+
+
+def _named(source: LightField, wanted: str) -> list[MirrorId]:
+    every = {one.name: one for one in _all_mirrors(source)}
+    names: set[str] = set()
+    for word in (part.strip() for part in wanted.split(",")):
+        if word in source.frames:
+            names |= {name for name, one in every.items() if one.frame == word}
+        elif word in every:
+            names.add(word)
+        else:
+            raise InputError(
+                f"--cameras: {word!r} is no virtual camera of the capture: allowed are "
+                f"{' and '.join(source.frames)} for all of one camera, or names from "
+                f"{min(every)} to {max(every)}, apart by commas"
+            )
+    return [every[name] for name in sorted(names)]
+
+
+def reading_order(source: LightField, mirrors: Sequence[MirrorId]) -> Ints:
+    """Indices (m,) of mirrors from the top of each picture down: parts of it are read once."""
+    frames = [one.frame for one in mirrors]
+    tops = [source.frames[one.frame].boxes[one.index, 2] for one in mirrors]
+    return np.lexsort([tops, frames])
+
+
+def spread_evenly(u: Floats, count: int) -> Ints:
+    """A number of directions of (m, 3) far from each other, as indices in ascending order.
+
+    Each is the one farthest from those before it, from the first one on (T. F. Gonzalez,
+    Theoretical Computer Science 38, 293, 1985): no two are nearer than half the best possible.
+    """
+    distance, chosen = np.full(len(u), np.inf), [0]
+    while len(chosen) < count:
+        np.minimum(distance, np.linalg.norm(u - u[chosen[-1]], axis=1), out=distance)
+        chosen.append(int(distance.argmax()))
+    return np.sort(np.array(chosen))
 
 
 @dataclass(frozen=True)
@@ -54,13 +164,7 @@ class FittedCameras:
 def virtual_cameras(
     source: LightField, mirrors: list[MirrorId], progress: Progress = lambda _: None
 ) -> FittedCameras:
-    """Measure the virtual cameras of some mirrors.
-
-    Args:
-        source: the light field.
-        mirrors: which of its mirrors.
-        progress: called with each step.
-    """
+    """Measure the virtual cameras of some mirrors of a light field."""
     radius = source.capture_mm / 2
 
     def measured(mirror: MirrorId) -> Floats | str:

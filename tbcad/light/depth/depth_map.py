@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from PIL import Image
 
-from tbcad.cad.formats.ply import points_ply
+from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.common.compiled import compiled_loop
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.depth.plane_sweep import FINE, Sweep, swept_depth
-from tbcad.light.simulate.scene.viewpoint import view_directions
+from tbcad.light.simulate.scene.rays import view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import SynthesisedView, synthesise
 from tbcad.types import Bytes, Floats, Progress
@@ -89,14 +89,7 @@ class DepthMap:
 
 @compiled_loop
 def _along(away: Floats, axes: Floats, pitch: float, direction: Floats) -> Floats:
-    """Distance (n,) along rays from a pinhole to a surface, between four of its known points.
-
-    Args:
-        away: of the surface along the view, for each pixel, mm, (h, w).
-        axes: of the view, (3, 3).
-        pitch: width of a pixel at unit distance.
-        direction: of the rays, (n, 3).
-    """
+    """Distance (n,) along rays (n, 3) to a surface `away` (h, w), mm, linear between its points."""
     height, width = away.shape
     result = np.empty(len(direction))
     for k in range(len(direction)):
@@ -117,16 +110,7 @@ def _along(away: Floats, axes: Floats, pitch: float, direction: Floats) -> Float
 
 
 def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> DepthMap:
-    """The depth of a view.
-
-    Args:
-        pictures: of all virtual cameras.
-        view: a camera that looks at the origin.
-        sweep: how fine it is.
-
-    Raises:
-        InputError: the camera does not look at the origin, so planes across it mean nothing.
-    """
+    """The depth of a view; InputError where its camera does not look at the origin."""
     aside = np.linalg.norm(np.cross(view.pinhole, view.forward))
     if aside > pictures.capture_mm / 2:
         raise InputError("the view does not look at the object: turn its camera to the origin")
@@ -147,14 +131,10 @@ class DepthViews:
     def of(
         self, view: Camera, shown: MirrorTiles | None = None
     ) -> tuple[SynthesisedView, DepthMap]:
-        """The picture that a pinhole camera would see, and its depth.
+        """The picture that a pinhole camera which looks at the origin would see, and its depth.
 
-        Args:
-            view: the camera, which looks at the origin.
-            shown: another light field of the same rays, whose colours the picture has.
-
-        Raises:
-            InputError: the camera looks elsewhere.
+        `shown` is another light field of the same rays, whose colours the picture has. InputError
+        where the camera looks elsewhere.
         """
         found = depth_map(self.pictures, view, self.sweep)
         return synthesise(shown or self.tiles, view, "blend", found.along_rays), found
@@ -163,11 +143,5 @@ class DepthViews:
 def depth_views(
     tiles: MirrorTiles, sweep: Sweep = FINE, progress: Progress = lambda _: None
 ) -> DepthViews:
-    """Make the pictures of all virtual cameras, from which views are then made quickly.
-
-    Args:
-        tiles: the light field.
-        sweep: how fine the depth is looked for.
-        progress: called with each virtual camera whose picture is made.
-    """
+    """Make the pictures of all virtual cameras, from which views are then made quickly."""
     return DepthViews(tiles, pinhole_pictures(tiles.source, progress), sweep)

@@ -15,7 +15,7 @@ from tbcad.common.compiled import compiled_loop
 from tbcad.core.optics.camera import Camera
 from tbcad.light.datasets.pictures import PinholePictures, facing, projections
 from tbcad.light.simulate.parallel import chunks, first_then_threads
-from tbcad.light.simulate.scene.viewpoint import view_directions
+from tbcad.light.simulate.scene.rays import view_directions
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
 CAMERAS = 16
@@ -54,17 +54,11 @@ class _Cameras(NamedTuple):
 def swept_depth(
     pictures: PinholePictures, view: Camera, sweep: Sweep = FINE
 ) -> tuple[Floats, Floats]:
-    """Depth of a view's pixels, and its confidence.
+    """Depth of the pixels of a view that looks at the origin, and its confidence.
 
-    Args:
-        pictures: of all virtual cameras.
-        view: a camera that looks at the origin, with the pixels of the depth.
-        sweep: how many planes, and how wide a window.
-
-    Returns:
-        Depth (h, w), mm behind the plane through the origin that faces the view; NaN where rays
-        pass the capture sphere, or are seen by fewer than REFERENCE cameras. And by how much
-        colours differ more on a middling plane than on that one (h, w), 0 to MOST_DIFFERENT.
+    Depth (h, w), mm behind the plane through the origin that faces the view; NaN where rays pass
+    the capture sphere, or are seen by fewer than REFERENCE cameras. And by how much colours differ
+    more on a middling plane than on that one (h, w), 0 to MOST_DIFFERENT.
     """
     radius = pictures.capture_mm / 2
     planes = np.linspace(-radius, radius, sweep.planes)
@@ -125,16 +119,9 @@ def _compare_rows(
     difference: Colours,
     rows: tuple[int, int],
 ) -> None:
-    """Fill in the differences (d, h, w) of some rows, whose first is the first of a block.
+    """Fill in differences (d, h, w) of some rows, the first that of a block, where `inside`.
 
-    Args:
-        cameras: that may show them.
-        pictures: of all cameras (m, s, s, 3), and where they are known, (m, s, s).
-        distance: of the planes along the view from its pinhole, mm, (d,).
-        pitch: width of the view's pixels at unit distance.
-        inside: where to compare, (d, h, w).
-        difference: is filled.
-        rows: the first, and the one behind the last.
+    `pictures` (m, s, s, 3) and where they are known; `distance` (d,) of planes along the view, mm.
     """
     _, height, width = inside.shape
     for top in range(rows[0], rows[1], BLOCK_PX):

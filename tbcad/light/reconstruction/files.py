@@ -21,8 +21,8 @@ from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from tbcad.cad.formats.glb import UPRIGHT
-from tbcad.common.srgb import srgb_light
+from tbcad.cad.formats.assembly import UPRIGHT
+from tbcad.common.colours import srgb_light
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.field import Field
 from tbcad.light.reconstruction.marching import MATT

@@ -9,7 +9,7 @@ from threading import Lock
 import numpy as np
 from scipy import ndimage
 
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.light.reconstruction.field import Field
@@ -20,7 +20,7 @@ from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.parallel import chunks, in_threads
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.viewpoints import OwnMethod
 from tbcad.types import Bytes, Floats
 

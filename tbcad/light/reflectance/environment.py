@@ -7,13 +7,11 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tbcad.cad.formats.images import openexr, radiance
-from tbcad.cad.formats.images.openexr import exr_picture
-from tbcad.cad.formats.images.pictures import picture_of
-from tbcad.cad.formats.images.radiance import hdr_picture
+from tbcad.cad.formats.light_pictures import EXR_SIGNATURE, HDR_SIGNATURE, exr_picture, hdr_picture
+from tbcad.cad.formats.pictures import picture_of
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.point_lights import PointLights
+from tbcad.light.simulate.scene.lamps import PointLights
 from tbcad.types import Floats, Ints
 
 LightFormat: TypeAlias = Literal["latlong", "angular", "mirror-ball", "cross"]
@@ -33,10 +31,7 @@ _FACES = {
     (1, 2): ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
     (2, 1): ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
 }
-_BACK = {
-    (3, 1): ((-1, 0, 0), (0, 1, 0), (0, 0, -1)),
-    (1, 3): ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
-}
+_BACK = {(3, 1): ((-1, 0, 0), (0, 1, 0), (0, 0, -1)), (1, 3): ((-1, 0, 0), (0, -1, 0), (0, 0, 1))}
 # So far away light from one direction is parallel: 60 mm apart it differs by 0.003 degrees.
 FAR_MM = 1e6
 GIVE = "give a picture of light: Radiance (.hdr), OpenEXR (.exr) or TIFF in floating point"
@@ -60,15 +55,10 @@ class LightPixels(NamedTuple):
 
 
 def light_pixels(picture: Floats, kind: LightFormat | None, name: str) -> LightPixels:
-    """The pixels of a picture (h, w, 3) that show something.
+    """The pixels of a picture (h, w, 3) of the surroundings that show something.
 
-    Args:
-        picture: of the surroundings.
-        kind: its format; None: latlong, if it has the shape of one.
-        name: of the picture, for the error.
-
-    Raises:
-        InputError: its shape is not that of its format.
+    Without a format it is latlong, if it has the shape of one. InputError, which names the picture:
+    its shape is not that of its format.
     """
     height, width = picture.shape[:2]
     aspects = ASPECTS[kind or "latlong"]
@@ -169,16 +159,9 @@ def even_directions(count: int) -> Floats:
 def environment(
     picture: Floats, turn: float = 0.0, kind: LightFormat | None = None, name: str = "the picture"
 ) -> Environment:
-    """The light of a picture (h, w, 3) of the surroundings.
+    """The light of a picture (h, w, 3) of the surroundings: linear red, green, blue.
 
-    Args:
-        picture: linear red, green, blue.
-        turn: about z, radians.
-        kind: format of the picture; None: latlong, if it has the shape of one.
-        name: of the picture, for the error.
-
-    Raises:
-        InputError: its shape is not that of its format.
+    It is turned about z, radians; format, name and errors are as of `light_pixels`.
     """
     pixels = light_pixels(picture, kind, name)
     above = pixels.direction[:, 2] > 0
@@ -191,8 +174,7 @@ def environment(
 def read_environment(path: Path, turn: float = 0.0, kind: LightFormat | None = None) -> Environment:
     """The light of a file; else as `environment`.
 
-    Raises:
-        InputError: it cannot be read, is not of that format, or is dark above the horizon.
+    InputError: it cannot be read, is not of that format, or is dark above the horizon.
     """
     found = environment(read_light(path), turn, kind, str(path))
     if not (found.light > 0).any():
@@ -203,8 +185,7 @@ def read_environment(path: Path, turn: float = 0.0, kind: LightFormat | None = N
 def read_light(path: Path) -> Floats:
     """Red, green and blue (h, w, 3), linear, colours of Rec. 709, from the top row down.
 
-    Raises:
-        InputError: it cannot be read, or is no picture of light.
+    InputError: it cannot be read, or is no picture of light.
     """
     try:
         data = path.read_bytes()
@@ -212,9 +193,9 @@ def read_light(path: Path) -> Floats:
         raise InputError(f"{path}: no such file; {GIVE}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}: {GIVE}") from None
-    if data.startswith(radiance.SIGNATURE):
+    if data.startswith(HDR_SIGNATURE):
         return hdr_picture(data, str(path))
-    light = exr_picture(path) if data.startswith(openexr.SIGNATURE) else picture_of(data, str(path))
+    light = exr_picture(path) if data.startswith(EXR_SIGNATURE) else picture_of(data, str(path))
     if light.dtype != np.float32:
         raise InputError(f"{path} has whole numbers, which clip what is bright: {GIVE}")
     grey = light[..., None] if light.ndim == 2 else light

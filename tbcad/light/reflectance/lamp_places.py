@@ -6,6 +6,7 @@ pixels of a cell at once are a lamp in that place, whose light is as wide as the
 Mirrors are convex, so these places are not far behind them: light falls off over the object.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,14 @@ from tbcad.core.geometry.vectors import dot, norm
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.csv_rows import number, read_rows
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import MirrorId, chosen_mirrors, spread_evenly
-from tbcad.light.datasets.virtual_cameras import virtual_cameras
+from tbcad.light.datasets.virtual_cameras import (
+    MirrorId,
+    chosen_mirrors,
+    spread_evenly,
+    virtual_cameras,
+)
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.point_lights import Spots, lit_cosine
+from tbcad.light.simulate.scene.lamps import Spots, lit_cosine
 from tbcad.types import Floats
 
 MIRRORS = "mirrors"
@@ -49,8 +54,7 @@ class LampPlaces:
 def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
     """Lamps of a table with the columns x_mm, y_mm and z_mm.
 
-    Raises:
-        InputError: it cannot be read, has no rows, or a lamp is in the capture sphere.
+    InputError: it cannot be read, has no rows, or a lamp is in the capture sphere.
     """
     if not path.exists():
         raise InputError(f"{path} is not there: give a table with {','.join(COLUMNS)}, or mirrors")
@@ -70,8 +74,7 @@ def read_lamp_places(path: Path, capture_mm: float) -> LampPlaces:
 def lamps_of_mirrors(source: LightField, every: int) -> LampPlaces:
     """Lamps at virtual cameras: one of so many, the kept ones spread evenly.
 
-    Raises:
-        InputError: no mirror gives a virtual camera.
+    InputError: no mirror gives a virtual camera.
     """
     mirrors = [one for one in chosen_mirrors(source, None, 1) if not _second_half(source, one)]
     u = np.array([source.frames[one.frame].u[one.index] for one in mirrors])
@@ -119,27 +122,16 @@ class MirrorPixels:
         return np.asarray(inside & (owner == self.number))
 
 
-@dataclass(frozen=True)
-class Projectors:
-    """The mirrors of some lamps."""
+def projectors(source: LightField, lamps: Iterable[MirrorId]) -> list[tuple[MirrorPixels, ...]]:
+    """What projectors in the places of the cameras throw by mirrors.
 
-    # of each lamp: one, or both halves of one on the seam
-    mirrors: tuple[tuple[MirrorPixels, ...], ...]
-
-    def light(self, embree: Any, lamp: int, spots: Spots) -> Floats:
-        """Light on spots (k,) of a lamp by its number."""
-        return np.asarray(sum(one.light(embree, spots) for one in self.mirrors[lamp]))
-
-
-def projectors(source: LightField, lamps: tuple[MirrorId, ...]) -> Projectors:
-    """The projectors of mirrors, in the places of the cameras of a light field."""
+    By one for each lamp, or by both halves of one on the seam.
+    """
     owner = {name: np.asarray(frame.planes["mirror"][:]) for name, frame in source.frames.items()}
-    return Projectors(
-        tuple(
-            tuple(_pixels(source, one, owner[one.frame]) for one in _halves(source, lamp))
-            for lamp in lamps
-        )
-    )
+    return [
+        tuple(_pixels(source, one, owner[one.frame]) for one in _halves(source, lamp))
+        for lamp in lamps
+    ]
 
 
 def _halves(source: LightField, mirror: MirrorId) -> list[MirrorId]:
@@ -195,14 +187,9 @@ def reflected(
 def _turn(p: float, q: float, whole: float, radius: float) -> float:
     """Angle at a circle's centre from the pinhole to the normal that reflects it, radians.
 
-    The angles of incidence and reflection differ by a sum that grows with the turn, from below
-    zero where the normal looks at the pinhole to above zero where it looks at the other point.
-
-    Args:
-        p: distance of the pinhole from the centre, mm.
-        q: of the other point.
-        whole: angle between both, radians.
-        radius: of the circle, less than p and q.
+    The angles of incidence and reflection differ by a sum that grows with the turn, from below zero
+    where the normal looks at the pinhole to above zero where it looks at the other point. Pinhole
+    and point are at p and q from the centre, mm, more than the radius, and `whole` apart, radians.
     """
     low, high = 0.0, whole
     turn = whole / 2

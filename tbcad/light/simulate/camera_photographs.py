@@ -6,12 +6,10 @@ from functools import partial
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand, Samples, photograph
 from tbcad.light.simulate.prototype.merge import merge_run
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.prototype.run import ball_reflector, prototype_runs
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import ball_reflector, prototype_runs, read_plan
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.options.captures import Geometry
 from tbcad.types import Progress
@@ -22,16 +20,8 @@ def camera_photographs(
 ) -> CameraPhotographs:
     """Both cameras, each with what takes its photograph.
 
-    Args:
-        export: the design as it was written.
-        scene: the object.
-        geometry: spheres of the record, meshes of the shells, or the prototype's balls, stop by
-            stop.
-        samples: a pixel is the mean of these rays.
-        progress: called with each step.
-
-    Raises:
-        InputError: files of that geometry are missing or broken.
+    By spheres of the record, meshes of the shells, or the prototype's balls, stop by stop; a pixel
+    is the mean of `samples`. InputError where files of that geometry are missing or broken.
     """
     if geometry == "prototype":
         both = prototype_runs(export.reflectors, read_plan(export))

@@ -24,13 +24,7 @@ def check_image_path(
 ) -> None:
     """Refuse a file that could not be written, before long work.
 
-    Args:
-        file: to write.
-        force: whether a file that exists may be replaced.
-        suffixes: that its name may have.
-
-    Raises:
-        InputError: another kind of file, its folder does not exist, or the file exists.
+    InputError: another kind of file, its folder does not exist, or the file exists.
     """
     if file.suffix.lower() not in suffixes:
         raise InputError(f"{file}: name a file that ends in {' or '.join(suffixes)}")
@@ -44,8 +38,7 @@ def check_image_path(
 def write_images(images: Mapping[Path, Bytes]) -> None:
     """Write images (h, w, 3) into one folder, each replaced as a whole, none before all are made.
 
-    Raises:
-        InputError: the folder cannot be written.
+    InputError: the folder cannot be written.
     """
     folder = next(iter(images)).parent
     replace_files(folder, {path.name: png_bytes(image) for path, image in images.items()})
@@ -54,8 +47,7 @@ def write_images(images: Mapping[Path, Bytes]) -> None:
 def write_animation(path: Path, frames: Sequence[Bytes]) -> None:
     """Write images (h, w, 3) as one that moves forward and back without end.
 
-    Raises:
-        InputError: the folder cannot be written.
+    InputError: the folder cannot be written.
     """
     images = [Image.fromarray(frame) for frame in frames]
     cycle = images + images[-2:0:-1]

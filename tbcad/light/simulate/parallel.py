@@ -33,10 +33,7 @@ def in_batches(
 ) -> Iterator[Result]:
     """Results in the items' order, of which few are in memory at a time.
 
-    Args:
-        work: run in threads.
-        items: what to work on.
-        begin: called with the first item of each batch before the batch.
+    `begin` is called with the first item of each batch before the batch.
     """
     for batch in chunks(len(items), 2 * THREADS):
         begin(items[batch.start])

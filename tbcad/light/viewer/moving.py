@@ -21,11 +21,9 @@ REGION_PX, BLOCK_PX = 64, 16
 def moving_view(pictures: PinholePictures, view: Camera, limits: tuple[float, ...]) -> Bytes:
     """The picture (h, w, 3) that a pinhole camera would see; black where nothing is near.
 
-    Args:
-        pictures: of all virtual cameras.
-        view: the camera, which looks at the origin.
-        limits: how far rays may be from target rays, root mean square over the depth of the
-            capture sphere, mm: the second where nothing is as near as the first, and so on.
+    The camera looks at the origin. `limits`: how far rays may be from target rays, root mean square
+    over the depth of the capture sphere, mm: the second where nothing is as near as the first, and
+    so on.
     """
     image = np.zeros((view.height_px, view.width_px, 3), dtype=np.uint8)
     cameras = _seen_from(pictures, view)
@@ -68,16 +66,10 @@ def _fill_region(
     picture: Bytes,
     mask: Bools,
 ) -> bool:
-    """Fill a region's pixels as far as virtual cameras are near; whether that is all of them.
+    """Fill the pixels of a region from a corner as far as cameras (k, 13) are near; whether all.
 
-    Args:
-        image: (h, w, 3).
-        corner: first row and column.
-        lens: pixel pitch; the pinhole along right, down, forward; its power to the sphere.
-        limit: how far rays may be from target rays, mm.
-        cameras: as `_seen_from`, (k, 13).
-        picture: (m, s, s, 3).
-        mask: (m, s, s).
+    `lens`: pixel pitch; the pinhole along right, down, forward; its power to the sphere. `picture`
+    (m, s, s, 3) and `mask` (m, s, s) are those of all cameras.
     """
     height, width, _ = image.shape
     bottom, right = min(corner[0] + REGION_PX, height), min(corner[1] + REGION_PX, width)

@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl
 from tbcad.common.web_page import BEGIN, web_page
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.scene.rays import camera_around_object
 
 MAX_DISTANCE_MM = 5000.0
 MAX_APERTURE_MM = 300.0
@@ -33,14 +33,7 @@ class Query:
     still: int = 0  # 1 for the best picture, 0 for the quickest
 
     def check(self, capture_mm: float) -> "Query":
-        """This query, if all of its values are allowed.
-
-        Args:
-            capture_mm: diameter of the capture sphere.
-
-        Raises:
-            InputError: one is not.
-        """
+        """This query, if all of its values are allowed; else InputError."""
         for name, (low, high) in limits(capture_mm).items():
             value = getattr(self, name)
             if not low <= value <= high:
@@ -72,8 +65,7 @@ def limits(capture_mm: float) -> dict[str, tuple[float, float]]:
 def parse_query(text: str, capture_mm: float) -> Query:
     """The query of an address; what it leaves out has its default.
 
-    Raises:
-        InputError: a name is unknown or given twice, or a value is no number or not allowed.
+    InputError: a name is unknown or given twice, or a value is no number or not allowed.
     """
     kinds = {one.name: type(one.default) for one in fields(Query)}
     try:
@@ -104,14 +96,10 @@ def _number(name: str, text: str, kind: type) -> float:
 def viewer_page(
     title: str, start: Query, capture_mm: float, method: str, *, lens: bool = True
 ) -> str:
-    """The page that asks a server for views.
+    """The page that asks a server for views, beginning with one.
 
-    Args:
-        title: name of the light field, or of a field without one.
-        start: the first view.
-        capture_mm: diameter of the capture sphere.
-        method: of views that do not move.
-        lens: whether there are views by a lens: of a light field.
+    `method` is that of views that do not move; `lens`: whether there are views by a lens, of a
+    light field.
     """
     allowed = limits(capture_mm)
     first = {name: getattr(start, name) for name in allowed}
@@ -131,14 +119,9 @@ def filled(
 ) -> str:
     """A page with its styles, script and data.
 
-    Args:
-        name: of its HTML and script.
-        title: text.
-        data: what the script reads, as JSON.
-        kind: what the browser shows behind the title.
-        begin: the first lines.
-        images: where pictures come from when there is no server.
-        more: other HTML by the names of its places.
+    `name` is that of its HTML and script; the script reads `data` as JSON; `kind` is shown behind
+    the title; `images` says where pictures come from without a server; `more` is other HTML by the
+    names of its places.
     """
     static = files("tbcad.light.viewer") / "static"
     blocks = {

@@ -1,23 +1,28 @@
-"""Views of one light field or field, one after the other, as quickly as they are asked for."""
+"""Views of a light field or a field: one after the other as asked for, and a turntable of many."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import replace
+from base64 import b64encode
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from io import BytesIO
 from itertools import count
+from pathlib import Path
 from threading import Lock
 from typing import Literal
 
 import numpy as np
 from PIL import Image
 
+from tbcad.common.atomic_files import replace_files
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import pinhole_pictures
-from tbcad.light.depth.depth_map import DepthViews
+from tbcad.light.depth.depth_map import DepthViews, depth_views
+from tbcad.light.depth.plane_sweep import QUICK
 from tbcad.light.reconstruction.field import Field
 from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus
 from tbcad.light.simulate.views.synthesis import (
@@ -27,7 +32,8 @@ from tbcad.light.simulate.views.synthesis import (
     synthesise,
 )
 from tbcad.light.viewer.moving import moving_view
-from tbcad.light.viewer.page import Query
+from tbcad.light.viewer.page import Query, filled
+from tbcad.output.single_files import check_file
 from tbcad.types import Bytes, Progress
 
 MethodAtRest = Method | Literal["depth"]
@@ -36,6 +42,12 @@ JPEG_QUALITY = 88
 MOVING_RADIUS2 = 2
 MOVING_STEP = 2
 MOVING_STRIDE = 1.0  # distances of a field's nodes between samples, while the view moves
+MAX_BYTES = 6_000_000
+BEGIN = "<!doctype html>\n<!-- tbcad turntable -->"
+# Tried one after the other until the page is small enough.
+WEBP_QUALITIES = (85, 75, 65, 50, 35, 20)
+LOWEST_DEG, HIGHEST_DEG = 15.0, 75.0
+KIND = "data:image/webp;base64,"
 
 
 class Superseded(Exception):
@@ -72,17 +84,13 @@ class ViewRenderer(ABC):
 
         with self._lock:
             image = self.picture(query, proceed)
-        return jpeg_bytes(image)
+        return image_bytes(image, "JPEG", quality=JPEG_QUALITY)
 
     def picture(self, query: Query, proceed: Callable[[], None] = lambda: None) -> Bytes:
         """The picture (h, w, 3) of a query; a lens that moves gives a smaller one.
 
-        Args:
-            query: the view.
-            proceed: called now and then while a lens's pinholes are added up; may raise.
-
-        Raises:
-            InputError: a lens is asked for of a field without its light field.
+        `proceed` is called now and then while a lens's pinholes are added up; it may raise.
+        InputError where a lens is asked for of a field without its light field.
         """
         view = query.camera(self.capture_mm)
         if query.aperture == 0:
@@ -92,7 +100,8 @@ class ViewRenderer(ABC):
         lens = ThinLens(query.aperture, query.focus)
         if query.still:
             return refocus(self.lens, view, lens, proceed=proceed).image
-        smaller = _smaller(query).camera(self.capture_mm)
+        width, height = (max(side // MOVING_STEP, 1) for side in (query.width, query.height))
+        smaller = replace(query, width=width, height=height).camera(self.capture_mm)
         return refocus(self.lens, smaller, lens, lens_pinholes(MOVING_RADIUS2)).image
 
     @abstractmethod
@@ -105,12 +114,7 @@ class ViewRenderer(ABC):
 
 
 class Renderer(ViewRenderer):
-    """Pictures of a light field.
-
-    Attributes:
-        tiles: the light field.
-        pictures: of its virtual cameras, for views that move.
-    """
+    """Pictures of a light field: its tiles, and pictures of its virtual cameras to move fast."""
 
     method: MethodAtRest
 
@@ -120,13 +124,7 @@ class Renderer(ViewRenderer):
         method: MethodAtRest = "depth",
         progress: Progress = lambda _: None,
     ) -> None:
-        """Make the pictures of all virtual cameras.
-
-        Args:
-            source: a light field, whose file stays open.
-            method: of views that do not move.
-            progress: called with each step.
-        """
+        """Make the pictures of all virtual cameras of a light field, whose file stays open."""
         self.tiles = MirrorTiles(source)
         self.pictures = pinhole_pictures(source, progress)
         self._limits = search_radius(self.tiles), horizon_search_radius(self.tiles)
@@ -163,13 +161,101 @@ def capture_mm(pictured: MirrorTiles | Field) -> float:
     return pictured.source.capture_mm
 
 
-def _smaller(query: Query) -> Query:
-    width, height = query.width // MOVING_STEP, query.height // MOVING_STEP
-    return replace(query, width=max(width, 1), height=max(height, 1))
-
-
-def jpeg_bytes(image: Bytes) -> bytes:
-    """An image (h, w, 3) as a JPEG file."""
+def image_bytes(image: Bytes, kind: str, **options: int) -> bytes:
+    """An image (h, w, 3) as a file of a kind that Pillow writes."""
     with BytesIO() as buffer:
-        Image.fromarray(np.ascontiguousarray(image)).save(buffer, "JPEG", quality=JPEG_QUALITY)
+        Image.fromarray(np.ascontiguousarray(image)).save(buffer, kind, **options)
         return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class Turntable:
+    """Which pictures a turntable has."""
+
+    columns: int  # views once around
+    elevations_deg: tuple[float, ...]  # a row of views each
+    distance: float  # of the camera from the middle of the object, mm
+    size: tuple[int, int]  # columns and rows of a picture
+    method: MethodAtRest  # how those of a light field are made
+
+
+def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:
+    """Elevations of rows: one at `middle_deg`, more evenly from LOWEST_DEG to HIGHEST_DEG."""
+    if rows == 1:
+        return (middle_deg,)
+    return tuple(np.linspace(LOWEST_DEG, HIGHEST_DEG, rows).tolist())
+
+
+def check_turntable_path(file: Path, force: bool) -> None:
+    """Refuse, before any work, a file that cannot be written or that exists.
+
+    InputError: as said.
+    """
+    if file.suffix.lower() != ".html" or not file.parent.is_dir() or file.is_dir():
+        raise InputError(f"{file}: give a file that ends in .html, in a folder that exists")
+    check_file(file, force)
+
+
+def write_turntable(
+    file: Path, shown: MirrorTiles | Field, table: Turntable, title: str, progress: Progress
+) -> int:
+    """Write the page of a light field or a field; its size in bytes.
+
+    InputError: it cannot be written, or so many views do not fit into MAX_BYTES.
+    """
+    picture, pictures = _pictures(shown, table.method, progress), []
+    azimuths = (2 * np.pi * np.arange(table.columns) / table.columns).tolist()
+    for k, elevation in enumerate(table.elevations_deg):
+        progress(f"row {k + 1} of {len(table.elevations_deg)}, elevation {elevation:.0f} degrees")
+        place = float(np.radians(elevation)), table.distance, capture_mm(shown), table.size
+        pictures.append([picture(camera_around_object(one, *place)) for one in azimuths])
+    page = smallest_loss(pictures, table, title)
+    replace_files(file.parent, {file.name: page})
+    return len(page)
+
+
+def smallest_loss(
+    pictures: Sequence[Sequence[Bytes]], table: Turntable, title: str, most: int = MAX_BYTES
+) -> bytes:
+    """The page with the best pictures that fit; InputError: none fit."""
+    for quality in WEBP_QUALITIES:
+        page = turntable_page(pictures, table, title, quality).encode("utf-8")
+        if len(page) <= most:
+            return page
+    raise InputError(
+        f"{table.columns} x {len(pictures)} views do not fit into {most / 1e6:g} MB: give fewer "
+        "--frames or --rows, or a smaller --width and --height"
+    )
+
+
+def turntable_page(
+    pictures: Sequence[Sequence[Bytes]], table: Turntable, title: str, quality: int
+) -> str:
+    """The page with its pictures (h, w, 3), row by row, in WebP of a quality."""
+    kind = {"quality": quality, "method": 4}
+    frames = [
+        [b64encode(image_bytes(picture, "WEBP", **kind)).decode() for picture in row]
+        for row in pictures
+    ]
+    data = {
+        "size": table.size,
+        "elevations": table.elevations_deg,
+        "row": len(frames) // 2,
+        "kind": KIND,
+        "frames": frames,
+    }
+    views = sum(map(len, frames))
+    about = f"{views} views of {table.size[0]} x {table.size[1]} pixels."
+    return filled("turntable", title, data, begin=BEGIN, images="data: blob:", about=about)
+
+
+def _pictures(
+    shown: MirrorTiles | Field, method: MethodAtRest, progress: Progress
+) -> Callable[[Camera], Bytes]:
+    """What makes the picture (h, w, 3) of a camera."""
+    if isinstance(shown, Field):
+        return lambda camera: field_picture(shown, camera).image
+    if method == "depth":
+        views = depth_views(shown, QUICK, progress)
+        return lambda camera: views.of(camera)[0].image
+    return lambda camera: synthesise(shown, camera, method).image

@@ -38,30 +38,14 @@ TEXT, HTML, JPEG = "text/plain; charset=utf-8", "text/html; charset=utf-8", "ima
 
 
 class ViewServer(ThreadingHTTPServer):
-    """Serves one light field or field until it is shut down.
-
-    Attributes:
-        renderer: makes the views.
-        page: the page, HTML.
-        token: random word of the address.
-    """
+    """Serves one light field or field until it is shut down; `token` is a word of its address."""
 
     daemon_threads = True
     allow_reuse_address = False
     request_queue_size = MAX_CONNECTIONS
 
     def __init__(self, renderer: ViewRenderer, title: str, start: Query, port: int = 0) -> None:
-        """Listen on this computer alone.
-
-        Args:
-            renderer: makes the views.
-            title: name of what is shown.
-            start: the first view.
-            port: 0 for any that is free.
-
-        Raises:
-            InputError: the port is taken.
-        """
+        """Listen on this computer alone, at a port, 0 for any; InputError if it is taken."""
         self.renderer = renderer
         page = viewer_page(
             title, start, renderer.capture_mm, renderer.method, lens=renderer.lens is not None

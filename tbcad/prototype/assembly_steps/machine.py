@@ -1,15 +1,17 @@
-"""A prototype as its export describes it: bodies, fasteners, list of parts; words of a step."""
+"""A prototype as its export describes it: bodies, fasteners, list of parts; steps as planned."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import TypeAlias
 
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.csv_rows import read_rows
 from tbcad.errors import InputError
-from tbcad.prototype.electronics import wiring
-from tbcad.prototype.files.bom_view import read_parts_list
+from tbcad.prototype import electronics
+from tbcad.prototype.files.bom import read_parts_list
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts
 from tbcad.records.prototype import NAME, FastenerRecord, Prototype
 from tbcad.records.tables import BallRow
@@ -52,7 +54,7 @@ class Machine:
 
     @property
     def fasteners(self) -> tuple[FastenerRecord, ...]:
-        """Records of screws, inserts, magnets and the like."""
+        """Screws, inserts, magnets and the like."""
         return self.record.fasteners
 
     def has(self, body: str) -> bool:
@@ -87,19 +89,6 @@ class Machine:
         return self.ref(self.bodies[body])
 
 
-class Text(NamedTuple):
-    """Words of a step: what is done, what must be true afterwards, and other fits."""
-
-    does: tuple[str, ...]
-    checks: tuple[str, ...]
-    fits: tuple[str, ...] = ()
-
-
-def lines(*texts: str) -> tuple[str, ...]:
-    """Those that are not empty."""
-    return tuple(text for text in texts if text)
-
-
 def read_machine(folder: Path) -> Machine:
     """The prototype of an export.
 
@@ -108,12 +97,48 @@ def read_machine(folder: Path) -> Machine:
     """
     rows = read_parts_list(folder).rows
     record = Prototype.read(folder / NAME)
-    lines = [row for _, row in read_rows(_present(folder / WIRING), WIRING, wiring.COLUMNS)]
+    if not (wiring := folder / WIRING).is_file():
+        raise InputError(f"{wiring} is not there: name a folder with a prototype by tbcad build")
+    lines = [row for _, row in read_rows(wiring, WIRING, electronics.COLUMNS)]
     sizes = {ball.number: ball.size for ball in BallRow.read(folder) if ball.kind == "ball"}
     return Machine(rows, record, tuple(lines), sizes, load_parts())
 
 
-def _present(path: Path) -> Path:
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder with a prototype by tbcad build")
-    return path
+Words: TypeAlias = tuple[list[str], ...]
+"""What is done in a step, what must be true afterwards, and fits besides; empty texts are none."""
+
+
+@dataclass(frozen=True)
+class StepPlan:
+    """A step as it is planned for all designs."""
+
+    title: str  # of the step
+    words: Callable[[Machine], Words]  # for a prototype; it has the step's name for files
+    bodies: tuple[str, ...]  # patterns of names of the bodies that it mounts
+    loose: tuple[str, ...]  # parts, or kinds of them, without bodies that it takes
+    near: tuple[str, ...]  # bodies that the picture shows, too
+
+    @property
+    def key(self) -> str:
+        """Name of the step for files."""
+        return self.words.__name__
+
+    def needed(self, machine: Machine) -> bool:
+        """Whether a prototype has any of its bodies; a step of none is always needed."""
+        return not self.bodies or any(map(self.mounts, machine.bodies))
+
+    def mounts(self, body: str) -> bool:
+        """Whether it mounts a body."""
+        return any(fnmatchcase(body, pattern) for pattern in self.bodies)
+
+
+def planned(
+    title: str, *bodies: str, loose: tuple[str, ...] = (), near: tuple[str, ...] = ()
+) -> Callable[[Callable[[Machine], Words]], StepPlan]:
+    """Plan a step whose words a function gives."""
+    return lambda words: StepPlan(title, words, bodies, loose, near)
+
+
+def when(condition: object, text: str) -> str:
+    """A text that is told under a condition."""
+    return text if condition else ""

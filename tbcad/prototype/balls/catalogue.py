@@ -61,11 +61,7 @@ class Catalogue:
         return np.array([ball.mass_g for ball in self.balls])
 
     def available(self, grade: str, max_diameter: float) -> "Catalogue":
-        """The sizes sold in a grade and no larger than a diameter (mm).
-
-        Raises:
-            SpecError: when there are none.
-        """
+        """The sizes sold in a grade up to a diameter (mm); SpecError when there are none."""
         balls = tuple(
             ball for ball in self.balls if grade in ball.grades and ball.diameter_mm <= max_diameter
         )
@@ -103,14 +99,10 @@ def load_grades() -> dict[str, Grade]:
 
 
 def load_catalogue(names: Iterable[str]) -> Catalogue:
-    """Return the balls of several catalogues as one, by rising diameter.
+    """The balls of several catalogues as one by rising diameter; of equal ones the first counts.
 
-    Args:
-        names: "metric", "inch", or paths of CSV files (from the current folder) with the columns
-            of COLUMNS; an empty mass is that of steel. Of equal diameters the first one counts.
-
-    Raises:
-        SpecError: a catalogue that cannot be read, is empty or wrong, with line and column.
+    Names are "metric", "inch", or paths of CSV files (from the current folder) with the columns of
+    COLUMNS; an empty mass is that of steel. SpecError names line and column of what is wrong.
     """
     by_diameter: dict[float, StockBall] = {}
     for name in names:

@@ -36,11 +36,7 @@ def min_separations(
 ) -> tuple[Floats, Floats]:
     """Minimum differences of azimuth so that no balls touch, and so that light passes, (k, k) each.
 
-    Args:
-        balls: in the frame at azimuth zero.
-        spec: with the wall between balls and the margin of the light.
-        pinhole: distance of the pinhole along the axis, mm.
-        capture: radius of the capture sphere, mm.
+    pinhole is its distance along the axis and capture the radius of the capture sphere, mm.
     """
     centre, radius = balls.body_centre[:, :2], balls.body_radius
     touching = contact_angle(centre, radius, spheres(centre, radius).grown(spec.ball_wall_mm))
@@ -60,13 +56,9 @@ def _with_margin(angle: Floats) -> Floats:
 
 
 def obstacles(spec: PrototypeSpec, frame: Floats, view: Camera, length: float) -> list[Obstacle]:
-    """The post below the object and the camera's body behind its pinhole.
+    """The post below the object, and the camera behind its pinhole; of diameter zero left out.
 
-    Args:
-        spec: with their sizes; a diameter of zero leaves one out.
-        frame: rows of the ellipsoid's frame, (3, 3).
-        view: the camera.
-        length: of the post, to beyond all balls, mm.
+    The post's length reaches beyond all balls, mm; frame (3, 3): rows of the ellipsoid's frame.
     """
     post = _capsule(np.zeros(3), frame @ [0.0, 0.0, -length], spec.post_diameter_mm / 2)
     start = frame @ view.pinhole
@@ -88,8 +80,7 @@ def allowed_azimuths(
 ) -> tuple[Floats, Floats]:
     """Minimum and maximum azimuth (k,) of each ball between which it is clear of all obstacles.
 
-    Raises:
-        SpecError: when a ball meets an obstacle at every azimuth.
+    SpecError when a ball meets an obstacle at every azimuth.
     """
     lowest, highest = np.full(len(balls), -np.pi), np.full(len(balls), np.pi)
     for obstacle in obstacles:

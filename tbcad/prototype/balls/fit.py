@@ -21,11 +21,10 @@ from tbcad.prototype.balls.selection import (
 from tbcad.records.prototype import Alternative
 from tbcad.types import Bools, Floats, Ints
 
-SELECTION_RULES = {
-    "cover, with caps": {"snap": "cover", "caps": True},
-    "cover, balls only": {"snap": "cover", "caps": False},
-    "nearest, with caps": {"snap": "nearest", "caps": True},
-    "nearest, balls only": {"snap": "nearest", "caps": False},
+SELECTION_RULES: dict[str, dict[str, Any]] = {
+    f"{snap}, {name}": {"snap": snap, "caps": caps}
+    for snap in ("cover", "nearest")
+    for name, caps in (("with caps", True), ("balls only", False))
 }
 
 
@@ -79,40 +78,29 @@ def _pixels(array: MirrorArray, outline: Floats) -> Floats:
 def ball_alternatives(
     spec: Spec, array: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
 ) -> tuple[Alternative, ...]:
-    """What each rule costs, for groups of camera a's mirrors.
+    """What each rule costs for groups of camera a's mirrors; fit is by the spec's own rule.
 
     pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
     within the moved cells, and mirrors_below_target counts those whose coverage is less.
-
-    Args:
-        spec: the design.
-        array: camera a's mirrors.
-        groups: of them.
-        balls: chosen by the spec's own rule, from the catalogue that all rules choose from.
-        fit: of these balls.
     """
     target = spec.optics.capture_diameter_mm
     candidates = ball_candidates(array, groups, target, spec.prototype.ball_margin_mm)
 
-    def alternative(rule: dict[str, Any]) -> tuple[Balls, BallFit]:
-        ruled = spec.prototype.model_copy(update=rule)
-        if ruled == spec.prototype:
-            return balls, fit
-        other = choose_balls(candidates, ruled, balls.catalogue)
-        return other, ball_fit(candidates, other, ruled)
-
-    return tuple(
-        _record(name, *alternative(rule), target) for name, rule in SELECTION_RULES.items()
-    )
-
-
-def _record(name: str, balls: Balls, fit: BallFit, target: float) -> Alternative:
-    return Alternative(
-        name=name,
-        pixels=float(fit.pixels.sum()),
-        pixels_kept_share=fit.kept_share,
-        coverage_mm=float(fit.coverage.min()),
-        mirrors_below_target=int((fit.coverage < target - COVERAGE_ROUNDING_MM).sum()),
-        balls_mass_g=float(balls.mass_g.sum()),
-        caps=int(balls.cap.sum()),
-    )
+    alternatives = []
+    for name, rule in SELECTION_RULES.items():
+        ruled, chosen, shown = spec.prototype.model_copy(update=rule), balls, fit
+        if ruled != spec.prototype:
+            chosen = choose_balls(candidates, ruled, balls.catalogue)
+            shown = ball_fit(candidates, chosen, ruled)
+        alternatives.append(
+            Alternative(
+                name=name,
+                pixels=float(shown.pixels.sum()),
+                pixels_kept_share=shown.kept_share,
+                coverage_mm=float(shown.coverage.min()),
+                mirrors_below_target=int((shown.coverage < target - COVERAGE_ROUNDING_MM).sum()),
+                balls_mass_g=float(chosen.mass_g.sum()),
+                caps=int(chosen.cap.sum()),
+            )
+        )
+    return tuple(alternatives)

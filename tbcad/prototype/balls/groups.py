@@ -41,19 +41,12 @@ def _means(group_of: Ints, values: Floats, k: int) -> Floats:
 
 
 def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: float) -> MirrorGroups:
-    """Group mirrors by k-means (the paper, section 5.1).
+    """Group mirrors by k-means (the paper, section 5.1): polar angles, rad, radii, mm, (m,).
 
-    The starting points are spread evenly over polar angle instead of drawn at random: the result
-    is the same every time, and its largest error of direction is nearly the minimum.
-
-    Args:
-        polar: polar angles, radians, (m,).
-        radius: radii, mm, (m,).
-        k: number of groups.
-        radius_weight_deg: degrees of polar angle that 1 mm of radius counts as.
-
-    Raises:
-        SpecError: when there are fewer mirrors than groups, or too few that differ.
+    The starting points are spread evenly over polar angle instead of drawn at random: the result is
+    the same every time, and its largest error of direction is nearly the minimum. 1 mm of radius
+    counts as radius_weight_deg degrees. SpecError when there are too few mirrors, or too few that
+    differ.
     """
     features = _features(polar, radius, radius_weight_deg)
     start = _start(features, k)
@@ -67,9 +60,8 @@ def group_mirrors(polar: Floats, radius: Floats, k: int, radius_weight_deg: floa
 
 def _by_polar_angle(group_of: Ints, polar: Floats, k: int) -> Ints:
     """Groups (m,) renumbered by rising mean polar angle."""
-    rank = np.empty(k, dtype=np.int64)
-    rank[np.argsort(_means(group_of, polar, k), kind="stable")] = np.arange(k)
-    return rank[group_of]
+    order = np.argsort(_means(group_of, polar, k), kind="stable")
+    return np.argsort(order)[group_of]
 
 
 def max_groups(polar: Floats, radius: Floats, radius_weight_deg: float) -> int:

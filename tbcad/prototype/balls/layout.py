@@ -146,14 +146,8 @@ def prototype_layout(
 ) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 
-    Args:
-        spec: the design.
-        design: its mirrors.
-        count: number of balls; None: the first that the spec permits.
-        choices: of balls that were looked at before.
-
-    Raises:
-        SpecError: when there is no such layout; it says what to change.
+    count None: the first number of balls that the spec permits. choices were looked at before.
+    SpecError when there is no such layout says what to change.
     """
     array = design.arrays[0]
     choices = choices or BallChoices(spec, array)
@@ -174,7 +168,9 @@ def prototype_layout(
         problem=problem,
         placement=replace(placement, azimuth=azimuth, outermost=problem.outermost(azimuth)),
         stops=plan_stops(groups, array.polar, requests, azimuth),
-        twin=_twins(array),
+        # Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z): that of camera b's
+        # mirror with the number of (x, -y, z).
+        twin=(array.u @ (array.u * FLIP_X[[1, 0, 2]]).T).argmax(axis=0),
     )
 
 
@@ -184,14 +180,7 @@ def ball_counts(
     """Numbers of balls that the spec permits, in the order in which layouts are tried.
 
     With prototype.k auto: the smallest number within the limits auto_..., a few more, then fewer.
-
-    Args:
-        spec: the design.
-        design: its mirrors.
-        choices: takes the balls that are looked at.
-
-    Raises:
-        SpecError: no prototype of balls suits the mirrors.
+    choices take the balls that are looked at. SpecError: no prototype of balls suits the mirrors.
     """
     array = design.arrays[0]
     check_suitable(spec)
@@ -210,21 +199,15 @@ def _smallest_count(choices: BallChoices, most: int) -> int | None:
     """The smallest number of balls within the limits of the spec, None when there is none."""
     limits = choices.spec.prototype
     for k in range(1, min(most, MANY_BALLS) + 1):
-        if _directions_within_limits(choices, k):
-            _, _, fit = choices.chosen(k)
-            if 100 * (1 - fit.kept_share) <= limits.auto_lost_percent:
-                return k
+        groups = choices.groups(k)
+        error = np.degrees(np.abs(groups.polar[groups.group_of] - choices.array.polar))
+        if (
+            error.max() <= limits.auto_direction_max_deg
+            and np.median(error) <= limits.auto_direction_median_deg
+            and 100 * (1 - choices.chosen(k)[2].kept_share) <= limits.auto_lost_percent
+        ):
+            return k
     return None
-
-
-def _directions_within_limits(choices: BallChoices, k: int) -> bool:
-    """Whether the polar errors of k groups are within the limits; this needs no balls."""
-    limits, groups = choices.spec.prototype, choices.groups(k)
-    error = np.degrees(np.abs(groups.polar[groups.group_of] - choices.array.polar))
-    return bool(
-        error.max() <= limits.auto_direction_max_deg
-        and np.median(error) <= limits.auto_direction_median_deg
-    )
 
 
 def _placement_problem(
@@ -244,13 +227,3 @@ def _placement_problem(
         seat_half_angle=seat_half_angles(balls, limits.ball_wall_mm),
         max_swing=float(np.radians(limits.max_swing_deg)),
     )
-
-
-def _twins(array: MirrorArray) -> Ints:
-    """Mirror (m,) that is each one's image in the plane y = 0.
-
-    Turned by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z): that of camera b's
-    mirror with the number of (x, -y, z).
-    """
-    image = array.u * FLIP_X[[1, 0, 2]]
-    return np.asarray((array.u @ image.T).argmax(axis=0))

@@ -136,10 +136,7 @@ def _placed_in_order(
 def min_swing_placement(problem: PlacementProblem) -> Placement:
     """Azimuths with the minimum swing, and of those the ones with the minimum outermost azimuth.
 
-    The search stops at MAX_NODES nodes with the best found.
-
-    Raises:
-        SpecError: when there are none.
+    The search stops at MAX_NODES nodes with the best found. SpecError when there are none.
     """
     limits = problem.rounded()
     solution = None if _is_crowded(problem) else _min_swing(limits, greedy_placement(limits))
@@ -163,13 +160,13 @@ def _is_crowded(problem: PlacementProblem) -> bool:
     first ball of a group to the last is a path through all, no shorter than their minimum
     spanning tree.
     """
-    half_swing = min(problem.max_swing, 2 * np.pi) / 2
+    half_swing, apart = min(problem.max_swing, 2 * np.pi) / 2, problem.min_separation
     low, high = problem.served_high - half_swing, problem.served_low + half_swing
-    return any(
-        _spanning_length(problem.min_separation[np.ix_(group, group)])
-        > high[group].max() - low[group].min() + SLACK * len(group)
-        for group in _groups_apart(problem.min_separation)
-    )
+    for group in _groups_apart(apart):
+        tree = minimum_spanning_tree(csr_array(np.triu(apart[np.ix_(group, group)], 1)))
+        if tree.sum() > high[group].max() - low[group].min() + SLACK * len(group):
+            return True
+    return False
 
 
 def _groups_apart(separation: Floats) -> Iterator[Ints]:
@@ -181,11 +178,6 @@ def _groups_apart(separation: Floats) -> Iterator[Ints]:
             group.append(ball)
             rest = rest[(separation[ball, rest] > 0) & (rest != ball)]
         yield np.array(group)
-
-
-def _spanning_length(separation: Floats) -> float:
-    """Length of the minimum spanning tree of all balls, by their separations (k, k)."""
-    return float(minimum_spanning_tree(csr_array(np.triu(separation, 1))).sum())
 
 
 def _min_swing(problem: PlacementProblem, greedy: Placement) -> tuple[Floats, float] | None:

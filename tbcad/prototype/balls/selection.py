@@ -102,7 +102,10 @@ class BallCandidates:
         )
         across = rotated_about_x(np.broadcast_to([0.0, 0.0, 1.0], centre.shape), array.azimuth)
         frame = array.ellipsoid.frame()
-        rotation = self._window_rotation() if moved else np.zeros(len(array))
+        # Of each mirror's window about the pinhole, which takes its apex to the ball's.
+        angle = field_angles(array.ellipsoid, self.groups.polar)[group_of]
+        turned = field_angles(array.ellipsoid, array.polar) - angle
+        rotation = turned if moved else np.zeros(len(array))
         covered = self.windows.coverage(centre @ frame, radius[group_of], across @ frame, rotation)
         return covered if moved else np.where(self._shows_origin(), covered, 0.0)
 
@@ -110,11 +113,6 @@ class BallCandidates:
         """Whether radii (k,) show what is required for each group's mirrors but those ignored."""
         covered = np.where(ignored, np.inf, self.coverage(radius, moved))
         return np.asarray(self.groups.minimum(covered) >= self.required)
-
-    def _window_rotation(self) -> Floats:
-        """Rotation of each mirror's window about the pinhole that takes its apex to the ball's."""
-        angle = field_angles(self.array.ellipsoid, self.groups.polar)[self.groups.group_of]
-        return field_angles(self.array.ellipsoid, self.array.polar) - angle
 
     def _shows_origin(self) -> Bools:
         """Whether the ball's apex, which shows the origin, is in the mirror's own cell, (m,)."""
@@ -157,24 +155,16 @@ def balls_with_radii(
     pinhole, capture = 2 * ellipsoid.linear_eccentricity, candidates.target / 2
     outline = used_outlines(poses, radius, pinhole, capture)
     balls = Balls(poses, radius, stock, catalogue, outline, radius, radius)
-    body, depth = _cap_bodies(radius, balls.used_radius + rim)
+    # The edge is at 45 degrees on the ball whose front a cap's sphere replaces, so that the ball's
+    # widest part, and the seat behind it, stay whole.
+    edge = np.minimum(balls.used_radius + rim, radius)
+    body, depth = np.sqrt(2) * edge, radius - np.sqrt(radius**2 - edge**2) + edge
     smaller = balls.cap & (body < radius)
     return replace(
         balls,
         body_radius=np.where(smaller, body, radius),
         body_depth=np.where(smaller, depth, radius),
     )
-
-
-def _cap_bodies(radius: Floats, edge: Floats) -> tuple[Floats, Floats]:
-    """Radius and depth of the ball whose front, replaced by the cap's sphere, has this edge (k,).
-
-    The edge is at 45 degrees on the ball, so that the ball's widest part, and the seat behind it,
-    stay whole.
-    """
-    edge = np.minimum(edge, radius)
-    drop = radius - np.sqrt(radius**2 - edge**2)
-    return np.sqrt(2) * edge, drop + edge
 
 
 def coverable(candidates: BallCandidates, catalogue: Catalogue, moved: bool) -> Bools:

@@ -73,13 +73,7 @@ class StopPlan:
 
 
 def stop_requests(groups: MirrorGroups, azimuth: Floats, error: float) -> StopRequests:
-    """The base angles that the mirrors request.
-
-    Args:
-        groups: of the m mirrors.
-        azimuth: of the mirrors, radians, (m,).
-        error: maximum error of direction that a shared stop may cause, radians.
-    """
+    """The base angles that mirrors at azimuths (m,) request; error: most that a stop may cause."""
     share = np.sin(error / 2) / np.maximum(np.sin(groups.polar), MIN_SINE)
     tolerance = 2 * np.arcsin(np.minimum(share, 1))
     return StopRequests(groups.group_of, azimuth, tolerance[groups.group_of])
@@ -88,8 +82,7 @@ def stop_requests(groups: MirrorGroups, azimuth: Floats, error: float) -> StopRe
 def min_stabbing_points(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     """The fewest points that hit all intervals [low, high] (m,).
 
-    Returns:
-        The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
+    The maximum of each point, ascending, (s,), and the point that hits each interval, (m,).
     """
     order = np.argsort(high, kind="stable")
     new = _new_points(low[order], high[order])
@@ -127,7 +120,9 @@ def azimuths_for_fewer_stops(
         before = azimuth.copy()
         for ball in range(len(problem)):
             tried = _free_azimuths(problem, azimuth, ball, step[ball], limits)
-            counts = np.array([_count(requests, azimuth, ball, one) for one in tried.tolist()])
+            moves = np.where(np.arange(len(azimuth)) == ball, tried[:, None], azimuth)
+            limits_of = (requests.intervals(one) for one in moves)
+            counts = np.array([len(min_stabbing_points(*both)[0]) for both in limits_of])
             moved = np.round(np.abs(tried - azimuth[ball]), DECIMALS)
             azimuth[ball] = tried[np.lexsort((tried, moved, counts))[0]]
         if np.array_equal(before, azimuth):
@@ -154,26 +149,10 @@ def _free_azimuths(
     return np.asarray(tried[clear])
 
 
-def _count(requests: StopRequests, azimuth: Floats, ball: int, moved_to: float) -> int:
-    """Number of stops with one ball moved to another azimuth."""
-    moved = azimuth.copy()
-    moved[ball] = moved_to
-    low, high = requests.intervals(moved)
-    order = np.argsort(high, kind="stable")
-    return int(np.count_nonzero(_new_points(low[order], high[order])))
-
-
 def plan_stops(
     groups: MirrorGroups, polar: Floats, requests: StopRequests, azimuth: Floats
 ) -> StopPlan:
-    """The stops for balls at azimuths (k,), each mirror at the one with the smallest error.
-
-    Args:
-        groups: of the mirrors.
-        polar: of the mirrors, radians, (m,).
-        requests: of the mirrors.
-        azimuth: of the balls on the base, radians, (k,).
-    """
+    """The stops for balls at azimuths (k,), each mirror at that of its smallest error."""
     exact = requests.base_angles(azimuth)
     angle = _stop_angles(exact, *requests.intervals(azimuth))
     stop = np.abs(angle - exact[:, None]).argmin(axis=1)

@@ -1,4 +1,4 @@
-"""Caps in numbers: key and magnet in the seat, and limits from the coverage that is set aside.
+"""Caps in numbers, their limits from the coverage that is set aside, and what holds all balls.
 
 Pads fix the centre of a ball, which is all a ball needs; a cap could tilt on them, and its front's
 centre with it. A spigot in the pocket of the seat's magnet takes that up.
@@ -14,11 +14,24 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import Spec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.fasteners import magnet_part
+from tbcad.prototype.base.fasteners import magnet_part, seat_magnets
+from tbcad.prototype.base.holding import (
+    DERATING,
+    GLUE_MPA,
+    MIN_RATIO,
+    REMANENCE_T,
+    WIDER_GAP_MM,
+    Motion,
+    force_needed,
+    glue_force,
+    pull_of_pair,
+    pull_on_ball,
+)
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.balance import ball_masses
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.purchased.parts import Parts
-from tbcad.records.prototype import CapRecord
+from tbcad.records.prototype import CapRecord, HeldBall, Holding
 
 WEB_MM = 0.8  # between the flat and the pads, and round the magnet's pocket
 FRONT_MM = 2.0  # minimum material before the pocket
@@ -57,12 +70,9 @@ def flat_depth(base: BaseLayout, k: int) -> float:
 
 
 def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
-    """Radius and depth of the pocket for the cap's own magnet, mm; zeros where there is none.
+    """Radius and depth of the pocket for the own magnet of cap k, mm; zeros where there is none.
 
-    Args:
-        base: with the seats.
-        k: number of the seat.
-        depth: of the body's centre behind the apex, mm.
+    depth is that of the body's centre behind the apex, mm.
     """
     spec, (spigot, end) = base.spec, cap_spigot(base, k)
     largest = spigot - WEB_MM
@@ -74,11 +84,7 @@ def cap_pocket(base: BaseLayout, k: int, depth: float) -> tuple[float, float]:
 
 
 def cap_magnets(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> list[Fastener]:
-    """Magnets in the caps' own pockets.
-
-    Raises:
-        SpecError: when one is in no list.
-    """
+    """Magnets in the caps' own pockets; SpecError when one is in no list."""
     seats, spec, magnets = base.seats, base.spec, []
     for k in np.flatnonzero(prototype.balls.cap).tolist():
         radius, height = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
@@ -133,3 +139,49 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
         pdf=f"{drawing}.pdf",
         dxf=f"{drawing}.dxf",
     )
+
+
+def holding(base: BaseLayout, prototype: PrototypeLayout, motion: Motion, parts: Parts) -> Holding:
+    """What holds each ball in its seat, with the pads as they are turned, and assumptions."""
+    seats, masses = base.seats, ball_masses(prototype, motion.cap_density)
+    needed = force_needed(
+        seats.pad_normals, seats.axis, seats.centre, masses.mass_g, base.frame, motion
+    ).tolist()
+    held = (_forces(base, prototype, k) for k in range(len(seats)))
+    rows = zip(needed, held, seat_magnets(base, parts), strict=True)
+    return Holding(
+        min_ratio=MIN_RATIO,
+        remanence_t=REMANENCE_T,
+        derating=DERATING,
+        glue_mpa=GLUE_MPA,
+        wider_gap_mm=WIDER_GAP_MM,
+        balls=tuple(
+            HeldBall(
+                ball=number,
+                by="glue" if wider is None else "magnet",
+                magnet=magnet.name if magnet else None,
+                force_needed_n=least,
+                force_available_n=force,
+                ratio=force / least,
+                wider_gap_n=force if wider is None else wider,
+            )
+            for number, (least, (force, wider), magnet) in enumerate(rows, 1)
+        ),
+    )
+
+
+def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float, float | None]:
+    """Force with the gap as drawn and with a wider one, N; None with glue."""
+    seats, gap = base.seats, base.spec.magnet_gap_mm
+    magnet, height = float(seats.magnet[k]) / 2, float(seats.magnet_height[k])
+    gaps, radius = (0.0, WIDER_GAP_MM), float(seats.radius[k])
+    if magnet and not prototype.balls.cap[k]:
+        drawn, wider = (pull_on_ball(radius, gap + more, magnet, height) for more in gaps)
+        return drawn, wider
+    own, own_height = cap_pocket(base, k, float(prototype.balls.body_depth[k]))
+    own -= base.spec.magnet_play_mm / 2
+    if magnet and own > 0:
+        between, heights = radius + gap - cap_spigot(base, k)[1], (own_height, height)
+        drawn, wider = (pull_of_pair(own, magnet, between + more, heights) for more in gaps)
+        return drawn, wider
+    return float(glue_force(seats.pocket[k])), None

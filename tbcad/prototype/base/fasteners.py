@@ -13,10 +13,9 @@ from tbcad.prototype.base.hub import (
     SET_SCREW_AZIMUTHS,
     ZERO_DISC_MM,
 )
-from tbcad.prototype.base.joints import Joint
+from tbcad.prototype.base.joints import M3_MM, MIN_ENGAGEMENT_MM, Joint, by_length, joint_hardware
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
-from tbcad.prototype.base.screws import M3_MM, MIN_ENGAGEMENT_MM, joint_hardware
 from tbcad.prototype.base.split import BaseSplit
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
@@ -37,17 +36,7 @@ AXIS, ACROSS = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 def base_fasteners(
     base: BaseLayout, split: BaseSplit, drive: Drive, parts: Parts
 ) -> list[Fastener]:
-    """Fasteners of the base.
-
-    Args:
-        base: in numbers.
-        split: its pieces and joints.
-        drive: that is bolted to its hub.
-        parts: lists of purchased parts.
-
-    Raises:
-        SpecError: when a part is in no list.
-    """
+    """Fasteners of the base; SpecError when a part is in no list."""
     places = _Places(base, split)
     return [
         *_magnets(places, parts),
@@ -88,11 +77,7 @@ def _magnets(places: _Places, parts: Parts) -> Iterator[Fastener]:
 
 
 def seat_magnets(base: BaseLayout, parts: Parts) -> list[PurchasedPart | None]:
-    """The magnet behind each ball, None where there is none.
-
-    Raises:
-        SpecError: when one is in no list.
-    """
+    """The magnet behind each ball, None for glue; SpecError when one is in no list."""
     sizes = np.column_stack([base.seats.magnet, base.seats.magnet_height]).tolist()
     return [
         magnet_part(diameter, height, parts) if diameter else None for diameter, height in sizes
@@ -100,11 +85,7 @@ def seat_magnets(base: BaseLayout, parts: Parts) -> list[PurchasedPart | None]:
 
 
 def magnet_part(diameter: float, height: float, parts: Parts) -> PurchasedPart:
-    """The disc magnet of a diameter and a height, mm.
-
-    Raises:
-        SpecError: when it is in no list.
-    """
+    """The disc magnet of a diameter and a height, mm; SpecError when it is in no list."""
     for part in of_kind(parts, "magnets", diameter_mm=diameter, height_mm=height):
         return part
     raise SpecError(
@@ -125,29 +106,30 @@ def _lock(places: _Places, parts: Parts) -> Iterator[Fastener]:
     hub, spec = places.base.hub, places.base.spec
     if hub.lock == "set-screws":
         # It stands out of the boss a little rather than grip too little.
-        insert = m3_insert(spec, parts)
+        insert, middle = m3_insert(spec, parts), hub.lock_z * AXIS
         grip = hub.boss - insert["length_mm"] + M3_MM - hub.bore
-        screw = _shortest_set_screw(grip, parts)
+        refusal = f"no M3 set screw of at least {grip:.1f} mm is in setscrews.csv: add one"
+        screw = by_length(parts, "setscrews", refusal, grip, thread_mm=M3_MM)[0]
+        end = hub.bore + screw["length_mm"]
         for azimuth in SET_SCREW_AZIMUTHS.tolist():
-            out, middle = meridian(azimuth)[0], hub.lock_z * AXIS
+            out = meridian(azimuth)[0]
             yield places.fastener(insert, middle + hub.boss * out, -out)
-            end = hub.bore + screw["length_mm"]
             yield places.fastener(screw, middle + end * out, -out, places.piece(middle))
     elif hub.lock == "clamp":
         middle = np.array([-(hub.bore + hub.boss) / 2, 0.0, hub.lock_z])
         half = float(np.sqrt(hub.boss**2 - middle[0] ** 2)) * ACROSS
         yield places.fastener(m3_insert(spec, parts), middle + half, -ACROSS)
-        screw = _longest_screw(2 * float(half[1]), parts)
+        room = 2 * float(half[1])
+        refusal = f"no M3 screw of at most {room:.1f} mm is in screws.csv: add one"
+        screw = by_length(parts, "screws", refusal, high=room, thread_mm=M3_MM)[-1]
         yield places.fastener(screw, middle - half, ACROSS)
 
 
 def _key(places: _Places, parts: Parts) -> Fastener:
     """The longest dowel through the zero disc into the hub's hole."""
     hub, room = places.base.hub, ZERO_DISC_MM + KEY_DEPTH_MM
-    dowels = [one for one in of_kind(parts, "dowels", diameter_mm=KEY_MM) if _fits(one, room)]
-    if not dowels:
-        raise SpecError(f"no dowel of {KEY_MM:g} mm is at most {room:g} mm long: add one")
-    part = max(dowels, key=lambda one: one["length_mm"])
+    refusal = f"no dowel of {KEY_MM:g} mm is at most {room:g} mm long: add one"
+    part = by_length(parts, "dowels", refusal, high=room, diameter_mm=KEY_MM)[-1]
     piece = places.piece(np.array([*hub.key, hub.face + SAME_SIZE_MM]))
     return places.fastener(part, np.array([*hub.key, hub.mount]), AXIS, "zero_disc", piece)
 
@@ -188,38 +170,11 @@ def _joint(places: _Places, joint: Joint, parts: Parts) -> Iterator[Fastener]:
         yield places.fastener(m3_insert(spec, parts), at, along, through[1])
 
 
-def _fits(part: PurchasedPart, room: float) -> bool:
-    return part["length_mm"] <= room
-
-
-def _longest_screw(room: float, parts: Parts) -> PurchasedPart:
-    """The longest M3 screw no longer than a length (mm)."""
-    screws = [one for one in of_kind(parts, "screws", thread_mm=M3_MM) if _fits(one, room)]
-    if not screws:
-        raise SpecError(f"no M3 screw of at most {room:.1f} mm is in screws.csv: add one")
-    return max(screws, key=lambda one: one["length_mm"])
-
-
-def _shortest_set_screw(length: float, parts: Parts) -> PurchasedPart:
-    """The shortest M3 set screw of at least a length (mm)."""
-    screws = of_kind(parts, "setscrews", thread_mm=M3_MM)
-    screws = [one for one in screws if one["length_mm"] >= length]
-    if not screws:
-        raise SpecError(f"no M3 set screw of at least {length:.1f} mm is in setscrews.csv: add one")
-    return min(screws, key=lambda one: one["length_mm"])
-
-
 def m3_insert(spec: BaseSpec, parts: Parts) -> PurchasedPart:
-    """The longest M3 insert that the holes of the spec take.
-
-    Raises:
-        SpecError: when none is in the lists.
-    """
-    inserts = of_kind(parts, "inserts", thread_mm=M3_MM, hole_mm=spec.insert_hole_mm)
-    inserts = [insert for insert in inserts if _fits(insert, spec.insert_depth_mm)]
-    if not inserts:
-        raise SpecError(
-            f"no M3 insert for holes of {spec.insert_hole_mm:g} mm, {spec.insert_depth_mm:g} mm "
-            "deep, is in inserts.csv: change prototype.base.insert_hole_mm or insert_depth_mm"
-        )
-    return max(inserts, key=lambda part: part["length_mm"])
+    """The longest M3 insert that the holes of the spec take; SpecError when there is none."""
+    refusal = (
+        f"no M3 insert for holes of {spec.insert_hole_mm:g} mm, {spec.insert_depth_mm:g} mm deep, "
+        "is in inserts.csv: change prototype.base.insert_hole_mm or insert_depth_mm"
+    )
+    sizes = {"thread_mm": M3_MM, "hole_mm": spec.insert_hole_mm}
+    return by_length(parts, "inserts", refusal, high=spec.insert_depth_mm, **sizes)[-1]

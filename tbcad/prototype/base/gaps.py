@@ -30,12 +30,9 @@ def ring_arcs(base: BaseLayout, ring: Floats, low: float, high: float) -> list[t
 
 
 def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
-    """Polygons (n, 2) of (z, r) over which a rib at an azimuth is left out.
+    """Polygons (n, 2) of (z, r) over which a rib at an azimuth (radians) is left out.
 
-    Args:
-        base: with its seats about z.
-        azimuth: of the rib, radians.
-        side: where the rib begins beside the azimuth, in its thicknesses.
+    The rib begins at a side of the azimuth, in its thicknesses.
     """
     spec = base.spec
     place, normal = _points_along(base.outline)
@@ -45,11 +42,16 @@ def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
     widths = (side + np.linspace(0, 1, WIDTH_POINTS)) * spec.rib_mm
     points = section[..., 1, None] * out + section[..., 0, None] * np.array([0.0, 0.0, 1.0])
     points = (points[:, :, None] + widths[:, None] * across).reshape(len(place), -1, 3)
-    length = np.arange(len(place), dtype=np.float64) * STEP_MM
-    kept = _runs(length, _free(base.local_seats, points), MIN_PART_MM)
-    return [
-        _gap_section(place, normal, height, first, last) for first, last in _between(length, kept)
-    ]
+    length, keep = np.arange(len(place), dtype=np.float64) * STEP_MM, np.zeros(len(place), bool)
+    for low, high in _runs(length, _free(base.local_seats, points), MIN_PART_MM):
+        keep |= (length >= low) & (length <= high)
+    gaps = []
+    for first, last in _spans(~keep):
+        steps = np.unique(np.linspace(first, last, GAP_POINTS).round().astype(int))
+        outer = place[steps] + BEYOND_MM * normal[steps]
+        inner = place[steps] - (height + BEYOND_MM) * normal[steps]
+        gaps.append(np.vstack([outer, inner[::-1]]))
+    return gaps
 
 
 def _points_of_section(ring: Floats) -> Floats:
@@ -92,19 +94,3 @@ def _runs(at: Floats, free: Bools, shortest: float) -> list[tuple[float, float]]
     """Intervals of places (n,) that are free, without the short ones."""
     pairs = [(float(at[first]), float(at[last])) for first, last in _spans(free)]
     return [(low, high) for low, high in pairs if high - low >= shortest]
-
-
-def _between(length: Floats, kept: list[tuple[float, float]]) -> list[tuple[int, int]]:
-    """First and last step of each interval that is not kept."""
-    keep = np.zeros(len(length), dtype=np.bool_)
-    for low, high in kept:
-        keep |= (length >= low) & (length <= high)
-    return _spans(~keep)
-
-
-def _gap_section(place: Floats, normal: Floats, height: float, first: int, last: int) -> Floats:
-    """Polygon over some steps of a rib's outline, from within the wall to beyond the rib."""
-    steps = np.unique(np.linspace(first, last, GAP_POINTS).round().astype(int))
-    outer = place[steps] + BEYOND_MM * normal[steps]
-    inner = place[steps] - (height + BEYOND_MM) * normal[steps]
-    return np.vstack([outer, inner[::-1]])

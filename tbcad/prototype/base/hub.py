@@ -18,6 +18,8 @@ DISC_BEYOND_BOSS_MM = 8.0  # minimum radius of the disc beyond that of the boss
 MIN_DISC_RADIUS_MM = 30.0  # with a boss
 SOCKET_MM = 9.0  # depth of the bore's free end, within the disc
 BELOW_HEAD_MM = 6.0  # material below a counterbore
+PIN_MM = 4.0  # diameter of the rod that fixes angle zero
+PIN_OUT_MM = 44.0  # of the pin: beyond the largest wheel, short of the motor
 ZERO_DISC_MM = 5.0  # thickness of the disc between hub and drive
 # Dowel that gives the disc its place about the axis, on the drive's circle between two holes.
 KEY_MM, KEY_DEPTH_MM = 3.0, 6.0
@@ -82,14 +84,15 @@ class Hub:
 
 
 def hub_layout(spec: BaseSpec, front: float) -> Hub:
-    """The hub whose disc begins at z = front.
-
-    Raises:
-        SpecError: when the shaft's bore meets the holes of the drive.
-    """
+    """The hub whose disc begins at z = front; SpecError when bore and drive's holes meet."""
     pattern, bore = PATTERNS[spec.drive], spec.shaft_mm / 2
     hole = pattern.hole or spec.insert_hole_mm
-    _check_shaft(spec, pattern, hole)
+    largest = pattern.circle - max(hole, pattern.head[0]) - 2 * MIN_WALL_MM
+    if spec.shaft_mm > largest:
+        raise SpecError(
+            f"a shaft of {spec.shaft_mm:g} mm leaves no wall to the holes of drive {spec.drive}: "
+            f"make prototype.base.shaft_mm {largest:g} or less"
+        )
     outer = pattern.circle / 2 + max(hole, pattern.head[0]) / 2 + WALL_MM
     if pattern.boss:
         boss = max(outer, bore + WALL_MM + spec.insert_depth_mm)
@@ -133,12 +136,3 @@ def deepened(hub: Hub, face: float) -> Hub:
         head=(diameter, depth + more),
         lock_z=face,
     )
-
-
-def _check_shaft(spec: BaseSpec, pattern: HolePattern, hole: float) -> None:
-    largest = pattern.circle - max(hole, pattern.head[0]) - 2 * MIN_WALL_MM
-    if spec.shaft_mm > largest:
-        raise SpecError(
-            f"a shaft of {spec.shaft_mm:g} mm leaves no wall to the holes of drive {spec.drive}: "
-            f"make prototype.base.shaft_mm {largest:g} or less"
-        )

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import distance_outside, half_plane, offset
-from tbcad.prototype.base.screws import joint_hardware
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts, of_kind
 from tbcad.types import Bools, Floats
 
 GRID_MM = 2.0  # of places tried for holes
@@ -31,6 +33,11 @@ OFF_END_MM = 1.0  # of a hole's margin from the wall's end
 # Points along an axis that are checked: through both flanges, over a head, within a label.
 THROUGH_POINTS, ACCESS_POINTS, LABEL_POINTS = 9, 10, 4
 DECIMALS = 6  # to which distances are compared, mm
+M3_MM = 3.0
+FLOOR_MM = 1.0  # below holes
+MIN_ENGAGEMENT_MM = 4.0  # of a screw in its insert: 1.3 diameters
+BEYOND_DOWEL_MM = 0.5  # depth of a hole beyond its dowel
+KEY_PLAY_MM = 0.55  # round a screw's head
 
 
 @dataclass(frozen=True)
@@ -89,13 +96,7 @@ def flange_top(base: BaseLayout) -> Floats:
 
 
 def plan_joint(base: BaseLayout, cut: Cut, others: Sequence[Cut]) -> Joint | None:
-    """Dowels, screws and numbers of a joint, or None where they have no room.
-
-    Args:
-        base: to be cut.
-        cut: that the joint is on.
-        others: all other cuts.
-    """
+    """Dowels, screws and numbers of a joint clear of other cuts; None where they have no room."""
     spec, flanges = base.spec, _Flanges(base, *cut, others)
     head = joint_hardware(spec).access_radius
     places = flanges.places(max(spec.dowel_mm / 2, spec.insert_hole_mm / 2))
@@ -117,14 +118,7 @@ def plan_joint(base: BaseLayout, cut: Cut, others: Sequence[Cut]) -> Joint | Non
 
 
 def _label(flanges: "_Flanges", side: int, holes: Floats, head: float) -> Floats:
-    """Place for a number on a side, if there is one, (0 or 1, 3); preferably off all ribs.
-
-    Args:
-        flanges: on the plane.
-        side: above the plane 1, below -1.
-        holes: their places, mm, (n, 3).
-        head: radius of what is kept clear round them, mm.
-    """
+    """Place (0 or 1, 3) for a number off holes (n, 3) and heads' radius, best off all ribs."""
     places = flanges.places(LABEL_MM - MIN_WALL_MM)
     places = places[flanges.accessible(places, side, LABEL_MM, ACCESS_MM)]
     best = _spread(places[flanges.off_ribs(places, side)], holes, 1, LABEL_MM + head)
@@ -245,3 +239,50 @@ def _spread(points: Floats, taken: Floats, count: int, spacing: float) -> Floats
             break
         chosen = np.vstack([chosen, points[best]])
     return chosen[len(taken) :]
+
+
+@dataclass(frozen=True)
+class JointHardware:
+    """Purchased parts of joints: names, and what their holes need, mm.
+
+    The access radius is that of what is kept clear over a screw's head.
+    """
+
+    dowel: str
+    dowel_depth: float
+    screw: str
+    access_radius: float
+
+
+def by_length(
+    parts: Parts, kind: str, refusal: str, low: float = 0.0, high: float = np.inf, **sizes: float
+) -> list[PurchasedPart]:
+    """Parts of a kind with lengths between two (mm), the shortest first; refused without any."""
+    some = [one for one in of_kind(parts, kind, **sizes) if low <= one["length_mm"] <= high]
+    if not some:
+        raise SpecError(refusal)
+    return sorted(some, key=lambda one: one["length_mm"])
+
+
+def joint_hardware(spec: BaseSpec) -> JointHardware:
+    """The longest dowel and the shortest M3 screw for the flanges; SpecError without any."""
+    minimum, parts = spec.insert_depth_mm + FLOOR_MM, load_parts()
+    if spec.joint_mm < minimum:
+        raise SpecError(
+            f"flanges of {spec.joint_mm:g} mm are too thin for inserts: make "
+            f"prototype.base.joint_mm at least {minimum:g}"
+        )
+    longest = 2 * (spec.joint_mm - FLOOR_MM - BEYOND_DOWEL_MM)
+    refusal = (
+        f"no dowel of {spec.dowel_mm:g} mm is at most {longest:g} mm long: make "
+        "prototype.base.joint_mm larger or prototype.base.dowel_mm smaller"
+    )
+    dowel = by_length(parts, "dowels", refusal, high=longest, diameter_mm=spec.dowel_mm)[-1]
+    low, high = spec.joint_mm + MIN_ENGAGEMENT_MM, spec.joint_mm + spec.insert_depth_mm
+    refusal = (
+        f"no M3 screw is {low:g} to {high:g} mm long: make prototype.base.joint_mm one of the "
+        "lengths on sale less 4"
+    )
+    screw = by_length(parts, "screws", refusal, low, high, thread_mm=M3_MM)[0]
+    depth = dowel["length_mm"] / 2 + BEYOND_DOWEL_MM
+    return JointHardware(dowel.name, depth, screw.name, screw["head_mm"] / 2 + KEY_PLAY_MM)

@@ -113,16 +113,7 @@ class BaseLayout:
 def base_layout(
     spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
 ) -> BaseLayout:
-    """The base for a prototype's balls.
-
-    Args:
-        spec: of the base.
-        prototype: with its balls.
-        motion: of the base, against which its balls are held.
-
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-    """
+    """The base for a prototype's balls in motion; SpecError names what to change to fit."""
     frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype, motion)
     light = _light(spec, prototype)
     _check_fronts(seats, light, frame)
@@ -131,6 +122,10 @@ def base_layout(
     sector, rings = _sector(spec, seats, prototype), _rings(spec, inner)
     protruding = _protruding(spec, seats, frame, offset(inner, spec.thickness_mm))
     hub = deepened(hub, _rearmost(spec, protruding, rings, frame) - BEHIND_MM)
+    # The ribs begin at the hub's outer end, so that they are its gussets.
+    line = offset(inner, spec.thickness_mm + spec.rib_height_mm)
+    corner = [hub.face + HUB_CORNER_MM, (hub.boss or hub.disc) - HUB_CORNER_MM]
+    outline = shortened(hull(np.vstack([[corner], line[line[:, 0] > corner[0]]])), RIB_END_MM)
     return BaseLayout(
         spec=spec,
         frame=frame,
@@ -138,7 +133,7 @@ def base_layout(
         inner=inner,
         sector=sector,
         ribs=_ribs(spec, seats, prototype, sector),
-        outline=_outline(spec, inner, hub),
+        outline=outline,
         rings=rings,
         hub=hub,
         seats=protruding,
@@ -159,21 +154,16 @@ def _light(spec: BaseSpec, prototype: PrototypeLayout) -> LightSpheroid:
 
 
 def _check_fronts(seats: Seats, light: LightSpheroid, frame: Floats) -> None:
-    """Refuse seats that reach into the light."""
-    excess = light.min_excess(_front_corners(seats) @ frame.T)
+    """Refuse seats that reach into the light, by corners of a polygon round each boss's front."""
+    circle = unit_circle(even_angles(FRONT_CORNERS)) / np.cos(np.pi / FRONT_CORNERS)
+    corners = seats.boss[:, None, None] * (circle @ seats.axes[:, :2])
+    excess = light.min_excess((seats.at_depth(seats.front)[:, None] + corners) @ frame.T)
     worst = int(excess.argmin())
     if excess[worst] < 0:
         raise SpecError(
             f"the seat of ball {worst + 1} reaches {-excess[worst] / 2:.1f} mm into the light: "
             "make prototype.base.pad_angle_deg, pad_mm, cup_wall_mm or light_clearance_mm smaller"
         )
-
-
-def _front_corners(seats: Seats) -> Floats:
-    """Corners of a polygon round the front of each boss, mm, (k, FRONT_CORNERS, 3)."""
-    circle = unit_circle(even_angles(FRONT_CORNERS)) / np.cos(np.pi / FRONT_CORNERS)
-    middle = seats.at_depth(seats.front)[:, None]
-    return np.asarray(middle + seats.boss[:, None, None] * (circle @ seats.axes[:, :2]))
 
 
 def _half_plane(points: Floats) -> Floats:
@@ -209,19 +199,15 @@ def _inner(spec: BaseSpec, seats: Seats, frame: Floats, light: LightSpheroid, hu
     """The wall's inner line: round the light, from the hub's rim to beyond the last boss."""
     behind = np.vstack([_wall_points(spec, seats, frame), light.outline()])
     rim = np.array([[hub.front, hub.disc + OFF_RIM_MM]])
-    end = _end(seats, frame)
+    # Beyond all bosses, toward the camera.
+    ends, fronts = (seats.at_depth(depth) @ frame[0] for depth in (seats.back, seats.front))
+    side = seats.boss * (seats.axes[:, 0] @ frame[0])
+    end = float((np.maximum(ends, fronts) + side).max() + EDGE_MM)
     line = trimmed(hull(np.vstack([rim, behind[behind[:, 0] > hub.front]])), end)
     if norm(line[-1] - line[-2]) < MIN_PART_MM and len(line) > 2:
         line = trimmed(line[:-1], end)
     root = line[0] - ROOTED_MM * unit(line[1] - line[0])
     return thinned(np.vstack([root, line[1:]]), MIN_PART_MM)
-
-
-def _end(seats: Seats, frame: Floats) -> float:
-    """Z beyond all bosses, toward the camera."""
-    ends, fronts = (seats.at_depth(depth) @ frame[0] for depth in (seats.back, seats.front))
-    side = seats.boss * (seats.axes[:, 0] @ frame[0])
-    return float((np.maximum(ends, fronts) + side).max() + EDGE_MM)
 
 
 def _rearmost(spec: BaseSpec, seats: Seats, rings: tuple[Floats, ...], frame: Floats) -> float:
@@ -265,13 +251,6 @@ def _ribs(
         best = np.lexsort((np.abs(shifts), np.round(overlap, 6)))[0]
         between.append(middle + shifts[best])
     return np.array([sector[0], *between, sector[1]])
-
-
-def _outline(spec: BaseSpec, inner: Floats, hub: Hub) -> Floats:
-    """Outer line of the ribs, from the hub's outer end, so that they are its gussets."""
-    line = offset(inner, spec.thickness_mm + spec.rib_height_mm)
-    corner = [hub.face + HUB_CORNER_MM, (hub.boss or hub.disc) - HUB_CORNER_MM]
-    return shortened(hull(np.vstack([[corner], line[line[:, 0] > corner[0]]])), RIB_END_MM)
 
 
 def _rings(spec: BaseSpec, inner: Floats) -> tuple[Floats, ...]:

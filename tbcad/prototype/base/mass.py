@@ -14,39 +14,23 @@ from tbcad.types import Floats
 
 
 def carrier_masses(base: BaseLayout, density: float) -> PointMasses:
-    """The carrier's pieces as point masses.
-
-    Args:
-        base: in numbers.
-        density: g/cm^3.
-    """
-    pieces = [_wall(base), *(_ring(base, ring) for ring in base.rings), _ribs(base), _bosses(base)]
-    pieces.append(_hub(base))
-    volume = np.concatenate([volumes for volumes, _ in pieces])
-    centre = np.concatenate([centres for _, centres in pieces])
+    """The carrier's pieces as point masses, by a density in g/cm^3."""
+    inner, outer = base.inner, base.outer
+    wall = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
+    revolved = _revolved(base, np.concatenate([wall, np.stack(base.rings)]))
+    pieces = [revolved, _ribs(base), _bosses(base), _hub(base)]
+    volume, centre = (np.concatenate(each) for each in zip(*pieces, strict=True))
     return PointMasses(volume / 1000 * density, centre)
 
 
-def _wall(base: BaseLayout) -> tuple[Floats, Floats]:
-    """Volumes (n,) and centres (n, 3) of the wall's parts."""
-    inner, outer = base.inner, base.outer
-    quads = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
-    return _revolved(base, quads)
-
-
-def _ring(base: BaseLayout, ring: Floats) -> tuple[Floats, Floats]:
-    return _revolved(base, ring[None])
-
-
 def _revolved(base: BaseLayout, quads: Floats) -> tuple[Floats, Floats]:
-    """Quadrilaterals (n, 4, 2) of (z, r) turned over the sector."""
-    area, middle = _area(quads), quads.mean(axis=1)
-    low, high = base.sector
+    """Volumes (n,) and centres (n, 3) of quadrilaterals (n, 4, 2) of (z, r) over the sector."""
+    middle, (low, high) = quads.mean(axis=1), base.sector
     angle = high - low
-    volume = area * middle[:, 1] * angle
     # The centre of gravity of an arc is nearer to the axis by the chord over the arc.
     arc = np.column_stack([middle[:, 0], middle[:, 1] * np.sin(angle / 2) / (angle / 2)])
-    return volume, at_azimuths(arc, np.array([(low + high) / 2]))[0] @ base.axes
+    centre = at_azimuths(arc, np.array([(low + high) / 2]))[0] @ base.axes
+    return _area(quads) * middle[:, 1] * angle, centre
 
 
 def _ribs(base: BaseLayout) -> tuple[Floats, Floats]:

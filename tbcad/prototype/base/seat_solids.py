@@ -1,6 +1,7 @@
-"""Bosses of the seats, and what is cut out of them: cup, pocket and path, but not the pads.
+"""Bosses of the seats, what is cut out of them, and caps.
 
-Each is built in the seat's own frame with the ball's centre at the origin and the seat's axis
+A cap is a part like a ball whose front is turned to a larger radius, for the same seat. Each is
+built in the seat's own frame with the ball's centre at the origin and the seat's axis
 along z, and then moved: a sphere whose axis is not the axis of the cut comes out invalid now and
 then.
 """
@@ -19,12 +20,17 @@ from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import Maker, Ring, hole_faces
+from tbcad.cad.kernel.checks import closed_mesh, properties
 from tbcad.cad.kernel.meshing import growth, primitive_mesh
-from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, revolved, wires
+from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, one_solid, revolved, wires
 from tbcad.core.geometry.primitives import Cylinder, Revolved
 from tbcad.core.geometry.vectors import perpendicular_axes
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.caps import cap_pocket, cap_spigot, flat_depth
+from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.profile import meridian
 from tbcad.prototype.base.seats import Seats
+from tbcad.prototype.printed import PlacedSolid
 from tbcad.types import Floats
 
 # The path is narrower than the cup by this share of the cup's clearance, so that the two meet at
@@ -38,6 +44,7 @@ ALONG = OWN_AXES[2]
 
 Point = tuple[float, float]
 """A point (x out, z along) of the half-plane y = 0."""
+UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
@@ -47,12 +54,9 @@ def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
 
 
 def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
-    """What a ball and its magnet need, without the posts of the pads, in the seat's own frame.
+    """What a ball and its magnet need, without posts of pads, in the own frame of seat k.
 
-    Args:
-        seats: of all balls.
-        k: number of the seat.
-        offset: how far the pads are moved off the ball, mm.
+    Pads are moved off the ball by an offset, mm.
     """
     return Maker(mirrored=False).solid(with_posts(faces(seat_room(seats, k)), seats, k, offset))
 
@@ -68,15 +72,11 @@ def seat_room(seats: Seats, k: int) -> TopoDS_Shape:
 def with_posts(
     room: Sequence[TopoDS_Face], seats: Seats, k: int, offset: float, axes: Floats = OWN_AXES
 ) -> list[TopoDS_Face]:
-    """Faces that bound a seat's room with those of the posts of its pads.
+    """Faces that bound the room of seat k with those of the posts of its pads.
 
-    Args:
-        room: faces with the room on their inner side, the ball's centre at the origin; the only
-            ones on a sphere are the cup's.
-        seats: of all balls.
-        k: number of the seat.
-        offset: how far the pads are moved off the ball, mm.
-        axes: what the seat's own x, y and z have become, as rows, (3, 3).
+    The room is on the inner side of its faces, the ball's centre at the origin; the only ones on a
+    sphere are the cup's. Pads are moved off the ball by an offset (mm). The rows of axes (3, 3) are
+    what the seat's own x, y and z have become.
     """
     maker = Maker(mirrored=False)
     size = (float(seats.cup[k]), float(seats.radius[k]) + offset, float(seats.pad[k]))
@@ -104,16 +104,10 @@ def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:
 def _post_faces(
     maker: Maker, normal: Floats, cup: float, end: float, radius: float
 ) -> tuple[Ring, list[TopoDS_Face]]:
-    """A pad's post in a cup: its rim on the cup's sphere; its wall, and the pad at its end.
+    """A pad's post: its rim on the sphere of a cup (mm); its wall, and the pad at its end.
 
-    Seats leave a web between their pads and the pocket, so that the rim is a whole circle.
-
-    Args:
-        maker: of kernel shapes.
-        normal: from the pad to the ball's centre, which is the origin, (3,).
-        cup: radius, mm.
-        end: distance of the pad from the origin, mm.
-        radius: of the post, mm.
+    The normal (3,) points from the pad to the ball's centre, which is the origin. Seats leave a web
+    between pads and pocket, so that the rim is a whole circle.
     """
     start = float(np.sqrt(cup**2 - radius**2))
     centre, depth = -start * normal[None], (start - end) * normal
@@ -145,11 +139,6 @@ def column_behind_boss(seats: Seats, k: int, length: float) -> TopoDS_Shape:
     """Cylinder behind a boss, in its own frame; no face of it lies on one of the boss."""
     start = (seats.back[k] - INTO_BOSS_MM) * ALONG
     return cylinder(start, ALONG, float(seats.boss[k]) - INTO_BOSS_MM, length)
-
-
-def moved_to_seat(shape: TopoDS_Shape, seats: Seats, k: int) -> TopoDS_Shape:
-    """A shape of the seat's own frame moved to its place."""
-    return moved(shape, seats.axes[k], seats.centre[k])
 
 
 def _hollow_section(cup: float, pocket: float, bottom: float) -> TopoDS_Face:
@@ -186,3 +175,43 @@ def arc_about_axis(middle: float, radius: float, start: Point, end: Point) -> To
     circle = gp_Circ(gp_Ax2(gp_Pnt(0, 0, middle), gp_Dir(0, -1, 0), gp_Dir(1, 0, 0)), radius)
     ends = (gp_Pnt(start[0], 0, start[1]), gp_Pnt(end[0], 0, end[1]))
     return BRepBuilderAPI_MakeEdge(circle, *ends).Edge()
+
+
+def cap_parts(base: BaseLayout, prototype: PrototypeLayout, mesh_mm: float) -> list[PlacedSolid]:
+    """A cap for each ball that is not bought, in its seat, its front up when it is printed."""
+    caps = np.flatnonzero(prototype.balls.cap).tolist()
+    return [_cap(base, prototype, k, mesh_mm) for k in caps]
+
+
+def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int, mesh_mm: float) -> PlacedSolid:
+    seats, balls, name = base.seats, prototype.balls, f"cap_{k + 1}"
+    section = _section(base, float(balls.radius[k]), float(balls.body_depth[k]), k)
+    axes, centre = seats.axes[k], seats.centre[k]
+    shape = one_solid(name, moved(revolved(section), axes, centre))
+    # The front is up and the flat lies on the bed.
+    on_bed = axes.T @ UPSIDE_DOWN
+    _, end = cap_spigot(base, k)
+    mesh, origin = closed_mesh(name, shape, mesh_mm), np.array([0, 0, end]) - centre @ on_bed
+    return PlacedSolid(name, shape, mesh, properties(shape), on_bed, origin)
+
+
+def _section(base: BaseLayout, front: float, depth: float, k: int) -> TopoDS_Face:
+    """Half section in y = 0: front, body, flat, spigot, pocket."""
+    body, flat = float(base.seats.radius[k]), flat_depth(base, k)
+    pocket, pocket_depth = cap_pocket(base, k, depth)
+    spigot, end = cap_spigot(base, k)
+    half_width = body / np.sqrt(2)
+    apex, edge = (0.0, -depth), (half_width, -half_width)
+    rim = (float(np.sqrt(body**2 - flat**2)), flat)
+    if front > body:
+        arcs = [
+            arc_about_axis(front - depth, front, apex, edge),
+            arc_about_axis(0.0, body, edge, rim),
+        ]
+    else:
+        arcs = [arc_about_axis(0.0, body, apex, rim)]
+    back: list[Point] = [(spigot, flat), (spigot, end)]
+    if pocket:
+        back += [(pocket, end), (pocket, end - pocket_depth)]
+    back.append((0.0, end - (pocket_depth if pocket else 0.0)))
+    return section_face([*arcs, *lines([rim, *back, apex])])

@@ -13,11 +13,11 @@ from tbcad.core.geometry.vectors import dot, norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
-from tbcad.prototype.base.pockets import (
+from tbcad.prototype.base.holding import (
+    AT_DEFAULT_SPEED,
     PAD_AZIMUTHS,
     WEB_MM,
-    Pockets,
+    Motion,
     first_ball,
     glue_wells,
     magnet_pockets,
@@ -92,16 +92,9 @@ class Seats:
 def seat_layout(
     spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
 ) -> Seats:
-    """One seat for each body of the prototype.
+    """One seat for each body of the prototype, which holds it in a motion of the base.
 
-    Args:
-        spec: of the base.
-        prototype: with its balls.
-        motion: of the base, against which its balls are held.
-
-    Raises:
-        SpecError: when a pad, pocket or magnet does not fit, or does not hold a ball; it says
-            what to change.
+    SpecError when a pad, pocket or magnet does not fit, or does not hold a ball: what to change.
     """
     pad_angle = spec.pad_angles_deg[0]
     radius, tilt = prototype.balls.body_radius, float(np.radians(pad_angle))
@@ -109,12 +102,19 @@ def seat_layout(
     cup = radius + spec.clearance_mm
     front = radius * np.cos(tilt) - pad * np.sin(tilt) - LIP_MM
     _check_cups(spec, radius, pad, front, pad_angle)
-    pockets = _pockets(spec, prototype, pad, tilt, motion)
-    bottom = radius + spec.magnet_gap_mm + pockets.height
+    room = radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
+    axes = _axes(prototype)
+    needed = worst_force_needed(prototype, axes, tilt, motion)
+    magnet, height, pocket = (
+        glue_wells(prototype, needed, room)
+        if spec.holds[0] == "glue"
+        else magnet_pockets(spec, prototype, needed, room)
+    )
+    bottom = radius + spec.magnet_gap_mm + height
     seats = Seats(
         centre=prototype.body_centres(),
         radius=radius,
-        axes=_axes(prototype),
+        axes=axes,
         cup=cup,
         pad=pad,
         tilt=tilt,
@@ -122,9 +122,9 @@ def seat_layout(
         front=front,
         back=bottom + spec.floor_mm,
         boss=np.sqrt(cup**2 - front**2) + spec.cup_wall_mm,
-        magnet=pockets.magnet,
-        magnet_height=pockets.height,
-        pocket=pockets.radius,
+        magnet=magnet,
+        magnet_height=height,
+        pocket=pocket,
         bottom=bottom,
         insertion=(prototype.balls.body_depth + cup)[:, None] * prototype.normals(),
         pad_offset=spec.pad_offset_mm,
@@ -157,21 +157,6 @@ def _check_cups(
             f"the pads of ball {first_ball(sunk)} do not stand out of its cup: make "
             f"prototype.base.clearance_mm more than {minimum:.2f} or prototype.base.pad_mm smaller"
         )
-
-
-def _pockets(
-    spec: BaseSpec,
-    prototype: PrototypeLayout,
-    pad: Floats,
-    tilt: float,
-    motion: Motion,
-) -> Pockets:
-    """What holds each ball with the room between its pads."""
-    room = prototype.balls.body_radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
-    needed = worst_force_needed(prototype, _axes(prototype), tilt, motion)
-    if spec.holds[0] == "glue":
-        return glue_wells(prototype, needed, room)
-    return magnet_pockets(spec, prototype, needed, room)
 
 
 def _with_clear_paths(seats: Seats) -> Seats:

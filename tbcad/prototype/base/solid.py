@@ -5,29 +5,29 @@ facets round cones about the axis: a plane meets bosses, cups and paths in circl
 where a cone meets them the kernel fits splines, which took half of the time of the carrier.
 """
 
+from collections.abc import Callable
+
 import numpy as np
-from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.checks import COARSE_MM, checked
+from tbcad.cad.kernel.checks import COARSE_MM, SolidProperties, checked
 from tbcad.cad.kernel.glyphs import fitting_height, relief
-from tbcad.cad.kernel.measures import SolidProperties
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import as_manifold, moved_mesh, volume_by_meshes
 from tbcad.cad.kernel.solids import (
     cut,
     cylinder,
     fused,
+    moved,
     polygon,
     polyhedron,
     prism,
     revolved_polygon,
 )
 from tbcad.core.geometry.rotations import unit_circle
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.prototype import BaseSpec
-from tbcad.prototype.base import seat_solids
 from tbcad.prototype.base.gaps import rib_gaps, ring_arcs
 from tbcad.prototype.base.hub import (
     KEY_DEPTH_MM,
@@ -39,6 +39,13 @@ from tbcad.prototype.base.hub import (
 )
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout
 from tbcad.prototype.base.profile import meridian
+from tbcad.prototype.base.seat_solids import (
+    boss_solid,
+    column_behind_boss,
+    insertion_path,
+    seat_hollow,
+    seat_hollow_mesh,
+)
 from tbcad.prototype.base.seats import Seats
 from tbcad.prototype.base.split import UNCUT, BaseSplit, downward_directions
 from tbcad.prototype.base.split_solids import (
@@ -47,7 +54,7 @@ from tbcad.prototype.base.split_solids import (
     label_windows,
     number_solids,
 )
-from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.prototype.printed import PlacedSolid, placed_on_bed
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -154,17 +161,9 @@ def facet_count(radius: float, angle: float) -> int:
 def carrier_parts(
     base: BaseLayout, split: BaseSplit, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
-    """The carrier placed on the bed: in one piece or as it is split.
+    """The carrier placed on the bed, in one piece or as it is split, meshes within mesh_mm.
 
-    Args:
-        base: in numbers.
-        split: how it is cut.
-        printer: with its bed.
-        mesh_mm: largest distance of meshes from the surface.
-
-    Raises:
-        SpecError: when a piece does not fit; it says how large the bed must be.
-        InvalidSolidError: when the kernel fails.
+    SpecError when a piece does not fit says how large the bed must be.
     """
     solid, mesh, properties = carrier_solid(base, mesh_mm, split)
     if split.joints:
@@ -179,12 +178,14 @@ def carrier_solid(
 ) -> tuple[TopoDS_Solid, Mesh, SolidProperties]:
     """The carrier before it is cut up, about z, with the flanges of its joints; mesh, properties.
 
-    Raises:
-        InvalidSolidError: when the kernel fails at every distance of SAME_MM.
+    InvalidSolidError when the kernel fails at every distance of SAME_MM.
     """
     seats = base.local_seats
     added, removed = added_solids(base, seats, split), removed_solids(base, seats)
-    hollows = [_hollow_mesh(seats, k) for k in range(len(seats))]
+    hollows = [
+        moved_mesh(seat_hollow_mesh(seats, k, seats.pad_offset), seats.axes[k], seats.centre[k])
+        for k in range(len(seats))
+    ]
     bodies, others = (
         [as_manifold(one, COARSE_MM) for one in some] for some in (added, removed[len(seats) :])
     )
@@ -202,34 +203,27 @@ def carrier_solid(
 
 def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> list[TopoDS_Shape]:
     """Solids whose union is the carrier before anything is cut out."""
-    labels = number_solids(base, split)
-    labels += [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
-    bosses = _at_seats(seats, [seat_solids.boss_solid(seats, k) for k in range(len(seats))])
+    numbers = [solid for k in range(len(seats)) for solid in _number(base, seats, k)]
     return [
         polyhedron(wall_facets(base)),
         *_struts(base, split),
         *hub_bodies(base.hub),
-        *bosses,
-        *labels,
+        *_at_seats(seats, boss_solid),
+        *number_solids(base, split),
+        *numbers,
     ]
 
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """What is cut out of that union: first the hollows of all seats, then paths and holes."""
-    cups = [seat_solids.seat_hollow(seats, k, seats.pad_offset) for k in range(len(seats))]
-    paths = [seat_solids.insertion_path(seats, k) for k in range(len(seats))]
-    holes = hub_holes(base.hub, base.spec)
-    return [*_at_seats(seats, cups), *_at_seats(seats, paths), *holes]
+    hollows = _at_seats(seats, lambda seats, k: seat_hollow(seats, k, seats.pad_offset))
+    return [*hollows, *_at_seats(seats, insertion_path), *hub_holes(base.hub, base.spec)]
 
 
-def _hollow_mesh(seats: Seats, k: int) -> Manifold:
-    mesh = seat_solids.seat_hollow_mesh(seats, k, seats.pad_offset)
-    return moved_mesh(mesh, seats.axes[k], seats.centre[k])
-
-
-def _at_seats(seats: Seats, shapes: list[TopoDS_Shape]) -> list[TopoDS_Shape]:
-    """Shapes, one in the own frame of each seat, moved to their places."""
-    return [seat_solids.moved_to_seat(shape, seats, k) for k, shape in enumerate(shapes)]
+def _at_seats(seats: Seats, solid: Callable[[Seats, int], TopoDS_Shape]) -> list[TopoDS_Shape]:
+    """A solid in the own frame of each seat, moved to its place."""
+    numbers = range(len(seats))
+    return [moved(solid(seats, k), seats.axes[k], seats.centre[k]) for k in numbers]
 
 
 def _struts(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
@@ -245,14 +239,9 @@ def _struts(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
     struts, flanges = [*_ribs(base), *rings], flange_solids(base, split)
     if not flanges:
         return struts
-    return [cut(fused([*struts, *flanges]), [*_columns(base), *label_windows(base, split)])]
-
-
-def _columns(base: BaseLayout) -> list[TopoDS_Shape]:
-    """The space that is kept free behind all bosses."""
-    seats = base.local_seats
-    columns = [seat_solids.column_behind_boss(seats, k, COLUMN_MM) for k in range(len(seats))]
-    return _at_seats(seats, columns)
+    # Behind all bosses space is kept free.
+    columns = _at_seats(base.local_seats, lambda s, k: column_behind_boss(s, k, COLUMN_MM))
+    return [cut(fused([*struts, *flanges]), [*columns, *label_windows(base, split)])]
 
 
 def _ribs(base: BaseLayout) -> list[TopoDS_Shape]:

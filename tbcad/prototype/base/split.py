@@ -9,20 +9,28 @@ A piece is a region: rows (h, 4) of a unit normal and a level, the piece on the 
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import label
 from scipy.spatial import ConvexHull
 
-from tbcad.core.geometry.rotations import unit_circle
+from tbcad.core.geometry.rotations import even_angles, unit_circle
+from tbcad.core.geometry.vectors import norm, perpendicular_axes
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
-from tbcad.prototype.base.joints import Cut, CutPlane, Joint, in_region, plan_joint
+from tbcad.prototype.base.joints import (
+    Cut,
+    CutPlane,
+    Joint,
+    flange_top,
+    in_region,
+    joint_hardware,
+    plan_joint,
+)
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.profile import meridian
-from tbcad.prototype.base.screws import joint_hardware
-from tbcad.prototype.base.split_points import STEP_MM, base_points, bosses_and_hub
-from tbcad.prototype.printing.bed import min_bed, shortfall, size_text
+from tbcad.prototype.base.profile import at_azimuths, meridian
+from tbcad.prototype.print_bed import min_bed, shortfall, size_text
 from tbcad.types import Bools, Floats, Ints
 
 CLEARANCE_MM = 1.0  # of a plane from any boss
@@ -36,6 +44,9 @@ SLIVER = 50  # a piece of less than 1/50 of the wall is a sliver
 ROUNDING_MM = 1e-9
 DECIMALS = 3  # to which sizes of pieces are compared, mm
 WHOLE: Floats = np.zeros((0, 4))  # the region that nothing cuts
+AZIMUTH_STEP = np.radians(1.5)
+STEP_MM = 4.0  # maximum distance of points along a line
+RIM_CORNERS = 24
 
 
 @dataclass(frozen=True)
@@ -56,8 +67,7 @@ UNCUT = BaseSplit((WHOLE,), ())
 def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
     """How a base is cut so that every piece fits the bed: into as few as can be found.
 
-    Raises:
-        SpecError: when no cut does; it names the bed that would.
+    SpecError when no cut does; it names the bed that would.
     """
     search = _SplitSearch(base, printer)
     if search.shortfall(WHOLE) <= 0:
@@ -73,12 +83,7 @@ def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
 
 
 def downward_directions(base: BaseLayout, piece: Floats) -> list[Floats]:
-    """Directions of the carrier's own frame that may point down when a piece is printed.
-
-    Args:
-        base: with its sector.
-        piece: region of the piece, (h, 4).
-    """
+    """Directions of the carrier's own frame that may point down when a piece is printed."""
     x, y, up = np.eye(3)
     low, high = (meridian(azimuth)[1] for azimuth in base.sector)
     return [-up, up, 0.0 - low, high, -x, -y, y, *piece[:, :3], *-piece[:, :3]]
@@ -99,7 +104,10 @@ class _SplitSearch:
     def __post_init__(self) -> None:
         self.bodies = bosses_and_hub(self.base)
         self.wall, self.hull, self.flange_tops = base_points(self.base, self.bodies)
-        self.normals = _half_sphere(NORMALS)
+        # Spread evenly over the half sphere x >= 0 by a spiral.
+        share, turn = (np.arange(NORMALS) + 0.5) / NORMALS, np.pi * (1 + np.sqrt(5))
+        spiral = np.sqrt(1 - share**2)[:, None] * unit_circle(turn * np.arange(NORMALS))
+        self.normals = np.column_stack([share, spiral])
 
     def splits(self, count: int) -> Iterator[BaseSplit]:
         """Splits into a number of pieces that fit the bed and whose joints have room."""
@@ -197,12 +205,7 @@ def _sides(piece: Floats, plane: CutPlane) -> tuple[Floats, Floats]:
 
 
 def _widest_of_each_partition(below: Bools, gap: Floats) -> list[int]:
-    """A few of p planes for each partition of the bodies: the widest gaps, evenly thinned.
-
-    Args:
-        below: whether each body is below the plane, (p, b).
-        gap: between the bodies below and above, mm, (p,).
-    """
+    """A few planes for each partition of bodies below (p, b): the widest gaps (p,), thinned."""
     # Partitions in the order of binary numbers, the last body's digit first.
     _, partition = np.unique(below[:, ::-1], axis=0, return_inverse=True)
     chosen: list[int] = []
@@ -215,8 +218,71 @@ def _widest_of_each_partition(below: Bools, gap: Floats) -> list[int]:
     return chosen
 
 
-def _half_sphere(count: int) -> Floats:
-    """Directions spread evenly over the half sphere x >= 0 by a spiral, (count, 3)."""
-    share = (np.arange(count) + 0.5) / count
-    spiral = unit_circle(np.pi * (1 + np.sqrt(5)) * np.arange(count))
-    return np.column_stack([share, np.sqrt(1 - share**2)[:, None] * spiral])
+@dataclass(frozen=True)
+class RoundBodies:
+    """Cylinders that no plane may cut: ends (m, 3) of their axes, radii (m,), mm."""
+
+    start: Floats
+    end: Floats
+    radius: Floats
+
+    @property
+    def axis(self) -> Floats:
+        """Unit vectors from start to end, (m, 3)."""
+        return np.asarray((self.end - self.start) / norm(self.end - self.start)[:, None])
+
+    def levels(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Minimum and maximum level of each along unit normals (n, 3), both (n, m)."""
+        across = self.radius * np.sqrt(np.maximum(1 - (normals @ self.axis.T) ** 2, 0))
+        ends = np.stack([normals @ self.start.T, normals @ self.end.T])
+        return ends.min(axis=0) - across, ends.max(axis=0) + across
+
+    def rims(self) -> Floats:
+        """Corners of polygons round both ends of each, (m, 2, RIM_CORNERS, 3)."""
+        first, second = np.moveaxis(-perpendicular_axes(self.axis), 1, 0)
+        angle = even_angles(RIM_CORNERS)
+        circle = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
+        circle *= (self.radius / np.cos(np.pi / RIM_CORNERS))[:, None, None]
+        ends = np.stack([self.start, self.end], axis=1)
+        return np.asarray(ends[:, :, None] + circle[:, None])
+
+
+def bosses_and_hub(base: BaseLayout) -> RoundBodies:
+    """Bosses with their numbers, and last the hub."""
+    seats, hub = base.local_seats, base.hub
+    up = np.array([0.0, 0.0, 1.0])
+    return RoundBodies(
+        np.vstack([seats.at_depth(seats.front), hub.face * up]),
+        np.vstack([seats.at_depth(seats.back + base.spec.relief_mm), hub.front * up]),
+        np.append(seats.boss, max(hub.disc, hub.boss)),
+    )
+
+
+def base_points(base: BaseLayout, bodies: RoundBodies) -> tuple[Floats, Floats, Floats]:
+    """Points of a base with its bosses and hub, mm.
+
+    In the middle of the wall, a grid over azimuth and meridian, (a, p, 3); round all of the base,
+    (c, 3); and on the outer faces that flanges could have, (t, 3).
+    """
+    low, high = base.sector
+    azimuth = np.linspace(low, high, int(np.ceil((high - low) / AZIMUTH_STEP)) + 1)
+    parts = [
+        *(at_azimuths(_dense(line), azimuth) for line in (base.inner, base.outer)),
+        at_azimuths(_dense(base.outline), base.ribs),
+        *(at_azimuths(ring, azimuth) for ring in base.rings),
+        bodies.rims(),
+    ]
+    return (
+        at_azimuths(_dense(base.middle), azimuth),
+        np.vstack([part.reshape(-1, 3) for part in parts]),
+        at_azimuths(_dense(flange_top(base)), azimuth).reshape(-1, 3),
+    )
+
+
+def _dense(line: Floats) -> Floats:
+    """A line (n, 2) with points no farther apart than a step."""
+    parts = [
+        np.linspace(a, b, int(np.ceil(norm(b - a) / STEP_MM)), endpoint=False)
+        for a, b in pairwise(line)
+    ]
+    return np.vstack([*parts, line[-1:]])

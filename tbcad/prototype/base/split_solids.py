@@ -6,25 +6,24 @@ All is built in the carrier's own frame: z the axis, x azimuth zero.
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-from tbcad.cad.kernel.checks import checked
+from tbcad.cad.kernel.checks import SolidProperties, checked
 from tbcad.cad.kernel.glyphs import fitting_height, relief
-from tbcad.cad.kernel.measures import SolidProperties
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import volume_by_cut_mesh
 from tbcad.cad.kernel.solids import common, cut, cylinder, polygon, prism, revolved_polygon
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.joints import (
     ACCESS_MM,
     LABEL_MM,
     Joint,
     flange_profile,
+    joint_hardware,
 )
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.base.screws import joint_hardware
 from tbcad.prototype.base.split import BaseSplit, downward_directions
-from tbcad.prototype.printing.placing import PlacedSolid, placed_on_bed
+from tbcad.prototype.printed import PlacedSolid, placed_on_bed
 from tbcad.types import Bools, Floats
 
 FAR_MM = 2000.0  # larger than any base
@@ -39,16 +38,14 @@ SAME_PLANE = 1e-12
 
 def flange_solids(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
     """Both flanges of each joint in one solid."""
-    return [_flange(base, joint) for joint in split.joints]
-
-
-def _flange(base: BaseLayout, joint: Joint) -> TopoDS_Shape:
-    low, high = base.sector
+    (low, high), thickness, flanges = base.sector, base.spec.joint_mm, []
     inside = FLANGE_END * base.spec.rib_mm / float(base.inner[:, 1].max())
-    band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
-    thickness, normal = base.spec.joint_mm, joint.plane.normal
-    slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
-    return cut(common(band, slab), [_beyond(row) for row in joint.region])
+    for joint in split.joints:
+        normal = joint.plane.normal
+        band = revolved_polygon(flange_profile(base), low + inside, high - low - 2 * inside)
+        slab = prism(_square(normal, joint.plane.level - thickness), 2 * thickness * normal)
+        flanges.append(cut(common(band, slab), [_beyond(row) for row in joint.region]))
+    return flanges
 
 
 def _square(normal: Floats, level: float) -> TopoDS_Shape:
@@ -102,18 +99,9 @@ def _number(base: BaseLayout, split: BaseSplit, out: Floats, place: Floats) -> l
 def carrier_pieces(
     base: BaseLayout, split: BaseSplit, whole: TopoDS_Solid, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
-    """The pieces placed on the bed.
+    """The pieces of a whole carrier with flanges, placed on the bed; meshes within mesh_mm.
 
-    Args:
-        base: that is cut.
-        split: how it is cut.
-        whole: the carrier with its flanges, not yet cut.
-        printer: with its bed.
-        mesh_mm: largest distance of their meshes from the surface.
-
-    Raises:
-        SpecError: when a piece does not fit the bed.
-        InvalidSolidError: when the kernel fails.
+    SpecError when a piece does not fit, InvalidSolidError when the kernel fails.
     """
     seats = base.local_seats
     return [

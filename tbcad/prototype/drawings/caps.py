@@ -20,14 +20,7 @@ EDGE_DEG = 45.0  # where front and body meet, on the body
 
 
 def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: CapRecord) -> Sheet:
-    """The optical drawing of a cap.
-
-    Args:
-        design: for the title block.
-        base: with its seat.
-        prototype: with its body.
-        one: its key and limits.
-    """
+    """The optical drawing of a cap by its limits; the design is for the title block."""
     k = one.ball - 1
     body = 2 * float(prototype.balls.body_radius[k])
     scale = choose_scale((body, _thickness(prototype, one)), VIEW_MM)
@@ -45,9 +38,8 @@ def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: Ca
         *_section(base, prototype, one, scale),
         *_table(one, float(prototype.balls.radius[k]), body),
     ]
-    return Sheet(
-        one.pdf.removesuffix(".pdf"), block.title, name, A4, scale, MIDDLE_MM, tuple(entities)
-    )
+    file = one.pdf.removesuffix(".pdf")
+    return Sheet(file, block.title, name, A4, scale, MIDDLE_MM, tuple(entities))
 
 
 def _thickness(prototype: PrototypeLayout, one: CapRecord) -> float:

@@ -29,15 +29,15 @@ from tbcad.cad.drafting.sheet import (
     sheet_frame,
     table,
 )
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.frame.brackets import TAPPED_M5_MM
 from tbcad.prototype.frame.head import GAP_MM
 from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.prototype.frame.purchased import wheel_radius
+from tbcad.prototype.frame.purchased import EXTRUSION_MM, TAPPED_M5_MM, wheel_radius
+from tbcad.prototype.light.lamp import EDGE_MM, LampLayout
 from tbcad.prototype.purchased.parts import PurchasedPart
 
 PLATE, WHEEL, UPRIGHT = "drawing_plate", "drawing_wheel", "drawing_upright"
@@ -54,6 +54,9 @@ LAMP_NOTES = {
 }
 LEVEL_MM = 8.0  # from one dimension line to the next
 CUT_MM = 1.0  # tolerance of what is sawn, to either side: feet clamp anywhere along
+LAMP = "drawing_lamp"
+STRIP_CUT_MM = 0.5  # tolerance of a cut at its mark, to either side
+BESIDE_STRIPS_MM = 8.0  # of dimension lines from the strips
 
 
 @dataclass(frozen=True)
@@ -78,10 +81,9 @@ def listed(design: str, rows: Sequence[Row]) -> Listed:
 
 def sheets(frame: FrameLayout, base: BaseLayout, drive: Drive, bill: Listed) -> list[Sheet]:
     """All sheets of a prototype."""
-    found = [plate_sheet(frame, bill), upright_sheet(frame, bill)]
-    if drive.wheel:
-        found.append(wheel_sheet(base, drive.wheel, bill))
-    return found
+    wheel = [wheel_sheet(base, drive.wheel, bill)] if drive.wheel else []
+    lamps = [lamp_sheet(frame.lamps, bill)] if frame.lamps else []
+    return [plate_sheet(frame, bill), upright_sheet(frame, bill), *wheel, *lamps]
 
 
 def plate_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
@@ -135,6 +137,7 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
     circles = [one for one in drawn if isinstance(one, Circle) and one.layer == Layer.CUT]
     title = "driven wheel"
     angle = float(np.degrees(np.arctan2(places[0][1], places[0][0])))
+    on_holes = f"{len(holes)} x Ø<> on Ø{circle:g}"
     text = (
         f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, width of the belt's rim as bought.",
         f"{len(holes)} x Ø{SCREW_MM:g} through on a circle of Ø{circle:g} ± 0.1,",
@@ -145,30 +148,20 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: Listed) -> Sheet:
         f"Turn off a hub: the head's plate is {GAP_MM:g} mm behind.",
     )
     ring, bore, first = circles[0], circles[1], circles[2]
-    top = ring.centre[1] + ring.radius
+    right, top = origin[0] + ring.radius, ring.centre[1] + ring.radius
     entities = [
         *sheet_frame(paper, scale, bill.block(title, part, "on the face at the zero disc")),
         *drawn,
         *(line for one in (ring, *circles[2:]) for line in centre_cross(one)),
         across(
             (origin[0] - ring.radius, origin[1]),
-            (origin[0] + ring.radius, origin[1]),
+            (right, origin[1]),
             origin[1] - ring.radius - ASIDE_MM / 2,
             f"{2 * radius:.1f}",
             "(Ø<>)",
         ),
-        diameter(
-            first,
-            *_called(first, (origin[0] + ring.radius, top)),
-            f"{SCREW_MM:g}",
-            f"{len(holes)} x Ø<> on Ø{circle:g}",
-        ),
-        diameter(
-            bore,
-            *_called(bore, (origin[0] + ring.radius, origin[1])),
-            f"{part['bore_mm']:g}",
-            "Ø<>",
-        ),
+        diameter(first, *_called(first, (right, top)), f"{SCREW_MM:g}", on_holes),
+        diameter(bore, *_called(bore, (right, origin[1])), f"{part['bore_mm']:g}", "Ø<>"),
         *notes(corner, NOTES_MM - BESIDE_MM, text),
     ]
     return Sheet(WHEEL, title, part.name, paper, scale, origin, tuple(entities))
@@ -187,7 +180,8 @@ def upright_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
     ]
     drawn = placed([rectangle((0, 0, length, side), Layer.CUT), *lines], origin, scale)
     centre = origin[1] + side * scale / 2
-    heights = _lamp_screws(frame)
+    # Of a lamp holder's screws above the plate, mm; none without lamps.
+    heights = sorted(z - frame.floor for z in frame.lamps.screws) if frame.lamps else []
     title = "upright"
     text = (
         f"Saw from {part.what}.",
@@ -204,13 +198,6 @@ def upright_sheet(frame: FrameLayout, bill: Listed) -> Sheet:
         *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
     ]
     return Sheet(UPRIGHT, title, part.name, paper, scale, origin, tuple(entities))
-
-
-def _lamp_screws(frame: FrameLayout) -> list[float]:
-    """Heights of a lamp holder's screws above the plate, mm; none without lamps."""
-    if frame.lamps is None:
-        return []
-    return sorted(z - frame.floor for z in frame.lamps.screws)
 
 
 def _heights(
@@ -248,10 +235,8 @@ def _datum(origin: Point) -> Iterator[Entity]:
     x, y = origin
     corner = x - OFF_MM, y - OFF_MM
     right, up = (x + DATUM_MM, corner[1]), (corner[0], y + DATUM_MM)
-    for tip, place, name in (
-        (right, (right[0] + 1.0, right[1] - 1.0), "x"),
-        (up, (up[0] - 0.6, up[1] + 1.0), "y"),
-    ):
+    beyond_x, beyond_y = (right[0] + 1.0, right[1] - 1.0), (up[0] - 0.6, up[1] + 1.0)
+    for tip, place, name in ((right, beyond_x, "x"), (up, beyond_y, "y")):
         yield Line(Layer.DIMENSIONS, corner, tip)
         yield arrow(tip, corner)
         yield Text(Layer.DIMENSIONS, place, TEXT_MM, name)
@@ -272,3 +257,59 @@ def _hole_cells(frame: FrameLayout) -> list[tuple[str, ...]]:
         (str(number), f"{x:.2f}", f"{y:.2f}", "M5", name.replace("_", " "))
         for number, ((x, y), name) in enumerate(zip(places, frame.holds, strict=True), 1)
     ]
+
+
+def lamp_sheet(lamps: LampLayout, bill: Listed) -> Sheet:
+    """The strips of a lamp side by side, lying; the origin is their lower left corner."""
+    part, paper = lamps.strip, A4
+    left, low, right, high = drawing_room(paper)
+    middle = low + (high - low) / 2
+    size, pieces = (lamps.length, lamps.width), lamps.strips * len(lamps.places)
+    scale, origin = fitted(size, (left, middle, right, high))
+    wide = part["width_mm"]
+    strips = [
+        rectangle((0.0, k * wide, lamps.length, (k + 1) * wide), Layer.CUT)
+        for k in range(lamps.strips)
+    ]
+    steps = part["cut_mm"] * np.arange(1, round(lamps.length / part["cut_mm"]))
+    uncut = [Line(Layer.CENTRE, (x, 0.0), (x, lamps.width)) for x in steps.tolist()]
+    drawn = placed([*strips, *uncut], origin, scale)
+    x, y = origin[0] + lamps.length * scale, origin[1]  # beside it, the width of a strip
+    of_one = upward((x, y), (x, y + wide * scale), x + BESIDE_STRIPS_MM, f"{wide:g}")
+    title = "strips of a lamp"
+    text = (
+        f"Cut {pieces} pieces of {lamps.length:g} \u00b1 {STRIP_CUT_MM:g}, {lamps.strips} for each "
+        f"of {len(lamps.places)} lamps, at marks every {part['cut_mm']:g}, through the copper "
+        "pads.",
+        _place_note(lamps),
+        "Solder a cable to the pads of one end, plus to plus, before sticking; insulate the pads.",
+        f"{part['supply_v']:g} V, {part['watt_m'] * lamps.length / part['supply_v']:.0f} "
+        "mA for each piece; all pieces in parallel.",
+    )
+    entities = [
+        *sheet_frame(paper, scale, bill.block(title, part, "on the shining face")),
+        *drawn,
+        *outer(origin, (size[0] * scale, size[1] * scale), size),
+        *([of_one] if lamps.strips > 1 else []),
+        *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
+    ]
+    return Sheet(LAMP, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def _place_note(lamps: LampLayout) -> str:
+    """Where the strips stick on the printed plates."""
+    if not lamps.level:
+        half = max(lamps.width / 2 + EDGE_MM, EXTRUSION_MM / 2)
+        return (
+            f"Stick them upright on the printed face, side by side, {EDGE_MM:g} below its upper "
+            f"end: in the middle of a stand, their middle {half:g} from the outer edge of a holder."
+        )
+    aside = abs(float(lamps.places[0, 1]))
+    middle = (
+        f"their middle {aside:g} beside the middle of bar and bridge, on opposite sides"
+        if aside
+        else "in the middle of bar and bridge"
+    )
+    return (
+        f"Stick them level on the printed face, one above the other, at half its height, {middle}."
+    )

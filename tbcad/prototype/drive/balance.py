@@ -90,13 +90,10 @@ class BaseBalance:
         return float(np.abs(self.torque(np.array([low, high]))).max())
 
     def required_torque(self, low: float, high: float, acceleration: float, safety: float) -> float:
-        """Holding torque that a drive must have on the base, N mm.
+        """Holding torque that a drive must have between two base angles (rad), N mm.
 
-        Args:
-            low: minimum base angle, radians.
-            high: maximum base angle, radians.
-            acceleration: of the base, radians/s^2.
-            safety: factor on gravity and acceleration together; it covers friction too.
+        acceleration is in radians/s^2; safety is on it and gravity together, and covers friction
+        too.
         """
         return safety * (self.max_torque(low, high) + self.inertia * acceleration * 1e-6)
 
@@ -114,11 +111,7 @@ def sum_masses(frame: Floats, *loads: PointMasses) -> BaseBalance:
 
 
 def ball_masses(prototype: PrototypeLayout, cap_density: float) -> PointMasses:
-    """All balls and caps in their places.
-
-    Args:
-        prototype: with its balls.
-        cap_density: density of the caps' material, g/cm^3.
+    """All balls and caps in their places; cap_density in g/cm^3.
 
     The mass of a cap counts at the centre of its body's sphere, which is at most a few millimetres
     from its centre of gravity.

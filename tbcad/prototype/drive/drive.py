@@ -119,8 +119,7 @@ def belt_length(distance: float, small: float, large: float) -> float:
 def centre_distance(length: float, small: float, large: float) -> float:
     """Distance of two wheels' axes at which a belt of a length (mm) is tight, mm.
 
-    Raises:
-        SpecError: when the belt is too short for the wheels to clear each other.
+    SpecError when the belt is too short for the wheels to clear each other.
     """
     touching = (small + large) / 2
     if length <= belt_length(touching, small, large):
@@ -134,8 +133,7 @@ def centre_distance(length: float, small: float, large: float) -> float:
 def load_drives(parts: Parts, folder: Traversable | None = None) -> tuple[Drive, ...]:
     """All drives in the order of drives.csv, the smallest of a name first.
 
-    Raises:
-        SpecError: when the file is wrong, or names a part that is in no list.
+    SpecError when the file is wrong, or names a part that is in no list.
     """
     file = (folder or package_lists()) / "drives.csv"
     rows = read_rows(file, "drives.csv", DRIVE_COLUMNS)

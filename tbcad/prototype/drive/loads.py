@@ -190,11 +190,7 @@ class DriveLoads:
 
 
 def choose_drive(name: str, torques: BaseTorques, drives: Sequence[Drive]) -> Drive:
-    """The first drive of a name that bears the base.
-
-    Raises:
-        SpecError: when none does; it says what to change.
-    """
+    """The first drive of a name that bears the base; SpecError when none does."""
     candidates = [drive for drive in drives if drive.name == name]
     if not candidates:
         known = ", ".join(dict.fromkeys(drive.name for drive in drives))

@@ -14,13 +14,12 @@ Sources: grblHAL core gcode.c; grbl/gcode.c, grbl/protocol.h and doc/markdown/se
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import StopSequence, home_angles, stop_sequence
-from tbcad.prototype.electronics.outputs import LIT, phases
+from tbcad.prototype.electronics import LIT, phases
 from tbcad.records.prototype_drive import Phase
 
 MAX_LINE_LENGTH = 79
@@ -33,13 +32,7 @@ SETTING = {"X": 0, "A": 3}  # of the axis: $100 or $103, and so on
 def gcode_program(
     prototype: PrototypeLayout, drive: Drive, motion: MotionSpec, leds: int
 ) -> list[str]:
-    """Lines of the program, each shorter than 80 characters.
-
-    Args:
-        prototype: whose stops are driven to.
-        drive: of the base.
-        motion: of the base.
-        leds: number of LEDs.
+    """Lines of the program for the stops of a prototype, each shorter than 80 characters.
 
     Raises:
         SpecError: when the base cannot be where the program starts, for post or camera.
@@ -70,15 +63,8 @@ def _known_angle(prototype: PrototypeLayout, motion: MotionSpec) -> Iterator[str
         yield f"G92 {_axis_word(motion.home_deg, motion)}"
         return
     homed = round(home_angles(prototype, motion).homed + motion.home_trim_deg, DECIMALS)
-    yield "M0 (MSG, zero pin out, object straight? Then resume)"
-    yield "$H"
-    yield modes
+    yield from ("M0 (MSG, zero pin out, object straight? Then resume)", "$H", modes)
     yield f"G92 {_axis_word(homed, motion)}"
-
-
-def write_program(path: Path, lines: list[str]) -> None:
-    """Write rotation_plan.nc."""
-    path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
 
 
 def duration_minutes(sequence: StopSequence, motion: MotionSpec, lit: tuple[Phase, ...]) -> float:
@@ -138,20 +124,14 @@ def _phase(stop: int, phase: Phase, motion: MotionSpec, *, switched: bool) -> It
     if switched and motion.light_s:
         yield _dwell(motion.light_s)
     name = f"{phase.name}, " if switched else ""
-    yield from _photograph(f"stop {stop}: {name}photograph", motion)
+    if motion.trigger == "pause":
+        yield f"M0 (MSG, stop {stop}: {name}photograph, then resume)"
+    else:
+        yield from ("M8", _dwell(motion.trigger_s), "M9")
+        if motion.exposure_s:
+            yield _dwell(motion.exposure_s)
     if phase.output is not None:
         yield f"M65 P{phase.output}"
-
-
-def _photograph(title: str, motion: MotionSpec) -> Iterator[str]:
-    if motion.trigger == "pause":
-        yield f"M0 (MSG, {title}, then resume)"
-        return
-    yield "M8"
-    yield _dwell(motion.trigger_s)
-    yield "M9"
-    if motion.exposure_s:
-        yield _dwell(motion.exposure_s)
 
 
 def _dwell(seconds: float) -> str:

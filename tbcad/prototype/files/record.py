@@ -3,12 +3,11 @@
 import numpy as np
 
 from tbcad.cad.drafting.sheet import Sheet
-from tbcad.cad.formats.csv_table import Row
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
-from tbcad.prototype.base.caps import cap_limits
-from tbcad.prototype.base.held import holding
+from tbcad.prototype.base.caps import cap_limits, holding
 from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import Drive
@@ -20,21 +19,27 @@ from tbcad.prototype.drive.loads import (
     DriveLoads,
     base_torques,
 )
-from tbcad.prototype.drive.power_off import power_off
-from tbcad.prototype.drive.travel import stop_sequence
-from tbcad.prototype.electronics.outputs import phases
+from tbcad.prototype.drive.travel import power_off, stop_sequence
+from tbcad.prototype.electronics import phases
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.files.bom_csv import totals
+from tbcad.prototype.files.bom import totals
 from tbcad.prototype.frame.camera_gauge import marks_seen
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.printing.placing import PrintedPart
-from tbcad.prototype.stage.calibration import calibration_estimate
+from tbcad.prototype.printed import PrintedPart
 from tbcad.prototype.stage.layout import led_poses
+from tbcad.prototype.stage.leds import calibration_estimate
 from tbcad.records import prototype as records
 from tbcad.records.prototype import MATT_BLACK, Prototype
-from tbcad.records.prototype_drive import Controller, DriveRecord, Home, PowerOff
-from tbcad.records.prototype_light import CardPanel, LampPlace, LampsRecord, ShroudRecord
+from tbcad.records.prototype_drive import (
+    CardPanel,
+    Controller,
+    DriveRecord,
+    Home,
+    LampPlace,
+    LampsRecord,
+    ShroudRecord,
+)
 
 STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
 PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
@@ -50,14 +55,10 @@ BLACKENED = frozenset(
 
 
 def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> Prototype:
-    """What is known of the prototype, in numbers, but its steps of assembly.
-
-    Args:
-        built: the prototype.
-        bill: rows of the parts list.
-        drawings: of what is cut or drilled.
-    """
+    """What is known of the prototype, in numbers, but its steps of assembly."""
     layout, spec, frame = built.layout, built.spec.prototype, built.frame
+    angles, leds = frame.homing.angles, len(built.stage.leds)
+    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
     axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
     return Prototype(
         camera="a",
@@ -79,14 +80,14 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         controller=Controller(
             firmware=spec.motion.controller,
             axis=spec.motion.axis,
-            phases=phases(len(built.stage.leds), spec.motion),
+            phases=phases(leds, spec.motion),
         ),
         caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),
         home=Home(
-            switch_deg=frame.homing.angles.switch,
-            homed_deg=frame.homing.angles.homed,
-            travel_deg=frame.homing.angles.travel,
+            switch_deg=angles.switch,
+            homed_deg=angles.homed,
+            travel_deg=angles.travel,
             pin=frame.homing.pin,
             zero_error_deg=frame.homing.error_deg,
         ),
@@ -113,21 +114,16 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         assembly=records.AssemblyFiles(step=STEP, glb=GLB),
         drive=drive_record(built.balance, built.drive, spec.motion, layout.stops.range),
-        power_off=_power_off(built),
+        power_off=power_off(
+            built.balance, low, high, holds_itself=built.drive.efficiency < SELF_LOCKING
+        ),
     )
 
 
 def drive_record(
     balance: BaseBalance, drive: Drive, motion: MotionSpec, swing: tuple[float, float]
 ) -> DriveRecord:
-    """What the drive must bear and does, with its limits.
-
-    Args:
-        balance: masses on the base.
-        drive: chosen for them.
-        motion: of the base.
-        swing: smallest and largest base angle, radians.
-    """
+    """What the drive must bear and does over a swing (radians), with its limits."""
     torques = base_torques(balance, swing, motion)
     loads = DriveLoads(drive, torques)
     return DriveRecord(
@@ -162,13 +158,6 @@ def drive_record(
         motor_rise_k=loads.motor_rise,
         motor_rise_limit_k=MAX_RISE_K,
     )
-
-
-def _power_off(built: PrototypeModel) -> PowerOff:
-    """The base without power, between the ends of its travel."""
-    angles, drive = built.frame.homing.angles, built.drive
-    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
-    return power_off(built.balance, low, high, holds_itself=drive.efficiency < SELF_LOCKING)
 
 
 def _swing(built: PrototypeModel, motion: MotionSpec) -> tuple[float, float]:

@@ -5,9 +5,11 @@ rotation_plan.csv every picture, stops.csv every stop of the base, and plate_hol
 base plate is drilled and tapped.
 """
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
-from tbcad.cad.formats.csv_table import Cell, Row
+from tbcad.cad.formats.checked_files import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.loads import DriveLoads
@@ -32,10 +34,14 @@ def ball_rows(layout: PrototypeLayout) -> list[Row]:
     """
     served = np.bincount(layout.fit.ball, minlength=len(layout)).tolist()
     cells = zip(_pose(layout).tolist(), served, _shown(layout).tolist(), strict=True)
-    return [
-        dict(zip(BALL_COLUMNS, [*_names(layout, j), *pose, count, *shown], strict=True))
-        for j, (pose, count, shown) in enumerate(cells)
-    ]
+    return _rows(
+        BALL_COLUMNS,
+        ([*_names(layout, j), *cell[0], cell[1], *cell[2]] for j, cell in enumerate(cells)),
+    )
+
+
+def _rows(columns: Iterable[str], cells: Iterable[Sequence[Cell]]) -> list[Row]:
+    return [dict(zip(columns, row, strict=True)) for row in cells]
 
 
 def _names(layout: PrototypeLayout, j: int) -> list[Cell]:
@@ -88,20 +94,21 @@ def picture_rows(layout: PrototypeLayout) -> list[Row]:
     its stops twice, both times upward, so that play in the drive has no effect. One photograph
     shows all mirrors of a stop. Errors of azimuth and polar angle are the ball's less the mirror's.
     """
-    stops, ball = layout.stops, (layout.fit.ball + 1).tolist()
+    stops, ball, stop = layout.stops, (layout.fit.ball + 1).tolist(), layout.stops.stop.tolist()
     errors = [stops.polar_error, stops.azimuth_error, stops.error]
     degrees = (np.degrees([stops.angle[stops.stop], *errors]) + 0.0).T.tolist()
     order = np.argsort(stops.stop, kind="stable").tolist()
     mirrors_b = [f"b{i + 1:04d}" for i in layout.twin.tolist()]
-    rows = [
-        (turn, int(stops.stop[i]) + 1, degrees[i][0], ball[i], mirrors[i], *degrees[i][1:])
-        for turn, mirrors in ((0, layout.array.ids), (180, mirrors_b))
-        for i in order
-    ]
-    return [
-        dict(zip(PICTURE_COLUMNS, (number, *row), strict=True))
-        for number, row in enumerate(rows, 1)
-    ]
+    turns = (
+        (turn, ids, i) for turn, ids in ((0, layout.array.ids), (180, mirrors_b)) for i in order
+    )
+    return _rows(
+        PICTURE_COLUMNS,
+        (
+            (number, turn, stop[i] + 1, degrees[i][0], ball[i], ids[i], *degrees[i][1:])
+            for number, (turn, ids, i) in enumerate(turns, 1)
+        ),
+    )
 
 
 def stop_rows(layout: PrototypeLayout, balance: BaseBalance, loads: DriveLoads) -> list[Row]:
@@ -116,10 +123,8 @@ def stop_rows(layout: PrototypeLayout, balance: BaseBalance, loads: DriveLoads) 
     wind_up = loads.wind_up_at(torque)
     beyond = np.degrees(wind_up[:-1] - wind_up[-1]) + 0.0
     gravity = zip(torque[:-1].tolist(), beyond.tolist(), strict=True)
-    return [
-        _stop_row(layout, stop) | dict(zip(STOP_COLUMNS[-2:], effect, strict=True))
-        for stop, effect in enumerate(gravity)
-    ]
+    cells = ([*_stop_cells(layout, stop), *effect] for stop, effect in enumerate(gravity))
+    return _rows(STOP_COLUMNS, cells)
 
 
 def hole_rows(frame: FrameLayout) -> list[Row]:
@@ -129,19 +134,13 @@ def hole_rows(frame: FrameLayout) -> list[Row]:
     that is behind on the right when one looks from the uprights to the camera.
     """
     places = (frame.holes - frame.corner + 0.0).tolist()
-    return [
-        dict(zip(HOLE_COLUMNS, (number, x, y, THREAD, name), strict=True))
-        for number, ((x, y), name) in enumerate(zip(places, frame.holds, strict=True), 1)
-    ]
+    held = enumerate(zip(places, frame.holds, strict=True), 1)
+    return _rows(HOLE_COLUMNS, ((number, x, y, THREAD, name) for number, ((x, y), name) in held))
 
 
-def _stop_row(layout: PrototypeLayout, stop: int) -> Row:
+def _stop_cells(layout: PrototypeLayout, stop: int) -> list[Cell]:
     stops, mirrors = layout.stops, layout.stops.mirrors(stop)
     balls = " ".join(str(ball + 1) for ball in np.unique(layout.fit.ball[mirrors]).tolist())
-    worst = [float(np.abs(error[mirrors]).max()) for error in (stops.azimuth_error, stops.error)]
-    values = (stop + 1, _degrees(float(stops.angle[stop])), len(mirrors), balls)
-    return dict(zip(STOP_COLUMNS[:-2], (*values, *map(_degrees, worst)), strict=True))
-
-
-def _degrees(angle: float) -> float:
-    return float(np.degrees(angle)) + 0.0
+    worst = [np.abs(error[mirrors]).max() for error in (stops.azimuth_error, stops.error)]
+    angle, *errors = (np.degrees([stops.angle[stop], *worst]) + 0.0).tolist()
+    return [stop + 1, angle, len(mirrors), balls, *errors]

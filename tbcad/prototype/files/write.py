@@ -1,39 +1,66 @@
 """All files of the prototype: parts, tables, plan, record and assembly."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from tbcad.cad.drafting.sheet import Sheet
-from tbcad.cad.formats.csv_table import Row, write_table
+import numpy as np
+
+from tbcad.cad.formats.assembly import (
+    Colour,
+    ColouredSolid,
+    SolidGroup,
+    display_mesh,
+    mesh_groups,
+    write_assembly,
+    write_glb,
+)
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.dxf import write_dxf
-from tbcad.cad.formats.glb import write_glb
+from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
-from tbcad.cad.formats.step_assembly import write_assembly
-from tbcad.cad.formats.stl import write_stl
-from tbcad.cad.formats.threemf import write_3mf
-from tbcad.cad.kernel.assembly import mesh_groups
 from tbcad.cad.kernel.brep import Solid
+from tbcad.cad.kernel.solids import pyramid, sphere
 from tbcad.common.background import Submit, at_once
+from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
+from tbcad.prototype import electronics
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
-from tbcad.prototype.assembly import assembly_groups
 from tbcad.prototype.assembly_steps.machine import Machine
 from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
-from tbcad.prototype.drawings.lamps import lamp_sheet
-from tbcad.prototype.drawings.parts import Listed, listed, sheets
+from tbcad.prototype.drawings.parts import listed, sheets
 from tbcad.prototype.drive.loads import DriveLoads, base_torques
-from tbcad.prototype.electronics import wiring
-from tbcad.prototype.files import bom_csv, gcode, klipper, settings, tables
+from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
+from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
-from tbcad.prototype.printing.estimate import PrintEstimate, print_estimate
-from tbcad.prototype.printing.placing import PrintedPart, part_mesh
-from tbcad.prototype.purchased.prices import Prices, load_prices
-from tbcad.records.prototype import NAME, Prototype
+from tbcad.prototype.printed import (
+    PrintedPart,
+    Role,
+    component_solid,
+    part_mesh,
+    print_estimate,
+)
+from tbcad.prototype.purchased.parts import Prices, load_prices
+from tbcad.records.prototype import NAME
 from tbcad.types import Progress
+
+METAL: Colour = (0.55, 0.56, 0.58, 1.0)
+FASTENER: Colour = (0.25, 0.26, 0.28, 1.0)
+STEEL: Colour = (0.78, 0.80, 0.83, 1.0)
+SEEN: Colour = (0.30, 0.60, 0.95, 0.35)
+CARD: Colour = (0.05, 0.05, 0.06, 0.12)
+LIGHT: Colour = (1.00, 0.85, 0.30, 0.15)
+COLOURS: dict[Role, Colour] = {
+    "base": (0.36, 0.45, 0.58, 1.0),
+    "cap": (0.85, 0.70, 0.40, 1.0),
+    "stage": (0.30, 0.30, 0.32, 1.0),
+    "frame": (0.85, 0.50, 0.30, 1.0),
+}
 
 
 def export_prototype(
@@ -44,14 +71,7 @@ def export_prototype(
 ) -> Spec:
     """Build the prototype and write all of its files into a folder.
 
-    Args:
-        design: the mirrors.
-        folder: to write into.
-        progress: called with each stage.
-        submit: takes what can be done meanwhile.
-
-    Returns:
-        The design's spec with what was chosen for the prototype.
+    Returns the design's spec with what was chosen for the prototype.
 
     Raises:
         SpecError: when something does not fit; it says what to change.
@@ -66,42 +86,27 @@ def export_prototype(
         for panel in shroud.panels:
             submit(write_dxf, folder / f"{panel.name}.dxf", pattern(panel, shroud.sheet))
     _write_tables(built, folder)
+    title = f"{spec.name}, n = {spec.optics.n}"  # in the title blocks of drawings
     for one in cap_limits(spec, built.base, built.layout):
-        submit(cap_sheet(_title(spec), built.base, built.layout, one).write, folder)
+        submit(cap_sheet(title, built.base, built.layout, one).write, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
     submit(write_glb, folder / GLB, "prototype", mesh_groups(groups))
     write_assembly(folder / STEP, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
-    write_table(folder / bom_csv.NAME, bom_csv.COLUMNS, bill)
-    drawings = _drawings(built, listed(_title(spec), bill))
+    write_table(folder / bom.NAME, bom.COLUMNS, bill)
+    drawings = sheets(built.frame, built.base, built.drive, listed(title, bill))
     for sheet in drawings:
         submit(sheet.write, folder)
     record = prototype_record(built, bill, drawings)
-    steps = mounting_record(_machine(built, record))
+    caps = enumerate(built.layout.balls.cap.tolist(), 1)
+    sizes = {ball: "" for ball, cap in caps if not cap}
+    steps = mounting_record(Machine((), record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
     return spec
 
 
-def _machine(built: PrototypeModel, record: Prototype) -> Machine:
-    """Its bodies and fasteners, as the steps of assembly take them."""
-    caps = enumerate(built.layout.balls.cap.tolist(), 1)
-    return Machine((), record, (), {ball: "" for ball, cap in caps if not cap}, built.parts)
-
-
-def _drawings(built: PrototypeModel, bill: Listed) -> list[Sheet]:
-    """Sheets of what is cut or drilled."""
-    lamps = built.frame.lamps
-    of_lamps = [lamp_sheet(lamps, bill)] if lamps else []
-    return [*sheets(built.frame, built.base, built.drive, bill), *of_lamps]
-
-
-def _title(spec: Spec) -> str:
-    """The design in the title blocks of drawings."""
-    return f"{spec.name}, n = {spec.optics.n}"
-
-
-def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> PrintEstimate:
+def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, float]:
     """STEP as assembled, STL and 3MF on the printer's bed; an estimate of its print."""
     mesh, solid = part_mesh(part), Solid(part.name, part.solid.shape, ())
     write_step(folder / f"{part.name}.step", solid, spec.step.pcurves, part.solid.properties)
@@ -110,18 +115,16 @@ def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> PrintEstimate:
     return print_estimate(mesh)
 
 
-def _bill(built: PrototypeModel, estimates: list[PrintEstimate], prices: Prices) -> list[Row]:
+def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: Prices) -> list[Row]:
     """Rows of the parts list; estimates are of the printed parts, in their order."""
     layout, density = built.layout, built.spec.printer.density_g_cm3
     printed = [
-        bom_csv.cap_item(layout, part.ball, part.solid.volume, estimate)
+        bom.cap_item(layout, part.ball, part.solid.volume, estimate)
         if part.role == "cap"
-        else bom_csv.PrintedItem(part.name, part.what, part.solid.volume, estimate)
+        else bom.PrintedItem(part.name, part.what, part.solid.volume, estimate)
         for part, estimate in zip(built.printed, estimates, strict=True)
     ]
-    return bom_csv.bom_rows(
-        layout, built.drive, built.purchased, printed, density, built.parts, prices
-    )
+    return bom.bom_rows(layout, built.drive, built.purchased, printed, density, built.parts, prices)
 
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:
@@ -134,19 +137,85 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
         ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame)),
         (
             "wiring.csv",
-            wiring.COLUMNS,
-            wiring.wiring_rows(built.wiring, built.frame.lamps, built.drive),
+            electronics.COLUMNS,
+            electronics.wiring_rows(built.wiring, built.frame.lamps, built.drive),
         ),
     ):
         write_table(folder / name, columns, rows)
-    program = gcode.gcode_program(layout, built.drive, motion, len(built.stage.leds))
-    gcode.write_program(folder / "rotation_plan.nc", program)
-    values = settings.settings(built.drive, motion, built.frame.homing.angles)
-    title = f"settings of {built.spec.name} for {motion.controller}"
-    settings.write_settings(folder / settings.NAME, settings.settings_lines(title, values))
-    if motion.controller == "grblhal":
-        angles, lights = built.frame.homing.angles, built.wiring.lights
-        translated = klipper.klipper_program(program, motion, angles)
-        gcode.write_program(folder / klipper.PROGRAM, [*translated])
-        config = klipper.klipper_config(built.drive, motion, lights)
-        gcode.write_program(folder / klipper.CONFIG, [*config])
+    texts = controllers.controller_files(
+        layout, built.drive, motion, len(built.stage.leds), built.spec.name
+    )
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="ascii", newline="\n")
+
+
+def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
+    """All bodies of the assembled prototype, the base at angle zero.
+
+    Coupons are tools and left out. What light passes through is included to be looked at, and
+    transparent: the capture sphere, and what the camera sees.
+    """
+    purchased = (
+        ColouredSolid(component.name, component_solid(component), METAL)
+        for component in prototype.frame.purchased
+    )
+    return (
+        _printed("base", prototype, ("base", "cap")),
+        SolidGroup("balls", tuple(_balls(prototype))),
+        _printed("stage", prototype, ("stage",)),
+        _printed("frame", prototype, ("frame",)),
+        SolidGroup("bought", tuple(purchased)),
+        SolidGroup("shroud", tuple(_shroud(prototype))),
+        SolidGroup("fasteners", tuple(_fasteners(prototype.fasteners))),
+        _views(prototype),
+    )
+
+
+def _printed(name: str, prototype: PrototypeModel, roles: tuple[Role, ...]) -> SolidGroup:
+    solids = (
+        ColouredSolid(part.name, part.solid.shape, COLOURS[part.role], part.solid.mesh)
+        for part in prototype.printed
+        if part.role in roles
+    )
+    return SolidGroup(name, tuple(solids))
+
+
+def _fasteners(fasteners: Sequence[Fastener]) -> Iterator[ColouredSolid]:
+    """Those of one part are copies of one solid, which is built and meshed once."""
+    originals: dict[str, ColouredSolid] = {}
+    for one in fasteners:
+        name = one.part.name
+        if name not in originals:
+            at_origin = replace(one, place=np.zeros(3), along=np.eye(3)[0])
+            solid = component_solid(fastener_component(at_origin))
+            originals[name] = ColouredSolid(name, solid, FASTENER, display_mesh(solid))
+        yield originals[name].copy(one.name, fastener_axes(one.along), one.place)
+
+
+def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
+    balls, centre = prototype.layout.balls, prototype.layout.body_centres()
+    for k in (~balls.cap).nonzero()[0].tolist():
+        yield ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
+
+
+def _shroud(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
+    """The panels without flaps; transparent, so that the rig is seen."""
+    for panel in prototype.shroud.panels if prototype.shroud else ():
+        yield ColouredSolid(panel.name, component_solid(panel.component), CARD)
+
+
+def _views(prototype: PrototypeModel) -> SolidGroup:
+    """The capture sphere, and what the camera sees up to the sphere's far end."""
+    camera = prototype.layout.array.camera
+    radius = prototype.spec.optics.capture_diameter_mm / 2
+    length = float(norm(camera.pinhole)) + radius
+    width = length * np.tan(camera.hfov / 2)
+    height = width * camera.height_px / camera.width_px
+    middle, up = camera.pinhole + length * camera.forward, np.cross(camera.right, camera.forward)
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    corners = middle + signs @ np.stack([width * camera.right, height * up])
+    solids = (
+        ColouredSolid("capture_sphere", sphere(np.zeros(3), radius), SEEN),
+        ColouredSolid("camera_view", pyramid(camera.pinhole, corners), LIGHT),
+    )
+    return SolidGroup("views", solids)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from tbcad.core.camera.requirements import CameraRequirements
-from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
+from tbcad.core.geometry.primitives import Component, Prism, box
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
@@ -93,12 +93,7 @@ def camera_gauge(
 ) -> CameraGauge:
     """The gauge whose marks tell most of the pinhole's place.
 
-    Args:
-        base: that carries it.
-        camera: in its place.
-        diameter: of its body, mm.
-        needed: of it.
-        swing: smallest and largest base angle of the stops, radians.
+    diameter is that of the camera's body (mm), swing the smallest and largest base angle (radians).
     """
     distance, pitch = float(norm(camera.pinhole)), camera.pixel_pitch
     sights = _sights(base, camera, diameter, needed)
@@ -112,10 +107,12 @@ def camera_gauge(
         far_half=sight.far * tangent,
     )
     low, high = (math.degrees(end) for end in swing)
+    across = np.array([[1.0], [-1.0]]) * [sizes.near_half, sizes.far_half]
+    along = np.broadcast_to([sizes.near, sizes.far], across.shape)
     return CameraGauge(
         component=_component(base, sizes),
         sizes=sizes,
-        marks=_marks(sizes) @ _axes(base),
+        marks=np.stack([along, across, 0 * across], axis=-1) @ _axes(base),
         angles=(max(-QUARTER_DEG, low), 0.0, min(QUARTER_DEG, high)),
         errors=place_errors(sight, pitch, needed),
     )
@@ -154,14 +151,10 @@ def marks_seen(gauge: CameraGauge, base: BaseLayout, camera: Camera) -> tuple[Ma
 def place_errors(sight: Sight, pitch: float, needed: CameraRequirements) -> dict[str, float]:
     """Standard deviations of the pinhole's place, mm: along the base's axis, across, out.
 
-    A displacement is seen as the angle between near and far mark. Along the axis both sides are
-    read at once, and lengths of the gauge count; across and out it is read a quarter turn to
-    either side, where what is wrong with the gauge has opposite signs.
-
-    Args:
-        sight: of the marks.
-        pitch: of pixels at unit distance.
-        needed: of the camera.
+    A displacement is seen as the angle between near and far mark, with pixels of a pitch at unit
+    distance. Along the axis both sides are read at once, and lengths of the gauge count; across and
+    out it is read a quarter turn to either side, where what is wrong with the gauge has opposite
+    signs.
     """
     lines, parallax = math.atan(sight.tangent), 1 / sight.near - 1 / sight.far
     level = _reading(sight, 0.0, pitch, needed) / math.sqrt(2)
@@ -195,39 +188,30 @@ def _axes(base: BaseLayout) -> Floats:
     return np.stack([axis, third, -zero])
 
 
-def _marks(sizes: GaugeSizes) -> Floats:
-    """Marks in the gauge's own axes, (2, 2, 3)."""
-    near, far = (sizes.near, sizes.near_half), (sizes.far, sizes.far_half)
-    return np.array(
-        [[[along, side * half, 0.0] for along, half in (near, far)] for side in (1, -1)]
-    )
-
-
 def _component(base: BaseLayout, sizes: GaugeSizes) -> Component:
     """The cross as it sits on the hub, its marked face up when it is printed."""
-    axes, hub = _axes(base), sizes.hub
-
-    def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> Prism:
-        return box(np.array(low), np.array(high), axes)
-
-    added: list[Primitive] = [
-        block(
-            (hub, -FLANGE_HALF_MM, -FLANGE_BELOW_MM),
-            (hub + FLANGE_MM, FLANGE_HALF_MM, THICKNESS_MM),
-        ),
-        block((hub, -MAST_HALF_MM, 0.0), (sizes.near, MAST_HALF_MM, THICKNESS_MM)),
-        block(
-            (sizes.near - ARM_MM, -sizes.near_half, 0.0),
-            (sizes.near, sizes.near_half, THICKNESS_MM),
-        ),
-        block(
-            (sizes.far - ARM_MM, -sizes.far_half - BLOCK_MM, STEP_MM),
-            (sizes.far, sizes.far_half + BLOCK_MM, THICKNESS_MM),
+    axes, hub, near, far = _axes(base), sizes.hub, sizes.near, sizes.far
+    wide = sizes.far_half + BLOCK_MM
+    # A prism in the hub's bore, whose edges are pressed in.
+    circle = (base.hub.bore + PLUG_PRESS_MM / 2) * unit_circle(even_angles(PLUG_SIDES))
+    start = base.hub.socket + PLUG_FREE_MM
+    corners = np.column_stack([np.full(PLUG_SIDES, start), circle])
+    plug = Prism(corners @ axes, (base.hub.front + ROOT_MM - start) * axes[0])
+    blocks = (  # of half a width, between two places along the axis, above a level
+        (FLANGE_HALF_MM, hub, hub + FLANGE_MM, -FLANGE_BELOW_MM),
+        (MAST_HALF_MM, hub, near, 0.0),
+        (sizes.near_half, near - ARM_MM, near, 0.0),
+        (wide, far - ARM_MM, far, STEP_MM),
+    )
+    added = (
+        *(
+            box(np.array([low, -half, level]), np.array([high, half, THICKNESS_MM]), axes)
+            for half, low, high, level in blocks
         ),
         *(_far_end(sizes, side, axes) for side in (1, -1)),
-        _plug(base, axes),
-    ]
-    return Component("camera_gauge", WHAT, tuple(added), (), (axes[2], -axes[2]))
+        plug,
+    )
+    return Component("camera_gauge", WHAT, added, (), (axes[2], -axes[2]))
 
 
 def _far_end(sizes: GaugeSizes, side: int, axes: Floats) -> Prism:
@@ -238,11 +222,3 @@ def _far_end(sizes: GaugeSizes, side: int, axes: Floats) -> Prism:
     corners = [(sizes.far, half), (sizes.far, end), (back, end), (back, beyond)]
     points = np.array([[along, side * across, 0.0] for along, across in corners])
     return Prism(points @ axes, THICKNESS_MM * axes[2])
-
-
-def _plug(base: BaseLayout, axes: Floats) -> Prism:
-    """A prism in the hub's bore, whose edges are pressed in."""
-    circle = (base.hub.bore + PLUG_PRESS_MM / 2) * unit_circle(even_angles(PLUG_SIDES))
-    start = base.hub.socket + PLUG_FREE_MM
-    points = np.column_stack([np.full(PLUG_SIDES, start), circle])
-    return Prism(points @ axes, (base.hub.front + ROOT_MM - start) * axes[0])

@@ -28,7 +28,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,
     THROUGH_MM,
@@ -180,17 +180,10 @@ class _Place:
 
 
 def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts) -> CameraMount:
-    """Bracket, plate and fence for a camera.
+    """Bracket, plate and fence for a camera; axes (3, 3) are the frame's, as rows.
 
-    Args:
-        spec: of the prototype.
-        axes: of the frame, as rows, (3, 3).
-        camera: in its place.
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when the camera does not look along the frame's plane, its thread lies beyond
-            its end, or camera or mount reach the base plate.
+    SpecError when the camera does not look along the frame's plane, its thread lies beyond its end,
+    or camera or mount reach the base plate.
     """
     place = _Place(spec, axes, camera, parts[INSERT])
     _check_camera(place)
@@ -214,20 +207,13 @@ def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts
 
 def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
     """Three screws with two nuts and two washers each, two of the fence, the tripod screw."""
-    return (
-        *(
-            one
-            for back, across in place.screws.tolist()
-            for one in _tilting_screw(place, back, across, parts)
-        ),
-        *(one for side in (-1, 1) for one in _fence_screw(place, side * FENCE_SCREW_MM, parts)),
-        Fastener(
-            parts[CAMERA_SCREW],
-            place.point(place.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM),
-            -place.own[2],
-            ("camera_plate", "camera"),
-        ),
-    )
+    screws = [
+        *(_tilting_screw(place, back, across, parts) for back, across in place.screws.tolist()),
+        *(_fence_screw(place, side * FENCE_SCREW_MM, parts) for side in (-1, 1)),
+    ]
+    at = place.point(place.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM)
+    tripod = Fastener(parts[CAMERA_SCREW], at, -place.own[2], ("camera_plate", "camera"))
+    return (*(one for some in screws for one in some), tripod)
 
 
 def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> tuple[Fastener, ...]:
@@ -324,22 +310,30 @@ def _bracket(place: _Place) -> Bracket:
         return np.asarray(start + (height - start[1]) / back[1] * back)
 
     mount = np.array([at(TOP_MM, near), at_height(low, near), at_height(low, far), at(TOP_MM, far)])
-    start, end = float(mount[1, 0]), float(mount[2, 0]) + BRACKET_FOOT_MM
+    first, end = float(mount[1, 0]), float(mount[2, 0]) + BRACKET_FOOT_MM
     inside, high = far - OVERLAP_MM, low + frame.flange_mm - OVERLAP_MM
     web = np.array(
         [at(TOP_MM + MOUNT_WEB_MM, inside), at_height(high, inside), [end - WEB_SETBACK_MM, high]]
     )
     half = HALF_PLATE_MM + FOOT_BORDER_MM
-    foot = rectangle((start, low), (end, low + frame.flange_mm))
+    foot = rectangle((first, low), (end, low + frame.flange_mm))
     added = [
         level_prism(mount, -HALF_PLATE_MM, HALF_PLATE_MM, axes),
         level_prism(foot, -half, half, axes),
         *webs(web, HALF_PLATE_MM - frame.web_mm, frame.web_mm, axes),
     ]
-    beside, ends = half - SLOT_SIDE_MM, (start + SLOT_INNER_MM, end - SLOT_OUTER_MM)
+    beside, ends = half - SLOT_SIDE_MM, (first + SLOT_INNER_MM, end - SLOT_OUTER_MM)
     holes = np.array([[x, y] for x in ends for y in (-beside, beside)])
-    removed = (*_bracket_holes(place, near, far), *_foot_slots(frame, axes, holes))
-    out = place.own[2]
+    through, out = (near - THROUGH_MM, far + THROUGH_MM), place.own[2]
+    depth = (frame.flange_mm + 2 * THROUGH_MM) * axes[2]
+    starts = [np.array([*hole, low - THROUGH_MM]) @ axes for hole in holes]
+    key, window = frame.camera_screw_mm, place.window
+    removed = (
+        *(place.slot((x, y), 1, ACROSS_MM, through) for x, y in place.screws.tolist()),
+        # Through a window the tripod screw is turned.
+        place.block((key - window, -RECESS_MM, through[0]), (key + window, RECESS_MM, through[1])),
+        *(slot(start, axes[0], 2 * ALONG_PLATE_MM, M5_HOLE_MM / 2, depth) for start in starts),
+    )
     component = Component(
         "camera_bracket",
         "bracket of the camera",
@@ -347,23 +341,7 @@ def _bracket(place: _Place) -> Bracket:
         removed,
         (-out, -axes[2], out, axes[1]),
     )
-    return Bracket(component, holes, np.array([[start, -half], [end, half]]))
-
-
-def _bracket_holes(place: _Place, near: float, far: float) -> list[Primitive]:
-    """Slots across for the three screws, and a window through which the tripod screw is turned."""
-    through = (near - THROUGH_MM, far + THROUGH_MM)
-    places = place.screws.tolist()
-    slots = [place.slot((back, across), 1, ACROSS_MM, through) for back, across in places]
-    screw, window = place.frame.camera_screw_mm, place.window
-    low, high = (screw - window, -RECESS_MM, through[0]), (screw + window, RECESS_MM, through[1])
-    return [*slots, place.block(low, high)]
-
-
-def _foot_slots(spec: FrameSpec, axes: Floats, holes: Floats) -> list[Primitive]:
-    low, depth = spec.floor_mm - THROUGH_MM, (spec.flange_mm + 2 * THROUGH_MM) * axes[2]
-    starts = [np.array([*hole, low]) @ axes for hole in holes]
-    return [slot(at, axes[0], 2 * ALONG_PLATE_MM, M5_HOLE_MM / 2, depth) for at in starts]
+    return Bracket(component, holes, np.array([[first, -half], [end, half]]))
 
 
 def _check_camera(place: _Place) -> None:

@@ -12,7 +12,7 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
     HALF_FLANGE_MM,
@@ -21,10 +21,10 @@ from tbcad.prototype.frame.brackets import (
     Bracket,
     drilled_holes,
     level_prism,
+    on_uprights,
     webs,
 )
-from tbcad.prototype.frame.purchased import on_uprights
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
+from tbcad.prototype.purchased.parts import Parts, choose_screw
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats
 
@@ -56,12 +56,7 @@ CHANNEL_ROOF_MM = 3.0  # material above the channel
 def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int, parts: Parts) -> Bracket:
     """A foot on the front (side 1) or the back (side -1) of both uprights.
 
-    Args:
-        spec: section of the frame.
-        axes: of the frame, as rows, (3, 3).
-        face: level coordinate of the uprights' front.
-        side: on which the foot is.
-        parts: lists of purchased parts.
+    face is the level coordinate of the uprights' front; axes (3, 3) are the frame's, as rows.
     """
     low, thick, half = spec.floor_mm, spec.flange_mm, spec.uprights_mm / 2 + HALF_FLANGE_MM
     start = face if side > 0 else face - EXTRUSION_MM
@@ -130,10 +125,11 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) 
     width = CHANNEL_WIDTH_MM / 2
     height = min(CHANNEL_HEIGHT_MM, spec.flange_mm - CHANNEL_ROOF_MM)
     channel = np.array([-width, -half - THROUGH_MM, low - THROUGH_MM])
+    clamp, fasteners = _clamp(axes, stage, ear, top, parts)
     removed = (
         Cylinder(middle, up, stage.sizes.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
         Cylinder(base - THROUGH_MM * up, up, wire, COLLAR_HEIGHT_MM),
-        *_clamp(axes, stage, ear, top, parts[CLAMP_INSERT]),
+        *clamp,
         *drilled_holes(places, spec.flange_mm * up, M5_HOLE_MM),
         box(channel, np.array([width, 0.0, low + height]), axes),
     )
@@ -145,40 +141,32 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) 
         (-up, up),
     )
     foot = np.array([[-half, -half], [end, half]])
-    return Bracket(component, holes, foot, _clamp_fasteners(axes, stage, ear, top, parts))
-
-
-def _clamp_fasteners(
-    axes: Floats, stage: StageLayout, ear: float, top: float, parts: Parts
-) -> tuple[Fastener, ...]:
-    """The clamp's screw from one ear, its insert in the other."""
-    middle, side, across = _clamp_screw(stage, ear, top), np.array([0.0, EAR_MM, 0.0]), axes[1]
-    screw, name = choose_screw(parts, *CLAMP_SCREW_MM), ("stage_foot",)
-    return (
-        Fastener(screw, (middle - side) @ axes, across, name),
-        Fastener(parts[CLAMP_INSERT], (middle + side) @ axes, -across, name),
-    )
-
-
-def _clamp_screw(stage: StageLayout, ear: float, top: float) -> Floats:
-    """Middle of the clamp's screw."""
-    height = (stage.foot + SLIT_FLOOR_MM + top) / 2 + SLIT_FLOOR_MM
-    return np.array([ear - EAR_LENGTH_MM / 2, 0.0, height])
+    return Bracket(component, holes, foot, fasteners)
 
 
 def _clamp(
-    axes: Floats, stage: StageLayout, ear: float, top: float, insert: PurchasedPart
-) -> list[Primitive]:
-    """Slit, screw's hole across it, and the insert's hole."""
-    low = stage.foot + SLIT_FLOOR_MM
+    axes: Floats, stage: StageLayout, ear: float, top: float, parts: Parts
+) -> tuple[list[Primitive], tuple[Fastener, ...]]:
+    """Slit, holes of screw and insert across it; the screw in one ear, its insert in the other."""
+    insert, low = parts[CLAMP_INSERT], stage.foot + SLIT_FLOOR_MM
     slit = np.array([0.0, -SLIT_MM / 2, low])
     end = np.array([ear + BEYOND_EAR_MM, SLIT_MM / 2, top + THROUGH_MM])
-    screw = _clamp_screw(stage, ear, top)
-    outside = np.array([0.0, EAR_MM + THROUGH_MM, 0.0])
-    inside = np.array([0.0, EAR_MM - insert["length_mm"] - INSERT_PLAY_MM, 0.0])
-    hole = CLEARANCE_HOLE_MM[insert["thread_mm"]] / 2
-    return [
+    middle = np.array([ear - EAR_LENGTH_MM / 2, 0.0, (low + top) / 2 + SLIT_FLOOR_MM])
+    side, outside, inside = (
+        np.array([0.0, across, 0.0])
+        for across in (
+            *(EAR_MM, EAR_MM + THROUGH_MM),
+            EAR_MM - insert["length_mm"] - INSERT_PLAY_MM,
+        )
+    )
+    through, outer = CLEARANCE_HOLE_MM[insert["thread_mm"]] / 2, (middle + outside) @ axes
+    removed: list[Primitive] = [
         box(slit, end, axes),
-        cylinder_between((screw - outside) @ axes, (screw + outside) @ axes, hole),
-        cylinder_between((screw + inside) @ axes, (screw + outside) @ axes, insert["hole_mm"] / 2),
+        cylinder_between((middle - outside) @ axes, outer, through),
+        cylinder_between((middle + inside) @ axes, outer, insert["hole_mm"] / 2),
     ]
+    screw, name = choose_screw(parts, *CLAMP_SCREW_MM), ("stage_foot",)
+    return removed, (
+        Fastener(screw, (middle - side) @ axes, axes[1], name),
+        Fastener(insert, (middle + side) @ axes, -axes[1], name),
+    )

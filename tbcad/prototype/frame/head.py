@@ -19,39 +19,37 @@ from tbcad.core.geometry.primitives import (
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.base.fasteners import m3_insert
+from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.purchased import (
     CLEARANCE_HOLE_MM,
+    COUPLING_MM,
     HALF_FLANGE_MM,
     OVERLAP_MM,
-    THROUGH_MM,
-    drilled_holes,
-    level_prism,
-    webs,
-)
-from tbcad.prototype.frame.purchased import (
-    COUPLING_MM,
     PLATE_MM,
     STAGE_HEIGHT_MM,
+    THROUGH_MM,
     HeadPlate,
     ShaftParts,
     axial_cylinder,
+    drilled_holes,
     hub_point,
+    level_prism,
     motor_fasteners,
     motor_screw_places,
     on_uprights,
     purchased_components,
+    webs,
     wheel_radius,
 )
-from tbcad.prototype.homing.sizes import (
+from tbcad.prototype.homing import (
     MARK_DEPTH_MM,
     MARK_END_MM,
     MARK_MM,
     MIN_PLATE_MM,
     PIN_HOLE_MM,
-    PIN_OUT_MM,
     bracket_screws,
     tab_radius,
 )
@@ -94,17 +92,9 @@ class BearingHead:
 def bearing_head(
     spec: FrameSpec, base: BaseLayout, drive: Drive, axes: Floats, parts: Parts
 ) -> BearingHead:
-    """The head for a drive.
+    """The head for a drive behind the base's hub; axes (3, 3) are the frame's, as rows.
 
-    Args:
-        spec: section of the frame.
-        base: whose hub is in front of it.
-        drive: belt, direct or stage.
-        axes: of the frame, as rows, (3, 3).
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when there is no bearing or shaft for the hub's bore, or the motor meets it.
+    SpecError when there is no bearing or shaft for the hub's bore, or the motor meets it.
     """
     plate = _behind_disc(_head_plate(spec, base, drive), base, axes)
     shaft_parts = _shaft_parts(base, plate, parts) if drive.belt else None
@@ -116,7 +106,10 @@ def bearing_head(
     added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
     removed = _motor_holes(spec, base, drive, plate)
     removed += _zero_holes(base, plate)
-    screws = _screw_places(spec, axes, face, (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM))
+    sides = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
+    heights = (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM)
+    screws = [np.array([face, y, z]) @ axes for z in heights for y in sides]
+    insert, beside = m3_insert(base.spec, parts), plate.front - PLATE_MM / 2
     removed += drilled_holes(screws, spec.flange_mm * axes[0], CLEARANCE_HOLE_MM[5.0])
     if shaft_parts:
         rear, radius = shaft_parts.rear, shaft_parts.tube
@@ -137,7 +130,15 @@ def bearing_head(
         fasteners=(
             *on_uprights(component.name, screws, -axes[0], spec.flange_mm, parts),
             *motor_fasteners(base, drive, plate, parts),
-            *_side_inserts(base, plate, parts),
+            *(
+                Fastener(
+                    insert,
+                    hub_point(base, beside, out, plate.half_width),
+                    -base.frame[2],
+                    (component.name,),
+                )
+                for out in bracket_screws()
+            ),
         ),
         rear=shaft_parts.rear if shaft_parts else plate.back,
         shaft=shaft_parts.shaft if shaft_parts else None,
@@ -208,14 +209,6 @@ def _flange(
     return [flange, *webs(corners, WEB_MM, spec.web_mm, axes)]
 
 
-def _screw_places(
-    spec: FrameSpec, axes: Floats, face: float, heights: tuple[float, float]
-) -> list[Floats]:
-    """Of the screws in the uprights, on the flange's face."""
-    half = spec.uprights_mm / 2
-    return [np.array([face, y, z]) @ axes for z in heights for y in (-half, half)]
-
-
 def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
     """Hole of the zero pin and mark beside it; inserts for the bracket of the switch."""
     spec, through = base.spec, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
@@ -230,20 +223,6 @@ def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
         outer = hub_point(base, middle, out, plate.half_width + THROUGH_MM)
         holes.append(cylinder_between(inner, outer, spec.insert_hole_mm / 2))
     return holes
-
-
-def _side_inserts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> list[Fastener]:
-    """Inserts for the bracket of the switch."""
-    middle, insert = plate.front - PLATE_MM / 2, m3_insert(base.spec, parts)
-    return [
-        Fastener(
-            insert,
-            hub_point(base, middle, out, plate.half_width),
-            -base.frame[2],
-            ("bearing_head",),
-        )
-        for out in bracket_screws()
-    ]
 
 
 def _seats(

@@ -17,19 +17,19 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import home_angles
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import (
+from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
+from tbcad.prototype.frame.feet import stage_foot, upright_foot
+from tbcad.prototype.frame.head import BearingHead, bearing_head
+from tbcad.prototype.frame.purchased import (
     EXTRUSION_MM,
     TAPPED_M5_MM,
     THROUGH_MM,
     Bracket,
     drilled_holes,
     frame_axes,
+    plate_fasteners,
 )
-from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
-from tbcad.prototype.frame.feet import stage_foot, upright_foot
-from tbcad.prototype.frame.head import BearingHead, bearing_head
-from tbcad.prototype.frame.purchased import plate_fasteners
-from tbcad.prototype.homing.layout import HomingLayout, homing_layout
+from tbcad.prototype.homing import HomingLayout, homing_layout
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.lamps import lamp_layout
@@ -79,42 +79,29 @@ def frame_layout(
     keep_out: KeepOut,
     parts: Parts,
 ) -> FrameLayout:
-    """The frame round a base and a stage.
-
-    Args:
-        spec: of the prototype.
-        prototype: balls, their places and stops.
-        base: that turns.
-        stage: that carries the object.
-        drive: chosen for the base.
-        keep_out: what the frame must keep out of.
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-    """
+    """The frame round a base and a stage; SpecError names what to change where it does not fit."""
     axes = frame_axes(base.frame[0])
     head = bearing_head(spec.frame, base, drive, axes, parts)
     homing = homing_layout(base, head.plate, home_angles(prototype, spec.motion), parts)
-    camera = _camera(spec, prototype)
-    mount = camera_mount(spec, axes, prototype.array.camera, parts) if camera else None
-    brackets = _brackets(spec, axes, stage, head, mount, parts)
-    beside = (
-        *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
-        *((mount.plate, mount.fence) if mount else ()),
-        *(*head.purchased, homing.switch, *camera),
-    )
-    lamps = lamp_layout(spec, head.face, prototype.array.camera, keep_out, parts, beside)
+    camera, view = [], prototype.array.camera
+    if spec.camera_diameter_mm:
+        size = spec.camera_diameter_mm / 2, spec.camera_length_mm
+        body = Cylinder(view.pinhole, -view.forward, *size)
+        camera = [Component("camera", "camera behind its pinhole", (body,))]
+    mount = camera_mount(spec, axes, view, parts) if camera else None
+    brackets = [upright_foot(spec.frame, axes, head.face, side, parts) for side in (1, -1)]
+    brackets += [stage_foot(spec.frame, axes, stage, parts), *([mount.bracket] if mount else ())]
+    of_camera = (mount.plate, mount.fence) if mount else ()
+    bought = (*head.purchased, homing.switch, *camera)
+    beside = (head.component, homing.bracket, *(one.component for one in brackets), *of_camera)
+    lamps = lamp_layout(spec, head.face, view, keep_out, parts, (*beside, *bought))
     brackets += lamps.stands if lamps else ()
     upright, length, bars = _uprights(spec.frame, axes, head, parts)
     plate, plate_body, corner = _plate(spec.frame, axes, brackets, parts)
-    purchased = (
-        *(plate_body, *bars, *head.purchased, homing.switch, *camera),
-        *(lamps.bodies if lamps else ()),
-    )
+    purchased = (plate_body, *bars, *bought, *(lamps.bodies if lamps else ()))
     printed = (
         *(head.component, homing.bracket, *(bracket.component for bracket in brackets)),
-        *((mount.plate, mount.fence) if mount else ()),
+        *of_camera,
         *(lamps.holders if lamps else ()),
     )
     light, swept = _check_clearances((*printed, *purchased), keep_out, spec.frame.clearance_mm)
@@ -132,7 +119,14 @@ def frame_layout(
         plate=plate,
         upright=upright,
         length=length,
-        fasteners=_fasteners(spec.frame, axes, head, homing, brackets, mount, lamps, parts),
+        fasteners=(
+            *head.fasteners,
+            *(one for bracket in brackets for one in bracket.fasteners),
+            *plate_fasteners(spec.frame, brackets, axes, parts),
+            *homing.fasteners,
+            *(mount.fasteners if mount else ()),
+            *(lamps.fasteners if lamps else ()),
+        ),
         light=light,
         swept=swept,
     )
@@ -147,35 +141,6 @@ def frame_purchased_parts(frame: FrameLayout) -> dict[str, int]:
         counts[frame.lamps.strip.name] = math.ceil(frame.lamps.metres)
     counts.update([frame.homing.pin, str(frame.homing.switch.part)])
     return dict(sorted(counts.items()))
-
-
-def _fasteners(
-    spec: FrameSpec,
-    axes: Floats,
-    head: BearingHead,
-    homing: HomingLayout,
-    brackets: list[Bracket],
-    mount: CameraMount | None,
-    lamps: LampLayout | None,
-    parts: Parts,
-) -> tuple[Fastener, ...]:
-    on_brackets = (one for bracket in brackets for one in bracket.fasteners)
-    in_plate = plate_fasteners(spec, brackets, axes, parts)
-    of_camera, of_lamps = mount.fasteners if mount else (), lamps.fasteners if lamps else ()
-    return (*head.fasteners, *on_brackets, *in_plate, *homing.fasteners, *of_camera, *of_lamps)
-
-
-def _brackets(
-    spec: PrototypeSpec,
-    axes: Floats,
-    stage: StageLayout,
-    head: BearingHead,
-    mount: CameraMount | None,
-    parts: Parts,
-) -> list[Bracket]:
-    brackets = [upright_foot(spec.frame, axes, head.face, side, parts) for side in (1, -1)]
-    brackets.append(stage_foot(spec.frame, axes, stage, parts))
-    return [*brackets, mount.bracket] if mount else brackets
 
 
 def _uprights(
@@ -239,14 +204,6 @@ def _plate(
     holes = drilled_holes(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
     body = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
     return part, body, middle - half
-
-
-def _camera(spec: PrototypeSpec, prototype: PrototypeLayout) -> list[Component]:
-    if spec.camera_diameter_mm == 0:
-        return []
-    camera, radius = prototype.array.camera, spec.camera_diameter_mm / 2
-    body = Cylinder(camera.pinhole, -camera.forward, radius, spec.camera_length_mm)
-    return [Component("camera", "camera behind its pinhole", (body,))]
 
 
 def _check_clearances(

@@ -1,11 +1,18 @@
-"""Purchased parts in the head of the frame, in their places: bearings, shaft, wheels, motor."""
+"""What brackets of the frame share, and purchased parts of its head in their places."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.core.geometry.primitives import Component, Cylinder, box, cylinder_between
+from tbcad.core.geometry.primitives import (
+    Component,
+    Cylinder,
+    Primitive,
+    Prism,
+    box,
+    cylinder_between,
+)
 from tbcad.core.geometry.rotations import bolt_circle
 from tbcad.core.spec.prototype import FrameSpec
 from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
@@ -13,7 +20,6 @@ from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import OVERLAP_MM, THROUGH_MM, Bracket
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.types import Floats
 
@@ -28,6 +34,54 @@ STAGE_HEIGHT_MM, STAGE_TOP_MM, STAGE_GAP_MM = 40.0, 12.0, 0.5
 ENGAGEMENT_MM = 4.0  # smallest length of a screw beyond what it holds
 MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
 TNUT, WASHER = "TNUT-M5-6", "WASHER-5"
+# Diameters of clearance holes by ISO 273, medium, by thread (1/4 inch: 6.35).
+CLEARANCE_HOLE_MM = {3.0: 3.4, 4.0: 4.5, 5.0: 5.5, 6.0: 6.6, 6.35: 6.6}
+TAPPED_M5_MM = 4.2
+EXTRUSION_MM = 20.0  # side of the uprights
+HALF_FLANGE_MM = 10.0  # of flanges and feet beyond the middles of the uprights
+THROUGH_MM = 1.0  # by which a removed body extends beyond the part
+OVERLAP_MM = 2.0  # by which added bodies overlap, so that no faces coincide
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """A printed part that is screwed on."""
+
+    component: Component  # the part itself
+    # tapped holes that it needs in the base plate, (x, y) along the frame's axes, (h, 2)
+    holes: Floats
+    foot: Floats  # corners of its foot on the plate, the same, (f, 2)
+    fasteners: tuple[Fastener, ...] = ()  # of it, but for those in the base plate
+
+
+def frame_axes(axis: Floats) -> Floats:
+    """Axes of the frame, as rows: level under the axis w (3,), across it, up, (3, 3)."""
+    level = np.array([axis[0], axis[1], 0.0]) / np.hypot(*axis[:2])
+    up = np.array([0.0, 0.0, 1.0])
+    return np.stack([level, np.cross(up, level), up])
+
+
+def level_prism(corners: Floats, low: float, high: float, axes: Floats) -> Prism:
+    """A convex polygon (n, 2) of (level, up) between two places across, mm."""
+    x, z = corners.T
+    at = np.column_stack([x, np.full(len(x), low), z])
+    return Prism(at @ axes, (high - low) * axes[1])
+
+
+def webs(corners: Floats, inner: float, thickness: float, axes: Floats) -> list[Primitive]:
+    """Two webs of a polygon (n, 2) of (level, up), from inner outward to either side."""
+    return [
+        level_prism(corners, inner, inner + thickness, axes),
+        level_prism(corners, -inner - thickness, -inner, axes),
+    ]
+
+
+def drilled_holes(places: Sequence[Floats], depth: Floats, diameter: float) -> list[Primitive]:
+    """Holes from points (3,) along a vector (3,), a little longer to both sides."""
+    beyond = THROUGH_MM * depth / np.linalg.norm(depth)
+    return [
+        cylinder_between(place - beyond, place + depth + beyond, diameter / 2) for place in places
+    ]
 
 
 @dataclass(frozen=True)
@@ -76,7 +130,13 @@ def purchased_components(
         return _rotary_stage(base, drive.motor, plate)
     components = [_motor(base, drive, plate)]
     if drive.wheel and drive.pinion:
-        holes = _drilled(base, drive.wheel)
+        start, end = base.hub.mount, base.hub.mount - drive.wheel["width_mm"]
+        ends = [
+            (hub_point(base, start + THROUGH_MM, x, y), hub_point(base, end - THROUGH_MM, x, y))
+            for x, y in base.hub.holes.tolist()
+        ]
+        # The holes that are drilled into the wheel for the screws into the hub.
+        holes = [cylinder_between(*both, SCREW_MM / 2) for both in ends]
         components += [
             _wheel("wheel", base, drive.wheel, 0.0, *holes, rotates=True),
             _wheel("pinion", base, drive.pinion, drive.centre_mm),
@@ -121,19 +181,6 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
 def wheel_radius(part: PurchasedPart) -> float:
     """Radius of a toothed wheel over its rims, mm."""
     return pitch_diameter(part) / 2 + PULLEY_RIM_MM
-
-
-def _drilled(base: BaseLayout, wheel: PurchasedPart) -> list[Cylinder]:
-    """The holes that are drilled into the wheel for the screws into the hub."""
-    start, end = base.hub.mount, base.hub.mount - wheel["width_mm"]
-    return [
-        cylinder_between(
-            hub_point(base, start + THROUGH_MM, x, y),
-            hub_point(base, end - THROUGH_MM, x, y),
-            SCREW_MM / 2,
-        )
-        for x, y in base.hub.holes.tolist()
-    ]
 
 
 def _wheel(
@@ -183,14 +230,9 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
 def on_uprights(
     name: str, places: Sequence[Floats], along: Floats, flange: float, parts: Parts
 ) -> tuple[Fastener, ...]:
-    """Screws through a flange into T-nuts of the uprights.
+    """Screws through a body's flange (mm thick) into T-nuts of the uprights.
 
-    Args:
-        name: of the body with the flange.
-        places: on a face of the uprights, mm, (3,).
-        along: unit vector into the uprights, (3,).
-        flange: its thickness, mm.
-        parts: lists of purchased parts.
+    Places (3,) are on a face of the uprights, mm; the unit vector along points into them.
     """
     screw, fasteners = choose_screw(parts, 5.0, flange + ENGAGEMENT_MM), list[Fastener]()
     for place in places:

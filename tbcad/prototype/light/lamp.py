@@ -1,27 +1,45 @@
 """The lamps as data: strips, places, bodies, and what holds them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.core.geometry.primitives import Component, Primitive, Prism
+from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
-from tbcad.core.spec.prototype import StageSpec
+from tbcad.core.spec.prototype import FrameSpec, StageSpec
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.brackets import THROUGH_MM, Bracket
+from tbcad.prototype.frame.purchased import (
+    CLEARANCE_HOLE_MM,
+    EXTRUSION_MM,
+    THROUGH_MM,
+    Bracket,
+    drilled_holes,
+)
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 
 STRIP, SHORT_STRIP = "STRIP-COB-24V", "STRIP-240-24V"
 EDGE_MM = 2.0  # of a plate beyond the strips
-ACROSS, UP = np.eye(3)[1:]
 ROOM_SIDES = 12
 EDGE_POINTS = 9
 MARCHES, NEAR_MM = 48, 0.5  # steps along a line of light, and how near to the base it may come
+HOLDER_MM = 8.0  # thickness behind the strips
+COLUMN_MM = 14.0  # depth of a stand's column behind its holder's face
+COLUMN_OUT_MM = 6.0  # by which columns stand farther out than upright lamps, away from the camera
+# A stand's foot, from the column's middle: to either side along x, inward and outward along y, and
+# to its two screws.
+FOOT_HALF_MM, FOOT_IN_MM, FOOT_OUT_MM = 18.0, 10.0, 34.0
+SCREW_SIDE_MM, SCREW_OUT_MM = 10.0, 25.0
+OUT_MM = 12.0  # by which upright lamps are farther out than the uprights' middles
+TAIL_MM = 34.0  # of a holder on an upright below the strips, for its two screws
+TAIL_SCREWS_MM = (9.0, 25.0)  # below the strips
+SCREW_MM = 5.0  # thread
+LEVEL, ACROSS, UP = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -132,3 +150,132 @@ def _reaches(keep_out: KeepOut, starts: Floats, ends: Floats) -> bool:
             return True
         starts, along, at, length = starts[inside], along[inside], at[inside], length[inside]
     return False
+
+
+@dataclass(frozen=True)
+class LampMounts:
+    """Builds what holds a lamp."""
+
+    frame: FrameSpec  # section of the frame
+    strip: PurchasedPart  # part
+    face: float  # x of the uprights' front, mm
+    sides: tuple[float, float]  # of a shining face, along y and along z, mm
+
+    @property
+    def half(self) -> float:
+        """Half width of an upright lamp's plate, mm."""
+        return max(self.sides[0] / 2 + EDGE_MM, EXTRUSION_MM / 2)
+
+    @property
+    def half_height(self) -> float:
+        """Half height of a level lamp's plate, mm."""
+        return max(self.sides[1] / 2 + EDGE_MM, EXTRUSION_MM / 2)
+
+    @property
+    def across(self) -> float:
+        """Y of the uprights' middles."""
+        return self.frame.uprights_mm / 2
+
+    @property
+    def column(self) -> float:
+        """Y of the columns' middles, at either side."""
+        return self.across + OUT_MM + COLUMN_OUT_MM
+
+    def holder(self, number: int, place: Floats) -> Component:
+        """A plate on the front of an upright, with two screws below the strips."""
+        ends = self.across - EXTRUSION_MM / 2, abs(float(place[1])) + self.half
+        y = np.sort(np.sign(place[1]) * np.array(ends))
+        plate = self._plate(place, y, (self._end(place) - TAIL_MM, self._top(place)))
+        return _holder(number, "an upright", plate, self.holder_screws(place))
+
+    def holder_screws(self, place: Floats) -> list[Floats]:
+        """Places of a holder's screws on its upright's face, the upper first."""
+        y = np.sign(place[1]) * self.across
+        return [np.array([self.face, y, self._end(place) - down]) for down in TAIL_SCREWS_MM]
+
+    def bar(self, number: int, place: Floats) -> Component:
+        """A plate across both uprights, with a screw on each."""
+        end, half = self.across + EXTRUSION_MM / 2, self.half_height
+        heights = float(place[2]) - half, float(place[2]) + half
+        plate = self._plate(place, np.array([-end, end]), heights)
+        return _holder(number, "both uprights", plate, self.bar_screws(place))
+
+    def bar_screws(self, place: Floats) -> list[Floats]:
+        """Places of a bar's screws on the uprights' faces."""
+        return [np.array([self.face, side * self.across, float(place[2])]) for side in (1, -1)]
+
+    def stand(self, number: int, place: Floats) -> Bracket:
+        """A plate on a column, on a foot with two screws."""
+        side, end = np.sign(place[1]), abs(float(place[1]))
+        y = np.sort(side * np.array([end - self.half, end + self.half]))
+        plate = self._plate(place, y, (self._end(place) - EDGE_MM, self._top(place)))
+        what = f"stand of lamp {number}"
+        return self._standing(number, what, place, (float(side),), self._top(place), plate)
+
+    def bridge(self, number: int, place: Floats) -> Bracket:
+        """A plate across two columns, past the camera on both sides."""
+        half, z = self.half_height, float(place[2])
+        plate = self._plate(place, np.array([-self.column, self.column]), (z - half, z + half))
+        what = f"bridge of lamp {number} over the camera"
+        return self._standing(number, what, place, (1.0, -1.0), z + half, plate)
+
+    def strips(self, number: int, place: Floats, cut: str) -> Component:
+        """The strips of a lamp, as one body."""
+        half_y, half_z = np.array(self.sides) / 2
+        x = np.sort(place[0] + np.sign(place[0]) * np.array([0.0, self.strip["thickness_mm"]]))
+        y, z = place[1] + np.array([-half_y, half_y]), place[2] + np.array([-half_z, half_z])
+        low, high = np.array([x, y, z]).T
+        what = f"{self.strip.what}, cut to {cut}"
+        return Component(f"lamp_{number}", what, (box(low, high, np.eye(3)),), part=self.strip.name)
+
+    def _end(self, place: Floats) -> float:
+        return float(place[2]) - self.sides[1] / 2
+
+    def _top(self, place: Floats) -> float:
+        return float(place[2]) + self.sides[1] / 2 + EDGE_MM
+
+    def _plate(self, place: Floats, y: Floats, z: tuple[float, float]) -> Prism:
+        """The plate behind the strips, between two places across and two heights."""
+        near = abs(float(place[0])) + self.strip["thickness_mm"]
+        x = np.sort(np.sign(place[0]) * np.array([near, near + HOLDER_MM]))
+        return box(np.array([x[0], y[0], z[0]]), np.array([x[1], y[1], z[1]]), np.eye(3))
+
+    def _standing(
+        self,
+        number: int,
+        what: str,
+        place: Floats,
+        sides: tuple[float, ...],
+        top: float,
+        plate: Prism,
+    ) -> Bracket:
+        """A plate on a column at each of some sides, each on a foot with two screws."""
+        x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
+        floor, flange = self.frame.floor_mm, self.frame.flange_mm
+        feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
+        half = np.array([COLUMN_MM / 2, FOOT_IN_MM])
+        for side in sides:
+            middle = np.array([x, side * self.column])
+            y = np.sort(middle[1] + side * np.array([-FOOT_IN_MM, FOOT_OUT_MM]))
+            foot = np.array([[x - FOOT_HALF_MM, y[0]], [x + FOOT_HALF_MM, y[1]]])
+            for (low, high), end in ((foot, floor + flange), ((middle - half, middle + half), top)):
+                added.append(box(np.array([*low, floor]), np.array([*high, end]), np.eye(3)))
+            feet.append(foot)
+            beside = np.array([[-SCREW_SIDE_MM, 0], [SCREW_SIDE_MM, 0]])
+            holes.append(middle + beside + [0.0, side * SCREW_OUT_MM])
+        places = np.vstack(holes)
+        starts = [np.array([*hole, floor]) for hole in places]
+        component = Component(
+            f"lamp_stand_{number}",
+            what,
+            (*added, plate),
+            tuple(drilled_holes(starts, flange * UP, CLEARANCE_HOLE_MM[SCREW_MM])),
+            (LEVEL, -UP),
+        )
+        return Bracket(component, places, np.vstack(feet))
+
+
+def _holder(number: int, where: str, plate: Prism, screws: Sequence[Floats]) -> Component:
+    holes = tuple(drilled_holes(screws, HOLDER_MM * LEVEL, CLEARANCE_HOLE_MM[SCREW_MM]))
+    what = f"holder of lamp {number} on {where}"
+    return Component(f"lamp_holder_{number}", what, (plate,), holes, (-LEVEL,))

@@ -20,8 +20,17 @@ from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.core.spec.section import AUTO
 from tbcad.prototype.frame.purchased import on_uprights
 from tbcad.prototype.keepout import KeepOut, min_distance
-from tbcad.prototype.light.lamp import SHORT_STRIP, STRIP, LampLayout, hidden_by_base, in_view
-from tbcad.prototype.light.lamp_mounts import HOLDER_MM, OUT_MM, TAIL_MM, LampMounts
+from tbcad.prototype.light.lamp import (
+    HOLDER_MM,
+    OUT_MM,
+    SHORT_STRIP,
+    STRIP,
+    TAIL_MM,
+    LampLayout,
+    LampMounts,
+    hidden_by_base,
+    in_view,
+)
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.types import Floats
 
@@ -47,13 +56,8 @@ def lamp_layout(
 ) -> LampLayout | None:
     """The lamps of a prototype; None without any, also where "auto" finds no place for them.
 
-    Args:
-        spec: of the prototype.
-        face: x of the uprights' front.
-        camera: that must not see lamps or stands.
-        keep_out: what static parts must keep out of.
-        parts: purchased parts.
-        beside: static parts that lamps and their holders must not meet.
+    The face is x of the uprights' front, mm. The camera must not see lamps or stands, and these
+    must not meet the static parts beside them.
 
     Raises:
         SpecError: when lamps cannot be where the spec has them, or take too much current; it says
@@ -61,7 +65,7 @@ def lamp_layout(
     """
     section = spec.light
     strip, short = parts[STRIP], parts[SHORT_STRIP]
-    upright = _Places(spec, face, camera, keep_out, beside, parts, strip, aside=None)
+    upright = _LampSearch(spec, face, camera, keep_out, beside, parts, strip, aside=None)
     level = [replace(upright, strip=one, aside=at) for one in (strip, short) for at in ASIDE_MM]
     found = [upright, *level]
     if (current := found[0].layout(-1.0).current_ma) > MAX_MA:
@@ -85,7 +89,7 @@ def lamp_layout(
 
 
 @dataclass(frozen=True)
-class _Places:
+class _LampSearch:
     """Places of four upright lamps, or of two level ones beside the plane y = 0 (mm).
 
     What decides where lamps can be has the names of the arguments of `lamp_layout`.
@@ -137,39 +141,28 @@ class _Places:
             return z - self.mounts.half_height
         return z - self.length / 2 - TAIL_MM
 
-    def _reach(self, aside: float) -> float:
-        """How far level strips and a screw's head beside them reach from y = 0."""
-        return abs(aside) + self.length / 2 + HEAD_MM / 2
-
     def fault(self, z: float) -> str:
         """What is wrong with lamps at a height, or nothing."""
         if self._lowest(z) < self.spec.frame.floor_mm + FOOT_HEIGHT_MM:
             return "the lamps reach down to the base plate"
-        if self.aside is not None and self._reach(self.aside) > self.mounts.across:
+        # How far level strips and a screw's head beside them reach from y = 0.
+        reach = abs(self.aside or 0.0) + (self.length + HEAD_MM) / 2
+        if self.level and reach > self.mounts.across:
             return "the strips are longer than there is room between the uprights' screws"
         layout = self.layout(z)
-        if fault := self._static_fault(layout) or self._moving_fault(layout):
-            return fault
-        if hidden_by_base(layout, self.spec.stage, self.keep_out):
-            return "the base comes between a lamp and the object's room"
-        return ""
-
-    def _static_fault(self, layout: LampLayout) -> str:
-        if in_view(_bodies(layout), self.camera):
-            return "the camera sees a lamp or its stand"
-        if self.level and (name := _met(_bodies(layout), self.beside)):
-            return f"a lamp or its holder meets the {name.replace('_', ' ')}"
-        return ""
-
-    def _moving_fault(self, layout: LampLayout) -> str:
         need, bodies = self.spec.frame.clearance_mm, _bodies(layout)
+        if in_view(bodies, self.camera):
+            return "the camera sees a lamp or its stand"
+        if self.level and (name := _met(bodies, self.beside)):
+            return f"a lamp or its holder meets the {name.replace('_', ' ')}"
         for what, distance in (
             ("the light of the balls", self.keep_out.to_light),
             ("what the base sweeps", self.keep_out.to_swept),
         ):
             if min_distance(distance, bodies, need) < need:
                 return f"a lamp or its holder is less than {need:g} mm from {what}"
-        return ""
+        hidden = hidden_by_base(layout, self.spec.stage, self.keep_out)
+        return "the base comes between a lamp and the object's room" if hidden else ""
 
     def layout(self, z: float) -> LampLayout:
         """The lamps at a height."""
@@ -177,9 +170,11 @@ class _Places:
         numbered = list(enumerate(places, 1))
         before = [one for one in numbered if one[1][0] > 0]
         behind = [one for one in numbered if one[1][0] < 0]
-        stand = mounts.bridge if self.level else mounts.stand
-        holder = mounts.bar if self.level else mounts.holder
-        screws = mounts.bar_screws if self.level else mounts.holder_screws
+        stand, holder, screws = (
+            (mounts.bridge, mounts.bar, mounts.bar_screws)
+            if self.level
+            else (mounts.stand, mounts.holder, mounts.holder_screws)
+        )
         return LampLayout(
             strip=self.strip,
             strips=self.spec.light.strips,
@@ -214,10 +209,9 @@ def _met(bodies: Sequence[Primitive], others: Sequence[Component]) -> str:
     """Name of a part in whose way bodies are, by the upright boxes round all bodies, or ""."""
     own = [_box(body) for body in bodies]
     for other in others:
-        for low, high in (
-            (low - BESIDE_MM, high + BESIDE_MM) for low, high in map(_box, other.added)
-        ):
-            if any((low < top).all() and (bottom < high).all() for bottom, top in own):
+        for low, high in map(_box, other.added):
+            near = ((low - BESIDE_MM < top) & (bottom < high + BESIDE_MM) for bottom, top in own)
+            if any(axes.all() for axes in near):
                 return other.name
     return ""
 

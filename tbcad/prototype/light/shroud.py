@@ -64,14 +64,9 @@ class ShroudLayout:
 def shroud_layout(
     light: LightSpec, static: Iterable[Component], keep_out: KeepOut, floor: float, parts: Parts
 ) -> ShroudLayout | None:
-    """The shroud round all parts; None without, also where "auto" finds no sheet large enough.
+    """The shroud round static parts and what the base sweeps; the floor is z of the plate's foot.
 
-    Args:
-        light: section of lamps and shroud.
-        static: parts in their places.
-        keep_out: what the base sweeps.
-        floor: z of the base plate's lower face.
-        parts: purchased parts.
+    None without, also where "auto" finds no sheet large enough.
 
     Raises:
         SpecError: when the spec asks for one and no sheet is large enough.
@@ -87,7 +82,8 @@ def shroud_layout(
     fitting = [
         (sheet, some)
         for sheet, some in zip(sheets, panels, strict=True)
-        if all(_fits(panel.cut_size, sheet) for panel in some)
+        if max(max(panel.cut_size) for panel in some) <= sheet["length_mm"]
+        and max(min(panel.cut_size) for panel in some) <= min(sheet["width_mm"], sheet["length_mm"])
     ]
     if not fitting:
         if light.shroud == AUTO:
@@ -137,10 +133,12 @@ def _panels(low: Floats, high: Floats, sheet: PurchasedPart) -> tuple[Panel, ...
     (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
     out_x, out_y = (x0 - thick, x1 + thick), (y0 - thick, y1 + thick)
     in_y, up = (y0, y1), (z0, z1)
-
     back, front = (x0 - thick, x0), (x1, x1 + thick)
     right, left = (y0 - thick, y0), (y1, y1 + thick)
-    notch = _notch((back, in_y, up))
+    middle, half = (y0 + y1) / 2, NOTCH_MM[0] / 2
+    start = np.array([back[0] - 1.0, middle - half, z0 - 1.0])
+    end = np.array([back[1] + 1.0, middle + half, z0 + NOTCH_MM[1]])
+    notch = (box(start, end, np.eye(3)),)
     flaps = ("left", "right", "top")
     return (
         _panel("floor", "floor of the shroud below the plate", (out_x, out_y, (z0 - thick, z0))),
@@ -164,19 +162,6 @@ def _panel(
     component = Component(PREFIX + name, what, (box(low, high, np.eye(3)),), notch)
     width, height = np.delete(high - low, np.argmin(high - low)).tolist()
     return Panel(component, (width, height), flaps, bool(notch))
-
-
-def _notch(ranges: Ranges) -> tuple[Primitive, ...]:
-    (x0, x1), (y0, y1), (z0, _) = ranges
-    middle, half = (y0 + y1) / 2, NOTCH_MM[0] / 2
-    low = np.array([x0 - 1.0, middle - half, z0 - 1.0])
-    return (box(low, np.array([x1 + 1.0, middle + half, z0 + NOTCH_MM[1]]), np.eye(3)),)
-
-
-def _fits(size: tuple[float, float], sheet: PurchasedPart) -> bool:
-    return max(size) <= sheet["length_mm"] and min(size) <= min(
-        sheet["width_mm"], sheet["length_mm"]
-    )
 
 
 def _sheets(panels: Iterable[Panel], sheet: PurchasedPart) -> int:

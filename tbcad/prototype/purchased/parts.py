@@ -1,11 +1,18 @@
-"""Purchased parts: one CSV file for each kind in this folder."""
+"""Purchased parts, one CSV file for each kind in this folder, and their prices.
 
+Prices are tbcad's estimates in a CSV list, and lists of users before it.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
-from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.errors import SpecError, short_text
 
 COMMON_COLUMNS = ("part", "what", "material", "mass_g")
 SIZES: dict[str, tuple[str, ...]] = {
@@ -47,6 +54,13 @@ hole_square_mm is the side of a square of holes, hole_circle_mm the diameter of 
 """
 MAX_VALUE = 1e6  # of any size or mass
 SAME_SIZE_MM = 1e-6  # sizes are equal up to rounding
+PRICE_FIELDS = ("part", "each", "per_kg", "currency", "date", "source")
+ESTIMATES = "estimates"  # tbcad's own list
+MAX_PRICE = 1e6
+CURRENCY = re.compile("[A-Z]{3}")  # ISO 4217
+DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])(-(0[1-9]|[12]\d|3[01]))?")  # ISO 8601
+CENTS = 2
+WEIGHED_DIGITS = 2  # a price by mass is an estimate whatever the list says
 
 
 @dataclass(frozen=True)
@@ -76,10 +90,7 @@ def package_lists() -> Traversable:
 
 
 def load_parts(folder: Traversable | None = None) -> Parts:
-    """All purchased parts by name.
-
-    Args:
-        folder: that holds a CSV file for each kind; without, tbcad's own.
+    """All purchased parts by name, from a folder with a CSV file for each kind, or tbcad's own.
 
     Raises:
         SpecError: when a file is wrong; it names line and column.
@@ -118,16 +129,9 @@ def choose_part(
 ) -> PurchasedPart:
     """The smallest purchased part of a kind that has all sizes, and at least the size in order.
 
-    Args:
-        parts: lists of purchased parts.
-        kind: a list.
-        key: of the spec that asks for it.
-        hint: what to change when there is none.
-        order: size that must only be large enough; the smallest is taken.
-        sizes: required.
-
     Raises:
-        SpecError: when the list has none.
+        SpecError: when the list has none; it names the key of the spec that asks for it, and the
+            hint what to change.
     """
     exact = {size: value for size, value in sizes.items() if size != order}
     candidates = [
@@ -144,3 +148,91 @@ def choose_screw(parts: Parts, thread: float, length: float) -> PurchasedPart:
     hint = "make prototype.frame.flange_mm smaller"
     key = "prototype.frame.flange_mm"
     return choose_part(parts, "screws", key, hint, thread_mm=thread, length_mm=length)
+
+
+@dataclass(frozen=True)
+class Price:
+    """What one piece costs."""
+
+    amount: float  # in the currency
+    currency: str  # by ISO 4217
+    date: str  # year and month, or day, at which it held
+    source: str  # where it comes from
+
+
+@dataclass(frozen=True)
+class PriceRule:
+    """A line of a list."""
+
+    pattern: str  # name of a part, `*` for any characters
+    each: float  # price of a piece without what follows from its mass
+    per_kg: float  # price of a kilogram
+    currency: str  # of both
+    date: str  # at which they held
+    source: str  # where they come from
+
+    def price(self, mass_g: float) -> Price:
+        """Of a piece of a mass (g); by mass it is rounded to two digits."""
+        amount = self.each + self.per_kg * mass_g / 1000
+        if self.per_kg:
+            amount = float(f"{amount:.{WEIGHED_DIGITS}g}")
+        return Price(round(amount, CENTS), self.currency, self.date, self.source)
+
+
+@dataclass(frozen=True)
+class Prices:
+    """Rules in the order in which they are asked."""
+
+    rules: tuple[PriceRule, ...]
+
+    def of(self, part: str, mass_g: float) -> Price | None:
+        """The price of one piece by the first rule that fits its name; None without any."""
+        fitting = (rule for rule in self.rules if fnmatchcase(part, rule.pattern))
+        return next((rule.price(mass_g) for rule in fitting), None)
+
+
+def load_prices(names: Iterable[str]) -> Prices:
+    """The rules of several lists, those of the first list first.
+
+    A list is "estimates", or the path of a CSV file (from the current folder) with PRICE_FIELDS.
+
+    Raises:
+        SpecError: a list that cannot be read, or is wrong; it names line and column.
+    """
+    return Prices(tuple(rule for name in names for rule in _rules(_file(name), name)))
+
+
+def _file(name: str) -> Path | Traversable:
+    if name == ESTIMATES:
+        return package_lists() / "prices.csv"
+    if not Path(name).is_file():
+        raise SpecError(
+            f"prototype.prices: {short_text(name)} is neither {ESTIMATES} nor a file: name one of "
+            "these"
+        )
+    return Path(name)
+
+
+def _rules(file: Path | Traversable, name: str) -> Iterator[PriceRule]:
+    patterns = set[str]()
+    for where, row in read_rows(file, name, PRICE_FIELDS, ("each", "per_kg")):
+        pattern = required_text(where, row, "part")
+        check_unique(where, row, "part", patterns)
+        each, per_kg = (
+            positive_number(where, row, column, MAX_PRICE) if row[column] else 0.0
+            for column in ("each", "per_kg")
+        )
+        if not each and not per_kg:
+            raise SpecError(f"{where}: no price: fill in column each, per_kg or both")
+        currency = _matching(where, row, "currency", CURRENCY, "three letters such as EUR")
+        date = _matching(where, row, "date", DATE, "a month or day such as 2026-11")
+        source = required_text(where, row, "source")
+        yield PriceRule(pattern, each, per_kg, currency, date, source)
+
+
+def _matching(where: str, row: Row, column: str, form: re.Pattern[str], allowed: str) -> str:
+    if not form.fullmatch(row[column]):
+        raise SpecError(
+            f"{where}, column {column}: {short_text(row[column])}, allowed is {allowed}: change it"
+        )
+    return row[column]

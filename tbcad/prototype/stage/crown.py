@@ -1,4 +1,9 @@
-"""The components of the stage: crown with pockets and channels, turning disc, post."""
+"""The components of the stage: crown with pockets, channels and arms, turning disc, post.
+
+An arm carries an LED beside the object: out of the crown below the object's room, then upward,
+where the room leaves the capture sphere free. Its section is in the upright plane through the
+post's axis and the LED, in coordinates (r, z) from the axis, mm.
+"""
 
 from dataclasses import dataclass
 
@@ -14,11 +19,10 @@ from tbcad.core.geometry.primitives import (
     cylinder_between,
 )
 from tbcad.core.geometry.rotations import unit_circle
-from tbcad.core.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.purchased.parts import PurchasedPart
-from tbcad.prototype.stage.arms import UP, Arm, arm_axes
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, pillar_radius
 from tbcad.types import Floats
 
@@ -43,6 +47,83 @@ ROOT_SHARE = 0.4  # of the plate's width, from its rim inward, that an arm's roo
 ROOT_MM = 1.0  # by which studs reach into the plate
 SCREW_DIRECTION = np.array([0.0, -1.0, 0.0])
 LEVEL = np.array([1.0, 0.0, 0.0])
+ARM_CHORDS = 6  # along the sphere, of each part
+LAP_MM = 1.0  # by which one part reaches into the other, and grooves beyond their ends
+ARM_GROOVE_MM = 0.8  # depth of the wires' groove in the arm's inner face
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The arm of one LED."""
+
+    axes: Floats  # rows: out from the axis, across, up, (3, 3)
+    inner: float  # r of its upright inner face; the LED is half the width farther out
+    outer: float  # r of its outer side at the pocket
+    floor: float  # z of the pocket's floor
+    turn: float  # z below which the object's room ends and the arm turns outward
+    root: tuple[float, float]  # (r, z) where its upper face leaves the crown's plate
+    low: float  # z of the plate's lower face at its rim
+    sphere: float  # radius of the sphere that it stays in
+
+    @property
+    def half_width(self) -> float:
+        """Of the arm, and radius of the pillar on it."""
+        return (self.outer - self.inner) / 2
+
+    def bodies(self) -> list[Prism]:
+        """The part below the object's room, and the upright part to the pocket's floor."""
+        corner, lap = (self.inner, self.turn), (self.inner, self.turn - LAP_MM)
+        direction = float(np.arctan2(self.turn, self.inner))
+        bottom = float(np.arcsin(self.low / self.sphere))
+        side = -float(np.arccos(self.outer / self.sphere))
+        end = max(
+            -float(np.arccos(self.inner / self.sphere)), float(np.arcsin(lap[1] / self.sphere))
+        )
+        top = np.array([lap, (self.inner, self.floor), (self.outer, self.floor)])
+        upper, under = np.array([self.root, corner]), np.array([(self.root[0], self.low)])
+        sections = (
+            np.vstack([upper, self._arc(direction, bottom), under]),
+            np.vstack([top, self._arc(side, end)]),
+        )
+        return [self._prism(section, self.half_width) for section in sections]
+
+    def grooves(self, width: float) -> list[Prism]:
+        """The wires' way from the pocket's floor along the inner faces to the crown's plate."""
+        half, middle = width / 2, self.inner + self.half_width
+        root, corner = np.array(self.root), np.array([self.inner, self.turn])
+        along = unit(corner - root)
+        deep, above = ARM_GROOVE_MM * np.array([along[1], -along[0]]), LAP_MM * UP[1:]
+        start, end = root - LAP_MM * along, corner + ARM_GROOVE_MM * along
+        slanting = np.array([start + deep, end + deep, end + above, start + above])
+        top = self.floor + LAP_MM
+        return [
+            self._prism(slanting, half),
+            self._box((self.inner - LAP_MM, self.turn), (self.inner + ARM_GROOVE_MM, top), half),
+            self._box(
+                (self.inner - LAP_MM, self.floor - ARM_GROOVE_MM), (middle + half, top), half
+            ),
+        ]
+
+    def _arc(self, first: float, last: float) -> Floats:
+        """Points (k, 2) on the sphere between two angles from the horizon, radians."""
+        angle = np.linspace(first, last, ARM_CHORDS + 1)
+        return np.asarray(self.sphere * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+    def _prism(self, section: Floats, half: float) -> Prism:
+        across = np.full(len(section), -half)
+        corners = np.column_stack([section[:, 0], across, section[:, 1]]) @ self.axes
+        return Prism(corners, 2 * half * self.axes[1])
+
+    def _box(self, low: tuple[float, float], high: tuple[float, float], half: float) -> Prism:
+        first, last = (np.array([r, side, z]) for (r, z), side in ((low, -half), (high, half)))
+        return box(first, last, self.axes)
+
+
+def arm_axes(dome: Floats) -> Floats:
+    """Rows out from the post's axis to a place (3,), across, and up, (3, 3)."""
+    out = np.array([*dome[:2], 0.0]) / norm(dome[:2])
+    return np.stack([out, np.cross(UP, out), UP])
 
 
 @dataclass(frozen=True)
@@ -76,13 +157,9 @@ def crown_component(
     ]
     removed: list[Primitive] = []
     for dome, floor in zip(leds, pockets.tolist(), strict=True):
-        rim = floor + POCKET * (float(dome[2]) - floor)
-        top, arm = (
-            np.array([*dome[:2], rim]),
-            led_arm(dome, pillar_radius(stage, led), floor, sizes),
-        )
+        rim, arm = floor + POCKET * (float(dome[2]) - floor), led_arm(dome, pillar, floor, sizes)
         foot = np.array([*dome[:2], (floor if arm else sizes.plate) - INSIDE_MM])
-        added.append(cylinder_between(foot, top, pillar))
+        added.append(cylinder_between(foot, np.array([*dome[:2], rim]), pillar))
         added += arm.bodies() if arm else []
         removed += _pocket(stage, led, dome, (floor, rim), sizes.plate, arm)
     seat = (sizes.plug - SEAT_MM) * SCREW_DIRECTION + [0, 0, sizes.joint - PLUG_MM / 2]
@@ -120,22 +197,17 @@ def _pocket(
     arm: Arm | None,
 ) -> list[Primitive]:
     """Pocket between two heights, the wires' way down, and their groove to the bore."""
-    floor, rim = heights
+    (floor, rim), half = heights, stage.wire_mm / 2
     radius, groove = led["flange_mm"] / 2 + POCKET_PLAY_MM, plate - GROOVE_MM
     low, bottom = np.array([*dome[:2], groove]), np.array([*dome[:2], floor])
     length = arm.root[0] if arm else float(norm(dome[:2]))
-    way = cylinder_between(low, bottom + THROUGH_MM * UP, stage.wire_mm / 2)
+    way = cylinder_between(low, bottom + THROUGH_MM * UP, half)
+    end = np.array([length, half, plate + OPEN_MM])
     return [
         cylinder_between(bottom, np.array([*dome[:2], rim + THROUGH_MM]), radius),
         *(arm.grooves(stage.wire_mm) if arm else [way]),
-        _groove(stage, dome, (groove, plate + OPEN_MM), length),
+        box(np.array([0.0, -half, groove]), end, arm_axes(dome)),
     ]
-
-
-def _groove(stage: StageSpec, dome: Floats, heights: tuple[float, float], length: float) -> Prism:
-    """A groove from the axis outward toward an LED, between two heights."""
-    half, (low, high) = stage.wire_mm / 2, heights
-    return box(np.array([0.0, -half, low]), np.array([length, half, high]), arm_axes(dome))
 
 
 def led_arm(dome: Floats, pillar: float, floor: float, sizes: CrownSizes) -> Arm | None:

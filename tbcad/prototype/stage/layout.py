@@ -20,7 +20,6 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.keepout import KeepOut, min_distance
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
-from tbcad.prototype.stage.arms import UP
 from tbcad.prototype.stage.crown import (
     DISC_MM,
     INSIDE_MM,
@@ -29,6 +28,7 @@ from tbcad.prototype.stage.crown import (
     SCREW_DIRECTION,
     SEAT_MM,
     SHOULDER_MM,
+    UP,
     CrownSizes,
     crown_component,
     disc_component,
@@ -66,17 +66,7 @@ class StageLayout:
 def stage_layout(
     spec: PrototypeSpec, prototype: PrototypeLayout, keep_out: KeepOut, parts: Parts
 ) -> StageLayout:
-    """The stage that fits into the space that balls, base and light leave free.
-
-    Args:
-        spec: of the prototype.
-        prototype: balls, their places and stops.
-        keep_out: what the stage must keep out of.
-        parts: purchased parts.
-
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-    """
+    """The stage in the space that balls, base and light leave free; SpecError if there is none."""
     stage = spec.stage
     post, neck = _radii(spec, _grazing_radius(prototype, keep_out.capture))
     led, leds = parts[stage.led], np.array(stage.leds_mm).reshape(-1, 3)

@@ -1,19 +1,26 @@
-"""Whether LEDs on the stage can be used: inside the sphere, apart, not in one plane, seen."""
+"""LEDs on the stage: whether they can be used, and how well their reflections fix the balls."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.core.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.optics.reflection import reflection_points
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.purchased.parts import PurchasedPart
-from tbcad.types import Floats
+from tbcad.records.prototype import CentreEstimate
+from tbcad.types import Floats, Ints
 
 POCKET_PLAY_MM = 0.1  # to either side
 MIN_FLATNESS_MM = 1.0  # of the LEDs about the nearest plane, square root of the sum of squares
 MIN_SEEN = 2  # LEDs that fix a sphere's centre, two figures each, where its radius is known
 TINY = 1e-12  # keeps a division by zero away
+NOISE_PX = 0.05  # standard deviation of a highlight's place in a photograph, each way
+STEP_MM = 1e-3  # of the centres, for derivatives
 
 
 def check_leds(
@@ -26,16 +33,8 @@ def check_leds(
 ) -> None:
     """Refuse LEDs that are outside the sphere, collide, are in one plane or seen too little.
 
-    Args:
-        stage: section of the stage.
-        prototype: whose virtual cameras see the LEDs.
-        capture: radius of the capture sphere, mm.
-        led: the purchased part.
-        pockets: z of the pockets' floors, mm, (l,).
-        plate: z of the crown's upper face, mm.
-
-    Raises:
-        SpecError: as said.
+    capture is the sphere's radius, pockets (l,) the floors of the pockets and plate the crown's
+    upper face (z), mm.
     """
     domes, pillar = np.array(stage.leds_mm).reshape(-1, 3), pillar_radius(stage, led)
     from_axis, tip = norm(domes[:, :2]), led["diameter_mm"] / 2
@@ -62,17 +61,12 @@ def check_leds(
             if norm(dome[:2] - domes[j, :2]) < 2 * pillar:
                 raise SpecError(f"{name} collides with LED {j + 1}: move one of them")
     if len(domes):
-        _check_flatness(domes)
+        if float(np.linalg.svd(domes - domes.mean(axis=0))[1][-1]) < MIN_FLATNESS_MM:
+            raise SpecError(
+                "prototype.stage.leds_mm: the LEDs lie nearly in one plane, which does not "
+                "calibrate: move one of them up or down"
+            )
         _check_seen(stage, domes, prototype, led, capture)
-
-
-def _check_flatness(domes: Floats) -> None:
-    """Refuse LEDs that lie nearly in one plane."""
-    if float(np.linalg.svd(domes - domes.mean(axis=0))[1][-1]) < MIN_FLATNESS_MM:
-        raise SpecError(
-            "prototype.stage.leds_mm: the LEDs lie nearly in one plane, which does not calibrate: "
-            "move one of them up or down"
-        )
 
 
 def _check_seen(
@@ -147,3 +141,63 @@ def hidden_by_object(
 def pillar_radius(stage: StageSpec, led: PurchasedPart) -> float:
     """Radius of the pillar round a pocket, mm."""
     return led["flange_mm"] / 2 + POCKET_PLAY_MM + stage.led_wall_mm
+
+
+@dataclass(frozen=True)
+class CalibrationEstimate:
+    """Standard deviations of spheres' centres from one photograph of the LEDs, radii known."""
+
+    seen: Ints  # LEDs that each mirror sees past an object in its room, (m,)
+    worst: Floats  # of each centre in its least certain direction, mm, (m,)
+    across: Floats  # in the directions across the line of sight, root mean square, mm, (m,)
+
+    def record(self) -> CentreEstimate:
+        """Figures for prototype.json."""
+        return CentreEstimate(
+            noise_px=NOISE_PX,
+            leds_seen_min=int(self.seen.min()),
+            centre_um_median=round(1000 * float(np.median(self.worst)), 3),
+            centre_um_95=round(1000 * float(np.percentile(self.worst, 95)), 3),
+            across_um_median=round(1000 * float(np.median(self.across)), 3),
+        )
+
+
+def calibration_estimate(
+    stage: StageSpec, array: MirrorArray, leds: Floats, capture: float
+) -> CalibrationEstimate:
+    """Covariance (J^T J)^-1 sigma^2 of each sphere's centre, J the highlights' derivatives.
+
+    The array's mirrors stand for the balls that show them; leds (l, 3) are the centres of the domes
+    and capture the radius of the capture sphere, mm.
+    """
+    cameras = array.ellipsoid.camera_distance * array.u
+    seen = ~hidden_by_object(stage, leds, cameras, capture)
+    curved = array.mirrors.curvature > 0
+    moved = np.stack([_derivatives(array, place) for place in leds])
+    weight = np.where(seen.T & curved, 1.0, 0.0)
+    information = np.einsum("lm,lmij,lmik->mjk", weight, moved, moved)
+    enough = curved & (seen.sum(axis=1) >= MIN_SEEN)
+    covariance = NOISE_PX**2 * np.linalg.inv(information[enough])
+    sight = unit(array.mirrors.centre[enough] - array.camera.pinhole)
+    along = np.einsum("mi,mij,mj->m", sight, covariance, sight)
+    total = np.trace(covariance, axis1=1, axis2=2)
+    return CalibrationEstimate(
+        seen=seen.sum(axis=1),
+        worst=np.sqrt(np.linalg.eigvalsh(covariance)[:, -1]),
+        across=np.sqrt(np.maximum(total - along, 0) / 2),
+    )
+
+
+def _derivatives(array: MirrorArray, place: Floats) -> Floats:
+    """Of a highlight's column and row by the centre's coordinates, px/mm, (m, 2, 3)."""
+    view, centre = array.camera, array.mirrors.centre
+    columns = []
+    for axis in np.eye(3):
+        ends = [
+            view.project(
+                reflection_points(centre + step * axis, array.mirrors.radius, place, view.pinhole)
+            )
+            for step in (-STEP_MM, STEP_MM)
+        ]
+        columns.append((ends[1] - ends[0]) / (2 * STEP_MM))
+    return np.stack(columns, axis=2)

@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.common.srgb import shown_colour
-from tbcad.core.geometry.ellipsoid import Ellipsoid
+from tbcad.common.colours import shown_colour
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.report.page.packing import PackedArrays
+from tbcad.report.page.mirrors import PackedArrays
 from tbcad.shell.envelope import closing_envelope
 from tbcad.shell.facets import Facets, means, middles, mirror_facets
 from tbcad.shell.mesh import shell_mesh
@@ -52,22 +52,29 @@ def packed_body(body: Body, arrays: PackedArrays) -> Record:
     """A body for the page; its positions are rounded to STEPS along its longest side."""
     low = body.vertices.min(axis=0)
     step = float(np.ptp(body.vertices, axis=0).max()) / STEPS or 1.0
-    places = np.round((body.vertices - low) / step).astype(np.uint16)
+    places = np.round((body.vertices - low) / step).astype(np.int64)
     # One number for a place, which is sorted far faster than three.
-    number = places.astype(np.int64) @ [1 << 32, 1 << 16, 1]
+    number = places @ [1 << 32, 1 << 16, 1]
     _, first, index = np.unique(number, return_index=True, return_inverse=True)
     triangles = index[body.triangles]
     whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return _record(body, (low, step), places[first], triangles[whole], arrays) | {
+        "turns": body.turns
+    }
+
+
+def _record(
+    body: Body, scale: tuple[Floats, float], places: Ints, triangles: Ints, arrays: PackedArrays
+) -> Record:
     return {
         "name": body.name,
         "group": body.group,
-        "low": _short(low),
-        "step": step,
-        "vertices": arrays.add(places[first].T, "Uint16Array"),
-        "triangles": arrays.add(triangles[whole], "Uint32Array"),
+        "low": _short(scale[0]),
+        "step": scale[1],
+        "vertices": arrays.add(places.T, "Uint16Array"),
+        "triangles": arrays.add(triangles, "Uint32Array"),
         "colour": [round(float(value), 3) for value in body.colour],
         "apart": _short(body.apart),
-        "turns": body.turns,
     }
 
 
@@ -153,17 +160,8 @@ def _exact(body: Body, arrays: PackedArrays) -> Record:
     """A body whose triangles all stay, since what they are of is told in their order."""
     low = body.vertices.min(axis=0)
     step = float(np.ptp(body.vertices, axis=0).max()) / STEPS
-    places = np.round((body.vertices - low) / step)
-    return {
-        "name": body.name,
-        "group": body.group,
-        "low": _short(low),
-        "step": step,
-        "vertices": arrays.add(places.T, "Uint16Array"),
-        "triangles": arrays.add(body.triangles, "Uint32Array"),
-        "colour": list(body.colour),
-        "apart": _short(body.apart),
-    }
+    places = np.round((body.vertices - low) / step).astype(np.int64)
+    return _record(body, (low, step), places, body.triangles, arrays)
 
 
 def _short(vector: Floats) -> list[float]:

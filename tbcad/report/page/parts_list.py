@@ -5,8 +5,8 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from tbcad.cad.formats.csv_table import Row
-from tbcad.prototype.files.bom_view import PartsList
+from tbcad.cad.formats.checked_files import Row
+from tbcad.prototype.files.bom import PartsList
 
 HEADS = ("No.", "Qty", "Part", "What it is", "Material", "Mass, g", "Print, h", "Price", "From")
 G_PER_KG, BYTES_PER_KB = 1000.0, 1000.0

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tbcad.cad.formats.images.pictures import decoded, visible_files
+from tbcad.cad.formats.pictures import decoded, visible_files
 from tbcad.errors import InputError
 from tbcad.types import Bytes
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 from tbcad_verify.report.as_made import NOT_MODELLED, AsMade
-from tbcad_verify.report.key_figures import KEY_FIGURES
+from tbcad_verify.report.methods import KEY_FIGURES
 
 from tbcad.cad.formats.checked_files import Finite, Record, read_json
 from tbcad.output.manifest import VERDICT
@@ -162,14 +162,12 @@ def checks_html(verdict: Verdict | None) -> Iterator[str]:
     failed = [check for check in every if check.passed is not True]
     if failed:
         yield from _check_table(failed)
-    names: dict[str, list[CheckRow]] = {}
-    for check in every:
-        names.setdefault(check.name, []).append(check)
+    place = {name: k for k, name in enumerate(dict.fromkeys(check.name for check in every))}
     passed = sum(check.passed is True for check in every)
     yield f"<p>{passed} of {len(every)} checks passed.</p>"
     yield f"<details><summary>All {len(every)} checks, by name</summary>"
     yield "<div class=wide>"
-    yield from _check_table([check for checks in names.values() for check in checks])
+    yield from _check_table(sorted(every, key=lambda check: place[check.name]))
     yield "</div></details>"
 
 

@@ -12,7 +12,7 @@ from tbcad_verify.report.as_made import AsMade
 from tbcad.common.atomic_files import replace_files
 from tbcad.common.web_page import web_page
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.output.manifest import (
     MANIFEST,
     REPORT,
@@ -22,11 +22,11 @@ from tbcad.output.manifest import (
     read_manifest,
 )
 from tbcad.output.single_files import refuse_member
-from tbcad.prototype.files.bom_view import read_parts_list
+from tbcad.prototype.files.bom import read_parts_list
 from tbcad.records.design import MISSING
-from tbcad.records.manifest import Manifest
+from tbcad.records.document import Manifest
 from tbcad.report.page import bodies, mirrors
-from tbcad.report.page.packing import PackedArrays
+from tbcad.report.page.mirrors import PackedArrays
 from tbcad.report.page.parts_list import files_html, parts_html
 from tbcad.report.page.pictures import Picture, photographs, pictures_html, read_pictures
 from tbcad.report.page.verdict import (
@@ -63,14 +63,7 @@ def write_report(
     *,
     force: bool = False,
 ) -> Path:
-    """Write the page of an export.
-
-    Args:
-        folder: the export.
-        out: file to write; None: report.html in the export.
-        as_made: simulated builds; None if there are none.
-        capture: a light field of the export, whose photographs the page then shows.
-        force: whether a file that tbcad did not write may be replaced.
+    """Write the page of an export, by default as its report.html, which may show a capture of it.
 
     Raises:
         InputError: the file exists, the export or the capture cannot be read, or writing fails.
@@ -82,11 +75,7 @@ def write_report(
 
 
 def check_writable(file: Path, force: bool) -> None:
-    """Refuse, before any work, a file that cannot be written or is not tbcad's to replace.
-
-    Raises:
-        InputError: as said.
-    """
+    """Refuse, before any work, a file that cannot be written or is not tbcad's to replace."""
     if file.suffix.lower() != ".html" or not file.parent.is_dir():
         raise InputError(f"{file}: name a .html file in a folder that exists")
     if file.is_dir():
@@ -106,13 +95,7 @@ def page(
     *,
     linked: bool = True,
 ) -> str:
-    """The page as HTML, at most MAX_BYTES: pictures that do not fit are left out.
-
-    Args:
-        folder: the export.
-        as_made: simulated builds.
-        capture: a light field of the export.
-        linked: whether files of the export are linked to.
+    """The page of an export; linked: with links to its files.
 
     Raises:
         InputError: the export or the capture cannot be read.

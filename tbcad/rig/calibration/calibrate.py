@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Geometry
@@ -65,8 +65,7 @@ class ShellSetup(Setup):
     def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
         """Means and standard deviations by its process.
 
-        Raises:
-            InputError: radii are given as measured, which only balls and caps can be.
+        InputError: radii are given as measured, which only balls and caps can be.
         """
         if measured:
             raise InputError("--measured is of balls and caps, and a shell has none: leave it out")
@@ -82,8 +81,7 @@ def prepared_setup(
 ) -> Setup:
     """The machine of an export as frames of a run, of a shell those of one camera, show it.
 
-    Raises:
-        InputError: the export has no prototype or LEDs, or another picture's size than the run.
+    InputError: the export has no prototype or LEDs, or another picture's size than the run.
     """
     kind: type[Setup] = Setup if geometry == "prototype" else ShellSetup
     plan = plan_of(export, geometry, frames)

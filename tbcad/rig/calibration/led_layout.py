@@ -13,10 +13,10 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflected_rays
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
-from tbcad.rig.calibration.estimate.reflection import projection, reflections
+from tbcad.rig.calibration.estimate.jacobian import projection, reflections
 from tbcad.rig.calibration.uncertainty import SPHERE_MM
 from tbcad.rig.machine.designed import designed_shell, read_leds
 from tbcad.types import Bools, Floats, Progress
@@ -63,11 +63,8 @@ def ray_errors(
 ) -> tuple[Floats, Floats]:
     """Root mean square errors of rays at the object's centre, mm, and of directions, mrad, (m,).
 
-    Args:
-        information: of spheres.
-        chosen: numbers of the LEDs.
-        noise_px: standard deviation of each figure of a highlight.
-        sigma: prior standard deviations of centre and radius, mm; infinite for none, 0 for known.
+    By chosen LEDs and noise of each figure of a highlight, px. Prior standard deviations of centre
+    and radius, mm, are infinite for none, 0 for known.
     """
     data = information.by_led[chosen].sum(axis=0) / noise_px**2
     known = np.array([sigma[0]] * 3 + [sigma[1]])
@@ -117,20 +114,13 @@ class LedRoom:
     def places(self) -> Floats:
         """Places that are tried: one of each pair, mm, (p, 3)."""
         azimuth = np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+        ring = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
         highest = np.sqrt(self.outer**2 - (self.inner + self.pillar) ** 2)
         rows = []
         for z in np.linspace(self.lowest, highest, HEIGHTS):
             farthest = np.sqrt(self.outer**2 - z**2) - self.pillar
             for radius in np.unique(np.linspace(self.inner, max(farthest, self.inner), RINGS)):
-                rows.append(
-                    np.column_stack(
-                        [
-                            radius * np.cos(azimuth),
-                            radius * np.sin(azimuth),
-                            np.full(AZIMUTHS, z),
-                        ]
-                    )
-                )
+                rows.append(np.column_stack([radius * ring, np.full(AZIMUTHS, z)]))
         return np.round(np.concatenate(rows), DIGITS) + 0.0
 
     def fits(self, places: Floats, chosen: list[int], new: int) -> bool:

@@ -46,15 +46,9 @@ def prototype_prior(
 ) -> Prior:
     """Prior of a prototype as designed, whose balls are on a base that rotates.
 
-    Args:
-        machine: as designed.
-        errors: of its process.
-        body_centre: of the bodies in the seats, mm, (k, 3); the spheres' own for balls.
-        is_cap: which spheres are made instead of purchased, (k,).
-        series: number of the series that each frame belongs to, (f,).
-        zero_error: half width of the base's angle zero, radians.
-        lens_known: whether focal lengths, principal point and distortion are given.
-        measured: radii that are measured, mm, with their standard deviations, by number of sphere.
+    Bodies in the seats are at (k, 3), mm; some are caps, (k,), made instead of purchased. Each
+    frame belongs to a series, (f,). The base's angle zero has a half width in radians. A known lens
+    is fixed; measured radii have numbers of spheres, values and standard deviations, mm.
     """
     radius, radii = _radii(machine, errors, is_cap, measured)
     arm = norm(machine.centre - body_centre)

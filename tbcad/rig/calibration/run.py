@@ -7,23 +7,21 @@ from pathlib import Path
 from typing import Any
 
 from tbcad.common.atomic_files import InFolder
-from tbcad.common.figure_files import PlotFormat
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import CalibrateOptions
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.inputs import Source, files_named
+from tbcad.output.single_files import Source, files_named
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detect import detect
-from tbcad.rig.calibration.detection.expected import Room
+from tbcad.rig.calibration.detection.matching import Room
 from tbcad.rig.calibration.intrinsics.files import read_lens
 from tbcad.rig.calibration.priors import parse_measured
 from tbcad.rig.calibration.report.files import write_calibration, write_recovered
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
 from tbcad.rig.machine.designed import dome_radius
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import TRUTH, read_machine
-from tbcad.rig.runs.photographs import Run, check_same_export, read_run
+from tbcad.rig.machine.machine import TRUTH, Machine, read_machine
+from tbcad.rig.runs import Run, check_same_export, read_run
 from tbcad.tolerancing.process.process import Process, load_process, process_errors
 
 DEFAULT_PROCESS = "fdm"
@@ -62,9 +60,8 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
 
     A prototype's files are in `options.out`, those of a shell's cameras in its folders a and b.
 
-    Raises:
-        InputError: one cannot be read, they do not belong together, there is nothing to calibrate
-            from, or out cannot be replaced.
+    InputError: one cannot be read, they do not belong together, there is nothing to calibrate from,
+    or out cannot be replaced.
     """
     folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
     progress, detail = options.progress, options.detail
@@ -95,8 +92,7 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
             out / name,
             _basis(one, result.setup, options, process),
             inputs,
-            options.force,
-            options.plot,
+            options,
         )
         for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
     )
@@ -116,13 +112,12 @@ def _written(
     out: Path,
     basis: dict[str, Any],
     inputs: Iterable[Source],
-    force: bool,
-    plot: PlotFormat,
+    options: CalibrateOptions,
 ) -> WrittenCalibration:
     judged = verdict(result)
-    with replacing(out, "calibration", force, inputs) as new:
-        record = write_calibration(new, result, judged, basis, plot)
-        texts = [] if truth is None else [write_recovered(new, result, truth, plot)]
+    with replacing(out, "calibration", options.force, inputs) as new:
+        record = write_calibration(new, result, judged, basis, options.plot)
+        texts = [] if truth is None else [write_recovered(new, result, truth, options.plot)]
     text = "\n".join([verdict_text(result, judged), *texts])
     return WrittenCalibration(out, result, judged, text, record)
 

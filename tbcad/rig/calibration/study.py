@@ -10,18 +10,15 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 
-from tbcad.common.results.plots import PlotPanel, Series
-from tbcad.common.results.study import Figure, Study
-from tbcad.common.results.tables import Cell, Record, Table
+from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import unit
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
 from tbcad.records.exposure import Frame
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places
-from tbcad.rig.calibration.estimate.covariance import Covariance, covariance
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior, covariance
 from tbcad.rig.calibration.led_layout import (
     FREE,
     PRIOR_MM,

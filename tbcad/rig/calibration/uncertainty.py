@@ -17,11 +17,9 @@ from scipy.sparse import csr_array
 
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
-from tbcad.light.simulate.prototype.plan import HALF_TURN
-from tbcad.rig.calibration.estimate.covariance import Covariance, covariance
-from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images
-from tbcad.rig.calibration.estimate.parameters import Prior
-from tbcad.rig.calibration.estimate.reflection import reflections
+from tbcad.light.simulate.prototype.run import HALF_TURN
+from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images, reflections
+from tbcad.rig.calibration.estimate.parameters import Covariance, Prior, covariance
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
@@ -97,14 +95,8 @@ def besides_motions(
     """Covariance (m, 4, 4) of rays less the motion that fits all of them best.
 
     A machine that is shifted and rotated as a whole, with its object, gives the same light field.
-    With S the rays' derivatives, M the motions and F what fits them to S, this is the covariance by
-    S - M F, without a matrix as large as that.
-
-    Args:
-        known: covariance of the parameters, (q, q).
-        slopes: derivatives of the rays, (4 m, q).
-        motions: what each motion does to the rays, (4 m, c).
-        covariance: of the rays with their motion, (m, 4, 4).
+    With S the rays' derivatives (4 m, q), M the motions (4 m, c) and F what fits them to S, this is
+    the covariance by S - M F, without a matrix as large as that.
     """
     fitted = motion_fit(motions) @ slopes
     spread = known.times(fitted.T)
@@ -139,10 +131,9 @@ def shared_motions(prior: Prior, frame: Ints, direction: Floats) -> tuple[Floats
 def rigid_motions(direction: Floats, flip: Floats) -> Floats:
     """Rays through the origin under shifts (mm) and rotations (rad) of the object, (4 m, 6).
 
-    Args:
-        direction: of the rays in the frame of the machine, (m, 3).
-        flip: factors that turn vectors from there into the frame of the object, (m, 3): the object
-            is turned by half a turn in the second series, and the machine is not.
+    Directions (m, 3) are in the machine's frame; factors (m, 3) turn vectors from there into the
+    frame of the object, which is turned by half a turn in the second series when the machine is
+    not.
     """
     across = perpendicular_axes(direction)
     result = np.zeros((len(direction), 4, 6))
@@ -162,11 +153,10 @@ def pixel_widths(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> Flo
 
 
 def ray_slopes(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> tuple[csr_array, Floats]:
-    """Derivatives of rays by a machine's parameters, and their directions.
+    """Derivatives of rays by a machine's parameters, (4 m, q), and their directions, (m, 3).
 
-    Returns:
-        Rows by ray: place along two directions, mm, rotation toward them, radians, (4 m, q).
-        Then unit vectors toward the object, (m, 3).
+    Rows by ray: place along two directions, mm, rotation toward them, radians. Directions
+    are unit vectors toward the object.
     """
     machine = prior.machine(values)
     direction = ray_directions(machine, frame, sphere)

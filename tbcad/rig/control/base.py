@@ -7,8 +7,7 @@ from tbcad.errors import InputError
 from tbcad.rig.control.grbl import HOME, SYNC, Grbl
 from tbcad.rig.control.machine import PIN_FIRST, MachineFault
 from tbcad.rig.control.messages import Status
-from tbcad.rig.control.plan import SETTINGS, ControlPlan
-from tbcad.rig.control.program import Move
+from tbcad.rig.control.plan import SETTINGS, ControlPlan, Move
 from tbcad.types import Progress
 
 SEEK_SETTING, TRAVEL_SETTING = 25, (130, 131, 132, 133)

@@ -20,12 +20,12 @@ from tbcad.rig.control.messages import (
     RESTING,
     STATES,
     Message,
+    Port,
     Status,
     firmware_of,
     meaning,
     parse,
 )
-from tbcad.rig.control.port import Port
 from tbcad.types import Progress
 
 RESET, HOLD, QUERY = b"\x18", b"!", b"?"
@@ -103,14 +103,9 @@ class Grbl:
     def command(self, line: str, expected_s: float = 0.0, silent_s: float = 0.0) -> list[Message]:
         """Send a line and wait until it is taken; return what else came meanwhile.
 
-        Args:
-            line: of G-code, or a $ command.
-            expected_s: how long the controller may be busy with it.
-            silent_s: how long it may leave `?` unanswered, as GRBL does while it homes.
-
-        Raises:
-            MachineFault: it is refused, answered by an alarm, or not answered.
-            ControllerReset: the controller began anew.
+        It may keep the controller busy for the expected time, and `?` unanswered for the silent
+        one, as homing does. MachineFault: it is refused, answered by an alarm, or not answered;
+        ControllerReset: the controller began anew.
         """
         if len(line) > MAX_LINE:
             raise MachineFault(f"{line!r} is longer than {MAX_LINE} characters")
@@ -215,14 +210,13 @@ class Grbl:
 
     def _refuse(self, message: Message, line: str) -> None:
         """Raise what ends a run."""
+        told = f"{line!r}: {message.text}: {meaning(message)}"
         if message.kind == "error":
             self.pending = ""
-            told = f"{message.text}: {meaning(message)}"
-            raise MachineFault(f"the controller refuses {line!r}: {told}")
+            raise MachineFault(f"the controller refuses {told}")
         if message.kind == "alarm":
             self._stopped = True
-            told = f"{message.text}: {meaning(message)}"
-            raise MachineFault(f"the controller stopped at {line!r}: {told}")
+            raise MachineFault(f"the controller stopped at {told}")
         if message.kind == "banner":
             raise ControllerReset(
                 f"the controller began anew at {line!r} ({message.text}): it has forgotten its "

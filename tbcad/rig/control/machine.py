@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from tbcad.errors import one_line
-from tbcad.rig.control.program import Move
+from tbcad.rig.control.plan import Move
 from tbcad.types import Progress
 
 PIN_FIRST = (

@@ -14,8 +14,8 @@ from scipy.ndimage import label, maximum
 
 from tbcad.errors import InputError
 from tbcad.records.exposure import DARK, DARK_LIT, LIT
-from tbcad.rig.control.cameras.camera import Shot
-from tbcad.rig.runs.images import Image16, decoded_image
+from tbcad.rig.control.camera import Shot
+from tbcad.rig.runs import Image16, decoded_image
 from tbcad.types import Bools, Floats, Progress
 
 THRESHOLD = 0.02  # of the largest number: less is no light, as of spots in a calibration
@@ -77,8 +77,7 @@ def preflight(times: dict[str, float | None], shoot: Shoot, where: str, note: Pr
 
     A time of None is that which the camera has; a note is given for each phase.
 
-    Raises:
-        InputError: an exposure will not do; it says which would.
+    InputError: an exposure will not do; it says which would.
     """
     dark: dict[str, Image16] = {}
     seen: dict[str, Seen] = {}

@@ -9,30 +9,30 @@ from time import monotonic
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.runs import Ask, RunOptions, Show
-from tbcad.output.content import refuse_inside
-from tbcad.output.inputs import refuse_inputs
-from tbcad.records.exposure import DARK_LIT, PhaseTimes, exposure_name
+from tbcad.options.shared import exposures
+from tbcad.output.manifest import refuse_inside
+from tbcad.output.single_files import refuse_inputs
+from tbcad.records.exposure import DARK_LIT, PhaseTimes
 from tbcad.records.run import RunRecord, read_record
 from tbcad.rig.control.base import Base
-from tbcad.rig.control.cameras.choice import (
+from tbcad.rig.control.chosen_camera import (
     check_camera_name,
     check_can_expose,
     connected_camera,
 )
 from tbcad.rig.control.grbl import Grbl
-from tbcad.rig.control.klipper.base import KlipperBase
-from tbcad.rig.control.klipper.files import read_klipper_files
-from tbcad.rig.control.klipper.host import Klipper
-from tbcad.rig.control.klipper.moonraker import PREFIX, Moonraker, read_address
+from tbcad.rig.control.klipper import Klipper
+from tbcad.rig.control.klipper_base import KlipperBase, read_klipper_files
 from tbcad.rig.control.machine import DrivenMachine, MachineFault
-from tbcad.rig.control.outcome import DryRun, Outcome
+from tbcad.rig.control.messages import SerialPort
+from tbcad.rig.control.moonraker import PREFIX, Moonraker, read_address
 from tbcad.rig.control.plan import ControlPlan, read_control_plan
-from tbcad.rig.control.port import SerialPort
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
+    DryRun,
+    Outcome,
     RunSelection,
-    Shots,
     chosen_frames,
     chosen_phases,
     count,
@@ -40,8 +40,7 @@ from tbcad.rig.control.selection import (
     expected_seconds,
 )
 from tbcad.rig.control.session import Session
-from tbcad.rig.runs.photographs import read_run
-from tbcad.rig.runs.writing import DiskFault, check_new
+from tbcad.rig.runs import DiskFault, check_new, read_run
 from tbcad.types import Progress
 
 STOPPED = "stopped by the operator"
@@ -51,12 +50,7 @@ def dry_run(options: RunOptions) -> DryRun:
     """What a run would do, without port and camera; nothing is written."""
     plan, chosen = _prepared(options)
     taken = set(read_run(Path(options.out)).exposures) if options.resume else set[str]()
-    names = [phase.name for phase in chosen.phases]
-    remaining = [
-        Shots(frame, left)
-        for frame in chosen.frames
-        if (left := tuple(name for name in names if exposure_name(frame, name) not in taken))
-    ]
+    remaining = chosen.left(taken)
     seconds = expected_seconds(plan, remaining, CAPTURE_S)
     each = BYTES_PER_PX * chosen.size_px[0] * chosen.size_px[1]
     return DryRun(plan, remaining, sum(seconds.values()), disk_bytes(count(remaining), each))
@@ -65,11 +59,8 @@ def dry_run(options: RunOptions) -> DryRun:
 def run_machine(options: RunOptions) -> Outcome:
     """Photograph what is asked for, and leave base held and lights off, whatever happens.
 
-    Returns:
-        What was photographed; nothing, if only the preflight is asked for.
-
-    Raises:
-        InputError: something was wrong before the first photograph of the run.
+    The outcome of a preflight alone is nothing. InputError: something was wrong before the first
+    photograph of the run.
     """
     if options.port is None:
         raise InputError(
@@ -135,7 +126,7 @@ def _faults_as_input_errors(port: str) -> Iterator[None]:
 def _prepared(options: RunOptions) -> tuple[ControlPlan, RunSelection]:
     """Plan and choice, or those of the run that is resumed."""
     exports, out, asked = Path(options.exports), Path(options.out), options.size()
-    times = PhaseTimes(*options.seconds())
+    times = PhaseTimes(*exposures(options.exposure_leds_s, options.exposure_lit_s))
     plan = read_control_plan(exports)
     phases = chosen_phases(plan, options.phases, times)
     frames = chosen_frames(plan, options.stops, options.runs or "ab")

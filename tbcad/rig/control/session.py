@@ -9,11 +9,11 @@ from pathlib import Path
 from tbcad.errors import InputError
 from tbcad.options.runs import Ask, Preflight, Show
 from tbcad.records.exposure import Frame, exposure_name
-from tbcad.rig.control.cameras.camera import RunCamera, Shot
+from tbcad.rig.control.camera import RunCamera, Shot
 from tbcad.rig.control.machine import CameraFault, DrivenMachine, MachineFault
-from tbcad.rig.control.outcome import Outcome
 from tbcad.rig.control.plan import ControlPlan
 from tbcad.rig.control.selection import (
+    Outcome,
     RunSelection,
     Shots,
     bytes_each,
@@ -28,11 +28,12 @@ from tbcad.rig.control.shooting import (
     Photograph,
     check_like_record,
     exposure_of,
+    faults_refused,
     light_on,
     run_record,
     taken_twice,
 )
-from tbcad.rig.runs.writing import DiskFault, RunWriter, new_run, resumed_run
+from tbcad.rig.runs import DiskFault, RunWriter, new_run, resumed_run
 from tbcad.types import Progress
 
 MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph
@@ -69,17 +70,16 @@ class Session:
         A new run begins with a preflight, unless `look` is "off"; nothing is written if it is
         "only". A camera on the controller's relay is released when the base is homed, not before.
 
-        Raises:
-            InputError: camera, disk, folder or exposure will not do; nothing was photographed.
-            MachineFault: the machine does not do what it is told.
+        InputError: camera, disk, folder or exposure will not do; nothing was photographed;
+        MachineFault: the machine does not do what it is told.
         """
         self._note = note
         if resume:
             note("the photographs that are there are compared with their sha256")
             self._writer = resumed_run(folder)
-            if not self._remaining():
-                return
-        remaining = self._remaining() if resume else self._all()
+        remaining = self._options.left(self._writer.taken if resume else ())
+        if not remaining:
+            return
         if self._camera.released:
             self._get_known_angle(_turned(remaining), ask)
         trials = self._trials()
@@ -112,10 +112,8 @@ class Session:
         return {name: first[seconds] for name, seconds in times.items()}
 
     def _trial(self, seconds: float | None) -> Photograph:
-        try:
+        with faults_refused():
             trial = taken_twice(self._camera, self._base, seconds, lambda _: None)
-        except CameraFault as fault:
-            raise InputError(f"the camera: {fault}") from None
         size = trial.facts.width_px, trial.facts.height_px
         if size != self._options.size_px:
             want = self._options.size_px
@@ -139,46 +137,20 @@ class Session:
         preflight(self._options.capture_times, self._looked_at, where, self._note)
 
     def _looked_at(self, phase: str, seconds: float | None) -> Shot:
-        try:
-            with self._light(phase):
-                return taken_twice(self._camera, self._base, seconds, lambda _: None).shot
-        except CameraFault as fault:
-            raise InputError(f"the camera: {fault}") from None
+        with faults_refused(), self._light(phase):
+            return taken_twice(self._camera, self._base, seconds, lambda _: None).shot
 
     def _light(self, phase: str) -> AbstractContextManager[None]:
         lights = {one.name: one for one in self._options.phases}
         return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
     def _check_same_run(self, folder: Path, trials: dict[str, Photograph]) -> None:
-        try:
+        with faults_refused(str(folder), ": set the camera as it was"):
             for phase, trial in trials.items():
                 check_like_record(self._writer.record, phase, trial)
-        except CameraFault as fault:
-            raise InputError(f"{folder}: {fault}: set the camera as it was") from None
-
-    def _all(self) -> list[Shots]:
-        names = tuple(phase.name for phase in self._options.phases)
-        return [Shots(frame, names) for frame in self._options.frames]
-
-    def _remaining(self) -> list[Shots]:
-        """What is not yet there, in the order of photographing."""
-        taken = self._writer.taken
-        left = [
-            Shots(
-                one.frame,
-                tuple(name for name in one.phases if exposure_name(one.frame, name) not in taken),
-            )
-            for one in self._all()
-        ]
-        return [one for one in left if one.phases]
 
     def photograph(self, ask: Ask, show: Show) -> None:
-        """Home, and photograph what remains.
-
-        Raises:
-            MachineFault: the machine cannot go on, or the operator will not.
-            DiskFault: the disk cannot.
-        """
+        """Home, and photograph what remains; MachineFault or DiskFault: it cannot go on."""
         for number, (turned, run) in enumerate(self._runs()):
             if number:
                 self._base.drive(self._plan.program.start)
@@ -194,7 +166,9 @@ class Session:
             self._base.drive(self._plan.program.end)
 
     def _runs(self) -> Iterator[tuple[bool, list[Shots]]]:
-        for turn, run in groupby(self._remaining(), lambda one: one.frame.object_turn_deg):
+        for turn, run in groupby(
+            self._options.left(self._writer.taken), lambda one: one.frame.object_turn_deg
+        ):
             yield bool(turn), list(run)
 
     def _get_known_angle(self, turned: bool, ask: Ask) -> None:
@@ -259,10 +233,6 @@ def _turned(remaining: list[Shots]) -> bool:
 
 
 def _have_done(ask: Ask, text: str) -> None:
-    """Ask for what a pause of the program says.
-
-    Raises:
-        MachineFault: the operator will not.
-    """
+    """Ask for what a pause of the program says; MachineFault: the operator will not."""
     if not ask(text.removesuffix("? Then resume").removesuffix(", then resume")):
         raise MachineFault("the operator did not go on")

@@ -11,8 +11,14 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import PhaseExposure, RunRecord
-from tbcad.rig.control.cameras.camera import RunCamera, Shot, are_near, shutter_seconds
-from tbcad.rig.control.cameras.image_facts import ImageFacts, image_facts
+from tbcad.rig.control.camera import (
+    ImageFacts,
+    RunCamera,
+    Shot,
+    are_near,
+    image_facts,
+    shutter_seconds,
+)
 from tbcad.rig.control.machine import CameraFault, DrivenMachine
 from tbcad.rig.control.plan import ControlPlan
 from tbcad.rig.control.selection import RunSelection
@@ -55,6 +61,15 @@ class Photograph:
 
 
 @contextmanager
+def faults_refused(where: str = "the camera", step: str = "") -> Iterator[None]:
+    """Before the first photograph a fault of the camera is one of the input."""
+    try:
+        yield
+    except CameraFault as fault:
+        raise InputError(f"{where}: {fault}{step}") from None
+
+
+@contextmanager
 def light_on(base: DrivenMachine, phase: Phase, seconds: float) -> Iterator[None]:
     """Have the light of a phase on, and let it settle for some seconds."""
     outputs = () if phase.output is None else (phase.output,)
@@ -90,12 +105,7 @@ def taken_twice(
 
 
 def take(camera: RunCamera, base: DrivenMachine, seconds: float | None = None) -> Photograph:
-    """Take one photograph, with an exposure time or that which the camera has.
-
-    Raises:
-        CameraFault: there is none, it cannot be read, or it has another exposure time.
-        MachineFault: the controller does not release the camera.
-    """
+    """Take a photograph with an exposure time or the camera's own; CameraFault: there is none."""
     if seconds is not None:
         camera.expose(seconds)
     begun = monotonic()
@@ -150,10 +160,8 @@ def run_record(
     plan: ControlPlan, options: RunSelection, trials: Mapping[str, Photograph], seconds: float
 ) -> RunRecord:
     """The record of a run, by a photograph for each phase and its expected duration."""
-    try:
+    with faults_refused():
         locked = common_settings(trials.values())
-    except CameraFault as fault:
-        raise InputError(f"the camera: {fault}") from None
     trial = next(iter(trials.values()))
     return RunRecord(
         export_sha256=plan.sha256,

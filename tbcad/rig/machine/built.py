@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.optics.camera import LensCamera
-from tbcad.core.optics.pedestals.walls import NO_WALLS, GrooveWalls
-from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
+from tbcad.light.simulate.prototype.run import Plan
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors

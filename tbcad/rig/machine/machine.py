@@ -1,19 +1,33 @@
-"""One machine: a camera, spheres that rotate about an axis, and LEDs that rest.
+"""One machine: a camera, spheres that rotate about an axis, and LEDs that rest; its record.
 
 Everything is in the frame of the design (mm, z up, the object's centre at the origin). A machine's
 frames are its photographed positions: one for each stop of each run of the base. The object is
 turned between both runs; camera, axis and LEDs are not. The shell of one camera is a machine with
-one frame, whose spheres are its mirrors.
+one frame, whose spheres are its mirrors. machine.json has its state, calibrated or simulated.
 """
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from tbcad.core.geometry.rotations import rotated
+from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflection_points
+from tbcad.errors import InputError
+from tbcad.records.calibration import CalibratedCamera, MachineRecord, SphereRecord
+from tbcad.records.exposure import Frame
 from tbcad.types import Floats, Ints
+
+RECORD = "machine.json"
+TRUTH = "truth.json"  # the machine of a simulated run, in its folder
+CAMERA = {
+    **{"pinhole": "pinhole_mm", "axes": "axes", "focal": "focal_px"},
+    **{"principal": "principal_px", "distortion": "distortion"},
+}
+"""Arrays of a camera, and their keys in machine.json."""
+ROUNDING = 1e-9  # of unit vectors
 
 
 @dataclass(frozen=True)
@@ -70,3 +84,52 @@ class Highlights:
 
     def __len__(self) -> int:
         return len(self.frame)
+
+
+def truth_file(machine: str) -> str:
+    """Name of the file with a machine as it was simulated: truth.json, of a shell truth_a.json."""
+    return f"truth_{machine}.json" if machine else TRUTH
+
+
+def write_machine(path: Path, machine: Machine, frames: tuple[Frame, ...]) -> None:
+    """Write machine.json, for a machine with these frames."""
+    camera = machine.camera
+    spheres = zip(machine.centre.tolist(), machine.radius.tolist(), strict=True)
+    MachineRecord(
+        camera=CalibratedCamera(
+            **{key: getattr(camera, name).tolist() for name, key in CAMERA.items()},
+            width_px=camera.width_px,
+            height_px=camera.height_px,
+        ),
+        axis=machine.axis.tolist(),
+        axis_point_mm=machine.axis_point.tolist(),
+        frames=frames,
+        angle_deg=np.degrees(machine.angle).tolist(),
+        spheres=tuple(SphereRecord(centre_mm=at, radius_mm=radius) for at, radius in spheres),
+        leds_mm=machine.leds.tolist(),
+        shift_mm=None if machine.shift is None else machine.shift.tolist(),
+    ).write(path)
+
+
+def read_machine(path: Path) -> tuple[Machine, tuple[Frame, ...]]:
+    """The machine that a file describes, and its frames; InputError: it says what cannot be."""
+    found = MachineRecord.read(path)
+    axis, axes = np.array(found.axis), np.array(found.camera.axes)
+    if abs(norm(axis) - 1) > ROUNDING or np.abs(axes @ axes.T - np.eye(3)).max() > ROUNDING:
+        raise InputError(f"{path}: axes are no unit vectors at right angles: calibrate again")
+    camera = LensCamera(
+        **{name: np.array(getattr(found.camera, key)) for name, key in CAMERA.items()},
+        width_px=found.camera.width_px,
+        height_px=found.camera.height_px,
+    )
+    machine = Machine(
+        camera=camera,
+        axis=axis,
+        axis_point=np.array(found.axis_point_mm),
+        angle=np.radians(found.angle_deg),
+        centre=np.array([sphere.centre_mm for sphere in found.spheres]),
+        radius=np.array([sphere.radius_mm for sphere in found.spheres]),
+        leds=np.array(found.leds_mm).reshape(-1, 3),
+        shift=None if found.shift_mm is None else np.array(found.shift_mm),
+    )
+    return machine, found.frames

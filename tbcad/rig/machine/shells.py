@@ -11,17 +11,16 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan, read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.calibration import NAME, CalibrationRecord
 from tbcad.records.exposure import Frame
 from tbcad.records.run import Geometry
 from tbcad.rig.machine.built import BuiltPrototype, built_camera, draw_other_errors
-from tbcad.rig.machine.designed import designed_shell
+from tbcad.rig.machine.designed import TURNS, designed_shell
 from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import TURNS
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_models, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
@@ -40,11 +39,7 @@ def shell_frame(half: int) -> Frame:
 
 
 def designed_half(export: ExportedDesign, half: int) -> Machine:
-    """One camera of an export's shell, 0 for a and 1 for b; LEDs as on the prototype's stage.
-
-    Raises:
-        InputError: a mirror is planar: it shows no LED that could be told from its place.
-    """
+    """One camera of a shell, 0 for a, 1 for b, and the stage's LEDs; InputError: planar mirrors."""
     reflector, flip = export.reflectors[half], _flip(half)
     if (reflector.mirrors.curvature <= 0).any():
         raise InputError(
@@ -169,11 +164,7 @@ def _flip(half: int) -> Floats:
 
 
 def export_of(calibration: Path) -> Path:
-    """The export that a calibration's record names.
-
-    Raises:
-        InputError: it names none.
-    """
+    """The export that a calibration's record names; InputError: it names none."""
     files = [one / NAME for one in (calibration, *(calibration / name for name in CAMERAS))]
     try:
         return Path(CalibrationRecord.read(next(filter(Path.is_file, files), files[0])).exports)

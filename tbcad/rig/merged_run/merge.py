@@ -1,35 +1,56 @@
-"""A run's photographs, ready to be merged into the light field of the machine that took them."""
+"""A run's photographs merged into the light field of the machine that took them, and its folder."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import hypot
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.files import capture_record, write_cameras, write_record
+from tbcad.light.simulate.capture.light_field import RAY_SIGMAS
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, ball_reflector
 from tbcad.light.simulate.scene.rays import meets_sphere
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import MergeOptions
-from tbcad.records.exposure import LIT, Frame
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import TURNS, machine_run, stops_known
-from tbcad.rig.machine.record import RECORD, read_machine
+from tbcad.records.exposure import LIT, Frame, exposure_name
+from tbcad.records.tables import RayRow
+from tbcad.rig.machine.designed import TURNS, machine_run, stops_known
+from tbcad.rig.machine.machine import RECORD, Machine, read_machine
 from tbcad.rig.machine.shells import NOT_SERVED, plan_of, tied
-from tbcad.rig.merged_run.ray_sigmas import ray_sigmas
 from tbcad.rig.merged_run.stop_photographs import (
     CorrectedPhotographs,
     Corrections,
     common_exposure,
     corrections,
 )
-from tbcad.rig.runs.photographs import Run, check_same_export, read_run
+from tbcad.rig.runs import Run, check_same_export, read_run
 from tbcad.types import Bools, Floats, Ints, Progress
+
+
+def ray_sigmas(
+    folders: Iterable[Path], mirrors: Mapping[str, int], capture_mm: float
+) -> dict[str, list[float | None]]:
+    """Root mean square error of the rays of each mirror where the object is, mm, by camera.
+
+    At the centre it is `sigma_mm`; elsewhere their angle counts too, here at half the radius of the
+    capture sphere. None: the calibration, whose folders may lack the table, does not say.
+    """
+    known = {
+        ray.mirror: round(hypot(ray.sigma_mm, ray.sigma_mrad / 1000 * capture_mm / 4), 5)
+        for folder in folders
+        if (folder / RayRow.FILE).is_file()
+        for ray in RayRow.read(folder)
+    }
+    return {
+        camera: [known.get(f"{camera}{number + 1:04d}") for number in range(count)]
+        for camera, count in mirrors.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -90,8 +111,7 @@ class Merge:
 def prepared_merge(folder: Path, calibration: Path, exports: Path, options: MergeOptions) -> Merge:
     """Read what a merge needs, but the photographs themselves.
 
-    Raises:
-        InputError: one cannot be read, they do not belong together, or nothing was photographed.
+    InputError: one cannot be read, they do not belong together, or nothing was photographed.
     """
     run, export = read_run(folder), read_export(exports)
     check_same_export(run, exports)
@@ -140,13 +160,10 @@ def _half(
         for frame in run.record.frames
         if frame.object_turn_deg == TURNS[half] and frame.stop <= len(plan.angle)
     }
-    frames: list[Frame | None] = []
-    missing: dict[int, str] = {}
-    for stop in range(len(plan.angle)):
-        frames.append(of_stop.get(stop) if known[half, stop] else None)
-        if stop not in of_stop:
-            missing[stop] = "the run leaves this stop out"
-    photographs = CorrectedPhotographs(run, tuple(frames), corrected, common_exposure(run), missing)
+    stops = range(len(plan.angle))
+    frames = tuple(of_stop.get(stop) if known[half, stop] else None for stop in stops)
+    missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
+    photographs = CorrectedPhotographs(run, frames, corrected, common_exposure(run), missing)
     return HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64))
 
 
@@ -190,3 +207,40 @@ def _shows_object(
     del distance
     origin = np.broadcast_to(pinhole, direction.shape).copy()
     return np.asarray((mirror == 0) & meets_sphere(origin, direction, radius))
+
+
+def write_merge(folder: Path, merge: Merge, progress: Progress) -> dict[str, Any]:
+    """Merge and write all files into the caller's folder, and return its record."""
+    record = capture_record(merge.facts)
+    stored = {**record, RAY_SIGMAS: merge.ray_sigma_mm}  # which would fill capture.json
+    write_cameras(folder, merge.cameras(progress), merge.capture_mm, stored)
+    record["based_on"] = {half.camera_id: based_on(half) for half in merge.halves}
+    write_record(folder, record)
+    return record
+
+
+def based_on(half: HalfMerge) -> dict[str, Any]:
+    """What a camera's picture is based on, after its merge, for capture.json."""
+    missing = half.missing_mirrors()
+    run, known = half.photographs.run, [f for f in half.photographs.frames if f is not None]
+    phases = LIT, half.photographs.dark_phase
+    names = {exposure_name(frame, phase) for frame in known for phase in phases}
+    unread = {
+        exposure_name(frame, LIT): half.photographs.missing[stop]
+        for stop, frame in enumerate(half.photographs.frames)
+        if frame is not None and stop in half.photographs.missing
+    }
+    return {
+        "mirrors": len(half.pixels),
+        "mirrors_with_rays": int((half.pixels > 0).sum()),
+        "stops": len(half.photographs.frames),
+        "stops_used": len(known) - len(unread),
+        "mirrors_missing": {
+            reason: [f"{half.camera_id}{number:04d}" for number in numbers]
+            for reason, numbers in missing.items()
+        },
+        "photographs_not_used": {name: fault for name, fault in run.faults.items() if name in names}
+        | unread,
+        "without_dark": sorted(half.photographs.without_dark),
+        "dark_scaled": sorted(half.photographs.dark_scaled),
+    }

@@ -8,15 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.common.srgb import srgb, srgb_light
+from tbcad.common.colours import srgb, srgb_light
 from tbcad.core.optics.camera import LensCamera, vignetting
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import between_pixels
 from tbcad.options.machines import MergeOptions
 from tbcad.options.shared import AnyPath
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
-from tbcad.rig.runs.images import Image16, read_image
-from tbcad.rig.runs.photographs import Run, read_photograph
+from tbcad.rig.runs import Image16, Run, read_image, read_photograph
 from tbcad.types import Bytes, Floats, Ints
 
 Encoding = Literal["linear", "srgb"]
@@ -79,8 +78,7 @@ def flat_field_gain(files: Sequence[AnyPath], encoding: Encoding, camera: LensCa
 
     Pixels with next to no light, beyond the lens's picture, show nothing.
 
-    Raises:
-        InputError: one cannot be read, has another size, or all is dark.
+    InputError: one cannot be read, has another size, or all is dark.
     """
     size = camera.height_px, camera.width_px
     total = np.zeros((*size, 3), dtype=np.float32)

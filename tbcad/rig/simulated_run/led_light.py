@@ -9,7 +9,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.led_dome import disc_images, dome_samples
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import (
@@ -18,7 +18,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
     balls_between,
     points_within_walls,
 )
-from tbcad.light.simulate.prototype.plan import HALF_TURN
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.rig.machine.built import BuiltPrototype
@@ -58,11 +58,7 @@ def _nearer(scene: Any | None, origin: Floats, direction: Floats, length: Floats
 
 
 def stage_scene(folder: Path) -> Any | None:
-    """The stage's printed parts of an export in their places; None where it has none.
-
-    Raises:
-        InputError: the record or a mesh cannot be read.
-    """
+    """The stage's printed parts of an export in their places; None where it has none."""
     parts = Prototype.read(folder / NAME).with_role("stage")
     facets = [_placed(folder, part) for part in parts]
     return embree_scene(np.concatenate(facets)) if facets else None
@@ -124,15 +120,10 @@ def led_light(
     dome: float = DOME_MM,
     faint: float = FAINT_PX2,
 ) -> LightPoints:
-    """All light of the LEDs that reaches the camera over the balls in a frame.
+    """All light of the LEDs that reaches the camera over the balls in a frame, from 0.
 
-    Args:
-        built: the prototype.
-        frame: from 0.
-        turned: whether the object is turned by 180 degrees.
-        occluders: what may hide LEDs.
-        dome: radius of an LED's dome, mm.
-        faint: area of an image of an image that is not followed, square pixels.
+    The object may be turned by 180 degrees; LEDs have domes of a radius in mm. Images of images
+    with less than a faint area, square pixels, are not followed.
     """
     balls = balls_of_frame(built, frame)
     once = _reflected_once(built, balls, turned, occluders, dome)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from tbcad.common.compiled import compiled
-from tbcad.core.optics.pedestals.walls import NO_WALLS, GrooveWalls
+from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.light.simulate.capture.photograph import row_bands
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
-from tbcad.light.simulate.prototype.plan import HALF_TURN
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.records.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.rig.machine.built import BuiltPrototype
@@ -172,13 +172,8 @@ def object_light(
 ) -> Colours:
     """What a camera sees of a lit object, 0 to 255, (h, w, 3).
 
-    Args:
-        pinhole: of the camera, mm, (3,).
-        directions: of its pixels, (h, w, 3).
-        balls: in the frame, (k, 8).
-        scene: the object as it stands in the first run.
-        turned: whether it is turned by 180 degrees.
-        walls: of the balls.
+    Its pixels have directions (h, w, 3); balls are (k, 8) in the frame. The scene is the object as
+    it stands in the first run; it may be turned by 180 degrees.
     """
     # Seen from the object, which rests, camera and balls are turned instead.
     flip = HALF_TURN if turned else np.ones(3)

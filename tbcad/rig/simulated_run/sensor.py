@@ -103,45 +103,28 @@ def recorded(
     random: np.random.Generator,
     seconds: float = 1.0,
 ) -> Image16:
-    """The numbers of a photograph; what is more than full is clipped, and does not bloom.
+    """The numbers of a photograph, (h, w, 3) of 8 bits or (h, w) of 16; more than full is clipped.
 
-    Args:
-        sensor: that takes it.
-        maps: of its pixels.
-        light: that falls on them before lens and dust, 1 fills a pixel, (h, w) or (h, w, 3); None
-            for darkness.
-        random: for the noise.
-        seconds: exposure time, which the dark signal grows with.
-
-    Returns:
-        (h, w, 3) of 8 bits, (h, w) of 16.
+    Light, (h, w) or (h, w, 3), falls on the pixels before lens and dust, 1 fills one; None for
+    darkness. The dark signal grows with the exposure time, s.
     """
     sensor = replace(sensor, dark_electrons=sensor.dark_electrons * seconds)
     shape = maps.transmission.shape
     colours = CHANNELS if sensor.bits == 8 else 1
     image = _empty(sensor, (maps.transmission.size, colours), random)
-    lit = np.empty(0, dtype=np.int64) if light is None else _lit(sensor, light)
+    pixels = None if light is None else light.reshape(maps.transmission.size, -1)
+    faint = EMPTY / sensor.full_electrons
+    lit = np.flatnonzero([] if pixels is None else pixels.max(axis=1) > faint)
     bright = np.union1d(lit, maps.hot)
     electrons = np.full((len(bright), colours), sensor.dark_electrons)
     electrons[np.searchsorted(bright, maps.hot)] += seconds * maps.hot_electrons[:, None]
-    if light is not None:
+    if pixels is not None:
         through = sensor.full_electrons * maps.transmission.ravel()[bright, None]
-        electrons += through * _in_colours(
-            light.reshape(maps.transmission.size, -1)[bright], colours
-        )
+        shown = pixels[bright]
+        electrons += through * (shown if colours == CHANNELS else shown.mean(axis=1, keepdims=True))
     image[bright] = _numbers(sensor, electrons, random)
     whole: Image16 = image.reshape(*shape, colours) if colours == CHANNELS else image.reshape(shape)
     return whole
-
-
-def _lit(sensor: SimulatedSensor, light: Signal) -> Ints:
-    """Numbers of the pixels that light falls on."""
-    most = light if light.ndim == 2 else light.max(axis=2)
-    return np.flatnonzero(most > EMPTY / sensor.full_electrons)
-
-
-def _in_colours(light: Signal, colours: int) -> Signal:
-    return light if colours == CHANNELS else light.mean(axis=1, keepdims=True)
 
 
 def _numbers(

@@ -17,20 +17,21 @@ from PIL import Image
 from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import THREADS
-from tbcad.light.simulate.prototype.lamps import lit_by, read_lamps
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
 from tbcad.light.simulate.scene.object import SceneObject, built_in_object
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.options.machines import SimulateRunOptions
+from tbcad.options.shared import exposures
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.inputs import Source, refuse_inputs
+from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
 from tbcad.records.run import RECORD, Geometry, RunRecord
 from tbcad.rig.machine.built import BuiltPrototype, designed_build, random_build
 from tbcad.rig.machine.designed import designed_prototype, dome_radius
-from tbcad.rig.machine.record import truth_file, write_machine
+from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
 from tbcad.rig.simulated_run.photographs import (
@@ -71,14 +72,10 @@ def prepare_run(
 ) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
     """A random build of an export before it is photographed, and the phases to photograph.
 
-    Returns:
-        The prototype, or both cameras of the shell, and the phases.
-
-    Raises:
-        InputError: the export has no prototype with LEDs, or a shell with planar mirrors, or has
-            not the stops or phases asked for.
+    It is the prototype, or both cameras of the shell. InputError: the export has no prototype with
+    LEDs, or a shell with planar mirrors, or has not the stops or phases asked for.
     """
-    times = PhaseTimes(*options.seconds())
+    times = PhaseTimes(*exposures(options.exposure_leds, options.exposure_lit))
     prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
     leds = len(prepared.builds[0][0].machine.leds)
     phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
@@ -154,15 +151,8 @@ def write_run(
 ) -> None:
     """Photograph all frames and write a run's folder, as a whole or not at all.
 
-    Args:
-        runs: the prototype, or both cameras of the shell.
-        phases: at each stop.
-        export: folder of the export.
-        out: folder to write, which must not hold anything.
-        progress: called with each step.
-
-    Raises:
-        InputError: the folder cannot be written.
+    The runs are the prototype, or both cameras of the shell. InputError: the folder holds
+    something, or cannot be written.
     """
     check_is_free(out, (export,))
     with replacing(out, "run", force=False, inputs=(export,)) as new:
@@ -175,14 +165,9 @@ def write_run(
 
 
 def check_is_free(out: Path, inputs: Iterable[Source] = ()) -> None:
-    """Refuse a folder that holds something: photographs are never overwritten.
+    """Refuse a folder that holds something, or is not apart from what is read.
 
-    Args:
-        out: folder of the run.
-        inputs: files and folders that are read for it.
-
-    Raises:
-        InputError: it does, or it is not apart from what is read.
+    Photographs are never overwritten.
     """
     with write_errors_as_input_errors(out):
         refuse_inputs(out, inputs)
@@ -257,8 +242,7 @@ def run_object(
 ) -> SceneObject:
     """The object of a file, or the built-in one in the size that stands on the stage.
 
-    Raises:
-        InputError: the file cannot be read, or the object is larger than the capture sphere.
+    InputError: the file cannot be read, or the object is larger than the capture sphere.
     """
     stage = export.spec.prototype.stage
     room = min(export.capture_mm, stage.object_diameter_mm, 2 * abs(stage.top_mm))

@@ -17,6 +17,7 @@ import numpy as np
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.loop_vectors import dot, minus, plus_scaled, vector
+from tbcad.tolerancing.montecarlo.edge_model import PairArrays
 from tbcad.tolerancing.montecarlo.edge_samples import (
     DISTANCE,
     PLACES,
@@ -31,8 +32,7 @@ from tbcad.tolerancing.montecarlo.edge_samples import (
     screen_crossings,
     touch_samples,
 )
-from tbcad.tolerancing.montecarlo.form_samples import displace_samples, reflect_formed_samples
-from tbcad.tolerancing.montecarlo.neighbour_pairs import PairArrays
+from tbcad.tolerancing.montecarlo.form import displace_samples, reflect_formed_samples
 from tbcad.tolerancing.montecarlo.visible_edges import (
     APEX,
     CURVATURE,
@@ -73,9 +73,9 @@ def trace_cell_edges(
         surfaces: apex, normal, curvature of the m mirrors, the seam, the foot, and the foot at
             the mirrors near it, (f, 7); with fillets in the valleys, mirrors moved out by their
             radius.
-        forms: waviness of the surfaces, see tbcad.tolerancing.montecarlo.form_samples, (f, ...);
+        forms: waviness of the surfaces, see tbcad.tolerancing.montecarlo.form, (f, ...);
             of none where no mirror has any.
-        pairs: see tbcad.tolerancing.montecarlo.neighbour_pairs.
+        pairs: see tbcad.tolerancing.montecarlo.edge_model.
         halved: mirrors whose seam edge does not limit their coverage, (m,).
         view: pinhole, object's centre, scale, the camera's axes right, down, forward, in the
             frame of the shell, and the radius of the valleys' fillets, (7, 3).

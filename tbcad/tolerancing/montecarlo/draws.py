@@ -46,19 +46,10 @@ def draw(
     warp: WarpMaps | None = None,
     walls: int = 0,
 ) -> tuple[ShellDraws, ShellDraws]:
-    """Errors of both halves of some builds.
+    """Errors of both halves of builds of some numbers, of m mirrors and w walls of pedestals each.
 
-    Args:
-        errors: of the process.
-        seed: of all builds.
-        builds: numbers of the builds.
-        mirrors: m of each half.
-        warp: what the process's warp does to them (`warp_maps_of`); needed where neighbours share
-            it.
-        walls: w of each half that end mirrors on pedestals.
-
-    Raises:
-        ValueError: it is missing.
+    The warp's maps are those of `warp_maps_of`; ValueError if neighbours share a warp and they are
+    missing.
     """
     if warp is None and errors.warp.spread != 0 and errors.warp.length != 0:
         raise ValueError("the warp of these errors needs its maps")

@@ -1,38 +1,142 @@
 """One half of the shell as designed, as the fast model needs it, and its simulated builds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 from scipy.spatial.transform import Rotation
 
-from tbcad.core.geometry.vectors import dot, perpendicular_axes, unit
+from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.camera import Camera
-from tbcad.core.optics.pedestals.walls import GrooveWalls, groove_walls
+from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.pedestals.cells import GrooveWalls, PedestalCells, groove_walls
 from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.shell.cell_outlines import rows_and_columns
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.montecarlo.form import MONOMIALS, term_polynomials
-from tbcad.tolerancing.montecarlo.form_samples import (
+from tbcad.tolerancing.montecarlo.form import (
     FIRST,
     FORM_COLUMNS,
     HEIGHT,
+    MONOMIALS,
     PER_MM,
     SECOND,
+    term_polynomials,
 )
-from tbcad.tolerancing.montecarlo.neighbour_pairs import NeighbourPairs, cell_radii, neighbour_pairs
 from tbcad.tolerancing.montecarlo.warp import ShellShape, WarpMaps, warp_maps
-from tbcad.types import Bools, Floats
+from tbcad.types import Bools, Floats, Ints
 
+# Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the
+# faces of a pair cover what lies between there and the cells.
+REACH = 1.5
+
+
+PairArrays: TypeAlias = tuple[Ints, Ints, Ints, Floats]
 # No symmetry plane of a design contains this direction, so no corner lies on a screen's axis; for
 # mirrors on the seam it points away from the seam, where both halves' outlines are open.
 ASYMMETRIC = np.array([1.0, 0.1234, 0.0567])
+APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6  # columns of a table of surfaces
 
-# Columns of a table of surfaces.
-APEX, NORMAL, CURVATURE = slice(0, 3), slice(3, 6), 6
+
+@dataclass(frozen=True)
+class NeighbourPairs:
+    """Pairs of faces that may share an edge, e of them, and the faces that may cut it short."""
+
+    pair: Ints  # a mirror and another mirror or a plane, (e, 2)
+    offset: Ints  # where the faces of each pair begin in `face`, (e + 1,)
+    face: Ints  # mirrors and planes, in the order of their distance from both of the pair
+    reach: Floats  # maximum distance of the edge's points from its middle, mm, (e,)
+    footed: Ints  # mirrors with a foot plane of their own, (r,): faces m + 2 onwards, then walls
+
+    @property
+    def arrays(self) -> PairArrays:
+        """All of them, for compiled code."""
+        return self.pair, self.offset, self.face, self.reach
+
+
+def neighbour_pairs(cells: Cells) -> NeighbourPairs:
+    """All pairs that are neighbours or share a neighbour as designed.
+
+    Errors move corners by far less than a cell is wide, so a mirror meets no other mirror. Seam and
+    foot are the first faces of each pair: they are never covered.
+    """
+    if isinstance(cells, PedestalCells):
+        return _pairs_with_walls(cells)
+    m = cells.mirrors
+    adjacency = _adjacency(cells)
+    nearby = csr_array(adjacency + adjacency @ adjacency)
+    first, second = coo_array(nearby).coords
+    pair = np.column_stack([first, second])[(first < second) & (first < m)].astype(np.int64)
+    offset, face = _cutting_faces(nearby, cells.surfaces, m, pair)
+    reach_mm = REACH * np.append(cell_radii(cells), [0, 0])[pair].max(axis=1)
+    return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
+
+
+def _pairs_with_walls(cells: PedestalCells) -> NeighbourPairs:
+    """A mirror on a pedestal and each plane that ends it; its other planes cut the edge there."""
+    m, (offsets, sides) = cells.mirrors, cells.rings
+    mirror, plane = cells.arcs.faces[sides // 2].T
+    plane = np.where(plane < m + PLANES, plane, plane + np.count_nonzero(plane == m + 1))
+    count = np.diff(offsets)[mirror]
+    of_pair, place = rows_and_columns(count)
+    side = offsets[mirror][of_pair] + place
+    others = side != of_pair
+    offset = np.concatenate([[0], np.cumsum(count - 1)])
+    reach_mm = REACH * cell_radii(cells)[mirror]
+    pair, face = np.column_stack([mirror, plane]), plane[side[others]]
+    return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
+
+
+def _with_own_feet(pairs: NeighbourPairs, m: int) -> NeighbourPairs:
+    """The same with a foot plane for each mirror: a shell that warps takes its foot with it."""
+    first, second = pairs.pair.T
+    footed = np.unique(first[second == m + 1])
+    number = np.full(m, m + 1)
+    number[footed] = m + 2 + np.arange(len(footed))
+    of_face = np.repeat(first, np.diff(pairs.offset))
+    pair = np.column_stack([first, np.where(second == m + 1, number[first], second)])
+    face = np.where(pairs.face == m + 1, number[of_face], pairs.face)
+    return replace(pairs, pair=pair, face=face, footed=footed)
+
+
+def cell_radii(cells: Cells) -> Floats:
+    """Distance of each mirror's farthest corner from its apex, mm, (m,)."""
+    mirror, corner = cells.triangles.ravel(), np.repeat(np.arange(len(cells.triangles)), 3)
+    if isinstance(cells, PedestalCells):
+        sides = cells.rings[1] // 2
+        mirror, corner = cells.arcs.left[sides], cells.arcs.start[sides]
+    mirror, corner = mirror[mirror < cells.mirrors], corner[mirror < cells.mirrors]
+    radius = np.zeros(cells.mirrors)
+    np.maximum.at(radius, mirror, norm(cells.corners[corner] - cells.surfaces.apex[mirror]))
+    return radius
+
+
+def _adjacency(cells: Cells) -> csr_array:
+    """Which faces touch, (m + 2, m + 2); mirrors are not neighbours through a plane."""
+    m, faces = cells.mirrors, cells.arcs.faces
+    both = np.concatenate([faces, faces[:, ::-1]])
+    both = both[both[:, 0] < m]
+    size = (m + 2, m + 2)
+    return csr_array(coo_array((np.ones(len(both), dtype=np.int64), both.T), shape=size))
+
+
+def _cutting_faces(nearby: csr_array, surfaces: Surfaces, m: int, pair: Ints) -> tuple[Ints, Ints]:
+    """Where the faces of each pair (e, 2) begin, (e + 1,), and the faces: see NeighbourPairs."""
+    first, second = pair.T
+    of_pair, place = rows_and_columns(np.diff(nearby.indptr)[first])
+    face = nearby.indices[nearby.indptr[first][of_pair] + place].astype(np.int64)
+    other = (face != first[of_pair]) & (face != second[of_pair])
+    of_pair, face = of_pair[other], face[other]
+    ends = np.where(pair < m, pair, first[:, None])[of_pair]
+    distance = norm(surfaces.apex[face][:, None] - surfaces.apex[ends]).sum(axis=1)
+    order = np.lexsort((np.where(face < m, distance, 0.0), of_pair))
+    offset = np.searchsorted(of_pair, np.arange(len(pair) + 1))
+    return np.asarray(offset, dtype=np.int64), np.asarray(face[order])
 
 
 @dataclass(frozen=True, eq=False)  # compared by identity, so that what follows can be kept
@@ -43,12 +147,9 @@ class EdgeModel:
     table: Floats  # apex, normal, curvature of the mirrors, the seam and the foot, (m + 2, 7)
     pairs: NeighbourPairs  # which of them may share an edge
     halved: Bools  # mirrors that the seam halves, (m,)
-    # two axes and the normal of a plane through the object for each mirror, (m, 3, 3); the normal
-    # is the direction u
-    screen: Floats
+    screen: Floats  # axes and normal u of a plane through the object each, (m, 3, 3)
     cell_radius: Floats  # distance of each mirror's farthest corner from its apex, mm, (m,)
-    # that end mirrors on pedestals, w of them; none where neighbouring spheres meet
-    walls: GrooveWalls
+    walls: GrooveWalls  # w of pedestals; none where neighbouring spheres meet
 
     def __len__(self) -> int:
         return len(self.halved)
@@ -102,13 +203,9 @@ def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
     """The surfaces of s builds before their shells are scaled and moved, (s, m + 2 + r + w, 7).
 
     They end with the foot plane at each of the r mirrors near it (NeighbourPairs.footed) and the w
-    walls.
-
-    A radius too large by d moves the apex out by d; this also holds for planar mirrors, which a
-    thicker coating moves too. Their tilt is not an error of its own kind.
-
-    Raises:
-        InputError: an error is larger than a mirror's radius.
+    walls. A radius too large by d moves the apex out by d; this also holds for planar mirrors,
+    which a thicker coating moves too. Their tilt is not an error of its own kind. InputError if an
+    error is larger than a mirror's radius.
     """
     m, footed = len(edge_model), edge_model.pairs.footed
     rows = np.append(np.arange(m + 2), np.full(len(footed), m + 1))

@@ -16,8 +16,7 @@ Distribution = Literal["normal", "uniform"]
 class Error:
     """One kind of error."""
 
-    # standard deviation if normal, half width if uniform; in mm, radians or as a share
-    spread: float = 0.0
+    spread: float = 0.0  # sigma if normal, half width if uniform; mm, radians or a share
     mean: float = 0.0  # error common to all builds, in the same unit
     distribution: Distribution = "normal"  # of the error about its mean
     length: float = 0.0  # over which places of one part share the error, mm; 0: each has its own
@@ -66,8 +65,7 @@ class Errors:
     warp: Error = NO_ERROR  # of length 0 an error of each mirror's centre
     waviness: Error = NO_ERROR
     groove_wall: Error = NO_ERROR
-    # of the fillets that a cutter leaves in the valleys between mirrors
-    cutter_radius: Error = NO_ERROR
+    cutter_radius: Error = NO_ERROR  # of fillets that it leaves in the valleys
     ridge_rounding: Error = NO_ERROR  # of the fillets there that a mandrel's ridges leave
 
     @property

@@ -14,10 +14,8 @@ from tbcad.types import Floats
 WorstCoverage = Callable[[Errors], Floats]
 """Minimum coverage of each of some builds with some errors, mm, (s,)."""
 
-# Factor on a process's error beyond which a kind of error is taken not to matter.
-LARGEST_FACTOR = 1000.0
-# Accuracy of the factor, as a share of itself.
-FACTOR_TOLERANCE = 0.02
+LARGEST_FACTOR = 1000.0  # on an error, beyond which its kind is taken not to matter
+FACTOR_TOLERANCE = 0.02  # accuracy of the factor, as a share of itself
 # The next factor tried lies beyond the one that a straight line predicts, within these bounds.
 OVERSHOOT, SMALLEST_STEP, LARGEST_STEP = 1.2, 1.5, 10.0
 
@@ -27,12 +25,9 @@ class SingleErrorEffect:
     """Effect of one kind of error when there is no other."""
 
     kind: str  # its name, as in Errors
-    # coverage of the worst virtual camera lost against the design, mm, mean of the builds
-    loss: float
+    loss: float  # mean coverage that the worst virtual camera loses, mm
     loss_at_yield: float  # the same in the worst build of those that are to be good, mm
-    # factor on the process's error up to which the yield is reached when there is no other error;
-    # infinite where it does not matter
-    tolerable_factor: float
+    tolerable_factor: float  # on the error, at which the yield is just reached; may be inf
 
 
 def present_kinds(errors: Errors) -> list[str]:

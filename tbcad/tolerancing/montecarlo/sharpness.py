@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.core.mirrors.array import design
 from tbcad.core.optics.camera import Camera
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
@@ -28,10 +28,8 @@ from tbcad.light.simulate.views.viewpoints import ground_truths, image_quality, 
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
-# Random stream of the residual, apart from those of the kinds of error.
-CALIBRATION_STREAM = 2000
-# Elevations, azimuths and distance of the viewpoints.
-VIEWPOINTS = ((20.0, 60.0), 2, 640.0)
+CALIBRATION_STREAM = 2000  # random stream of the residual, apart from those of the kinds of error
+VIEWPOINTS = ((20.0, 60.0), 2, 640.0)  # elevations, azimuths and distance of the viewpoints
 
 
 @dataclass(frozen=True)
@@ -80,10 +78,7 @@ def sharpness(
 
 @dataclass(frozen=True)
 class BuiltReflector(SubstitutedReflector):
-    """A camera and its mirrors at their places in a build.
-
-    The cells are those of the design: they only limit where in the picture a mirror may be.
-    """
+    """A camera and mirrors in a build; designed cells only limit where in the picture they are."""
 
     built_walls: GrooveWalls
 
@@ -101,10 +96,7 @@ class BuiltReflector(SubstitutedReflector):
 
 
 def built_reflector(at: Reflector, draws: ShellDraws, build: int) -> BuiltReflector:
-    """One camera and its mirrors as a build has them.
-
-    The mean of the scales along the axes is used for all three: a sphere stays a sphere.
-    """
+    """One camera and its mirrors in a build; with the mean scale a sphere stays a sphere."""
     scale = float(draws.scale[build].mean())
     tilt = Rotation.from_rotvec(draws.shell_tilt[build])
     radius = at.mirrors.radius + draws.radius[build]

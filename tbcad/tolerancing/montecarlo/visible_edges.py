@@ -31,13 +31,10 @@ from tbcad.core.geometry.loop_vectors import (
 )
 from tbcad.types import Floats, Ints
 
-# Maximum number of visible intervals of one edge.
-INTERVALS = 16
-# Value of a surface, as a share of its largest term, beyond which rounding cannot change its sign.
-CERTAIN = 1e-9
+INTERVALS = 16  # maximum number of visible intervals of one edge
+CERTAIN = 1e-9  # share of a value's largest term, beyond which rounding cannot change its sign
 
-# Columns of a table of surfaces.
-APEX, NORMAL, CURVATURE = 0, 3, 6
+APEX, NORMAL, CURVATURE = 0, 3, 6  # columns of a table of surfaces
 # Columns of an edge: point x0, unit vectors e and n, curvature.
 START, TANGENT, OUTWARD, BEND, EDGE_COLUMNS = 0, 3, 6, 9, 10
 
@@ -46,15 +43,10 @@ START, TANGENT, OUTWARD, BEND, EDGE_COLUMNS = 0, 3, 6, 9, 10
 def visible_spans(
     surfaces: Floats, faces: Ints, edge: Floats, reach: float, spans: Floats, spare: Floats
 ) -> int:
-    """Fill in the parts of an edge that faces leave visible, and return their number.
+    """Fill in the parts of an edge (`find_edge`) that faces leave visible, and return their number.
 
-    Args:
-        surfaces: apex, normal, curvature of all faces, (f, 7).
-        faces: numbers of those that may cut the edge.
-        edge: see `find_edge`.
-        reach: maximum distance of the edge's points from x0.
-        spans: the parameters where each part begins and ends, (INTERVALS, 2).
-        spare: of the same shape, for intermediate results.
+    Surfaces are apex, normal, curvature of all faces, (f, 7); parts are parameters of their begin
+    and end, (INTERVALS, 2), spare of the same shape; the reach is from x0, mm.
     """
     spans[0, 1] = _end_parameter(reach, edge[BEND])
     spans[0, 0], count = -spans[0, 1], 1

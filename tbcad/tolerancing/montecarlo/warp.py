@@ -14,16 +14,13 @@ import numpy as np
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.vectors import dot, perpendicular_axes
-from tbcad.core.optics.pedestals.walls import GrooveWalls
+from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.tolerancing.montecarlo.form import ASTIGMATISM, monomials, term_polynomials
 from tbcad.types import Floats, Ints
 
-# Share of the variance that a field may lack at any point: 0.1 % of its standard deviation.
-MISSING_VARIANCE = 1e-6
-# Digits of a variance by which points are compared, so that rounding does not choose among equals.
-COMPARED_DIGITS = 9
-# Points of a mirror that are followed, besides its apex: on a circle at a share of its radius.
-RING_POINTS = 6
+MISSING_VARIANCE = 1e-6  # that a field may lack at any point: 0.1 % of its standard deviation
+COMPARED_DIGITS = 9  # of variances, so that rounding does not choose among equal points
+RING_POINTS = 6  # of a mirror that are followed on a circle, besides its apex
 RING_SHARE = 0.8
 
 
@@ -84,9 +81,7 @@ class WarpMap:
     """What K random numbers for each axis do to the m mirrors of one half."""
 
     basis: Floats  # of the field at q points of each mirror, the apex first, (K, m q)
-    # centre and radius of the sphere, and astigmatism, from the points' displacements along their
-    # normals, (m, 6, q)
-    fit: Floats
+    fit: Floats  # sphere and astigmatism from displacements along the normals, (m, 6, q)
     normal: Floats  # there, (m, q, 3)
     foot_basis: Floats  # of the field where each mirror is nearest to the foot plane, (m, K)
     foot_normal: Floats  # unit normal of the foot plane, (3,)
@@ -105,9 +100,8 @@ class WarpMap:
     def moved(self, numbers: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Displacements of the mirrors of one build by random numbers (K, 3), mm.
 
-        Returns:
-            Of the centres (m, 3), by which radii grow (m,), of the foot plane at each mirror along
-            its normal (m,), and factors of the two terms of astigmatism (m, 2), mm.
+        Of the centres (m, 3), by which radii grow (m,), of the foot plane at each mirror along its
+        normal (m,), and factors of the two terms of astigmatism (m, 2), mm.
         """
         points = field_values(self.basis, numbers).reshape(3, *self.normal.shape[:2])
         along = np.einsum("xmq,mqx->mq", points, self.normal)

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
+from tbcad.core.spec.csv_rows import Table, read_toml
 from tbcad.core.spec.errors import SpecError, short_text, validation_error
-from tbcad.core.spec.files import Table, read_toml
 from tbcad.core.spec.section import Section
 from tbcad.tolerancing.process.kinds import (
     ErrorSpec,

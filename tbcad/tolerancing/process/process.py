@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
+from tbcad.core.spec.csv_rows import Table, read_toml, toml_value
 from tbcad.core.spec.errors import (
     SpecError,
     dotted_fields,
@@ -20,7 +21,6 @@ from tbcad.core.spec.errors import (
     unknown_key,
     validation_error,
 )
-from tbcad.core.spec.files import Table, read_toml, toml_value
 from tbcad.core.spec.prototype import GradeName
 from tbcad.core.spec.section import Section, as_tuple
 from tbcad.prototype.balls.catalogue import load_grades

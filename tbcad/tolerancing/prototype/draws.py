@@ -7,15 +7,14 @@ import numpy as np
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.tables import StopRow
 from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats
 
-# Random streams of a build begin here, beyond those of its shells.
-FIRST_STREAM = 1000
+FIRST_STREAM = 1000  # random streams of a build begin here, beyond those of its shells
 
 
 @dataclass(frozen=True)
@@ -29,12 +28,9 @@ class PrototypeDraws:
     radius: Floats  # by which balls are too large, mm, (s, k)
     seat: Floats  # of the balls' centres on the base, mm, (s, k, 3)
     cap_tilt: Floats  # of caps about two axes across their own, radians, (s, k, 2)
-    # of the base at each stop of each run, with its turn under gravity, radians, (s, 2, t)
-    angle: Floats
+    angle: Floats  # of the base at stops of both runs, with gravity, radians, (s, 2, t)
     runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
-    # of the axis about azimuth zero and across it, both through the object's centre, radians, (s,
-    # 2)
-    tilt: Floats
+    tilt: Floats  # of the axis about azimuth zero and across, at the object, radians, (s, 2)
     camera_shift: Floats  # of the pinhole, mm, (s, 3)
     camera_tilt: Floats  # rotation vectors about the pinhole, radians, (s, 3)
     focal: Floats  # focal length over the designed one, (s,)
@@ -88,10 +84,8 @@ def _shapes(k: int, t: int) -> dict[str, Shape]:
 def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
     """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
 
-    Motor and belt yield to the base's weight: see tbcad.prototype.drive.loads.
-
-    Raises:
-        InputError: the file is missing, malformed, or of another plan.
+    Motor and belt yield to the base's weight: see tbcad.prototype.drive.loads. InputError if the
+    file is missing, malformed, or of another plan.
     """
     path = export.folder / StopRow.FILE
     rows = StopRow.read(export.folder)

@@ -44,21 +44,14 @@ def minimum_miss_distances(
     centre: Floats,
     radius: Floats,
 ) -> Floats:
-    """Minimum distance from the object's centre of the rays through each window's outline.
+    """Minimum distance of the rays through each window's outline from the object, mm, (m,).
 
-    Args:
-        sides: camera directions along all sides, at even parameters, (e, SIDE_SAMPLES, 3); some of
-            them, see `coarse_directions`; and the number of each mirror's first side, (m + 1,).
-        outward: for each mirror a camera direction from the window's inside to its outline, (m, 3).
-        highlight: see `highlights`, (m, 3).
-        lens: matrices that turn camera directions, as rows, into true ones, (m, 3, 3).
-        pinhole: mm, (3,).
-        centre: of each mirror's ball, mm, (m, 3).
-        radius: of each, mm, (m,).
-
-    Returns:
-        mm, (m,); infinite where all rays miss the ball, zero where the outline does not surround
-        the point of the ball that shows the object's centre.
+    Sides are camera directions at even parameters, (e, SIDE_SAMPLES, 3), some of them (see
+    `coarse_directions`), and the number of each mirror's first side, (m + 1,). For each mirror: a
+    camera direction outward from the window's inside to its outline, the highlight (see
+    `highlights`), the lens, matrices that turn camera directions, as rows, into true ones, and the
+    ball. Infinite where all rays miss the ball, zero where the outline does not surround its
+    highlight.
     """
     side, coarse, first = sides
     result, side_minima = np.zeros(len(radius)), np.empty((np.diff(first).max(), SIDE_COLUMNS))
@@ -202,11 +195,7 @@ def _minimum_of_side(
     centre: Floats,
     radius: float,
 ) -> float:
-    """Minimum distance squared of the rays along one side (n, 3).
-
-    From the minimum of every COARSE-th ray, of this number, by ever closer ones about it, and at
-    last on the parabola through its neighbours.
-    """
+    """Minimum distance squared along a side (n, 3), from every COARSE-th ray by closer ones."""
     last = len(side) - 1
     step = COARSE // 2
     while step > 0:
@@ -235,10 +224,7 @@ def _miss(direction: Floats, lens: Floats, pinhole: Floats, centre: Floats, radi
 
 @compiled_loop
 def _miss_along(ray: Vector, camera: Vector, ball: Vector, radius: float) -> float:
-    """Distance squared from the origin of a ray after a ball; infinite where it misses the ball.
-
-    Infinite also where the ray goes away from the object, as in tbcad.core.optics.ball_light.
-    """
+    """Distance squared from the origin of a ray after a ball; infinite if it misses, or leaves."""
     from_ball = minus(camera, ball)
     along = -dot(from_ball, ray)
     root = radius * radius - dot(from_ball, from_ball) + along * along

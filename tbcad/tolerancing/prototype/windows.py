@@ -18,8 +18,7 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.optics.windows import cell_windows
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
@@ -43,13 +42,11 @@ class RunWindows:
 
     ball: Ints  # number of the ball in each window, (m,)
     stop: Ints  # number of its stop, (m,)
-    # unit directions along the sides of all windows, mirror after mirror, (e, SIDE_SAMPLES, 3)
-    side: Floats
+    side: Floats  # unit directions along the sides of all windows, (e, SIDE_SAMPLES, 3)
     coarse: Floats  # see tbcad.tolerancing.prototype.rays.coarse_directions
     first: Ints  # number of each mirror's first side, (m + 1,)
     middle: Floats  # unit directions of the mirrors' apices, (m, 3)
-    # directions from there to the outline, away from the seam where it halves, (m, 3)
-    outward: Floats
+    outward: Floats  # directions from there to the outline, away from the seam, (m, 3)
     halved: Bools  # mirrors that the seam halves, (m,)
 
 
@@ -146,9 +143,7 @@ class RunPose:
     """Actual camera and balls of one run of one build, in the prototype's frame."""
 
     pinhole: Floats  # mm, (3,)
-    # matrices that turn directions in the designed camera, as rows, into those of the window's
-    # pixels, (m, 3, 3)
-    lens: Floats
+    lens: Floats  # turn directions in the designed camera, as rows, into actual ones, (m, 3, 3)
     centre: Floats  # of the ball in each window, mm, (m, 3)
     radius: Floats  # of each, mm, (m,)
     highlight: Floats  # unit directions in which they show the object's centre, (m, 3)
@@ -186,11 +181,7 @@ def _lens(model: PrototypeWindows, tilt: Floats, focal: float) -> Floats:
 
 
 def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
-    """The same with windows that the software has moved to the actual balls.
-
-    It knows the camera then, and turns every window about the pinhole, until the middle of the
-    window shows the centre of the object.
-    """
+    """The same with windows moved to the actual balls, whose middles show the object's centre."""
     run = model.runs[half]
     lens = model.axes @ _shortest_rotations(unit(run.middle @ model.axes), pose.highlight)
     return replace(pose, lens=lens)
@@ -237,10 +228,7 @@ def _coverage(run: RunWindows, pose: RunPose) -> Floats:
 
 
 def _middle_rays(run: RunWindows, pose: RunPose) -> tuple[Floats, Floats]:
-    """Points on the balls and unit directions after them of the windows' middle rays, (m, 3) each.
-
-    NaN where there is no ball.
-    """
+    """Points on balls and unit directions after them of windows' middle rays, (m, 3), or NaN."""
     ray = unit((run.middle[:, None] @ pose.lens)[:, 0])
     to_centre = pose.centre - pose.pinhole
     along = dot(ray, to_centre)

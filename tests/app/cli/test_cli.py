@@ -1,8 +1,6 @@
 """The command as a user meets it: exit codes, one line of error, nothing half done."""
 
 import json
-import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,12 +11,10 @@ import pytest
 from tbcad_verify.report.summary import MAX_LINES
 
 from tbcad.app.cli import run
-from tbcad.version import __version__
-from tests.exported_files import contents, read_csv
+from tests.exported_files import read_csv
 
 STOPPED = "tbcad: stopped; nothing was changed"
 COMMAND = [sys.executable, "-m", "tbcad"]
-STAGE = re.compile(r"\[ *\d+ s\] ")
 SHELL = ["--parts", "shell"]
 # A quarter of the pixels, all of which a verification traces.
 SENSOR = ["--set", "camera.width_px=1040", "--set", "camera.height_px=776"]
@@ -31,17 +27,6 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("cli") / "exports"
     assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
     return out
-
-
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """Run a command that must end with exit code 2 and one line on stderr."""
-    assert run(arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    lines = [line for line in shown.err.splitlines() if not STAGE.match(line)]
-    assert len(lines) == 1
-    assert lines[0].startswith("tbcad: ")
-    return lines[0]
 
 
 def test_build_without_verification(export: Path) -> None:
@@ -125,43 +110,6 @@ def test_a_broken_process_is_found_before_anything_begins(
     assert all(word in shown.err for word in words)
 
 
-def test_foreign_files_are_refused_and_kept_on_force(
-    export: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "thesis.txt").write_text("years of work")
-    line = refused([*SMALL, "--out", str(out), "--no-verify"], capsys)
-    assert "thesis.txt" in line
-    assert "--force" in line
-    assert run([*SMALL, "--out", str(out), "--no-verify", "--force"]) == 0
-    assert (out / "thesis.txt").read_text() == "years of work"
-    assert (out / "shell_a.stl").read_bytes() == (export / "shell_a.stl").read_bytes()
-
-
-@pytest.mark.slow
-def test_a_kill_leaves_the_old_export(export: Path, tmp_path: Path) -> None:
-    """SIGKILL while the new one is being written: not a byte of the old one changes."""
-    out = tmp_path / "exports"
-    shutil.copytree(export, out)
-    before = contents(out)
-    build = subprocess.Popen(
-        [*COMMAND, "build", "--n", "7", *SHELL, "--out", str(out)],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        encoding="utf-8",
-    )
-    assert build.stderr is not None
-    for line in build.stderr:
-        if "files" in line:
-            break
-    build.send_signal(signal.SIGKILL)
-    build.wait()
-    assert contents(out) == before
-    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
-    assert [p.name for p in tmp_path.iterdir()] == ["exports"]  # what the killed build left is gone
-
-
 def _accept_interrupts() -> None:
     """A background job of a shell, and all that it starts, would ignore them."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -186,12 +134,3 @@ def test_interrupt_is_reported_in_one_line(tmp_path: Path, delay_s: float) -> No
     assert errors.splitlines()[-1] == STOPPED
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []
-
-
-def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--version"]) == 0
-    assert capsys.readouterr().out == f"tbcad {__version__}\n"
-    assert run(["build", "--help"]) == 0
-    shown = capsys.readouterr().out
-    for word in ("--n", "--out", "--radius-rule", "--set", "--no-verify", "--force"):
-        assert word in shown

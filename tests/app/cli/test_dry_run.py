@@ -41,20 +41,6 @@ def test_planar_mirrors_have_no_radius_and_no_prototype() -> None:
     assert "prototype" not in result.stdout
 
 
-def test_why_there_is_no_prototype() -> None:
-    options = ["--set", "camera_mm=[100, 5, -100]"]
-    result = run(app, ["build", "--n", "3", *options, "--dry-run"])
-    assert result.exit_code == 0
-    assert "no prototype: a prototype needs cameras that a half turn about z swaps" in result.stdout
-
-
-def test_a_folder_that_cannot_be_replaced_is_refused_as_by_the_build(tmp_path: Path) -> None:
-    (tmp_path / "exports").mkdir()
-    (tmp_path / "exports" / "mine.txt").write_text("mine")
-    result = run(app, ["build", "--n", "3", "--parts", "shell", "--dry-run"])
-    assert "holds what tbcad did not write (mine.txt)" in str(result.exception)
-
-
 @pytest.mark.parametrize("dry_run", [["--dry-run"], []])
 @pytest.mark.parametrize("key", ["catalogues", "prices"])
 def test_a_list_that_is_not_there_is_no_reason_to_leave_the_prototype_out(

@@ -25,28 +25,6 @@ def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str) -> No
     assert listed.keys() | {"manifest.json"} == contents(tmp_path / "one").keys()
 
 
-def test_what_is_not_its_own_is_kept(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A file of the user beside the exported images too, and an image that the user changed."""
-    out = tmp_path / "data"
-    export = ["export", str(captured), "--to", "nerfstudio", "--every", "50", "--out", str(out)]
-    assert run(export) == 0
-    before = contents(out)
-    (mine := out / "images" / "mine.png").write_text("mine")
-    assert run(export) == 2
-    assert "images" in capsys.readouterr().err
-    assert contents(out) == {**before, "images/mine.png": b"mine"}
-    assert run([*export, "--force"]) == 0
-    assert (out / "images.kept" / "mine.png").read_text() == "mine"
-    assert contents(out).items() >= before.items()
-    shutil.rmtree(out / "images.kept")
-    changed = next((out / "masks").iterdir())
-    changed.write_text("changed")
-    assert run(export) == 2
-    assert not mine.exists()
-
-
 def test_prints_what_is_in_the_record(
     captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,26 +1,36 @@
-"""Help of every command: nothing is lost on the way to the screen; -h and -o work everywhere."""
+"""Help of every command, one vocabulary for the options of all, examples, and completion."""
 
+import json
+import os
 import re
+import shlex
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import tbcad.app.cli  # noqa: F401 - adds all commands
 from tbcad.app.cli import run
-from tbcad.app.cli.help_texts import HEADINGS
+from tbcad.app.cli.help_texts import EXAMPLES, HEADINGS
 from tests.app.cli.commands import Words, commands, leaves, long_name, options
 
 WIDE = "2000"  # columns: no line of help is broken
 ALL = commands()
-NAMES = [" ".join(["tbcad", *words]) for words in ALL]
-
-
-def shown_help(
-    words: Words, flag: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> str:
-    monkeypatch.setenv("COLUMNS", WIDE)
-    assert run([*words, flag]) == 0
-    return " ".join(capsys.readouterr().out.split())
+# Write files or pictures that are their result, and print no figures.
+WITHOUT_FIGURES = {"picture", "report", "simulate-run", "view", "refocus"}
+# One name for one thing; where the values differ, it is said why.
+SEVERAL_KINDS = {
+    "--n",  # build leaves its check to the design
+    "--cameras",  # camera: a file of them; export: names of virtual ones
+    "--method",  # view also finds the depth first, which takes too long for moving and for studies
+    "--mesh",  # capture: trace the exported meshes; reconstruct: files of the surface
+    "--from",  # init: a design's name; studies: the smallest n
+    "--size",  # run, export: a picture's pixels; intrinsics: width of a square, mm
+    "--to",  # studies: the largest n; export: the program that reads it
+}
 
 
 def plain(text: str) -> str:
@@ -28,44 +38,71 @@ def plain(text: str) -> str:
     return " ".join(re.sub(r"\\(?=\[)|\*\*", "", text).split())
 
 
-@pytest.mark.parametrize(("words", "command"), ALL.items(), ids=NAMES)
-def test_screen_shows_every_word_of_the_help(
-    words: Words,
-    command: Any,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    shown = shown_help(words, "--help", monkeypatch, capsys)
-    for text in (command.help, *(one.help for one in command.params)):
-        for paragraph in (text or "").split("\n\n"):
-            assert plain(paragraph) in shown
-
-
-@pytest.mark.parametrize("words", ALL, ids=NAMES)
-def test_short_help_is_the_long_one(
+@pytest.mark.parametrize("words", ALL, ids=" ".join)
+def test_screen_shows_every_word_and_the_examples(
     words: Words, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shown = shown_help(words, "-h", monkeypatch, capsys)
+    monkeypatch.setenv("COLUMNS", WIDE)
+    assert run([*words, "-h"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
     assert shown.startswith(" ".join(["Usage: tbcad", *words]))
-    assert shown == shown_help(words, "--help", monkeypatch, capsys)
+    for text in (ALL[words].help, *(one.help for one in ALL[words].params)):
+        for paragraph in (text or "").split("\n\n"):
+            assert plain(paragraph) in shown
+    command = " ".join(words)
+    for example, about in EXAMPLES.get(command, ()):
+        assert about
+        ALL[words].make_context("tbcad", shlex.split(example))
+        assert f"{f'tbcad {command} {example}'.strip()} - {about}" in shown.partition("Examples")[2]
 
 
 def test_commands_are_under_headings_in_the_order_of_the_work(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    shown = shown_help((), "--help", monkeypatch, capsys)
+    assert run(["--help"]) == 0
+    shown = capsys.readouterr().out
     places = [shown.index(f"─ {title} ─") for title in HEADINGS]
     assert places == sorted(places)
-    listed = {name for names in HEADINGS.values() for name in names}
-    assert listed == {words[0] for words in ALL if words}
+    assert {name for names in HEADINGS.values() for name in names} == {
+        words[0] for words in ALL if words
+    }
+    assert {tuple(name.split()) for name in EXAMPLES} == leaves().keys()
 
 
-def test_every_out_is_an_o_too() -> None:
-    outs = [
-        one
-        for command in leaves().values()
-        for one in options(command)
-        if long_name(one) == "--out"
-    ]
-    assert len(outs) > 10
-    assert all("-o" in one.opts for one in outs)
+def test_an_option_is_called_and_takes_the_same_everywhere() -> None:
+    kinds = defaultdict(set)
+    for words, command in leaves().items():
+        for one in options(command):
+            kind = str(one.type_descriptor.annotation).replace(" | None", "")
+            kinds[long_name(one)].add((kind, one.is_flag))
+            assert long_name(one) != "--out" or "-o" in one.opts
+        names = {long_name(one) for one in options(command)}
+        assert ("--json" in names) != (words[0] in WITHOUT_FIGURES), words
+    assert {name for name, found in kinds.items() if len(found) > 1} == SEVERAL_KINDS
+    spelled = {name for one in leaves().values() for opt in options(one) for name in opt.opts}
+    assert {"--timeout", "--time-limit", "--for-process", "--process"} <= spelled  # old names
+
+
+def completed(place: dict[str, str]) -> str:
+    """What the command prints when a shell asks it, by variables of the environment."""
+    words, environment = [sys.executable, "-m", "tbcad"], {**os.environ, **place}
+    done = subprocess.run(words, env=environment, capture_output=True, encoding="utf-8", check=True)
+    return done.stdout
+
+
+def test_completion() -> None:
+    for typed, expected in (
+        ("tbcad study s", {"ssim"}),
+        ("tbcad build --for", {"--for-process", "--force"}),
+    ):
+        place = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+        assert set(completed({**place, "_TBCAD_COMPLETE": "complete_bash"}).split()) == expected
+    assert "tbcad" in completed({"_TBCAD_COMPLETE": "source_fish"})
+
+
+def test_a_study_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["study", "elevation", "--set", "n=4", "--json", "--out", str(tmp_path)]) == 0
+    record: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert record["study"] == "elevation"
+    assert {Path(file) for file in record["files"]} == set(tmp_path.iterdir())
+    assert {"quantity", "unit", "value", "paper", "where"} == set(record["figures"][0])

@@ -88,13 +88,3 @@ def test_a_search_that_was_stopped_goes_on(
     assert run(words(tmp_path)) == 2
     assert "go on with --resume, or begin anew with --force" in capsys.readouterr().err
     assert run(words(tmp_path, "--resume")) == 0
-
-
-def test_what_exists_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "found" / "better.toml"
-    file.parent.mkdir()
-    file.write_text("mine", encoding="utf-8")
-    assert run(words(tmp_path)) == 2
-    assert file.read_text(encoding="utf-8") == "mine"
-    assert "better.toml exists" in capsys.readouterr().err
-    assert run(words(tmp_path, "--force")) == 0

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tbcad.app.cli import run
-from tbcad.prototype.files.bom_csv import COLUMNS
-from tbcad.prototype.purchased.prices import COLUMNS as PRICE_FILE
+from tbcad.prototype.files.bom import COLUMNS
+from tbcad.prototype.purchased.parts import PRICE_FIELDS as PRICE_FILE
 
 ROWS = (
     *(["1", "2", "608-2Z", "bearing (ISO 15)", "ISO 15", "steel", "12.0", "24.0", "", "", ""],),

@@ -44,37 +44,6 @@ def test_capture_repeats_and_replaces_with_force_only(
     assert contents(copied) == before
 
 
-def test_capture_keeps_what_is_not_its_own(copied: Path, record: Path) -> None:
-    mine = copied / "notes.txt"
-    mine.write_text("mine")
-    assert run(["capture", str(record), "--out", str(copied), "--force"]) == 0
-    assert mine.read_text() == "mine"
-
-
-def test_capture_replaces_no_build(
-    record: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Neither another nor the one that it reads; and nothing is written into one."""
-    build, other = tmp_path / "build", tmp_path / "other"
-    shutil.copytree(record, build)
-    shutil.copytree(record, other)
-    monkeypatch.chdir(tmp_path)
-    before = contents(build), contents(other)
-    for out, words in (
-        ("other", "is a build, which a capture does not replace"),
-        ("build", "is read by this command"),
-        ("build/captures/knot", "is inside build"),
-        (".", "the folder you are in"),
-    ):
-        assert run(["capture", "build", "--out", out, "--force"]) == 2
-        assert words in capsys.readouterr().err
-    assert (contents(build), contents(other)) == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["build", "other"]
-
-
 def test_capture_is_named_after_its_object(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,21 +71,6 @@ def test_capture_says_how_a_file_was_taken(
     wanted = {"unit": "mm", "up": "y", "colours": "colours of materials (Kd)", "left_out": [lost]}
     assert json.loads(printed.out)["object_file"] == wanted
     assert json.loads((tmp_path / "out/capture.json").read_text())["object_file"] == wanted
-
-
-@pytest.mark.parametrize("more", [[], ["--surface", "plane"], ["--method", "blend", "--surface",
-                                                               "object"]])  # fmt: skip
-def test_view(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str]
-) -> None:
-    out = tmp_path / "view.png"
-    arguments = ["view", str(captured), "--azimuth", "30", "--elevation", "15", "--out", str(out)]
-    assert run([*arguments, "--width", "160", "--height", "120", *more]) == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "view-and-truth.png", "view-truth.png", "view.png"
-    ]  # fmt: skip
-    assert Image.open(out).size == (160, 120)
-    assert "PSNR" in capsys.readouterr().out
 
 
 def test_depth_of_a_view(captured: Path, tmp_path: Path) -> None:

@@ -6,8 +6,8 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.errors import InputError
-from tbcad.options.lists import numbers
-from tbcad.rig.runs.photographs import read_run
+from tbcad.options.shared import numbers
+from tbcad.rig.runs import read_run
 
 
 def test_numbers() -> None:

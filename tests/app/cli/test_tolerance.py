@@ -177,29 +177,6 @@ class TestWritten:
         for one, other in zip(plain["processes"], searched["processes"], strict=True):
             assert (one["process"], one["yield"]) == (other["process"], other["yield"])
 
-    def test_yield_is_said_first(
-        self, bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        assert run(["tolerance", str(bare), *FEW, "--process", "cnc", "--out", str(tmp_path)]) == 0
-        shown = capsys.readouterr()
-        lines = shown.err.splitlines()
-        told = next(k for k, line in enumerate(lines) if "of the builds cover 60 mm" in line)
-        assert told < next(k for k, line in enumerate(lines) if "each kind of error" in line)
-        assert lines[told].split("] ")[1] in " ".join(shown.out.split())
-
-
-def test_target_that_is_a_file_is_refused_at_once(
-    bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def never(*_: object) -> None:
-        raise AssertionError("worked before it looked")
-
-    monkeypatch.setattr("tbcad.tolerancing.analysis.analyse", never)
-    (tmp_path / "file").write_text("mine")
-    assert run(["tolerance", str(bare), "--out", str(tmp_path / "file")]) == 2
-    _one_line(capsys, "file")
-    assert (tmp_path / "file").read_text() == "mine"
-
 
 def test_planar_mirrors(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
@@ -212,13 +189,6 @@ def test_planar_mirrors(
     assert (tmp_path / "out").exists() == (code == 0)
     if code == 2:
         _one_line(capsys, "flat")
-
-
-@pytest.mark.slow
-def test_camera_that_looks_past_the_balls(export: Path, tmp_path: Path) -> None:
-    """68 mrad: a camera as mounted (docs/decisions/0007-how-tolerances-are-computed.md)."""
-    arguments = ["tolerance", str(export), *FEW, "--set", "camera_tilt_mrad=68"]
-    assert run([*arguments, "--out", str(tmp_path)]) == 0
 
 
 def _one_line(capsys: pytest.CaptureFixture[str], wrong: str) -> None:

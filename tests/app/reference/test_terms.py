@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tbcad.app.reference.entries import glossary
 from tbcad.app.reference.keys import key_sections
-from tbcad.app.reference.terms import glossary
 
 ROOT = Path(__file__).parents[3]
 TERMS = glossary().terms

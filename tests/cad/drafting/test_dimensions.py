@@ -8,9 +8,8 @@ import pytest
 from ezdxf.document import Drawing
 
 from tbcad.cad.drafting.dimensions import across, diameter, ruler_across, ruler_upward, upward
-from tbcad.cad.drafting.sheet import moved
 from tbcad.cad.formats.dxf import write_dxf
-from tbcad.cad.formats.entities import Circle, Dimension, Layer, Text, simple
+from tbcad.cad.formats.entities import Circle, Layer, simple
 from tbcad.cad.formats.pdf import write_pdf
 
 CIRCLE = Circle(Layer.CUT, (50.0, 50.0), 10.0)
@@ -92,25 +91,9 @@ def test_a_number_that_is_not_measured_stays_as_it_is(tmp_path: Path) -> None:
     assert one.dxf.text == "Ø61"
 
 
-def test_full_size_measures_the_part() -> None:
-    """On paper at 1:2, measured in the DXF at full size; the text keeps its height on paper."""
-    (dimension,) = (moved(one, (5.0, 5.0), 2.0) for one in DIMENSIONS[:1])
-    assert isinstance(dimension, Dimension)
-    assert dimension.measured == pytest.approx(120.0)
-    (text,) = (one for one in dimension.drawn if isinstance(one, Text))
-    assert text.height == 6.0
-    assert text.place == (50.0, -36.0)
-
-
 def test_the_pdf_has_lines_and_texts(tmp_path: Path) -> None:
     write_pdf(tmp_path / "some.pdf", "some", (100.0, 100.0), DIMENSIONS)
     write_pdf(tmp_path / "flat.pdf", "some", (100.0, 100.0), [*simple(DIMENSIONS)])
     data = (tmp_path / "some.pdf").read_bytes()
     assert data == (tmp_path / "flat.pdf").read_bytes()
     assert data.count(b" Tj") == len(DIMENSIONS)
-
-
-def test_the_same_dimensions_have_the_same_bytes(tmp_path: Path) -> None:
-    for name in ("one.dxf", "other.dxf"):
-        write_dxf(tmp_path / name, DIMENSIONS)
-    assert (tmp_path / "one.dxf").read_bytes() == (tmp_path / "other.dxf").read_bytes()

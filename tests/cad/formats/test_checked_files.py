@@ -2,14 +2,15 @@
 
 import json
 import os
+import tomllib
 from pathlib import Path
 
 import pytest
 
-from tbcad.cad.formats.checked_files import Record, parse_json, read_json
+from tbcad.cad.formats.checked_files import Record, parse_json, read_json, toml_text
 from tbcad.errors import InputError
 from tbcad.output.manifest import is_listed
-from tbcad.records.manifest import Entry
+from tbcad.records.document import Entry
 
 
 class Numbers(Record):
@@ -53,3 +54,9 @@ def test_a_pipe_or_folder_is_no_record_and_is_not_waited_for(tmp_path: Path) -> 
     for name in ("design.json", "manifest.json"):
         path = tmp_path / name
         assert not is_listed(path, Entry(sha256="0" * 64, size=path.lstat().st_size))
+
+
+@pytest.mark.parametrize("value", [1, 2.5, True, 'a "b" \\', (1.0, (2.0, -3.0)), ("a", "b"), ()])
+def test_toml_text_is_read_back(value: object) -> None:
+    read = tomllib.loads(f"x = {toml_text(value)}")["x"]
+    assert toml_text(read) == toml_text(value)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.images.radiance import hdr_picture
+from tbcad.cad.formats.light_pictures import hdr_picture
 from tbcad.errors import InputError
 
 HEADER = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n%b\n%b\n"

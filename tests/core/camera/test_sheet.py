@@ -4,8 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tbcad.core.camera.catalogue import (
     CAMERA_COLUMNS,
@@ -63,13 +61,6 @@ def test_a_close_up_lens_brings_the_nearest_focus_to_where_it_is_needed() -> Non
     s = 250 / 2 + (250**2 / 4 - f * 250) ** 0.5
     assert s + s * f / (s - f) == pytest.approx(250)
     assert one.close_up_dpt == pytest.approx(1000 / 120 - 1000 / s)
-
-
-@given(st.floats(20, 300), st.floats(20, 400))
-def test_no_close_up_lens_where_the_lens_focuses_nearer(focus: float, nearest: float) -> None:
-    needed = replace(NEEDED, focus_mm=focus)
-    one = only(lens=replace(LENS, min_focus_mm=nearest), needed=needed)
-    assert (one.close_up_dpt == 0) or nearest > focus
 
 
 def test_those_without_faults_come_first() -> None:

@@ -3,7 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.core.geometry.round_cones import RoundCones, contact_angle, spheres
+from tbcad.core.geometry.round_cones import RoundCones, contact_angle, smallest_sphere, spheres
+
+LENGTHS = st.floats(-100, 100)
+OUT = st.floats(0, 100)
+RADII = st.floats(0.1, 40)
+BALLS = st.tuples(LENGTHS, OUT, RADII)
 
 
 def at(along: float, out: float) -> np.ndarray:
@@ -41,12 +46,6 @@ def test_capsule_across_the_orbit_is_met_at_the_tangent() -> None:
     assert angle == pytest.approx(np.arcsin(10 / 100), rel=1e-9)
 
 
-LENGTHS = st.floats(-100, 100)
-OUT = st.floats(0, 100)
-RADII = st.floats(0.1, 40)
-BALLS = st.tuples(LENGTHS, OUT, RADII)
-
-
 @settings(max_examples=100)
 @given(BALLS, BALLS, st.tuples(LENGTHS, st.floats(1, 100), RADII))
 def test_against_many_spheres(
@@ -64,3 +63,32 @@ def test_against_many_spheres(
     gap = (np.sqrt(np.maximum(squared, 0)) - radius - size).min(axis=0)
     assert (gap[rotation < angle - 1e-6] < 2e-2).all()
     assert (gap[rotation > angle + 1e-6] > -1e-6).all()
+
+
+@pytest.mark.parametrize(
+    ("points", "middle", "radius"),
+    [
+        ([[1, 2, 3]], [1, 2, 3], 0),
+        ([[0, 0, 0], [2, 0, 0]], [1, 0, 0], 1),
+        ([[0, 0, 0], [1, 0, 0], [2, 0, 0], [4, 0, 0]], [2, 0, 0], 2),
+        ([[0, 0, 5], [6, 0, 5], [0, 8, 5]], [3, 4, 5], 5),
+        ([[0, 0, 0], [10, 0, 0], [5, 1, 0]], [5, 0, 0], 5),
+        ([[-1, -1, 7], [1, -1, 7], [1, 1, 7], [-1, 1, 7], [0, 0, 7]], [0, 0, 7], np.sqrt(2)),
+        ([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [0, 0, 0], np.sqrt(3)),
+    ],
+)
+def test_closed_forms(points: list[list[float]], middle: list[float], radius: float) -> None:
+    found, reach = smallest_sphere(np.array(points, dtype=np.float64))
+    assert found == pytest.approx(middle, abs=1e-9)
+    assert reach == pytest.approx(radius)
+
+
+@pytest.mark.parametrize("thickness", [1.0, 1e-6, 1e-13, 0.0])
+@pytest.mark.parametrize("shift", [0.0, 1e6])
+def test_no_other_middle_is_nearer_to_all(thickness: float, shift: float) -> None:
+    """The middle minimises a convex function, so no small step may make the reach shorter."""
+    random = np.random.default_rng(4)
+    points = random.normal(size=(300, 3)) * [1, 1, thickness] + shift
+    middle, reach = smallest_sphere(points)
+    for step in np.vstack([1e-3 * random.normal(size=(50, 3)), 1e-3 * np.eye(3)]):
+        assert np.linalg.norm(points - middle - step, axis=1).max() > reach - 1e-9

@@ -1,13 +1,20 @@
 import re
+import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import tbcad
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, numbered_directions
 from tbcad.core.spec.errors import SpecError
 from tests.mirror_arrays import mirror_array
+
+SIZES = st.tuples(
+    *(st.floats(60, 250), st.floats(-30, 30), st.floats(-250, -60)),
+    *(st.floats(70, 160), st.floats(10, 60)),
+)
 
 
 def attempt(*settings: str) -> tuple[MirrorArray | None, str]:
@@ -18,7 +25,7 @@ def attempt(*settings: str) -> tuple[MirrorArray | None, str]:
         return None, str(error)
 
 
-@pytest.mark.parametrize("n", [*range(2, 13), 17, 24, 36])
+@pytest.mark.parametrize("n", [2, 3, 5, 8, 17, 24])
 def test_traced_mirrors_all_see_the_target(n: int) -> None:
     array = mirror_array(f"n={n}")
     curved = array.mirrors.radius < 29.9999 * array.half_width
@@ -28,21 +35,13 @@ def test_traced_mirrors_all_see_the_target(n: int) -> None:
     assert np.isfinite(array.mirrors.radius).all()
 
 
-def test_mirrors_that_see_enough_are_nearly_flat() -> None:
-    """n = 4 and below: the radius stops at a stated multiple of the half width."""
-    array = mirror_array("n=4")
-    nearly_flat = np.isclose(array.mirrors.radius, 30 * array.half_width)
-    assert nearly_flat.sum() > 5
-    assert (array.coverage[nearly_flat] >= 60.6 - 0.01).all()
-
-
 def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
     array = mirror_array("n=4", "radius_rule=paper")
     assert (array.mirrors.radius > 0).all()
     assert array.mirrors.radius.max() == pytest.approx((30 * array.half_width).max(), rel=0.5)
 
 
-@pytest.mark.parametrize("stretch", [(1.6, 1.6), (1.3, 1.1)])
+@pytest.mark.parametrize("stretch", [(1.3, 1.1)])
 def test_stretched_directions_are_those_of_the_mirrors(stretch: tuple[float, float]) -> None:
     array = mirror_array("n=9", f"stretch={list(stretch)}")
     expected, _ = numbered_directions(9, stretch)
@@ -54,11 +53,7 @@ def test_stretched_directions_are_those_of_the_mirrors(stretch: tuple[float, flo
     assert wide == (stretch[0] > 1)
 
 
-def test_margin_is_added_to_the_target() -> None:
-    assert mirror_array("n=9", "margin_mm=2").coverage == pytest.approx(62.0, abs=0.01)
-
-
-@pytest.mark.parametrize("n", [4, 9])
+@pytest.mark.parametrize("n", [4])
 def test_each_mirror_has_a_margin_of_its_own(n: int) -> None:
     even = mirror_array(f"n={n}", "margin_mm=0.5")
     own = np.random.default_rng(1).uniform(0.5, 3, len(even)).round(2)
@@ -139,13 +134,7 @@ def test_mirrors_that_no_lens_takes_in_are_refused_before_their_radii_are_search
         mirror_array("n=18", "camera_mm=[100, 0, -20]", "capture_diameter_mm=20")
 
 
-SIZES = st.tuples(
-    *(st.floats(60, 250), st.floats(-30, 30), st.floats(-250, -60)),
-    *(st.floats(70, 160), st.floats(10, 60)),
-)
-
-
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(n=st.integers(2, 4), sizes=SIZES)
 def test_any_geometry_reaches_its_target_or_says_which_mirror_cannot(
     n: int, sizes: tuple[float, ...]
@@ -174,3 +163,12 @@ def check_any_geometry(n: int, x: float, y: float, z: float, b: float, capture: 
         return
     assert array.coverage.min() > capture + 0.6 - 0.01
     assert (array.area > 0).all()
+
+
+@pytest.mark.parametrize("settings", [(), ("radius_rule=flat", "name=plane")])
+def test_notebooks_show_it(settings: tuple[str, ...]) -> None:
+    text = tbcad.design(n=3, settings=settings)._repr_html_()
+    tree = ET.fromstring(text)
+    assert tree.findtext(".//caption") == ("plane" if settings else "turtleback")
+    assert ("planar" in text) == bool(settings)
+    assert not re.search("nan", text)

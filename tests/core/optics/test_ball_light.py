@@ -25,16 +25,6 @@ def outline(paper_array: MirrorArray, sampled: np.ndarray) -> np.ndarray:
     return ball_light.used_outlines(at, paper_array.mirrors.radius[sampled], pinhole, CAPTURE)
 
 
-def test_poses_turned_are_the_mirrors(paper_array: MirrorArray) -> None:
-    ellipsoid, mirrors = paper_array.ellipsoid, paper_array.mirrors
-    at = ball_light.ball_poses(ellipsoid, paper_array.polar)
-    frame = ellipsoid.frame()
-    assert rotated_about_x(at.apex, paper_array.azimuth) @ frame == pytest.approx(mirrors.apex)
-    whole = ~paper_array.cells.halved  # those on the seam are aimed beyond it
-    turned = rotated_about_x(at.normal, paper_array.azimuth) @ frame
-    assert turned[whole] == pytest.approx(mirrors.normal[whole])
-
-
 def test_rays_off_the_outline_touch_the_capture_sphere(
     paper_array: MirrorArray, sampled: np.ndarray, outline: np.ndarray
 ) -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import norm
-from tbcad.core.optics.geodesic import geodesic, icosahedron, prime_factors, stretched
+from tbcad.core.optics.geodesic import geodesic, icosahedron, stretched
 
 
 def test_icosahedron_is_regular_and_z_is_a_two_fold_axis() -> None:
@@ -11,12 +11,6 @@ def test_icosahedron_is_regular_and_z_is_a_two_fold_axis() -> None:
     assert np.ptp(sides) < 1e-15
     turned = vertices * [-1, -1, 1]
     assert {tuple(v) for v in np.round(turned, 12)} == {tuple(v) for v in np.round(vertices, 12)}
-
-
-def test_prime_factors_ascend() -> None:
-    assert prime_factors(1) == []
-    assert prime_factors(60) == [2, 2, 3, 5]
-    assert prime_factors(59) == [59]
 
 
 @pytest.mark.parametrize("n", [*range(1, 7), 31, 60])
@@ -53,11 +47,6 @@ def test_mirror_symmetry_in_every_coordinate_plane_is_exact_on_the_planes(n: int
         assert {tuple(v) for v in np.round(flipped, 10) + 0.0} == rounded
         size = np.abs(vertices[:, axis])
         assert not np.any((size > 0) & (size < 1e-6))
-
-
-def test_without_a_stretch_directions_are_the_very_same() -> None:
-    u = geodesic(6)[0]
-    assert np.array_equal(stretched(u, 1.0, 1.0), u)
 
 
 def test_stretched_directions_keep_planes_azimuth_and_follow_the_tangent() -> None:

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.vectors import unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.optics.reflection import miss_distances, reflected_rays
+from tbcad.core.optics.reflection import miss_distances, reflected_rays, reflection_points
 from tests.sphere_misses import sphere_miss_distances
 
 
@@ -31,11 +31,15 @@ def test_rays_find_their_points_on_the_spheres(paper_array: MirrorArray) -> None
     assert found == pytest.approx(miss_distances(pinhole, point, normal), abs=1e-9)
 
 
-def test_rays_past_a_sphere_or_away_from_the_origin_miss_by_infinity() -> None:
-    pinhole, radius = np.array([-50.0, 0.0, 0.0]), np.array(10.0)
-    ray = unit(np.array([[1.0, 0.2, 0.0], [1.0, 0.0, 0.0]]))
-    miss = sphere_miss_distances(pinhole, ray, np.array([100.0, 0.0, 0.0]), radius)
-    assert miss[0] == np.inf
-    assert miss[1] == 0
-    before_the_origin = np.array([-20.0, 0.0, 0.0])
-    assert sphere_miss_distances(pinhole, ray[1], before_the_origin, radius) == np.inf
+@pytest.mark.parametrize("radius", [1.0, 20.0, 300.0, 5000.0])
+def test_light_of_the_led_is_reflected_to_the_pinhole(radius: float) -> None:
+    """Angles of incidence and of reflection are equal, also on spheres much larger than the rig."""
+    rng = np.random.default_rng(1)
+    pinhole, place = np.array([100.0, 0.0, -100.0]), np.array([5.0, 20.0, -3.0])
+    apex = unit(rng.normal(loc=(0, 0, 1.5), size=(200, 3))) * 150
+    normal = unit(unit(place - apex) + unit(pinhole - apex) + 0.05 * rng.normal(size=(200, 3)))
+    centre = apex - radius * normal
+    point = reflection_points(centre, np.full(200, radius), place, pinhole)
+    assert norm(point - centre) == pytest.approx(np.full(200, radius))
+    to_led, to_pinhole = unit(place - point), unit(pinhole - point)
+    assert norm(np.cross(unit(to_led + to_pinhole), unit(point - centre))).max() < 1e-9

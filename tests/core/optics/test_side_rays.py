@@ -5,8 +5,7 @@ import pytest
 
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import unit
-from tbcad.core.optics.reflection import miss_distances
-from tbcad.core.optics.side_rays import misses_of_balls, misses_of_mirrors
+from tbcad.core.optics.side_rays import misses_of_balls
 from tbcad.types import Floats
 from tests.sphere_misses import sphere_miss_distances
 
@@ -30,18 +29,6 @@ def sides(rng: np.random.Generator) -> tuple[Floats, Floats, np.ndarray, Floats]
 def on_sides(points: Floats, weight: Floats, t: Floats) -> Floats:
     basis = np.stack([(1 - t) ** 2, 2 * t * (1 - t) * weight[:, None], t**2], axis=-1)
     return np.asarray(np.einsum("esk,ekx->esx", basis, points) / basis.sum(axis=-1, keepdims=True))
-
-
-def test_mirrors(rng: np.random.Generator) -> None:
-    points, weight, mirror, t = sides(rng)
-    apex = np.array([-100.0, 0.0, 50.0]) + rng.normal(size=(MIRRORS, 3))
-    normal = unit(np.array([2.0, 0, -1]) + rng.normal(size=(MIRRORS, 3)))
-    at = on_sides(points, weight, t)
-    normals = normal[mirror][:, None] + 0.05 * (at - apex[mirror][:, None])
-    table = np.column_stack([apex, normal, np.full(MIRRORS, 0.05)])
-    found = misses_of_mirrors(points, weight, mirror, table, PINHOLE, t)
-    expected = miss_distances(PINHOLE, at, normals)
-    assert found == pytest.approx(expected, abs=TOLERANCE, rel=TOLERANCE)
 
 
 def test_balls(rng: np.random.Generator) -> None:

@@ -17,10 +17,10 @@ from PIL import Image
 
 from tbcad.app.cli import run
 from tbcad.light.datasets.machine_scene import object_mesh
-from tbcad.light.simulate.scene.exported import read_export
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.reflector import read_export
 
 N, SIZE_PX, CROP_PX = 4, (416, 310), 100
 PARTS = ["mirrors_a", "walls_a", "mirrors_b", "walls_b", "object"]

@@ -8,10 +8,18 @@ from scipy.optimize import minimize
 
 from tbcad.core.geometry.vectors import unit
 from tbcad.errors import InputError
-from tbcad.light.datasets.crops import Crop, MirrorId, chosen_mirrors, read_crop, spread_evenly
 from tbcad.light.datasets.pictures import places, resampled
-from tbcad.light.datasets.seed_points import seed_points
-from tbcad.light.datasets.virtual_cameras import _measured, camera_at, virtual_cameras
+from tbcad.light.datasets.pinholes import seed_points
+from tbcad.light.datasets.virtual_cameras import (
+    Crop,
+    MirrorId,
+    _measured,
+    camera_at,
+    chosen_mirrors,
+    read_crop,
+    spread_evenly,
+    virtual_cameras,
+)
 from tbcad.light.simulate.capture.light_field import LightField
 
 RADIUS = 30.0
@@ -45,7 +53,7 @@ def pinhole_crop(centre: np.ndarray, size: int = 40) -> Crop:
     return crop_of_points(origin, points, np.rint(colour).astype(np.uint8))
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(angles=DIRECTIONS, distance=DISTANCES)
 def test_rays_of_a_pinhole_give_it_back(angles: tuple[float, float], distance: float) -> None:
     centre = distance * on_sphere(angles)
@@ -58,7 +66,7 @@ def test_rays_of_a_pinhole_give_it_back(angles: tuple[float, float], distance: f
     assert int(row[3]) == crop.meets.sum()
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(angles=DIRECTIONS, distance=DISTANCES, size=st.integers(16, 90))
 def test_the_picture_of_a_pinhole_shows_every_point_where_it_is(
     angles: tuple[float, float], distance: float, size: int

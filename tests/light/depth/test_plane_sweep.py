@@ -7,8 +7,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.light.datasets.pictures import PinholePictures
 from tbcad.light.datasets.virtual_cameras import camera_at
 from tbcad.light.depth.plane_sweep import swept_depth
-from tbcad.light.simulate.scene.rays import unit_directions
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
+from tbcad.light.simulate.scene.rays import camera_around_object, unit_directions
 from tbcad.types import Floats
 
 CAPTURE_MM, SIZE_PX, REACH_MM = 60.0, 60, 250.0

@@ -10,7 +10,7 @@ from tbcad.light.reconstruction.mesh_distance import mesh_distance
 from tbcad.light.simulate.scene.object import patterned_ball
 from tests.light.reconstruction.balls import parallel_rays
 
-RAYS = parallel_rays(lambda away: away < 7, across=81)
+RAYS = parallel_rays(lambda away: away < 7, across=41)
 
 
 def sphere(radius: float) -> trimesh.Trimesh:

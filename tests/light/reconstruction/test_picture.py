@@ -17,7 +17,7 @@ from tbcad.light.reconstruction.picture import (
     normals_png,
     opacity_png,
 )
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tests.light.reconstruction.balls import COLOUR, NODES, RADIUS, WIDTH_MM, ball, nothing
 
 VIEW = camera_around_object(0.7, 0.5, 200.0, WIDTH_MM, (64, 48))

@@ -11,14 +11,14 @@ import tbcad
 from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.light.reflectance.environment import read_environment
-from tbcad.light.reflectance.field_file import TRUE_LIGHTS, lit_scene, open_reflectance, relit
 from tbcad.light.reflectance.lamp_places import lamps_of_mirrors
+from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene, open_reflectance, relit
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene
-from tbcad.light.simulate.scene.viewpoint import camera_around_object
-from tbcad.light.simulate.views.ground_truth import pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 
@@ -107,17 +107,6 @@ def test_damaged_files_are_refused(captured: Path, tmp_path: Path, name: str) ->
     with h5py.File(tmp_path / "reflectance.h5", "r+") as store:
         del store[name]
     with pytest.raises(InputError, match="damaged"), open_reflectance(tmp_path):
-        pass
-
-
-@pytest.mark.parametrize("link", [h5py.SoftLink("/b/transport"), h5py.ExternalLink("x.h5", "/t")])
-def test_links_are_refused(captured: Path, tmp_path: Path, link: object) -> None:
-    """As in lightfield.h5; the other kinds are those of `test_hdf5`."""
-    (tmp_path / "reflectance.h5").write_bytes((captured / "reflectance.h5").read_bytes())
-    with h5py.File(tmp_path / "reflectance.h5", "r+") as store:
-        del store["a/transport"]
-        store["a/transport"] = link
-    with pytest.raises(InputError, match="elsewhere"), open_reflectance(tmp_path):
         pass
 
 

@@ -1,22 +1,29 @@
-"""Light adds up: the reflectance field against captures in the light of all lamps at once."""
+"""Light adds up: of lamps and of projectors, against captures, closed forms and bundles of rays."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tbcad.light.reflectance.field_file import open_reflectance
-from tbcad.light.reflectance.transport import seen_spots
+from tbcad.app.cli import run
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.optics.camera import Camera
+from tbcad.light.datasets.virtual_cameras import MirrorId
+from tbcad.light.reflectance.lamp_places import LEAST_CURVATURE, MirrorPixels, projectors, reflected
+from tbcad.light.reflectance.transport import open_reflectance, seen_spots
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import photograph
+from tbcad.light.simulate.scene.lamps import PointLights, Spots, received_light
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.point_lights import PointLights, Spots, received_light
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.types import Floats
 
 UP = np.array([0.0, 0.0, 1.0])
+PINHOLE = np.array([100.0, 0.0, -100.0])
+CENTRE, RADIUS = np.array([85.0, 20.0, 70.0]), 25.0
+POINTS = np.array([[0.0, 0, 0], [12.0, -20.0, 9.0], [-25.0, 8.0, -4.0], [3.0, 28.0, 6.0]])
 
 
 def plate_scene(z: float, half: float) -> Scene:
@@ -89,3 +96,102 @@ def test_rays_that_meet_nothing_are_left_out(
 
 def off_ray(point: Floats, origin: Floats, direction: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.cross(point - origin, direction), axis=1))
+
+
+def traced(direction: Floats, to: Floats, along: Floats) -> Floats:
+    """Where a ray from the pinhole off the sphere meets the plane through a point across a way."""
+    ray = unit(direction)
+    offset = PINHOLE - CENTRE
+    half = ray @ offset
+    point = PINHOLE + (-half - np.sqrt(half**2 - offset @ offset + RADIUS**2)) * ray
+    normal = (point - CENTRE) / RADIUS
+    away = ray - 2 * (ray @ normal) * normal
+    return np.asarray(point + ((to - point) @ along) / (away @ along) * away)
+
+
+def test_rays_to_where_a_sphere_reflects_come_to_the_points_and_spread_as_said() -> None:
+    """The area of a bundle of exact rays, by differences."""
+    found, spread = reflected(CENTRE, RADIUS, PINHOLE, POINTS)
+    assert np.linalg.norm(found - CENTRE, axis=1) == pytest.approx(np.full(4, RADIUS))
+    for point, at, area in zip(found, POINTS, spread, strict=True):
+        way, ray = unit(at - point), unit(point - PINHOLE)
+        assert traced(ray, at, way) == pytest.approx(at, abs=1e-8)
+        sides = unit(np.cross(ray, [0.3, 0.5, 0.8]))
+        step = 1e-5
+        first, second = (
+            (traced(ray + step * side, at, way) - traced(ray - step * side, at, way)) / (2 * step)
+            for side in (sides, np.cross(ray, sides))
+        )
+        assert np.linalg.norm(np.cross(first, second)) == pytest.approx(area, rel=1e-6)
+
+
+def test_head_on_it_is_the_light_of_the_image_behind_the_mirror() -> None:
+    """A convex mirror's image of a point: 1/image = 1/distance + 2/radius."""
+    far, near = 240.0, 80.0
+    pinhole, centre = np.array([0.0, 0, far]), np.array([0.0, 0, -RADIUS])
+    _, spread = reflected(centre, RADIUS, pinhole, np.array([[0.0, 0, near]]))
+    image = 1 / (1 / far + 2 / RADIUS)
+    assert spread == pytest.approx([(far / image * (image + near)) ** 2])
+
+
+def flat_mirror(owner: int) -> MirrorPixels:
+    """The plane z = 60 over the origin; all pixels belong to one mirror."""
+    radius = 1 / LEAST_CURVATURE
+    centre = np.array([0.0, 0, 60.0 + radius])
+    pinhole = np.array([80.0, 0, 0])
+    camera = Camera(pinhole, unit(np.array([-40.0, 0, 60])), np.array([0.0, 1, 0]), 40, 40, 1.5)
+    _, spread = reflected(centre, radius, pinhole, np.zeros((1, 3)))
+    owners = np.full((40, 40), owner, dtype=np.uint16)
+    return MirrorPixels(camera, 1, owners, centre, radius, float(spread[0]))
+
+
+def test_a_flat_mirror_gives_the_light_of_a_lamp_at_the_pinholes_image() -> None:
+    scene = plate_scene(-3.0, 5.0)
+    normals = unit(np.array([[0.0, 0, 1], [0.2, 0.3, 1], [0.5, -0.2, 1]]))
+    spots = Spots(np.array([[0.0, 0, 0], [10.0, 5, 3], [-9.0, 2, -1]]), normals, normals)
+    image = np.array([80.0, 0, 120.0])
+    expected = received_light(scene.embree, spots, image)
+    found = flat_mirror(1).light(scene.embree, spots)
+    assert expected.min() > 0
+    assert found == pytest.approx(expected, rel=1e-4)
+    assert flat_mirror(2).light(scene.embree, spots).tolist() == [0, 0, 0]
+
+
+def test_shadows_are_cast() -> None:
+    under = Spots(np.array([[0.0, 0, -5]]), np.array([[0.0, 0, 1]]), np.array([[0.0, 0, 1]]))
+    assert flat_mirror(1).light(plate_scene(-3.0, 8.0).embree, under) == pytest.approx([0])
+    assert flat_mirror(1).light(plate_scene(-9.0, 8.0).embree, under)[0] > 0
+
+
+def test_what_a_mirror_sees_is_what_it_lights(field: LightField, scene: Scene) -> None:
+    """Light goes back along captured rays: their spots get light from their own mirror."""
+    frame = field.frames["a"]
+    seen = seen_spots(frame, scene)
+    numbers = frame.planes["mirror"].ravel()[seen.pixel]
+    number = int(np.bincount(numbers).argmax())
+    own = numbers == number
+    (found,) = projectors(field, (MirrorId("a", number - 1),))
+    spots = Spots(*(values[own] for values in vars(seen.spots).values()))
+    light = found[0].light(scene.embree, spots)
+    steep = np.einsum("kj,kj->k", spots.normal, unit(found[0].centre - spots.place)) > 0.2
+    assert steep.sum() > 20
+    assert (light[steep] > 0).mean() > 0.97  # but for shadows at edges, by rounding
+
+
+def test_the_command_writes_projectors_and_relights(
+    record: Path, hdr: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "thrown"
+    assert run(["capture", str(record), "--lights", "projectors", "--every", "40", "--out",
+                str(out)]) == 0  # fmt: skip
+    with open_reflectance(out) as reflectance:
+        assert reflectance.facts["light"] == "projectors"
+        brightest = np.asarray(reflectance.transport["a"][:]).max(axis=(1, 2))
+        assert (brightest > 0.05).all()
+        assert brightest.max() < 10
+    capsys.readouterr()
+    options = ["--light", str(hdr), "--width", "64", "--height", "48", "--out"]
+    assert run(["view", str(out), *options, str(tmp_path / "lit.png")]) == 0
+    text = capsys.readouterr().out
+    assert "SSIM" in text
+    assert "same lamps" not in text

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from tbcad.app.cli import run
-from tbcad.cad.formats.csv_table import write_table
+from tbcad.cad.formats.checked_files import write_table
 from tbcad.errors import InputError
 from tbcad.prototype.assembly_steps.machine import Machine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
-from tbcad.prototype.electronics.wiring import COLUMNS as WIRING
-from tbcad.prototype.files.bom_csv import COLUMNS
+from tbcad.prototype.electronics import COLUMNS as WIRING
+from tbcad.prototype.files.bom import COLUMNS
 from tbcad.records.tables import BallRow
 from tests.prototype_records import (
     drive_section,
@@ -109,22 +109,15 @@ def taken(steps: tuple[Step, ...]) -> Counter[str]:
 
 
 def test_steps_take_exactly_the_parts_of_the_list(machine: Machine) -> None:
-    steps = assembly_steps(machine)
+    """And mount each body and fastener once; a fastener waits for the last that it goes through."""
+    steps, recorded = assembly_steps(machine), mounting_record(machine)
     assert taken(steps) == Counter(machine.quantities)
     assert [step.number for step in steps] == [*range(1, len(steps) + 1)]
     assert all(step.does and step.checks for step in steps)
-
-
-def test_every_body_and_fastener_is_mounted_once_for_the_record(machine: Machine) -> None:
-    steps = mounting_record(machine)
-    mounted = [name for step in steps for name in step.mounts]
+    mounted = [name for step in recorded for name in step.mounts]
     fasteners = [one.name for one in machine.fasteners]
     assert sorted(mounted) == sorted([*machine.bodies, *fasteners])
-    assert [step.key for step in steps] == [step.key for step in assembly_steps(machine)]
-
-
-def test_a_fastener_waits_for_the_last_body_that_it_goes_through(machine: Machine) -> None:
-    steps = assembly_steps(machine)
+    assert [step.key for step in recorded] == [step.key for step in steps]
     bodies = {body: step.number for step in steps for use in step.parts for body in use.bodies}
     for one in machine.fasteners:
         mounted = max(bodies[body] for body in one.through)
@@ -133,13 +126,11 @@ def test_a_fastener_waits_for_the_last_body_that_it_goes_through(machine: Machin
 
 
 def test_a_design_gets_the_steps_that_it_needs(machine: Machine) -> None:
-    keys = [step.key for step in assembly_steps(machine)]
+    """The belt is on the wheel before the shaft is in the bearings."""
+    steps = assembly_steps(machine)
+    keys = [step.key for step in steps]
     assert not {"lamps", "shroud", "gauge", "table", "caps"} & {*keys}
     assert keys.index("hub") < keys.index("shaft") < keys.index("motor") < keys.index("wiring")
-
-
-def test_the_belt_is_on_the_wheel_before_the_shaft_is_in_the_bearings(machine: Machine) -> None:
-    steps = assembly_steps(machine)
     (belt,) = [step for step in steps if "GT2-240-6" in {use.part for use in step.parts}]
     does = " ".join(belt.does)
     assert belt.key == "shaft"
@@ -198,54 +189,33 @@ def test_other_designs_have_steps_of_their_own(
     assert bool(joints) == (change is cut)
 
 
-def test_torques_follow_what_yields_first(machine: Machine) -> None:
-    steps = assembly_steps(machine)
+def test_torques_follow_what_yields_first(tmp_path: Path) -> None:
+    design = belt_design()
+    design["fasteners"].append(fastener("M2x12", 1, "bearing_head", x=80.0))
+    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
+    (line,) = [one for one in of(steps, "head").fits if "M2x12" in one]
+    assert "hand tight, in the printed hole" in line
     torques = [line for step in steps for line in step.fits if "N m" in line]
     by_screw = {line.split()[2]: float(line.split(": ")[1].split()[0]) for line in torques}
     # A bare head on plastic; in an insert; on a washer; 8.8 in steel would bear 5.5 N m.
     assert 0 < by_screw["M3x12"] < by_screw["M3x16"] < by_screw["M5x16"] < 5.5
 
 
-def test_hand_tight_where_no_torque_is_honest(tmp_path: Path) -> None:
-    design = belt_design()
-    design["fasteners"].append(fastener("M2x12", 1, "bearing_head", x=80.0))
-    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
-    (line,) = [one for one in of(steps, "head").fits if "M2x12" in one]
-    assert "hand tight, in the printed hole" in line
-
-
-def fewer_listed(design: Record, more: dict[str, int]) -> None:
-    more["GT2-60"] = -1
-
-
-def unknown_part(design: Record, more: dict[str, int]) -> None:
-    more["THING"] = 1
-
-
-def unknown_body(design: Record, more: dict[str, int]) -> None:
-    design["parts"].append(printed_part("wing"))
-
-
-def other_schema(design: Record, more: dict[str, int]) -> None:
-    design["schema"] = "tbcad-prototype/1"
-
-
 @pytest.mark.parametrize(
-    ("spoil", "words"),
+    ("changed", "more", "words"),
     [
-        (fewer_listed, "the list has 0 GT2-60 for 1 bodies"),
-        (unknown_part, "THING is in no step"),
-        (unknown_body, "wing is in no step"),
-        (other_schema, "this version of tbcad reads"),
+        ({}, {"GT2-60": -1}, "the list has 0 GT2-60 for 1 bodies"),
+        ({}, {"THING": 1}, "THING is in no step"),
+        ({"parts": [printed_part("wing")]}, {}, "wing is in no step"),
+        ({"schema": "tbcad-prototype/1"}, {}, "this version of tbcad reads"),
     ],
 )
 def test_what_does_not_add_up_is_refused(
-    tmp_path: Path, spoil: Callable[[Record, dict[str, int]], None], words: str
+    tmp_path: Path, changed: Record, more: dict[str, int], words: str
 ) -> None:
-    design, more = belt_design(), dict(LOOSE)
-    spoil(design, more)
+    folder = write(tmp_path, belt_design() | changed, LOOSE | more)
     with pytest.raises(InputError, match=words):
-        assembly_steps(read_machine(write(tmp_path, design, more)))
+        assembly_steps(read_machine(folder))
 
 
 def test_an_export_of_an_earlier_version_is_refused(
@@ -260,17 +230,12 @@ def test_an_export_of_an_earlier_version_is_refused(
     assert not (tmp_path / "page").exists()
 
 
-def test_json_has_the_same_steps(
+def test_json_and_page_have_the_same_steps(
     machine: Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["assembly", str(tmp_path), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)["steps"]
     assert printed == json.loads(json.dumps(record(assembly_steps(machine))))
-
-
-def test_the_page_has_all_steps_and_escapes_names(
-    machine: Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
     out = tmp_path / "page"
     assert run(["assembly", str(tmp_path), "--out", str(out), "--no-pictures"]) == 0
     text = (out / "assembly.html").read_text()

@@ -30,38 +30,31 @@ def refusal(folder: Path, *lines: str) -> str:
 
 
 class TestBuiltIn:
-    def test_metric(self) -> None:
-        stock = load_catalogue(["metric"])
-        assert len(stock) == 3 + 22 + 14 + 12
-        assert stock.diameter[[0, 1, 2, 3, -1]].tolist() == [1, 1.2, 1.5, 2, 60]
-        assert 25.4 not in stock.diameter
+    @pytest.mark.parametrize(
+        ("name", "count", "ends"), [("metric", 51, (1, 60)), ("inch", 61, (1.5875, 50.8))]
+    )
+    def test_lists(self, name: str, count: int, ends: tuple[float, float]) -> None:
+        """Sizes in millimetres, or whole inches and a fraction: what is ordered is built."""
+        stock = load_catalogue([name])
+        assert len(stock) == count
+        assert tuple(stock.diameter[[0, -1]]) == ends
+        expected = [steel_mass_g(diameter) for diameter in stock.diameter]
+        assert stock.mass_g == pytest.approx(expected, rel=1e-3)
+        for ball in stock.balls:
+            number, unit = ball.size.rsplit(" ", 1)
+            inches = float(sum(Fraction(part) for part in number.split()))
+            assert ball.diameter_mm == pytest.approx(inches * {"in": 25.4, "mm": 1.0}[unit])
 
-    def test_inch(self) -> None:
-        stock = load_catalogue(["inch"])
-        assert len(stock) == 29 + 16 + 16
-        assert stock.diameter[[0, -1]].tolist() == [1.5875, 50.8]
-        assert stock.balls[-1].size == "2 in"
-
-    def test_both_by_rising_diameter_without_doubles(self) -> None:
+    def test_both_by_rising_diameter_and_grade(self) -> None:
         both = load_catalogue(["metric", "inch"])
         assert (both.diameter[1:] > both.diameter[:-1]).all()
         separate = [load_catalogue([name]).balls for name in ("metric", "inch")]
         assert len(both) == len({ball.size for balls in separate for ball in balls})
-
-    @pytest.mark.parametrize("name", ["metric", "inch"])
-    def test_masses_are_those_of_steel(self, name: str) -> None:
-        stock = load_catalogue([name])
-        expected = [steel_mass_g(diameter) for diameter in stock.diameter]
-        assert stock.mass_g == pytest.approx(expected, rel=1e-3)
+        largest = [both.available(grade, 60).diameter[-1] for grade in ("G5", "G10", "G28", "G40")]
+        assert largest == [12.7, 25.4, 50.8, 60]
+        with pytest.raises(SpecError, match=r"no ball of grade G40 up to 0\.5 mm"):
+            both.available("G40", 0.5)
         assert steel_mass_g(60) == pytest.approx(883.3, abs=0.1)
-
-    @pytest.mark.parametrize("name", ["metric", "inch"])
-    def test_sizes_name_their_diameters(self, name: str) -> None:
-        """In millimetres, or in whole inches and a fraction: what is ordered is what is built."""
-        for ball in load_catalogue([name]).balls:
-            number, unit = ball.size.rsplit(" ", 1)
-            inches = float(sum(Fraction(part) for part in number.split()))
-            assert ball.diameter_mm == pytest.approx(inches * {"in": 25.4, "mm": 1.0}[unit])
 
     def test_grades_are_those_of_iso_3290_1(self) -> None:
         grades = load_grades()
@@ -69,15 +62,6 @@ class TestBuiltIn:
         g28 = grades["G28"]
         assert (g28.sphericity_um, g28.diameter_variation_um) == (0.7, 0.7)
         assert (g28.roughness_ra_um, g28.lot_variation_um) == (0.05, 1.4)
-
-    def test_fine_grades_end_at_smaller_sizes(self) -> None:
-        stock = load_catalogue(["metric", "inch"])
-        largest = [stock.available(grade, 60).diameter[-1] for grade in ("G5", "G10", "G28", "G40")]
-        assert largest == [12.7, 25.4, 50.8, 60]
-
-    def test_nothing_left(self) -> None:
-        with pytest.raises(SpecError, match=r"no ball of grade G40 up to 0\.5 mm"):
-            load_catalogue(["metric"]).available("G40", 0.5)
 
 
 class TestOwn:
@@ -87,28 +71,22 @@ class TestOwn:
         assert stock.mass_g == pytest.approx([0.2, steel_mass_g(5)])
         assert stock.balls[1].grades == {"G10", "G40"}
 
-    def test_empty(self, tmp_path: Path) -> None:
+    def test_wrong_cells_are_named(self, tmp_path: Path) -> None:
+        cases = {
+            ",5,s,G10,,x": "line 3, column size: empty",
+            "a,0,s,G10,,x": "line 3, column diameter_mm: '0', allowed is a number above 0 to",
+            "a,5,s,G10,-1,x": "column mass_g: '-1'",
+            "a,5,s,G11,,x": "column grades: 'G11', allowed are G3 G5",
+            "a,5,s,,,x": "column grades: ''",
+            "5 mm,6,s,G10,,x": "column size: '5 mm' twice",
+        }
+        for row, message in cases.items():
+            assert message in refusal(tmp_path, ROW, row)
         assert "mine.csv: an empty catalogue" in refusal(tmp_path)
 
-    @pytest.mark.parametrize(
-        ("row", "message"),
-        [
-            (",5,s,G10,,x", "line 3, column size: empty"),
-            ("a,0,s,G10,,x", "line 3, column diameter_mm: '0', allowed is a number above 0 to"),
-            ("a,5,s,G10,-1,x", "column mass_g: '-1'"),
-            ("a,5,s,G11,,x", "column grades: 'G11', allowed are G3 G5"),
-            ("a,5,s,,,x", "column grades: ''"),
-            ("5 mm,6,s,G10,,x", "column size: '5 mm' twice"),
-        ],
-    )
-    def test_wrong_cells_are_named(self, tmp_path: Path, row: str, message: str) -> None:
-        assert message in refusal(tmp_path, ROW, row)
-
-    @pytest.mark.parametrize("name", ["imperial", "", "a\0b"])
-    def test_unknown(self, name: str) -> None:
-        with pytest.raises(SpecError, match=r"neither metric nor inch nor a file|cannot be read"):
-            load_catalogue([name])
-
-    def test_none(self) -> None:
+    def test_unknown_or_none(self) -> None:
+        for name in ("imperial", "", "a\0b"):
+            with pytest.raises(SpecError, match=r"neither metric nor inch|cannot be read"):
+                load_catalogue([name])
         with pytest.raises(SpecError, match="names no catalogue"):
             load_catalogue([])

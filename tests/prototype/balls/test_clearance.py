@@ -12,7 +12,6 @@ from tbcad.prototype.balls.clearance import (
     allowed_azimuths,
     min_separations,
     obstacles,
-    seat_half_angles,
 )
 from tbcad.prototype.balls.groups import group_mirrors
 from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii
@@ -90,8 +89,3 @@ def test_post_lies_straight_below(paper_array: MirrorArray, balls: Balls) -> Non
     at = rotated_about_x(balls.body_centre[0], np.array(ceiling[0])) @ frame
     distance = np.hypot(at[0], at[1])
     assert distance == pytest.approx(30 + LIMITS.post_diameter_mm / 2 + LIMITS.ball_wall_mm)
-
-
-def test_edges_are_tangents_from_the_axis(balls: Balls) -> None:
-    expected = np.arcsin((balls.body_radius + 3) / balls.body_centre[:, 1])
-    assert seat_half_angles(balls, 3.0) == pytest.approx(expected)

@@ -2,29 +2,28 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.array import design as mirror_design
-from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.prototype.balls.fit import ball_alternatives, ball_fit
+from tbcad.prototype.balls.fit import BallFit, ball_fit
 from tbcad.prototype.balls.layout import (
     MORE_BALLS,
     PrototypeLayout,
     ball_counts,
     prototype_layout,
 )
-from tbcad.prototype.balls.placement import greedy_placement
+from tbcad.prototype.balls.placement import greedy_placement, min_swing_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
+    Balls,
     ball_candidates,
     choose_balls,
 )
-from tbcad.prototype.balls.stops import min_stabbing_points, plan_stops, stop_requests
+from tbcad.prototype.balls.stops import plan_stops, stop_requests
 from tbcad.prototype.files.tables import picture_rows
 from tests.helpers import segment_distances
 
@@ -48,9 +47,25 @@ def small(design: MirrorDesign, *options: str) -> PrototypeLayout:
 
 
 class TestBalls:
-    def test_all_mirrors_show_the_whole_target(self, prototype: PrototypeLayout) -> None:
+    def test_all_mirrors_show_the_whole_target_and_the_next_larger_ball_would_not(
+        self, prototype: PrototypeLayout, candidates: BallCandidates
+    ) -> None:
         assert prototype.fit.coverage.min() > 60
         assert prototype.fit.coverable.all()
+        balls, catalogue = prototype.balls, prototype.balls.catalogue
+        next_size = np.minimum(balls.stock + 1, len(catalogue) - 1)
+        larger = np.where(balls.cap, balls.radius + 0.11, catalogue.diameter[next_size] / 2)
+        assert (prototype.groups.minimum(candidates.coverage(larger, moved=True)) < 60).all()
+        beyond = balls.radius > 30
+        assert (balls.cap == beyond).all()
+        assert 0 < beyond.sum() < 5
+        assert (balls.mass_g[beyond] == 0).all()
+        assert balls.size[0].startswith("cap R 4")
+        # A cap's edge lies on its front and on its ball.
+        edge = balls.used_radius[beyond] + LIMITS.cap_rim_mm
+        drop = balls.radius[beyond] - np.sqrt(balls.radius[beyond] ** 2 - edge**2)
+        on_ball = np.hypot(edge, balls.body_depth[beyond] - drop)
+        assert on_ball == pytest.approx(balls.body_radius[beyond])
 
     def test_a_margin_is_shown_besides(self, small_design: MirrorDesign) -> None:
         # As many balls for both: more would show more.
@@ -62,117 +77,51 @@ class TestBalls:
         assert made.fit.pixels_shell.tolist() == plain.fit.pixels_shell.tolist()
         assert 0.9 < made.fit.pixels.sum() / plain.fit.pixels.sum() < 1
 
-    def test_the_next_larger_ball_would_not(
-        self, prototype: PrototypeLayout, candidates: BallCandidates
-    ) -> None:
-        catalogue, stock = prototype.balls.catalogue, prototype.balls.stock
-        larger = np.where(
-            prototype.balls.cap,
-            prototype.balls.radius + 0.11,
-            catalogue.diameter[np.minimum(stock + 1, len(catalogue) - 1)] / 2,
-        )
-        assert (prototype.groups.minimum(candidates.coverage(larger, moved=True)) < 60).all()
+    def test_other_rules(self, prototype: PrototypeLayout, candidates: BallCandidates) -> None:
+        """Without caps, of the nearest sizes, and with pictures left in place: tiny balls."""
+        catalogue, groups = prototype.balls.catalogue, prototype.groups
 
-    def test_groups_beyond_stock_get_caps(self, prototype: PrototypeLayout) -> None:
-        beyond = prototype.balls.radius > 30
-        assert (prototype.balls.cap == beyond).all()
-        assert 0 < beyond.sum() < 5
-        assert (prototype.balls.mass_g[beyond] == 0).all()
-        assert prototype.balls.size[0].startswith("cap R 4")
+        def fitted(**rule: object) -> tuple[Balls, BallFit]:
+            limits = LIMITS.model_copy(update=rule)
+            balls = choose_balls(candidates, limits, catalogue)
+            return balls, ball_fit(candidates, balls, limits)
 
-    def test_a_caps_edge_lies_on_its_front_and_on_its_ball(
-        self, prototype: PrototypeLayout
-    ) -> None:
-        balls, cap = prototype.balls, prototype.balls.cap
-        edge = balls.used_radius[cap] + LIMITS.cap_rim_mm
-        drop = balls.radius[cap] - np.sqrt(balls.radius[cap] ** 2 - edge**2)
-        on_ball = np.hypot(edge, balls.body_depth[cap] - drop)
-        assert on_ball == pytest.approx(balls.body_radius[cap])
-
-    def test_without_caps_the_largest_ball(
-        self, prototype: PrototypeLayout, candidates: BallCandidates
-    ) -> None:
-        balls = choose_balls(
-            candidates, LIMITS.model_copy(update={"caps": False}), prototype.balls.catalogue
-        )
+        balls, _ = fitted(caps=False)
         assert balls.radius.max() == 30
         assert not balls.cap.any()
-
-    def test_nearest(self, prototype: PrototypeLayout, candidates: BallCandidates) -> None:
-        limits = LIMITS.model_copy(update={"snap": "nearest"})
-        balls = choose_balls(candidates, limits, prototype.balls.catalogue)
-        every = prototype.balls.catalogue.diameter / 2
-        distance = np.abs(every - prototype.groups.radius[:, None]).min(axis=1)
-        bought = ~balls.cap
-        assert np.abs(balls.radius - prototype.groups.radius)[bought] == pytest.approx(
-            distance[bought]
-        )
-        assert ball_fit(candidates, balls, limits).coverage.min() < 60
-
-    def test_pictures_left_in_place_need_tiny_balls(
-        self, prototype: PrototypeLayout, candidates: BallCandidates
-    ) -> None:
-        limits = LIMITS.model_copy(update={"picture": "fixed"})
-        balls = choose_balls(candidates, limits, prototype.balls.catalogue)
-        fit = ball_fit(candidates, balls, limits)
+        balls, fit = fitted(snap="nearest")
+        distance = np.abs(catalogue.diameter / 2 - groups.radius[:, None]).min(axis=1)
+        off = np.abs(balls.radius - groups.radius)
+        assert off[~balls.cap] == pytest.approx(distance[~balls.cap])
+        assert fit.coverage.min() < 60
+        _, fit = fitted(picture="fixed")
         assert not fit.coverable.all()
         assert (fit.coverage_fixed[fit.coverable] >= 60 - COVERAGE_ROUNDING_MM).all()
         assert fit.kept_share < 0.05
 
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
-        spec, prototype = small_design.spec, small(small_design)
-        rows = ball_alternatives(
-            spec, prototype.array, prototype.groups, prototype.balls, prototype.fit
-        )
-        alternatives = {row.name: row for row in rows}
-        assert alternatives["cover, with caps"].pixels_kept_share == pytest.approx(
-            prototype.fit.kept_share
-        )
-        assert alternatives["cover, with caps"].mirrors_below_target == 0
-        assert (
-            alternatives["cover, balls only"].pixels_kept_share
-            < alternatives["cover, with caps"].pixels_kept_share
-        )
-        assert alternatives["nearest, with caps"].mirrors_below_target > 10
+        prototype = small(small_design)
+        rows = {row.name: row for row in prototype.alternatives}
+        own, bare = rows["cover, with caps"], rows["cover, balls only"]
+        assert own.pixels_kept_share == pytest.approx(prototype.fit.kept_share)
+        assert own.mirrors_below_target == 0
+        assert bare.pixels_kept_share < own.pixels_kept_share
+        assert rows["nearest, with caps"].mirrors_below_target > 10
 
 
 class TestPlaces:
-    def test_apices_stay_on_the_ellipsoid(self, prototype: PrototypeLayout) -> None:
-        apex = prototype.apices(0.3)
-        pinhole = prototype.array.camera.pinhole
-        assert norm(apex) + norm(apex - pinhole) == pytest.approx(
-            np.full(len(prototype), 2 * prototype.array.ellipsoid.semi_major)
-        )
-        assert prototype.centres(0.3) == pytest.approx(
-            apex - prototype.balls.radius[:, None] * prototype.normals(0.3)
-        )
-
-    def test_no_two_balls_come_closer_than_the_wall(self, prototype: PrototypeLayout) -> None:
+    def test_apices_stay_on_the_ellipsoid_and_balls_a_wall_apart(
+        self, prototype: PrototypeLayout
+    ) -> None:
+        apex, pinhole = prototype.apices(0.3), prototype.array.camera.pinhole
+        both = np.full(len(prototype), 2 * prototype.array.ellipsoid.semi_major)
+        assert norm(apex) + norm(apex - pinhole) == pytest.approx(both)
+        behind = prototype.balls.radius[:, None] * prototype.normals(0.3)
+        assert prototype.centres(0.3) == pytest.approx(apex - behind)
         centre, radius = prototype.body_centres(), prototype.balls.body_radius
         gap = norm(centre[:, None] - centre) - radius[:, None] - radius
         np.fill_diagonal(gap, np.inf)
-        assert gap.min() > LIMITS.ball_wall_mm
-        assert gap.min() < LIMITS.ball_wall_mm + 0.05  # and are no farther than they must
-
-    def test_no_ball_blocks_anothers_light(self, prototype: PrototypeLayout) -> None:
-        """Rays off every ball by brute force against every other ball."""
-        outline, balls = prototype.balls.outline, prototype.balls
-        camera, frame = prototype.array.camera.pinhole, prototype.array.ellipsoid.frame()
-        for share in (0.0, 0.5, 1.0):
-            inner = balls.poses.apex[:, None] + share * (outline - balls.poses.apex[:, None])
-            centre = balls.centre[:, None]
-            normal = unit(inner - centre)
-            point = centre + balls.radius[:, None, None] * normal
-            for j in range(len(prototype)):
-                rotation = Rotation.from_euler("x", prototype.placement.azimuth[j])
-                x, n = rotation.apply(point[j]) @ frame, rotation.apply(normal[j]) @ frame
-                out = reflected_rays(camera, x, n)
-                end = x - dot(x, out)[:, None] * out
-                assert norm(end).max() < 30 + 1e-6
-                others = np.arange(len(prototype)) != j
-                for target in (np.broadcast_to(camera, x.shape), end):
-                    gap = segment_distances(x, target, prototype.body_centres()[others])
-                    assert (gap - balls.body_radius[others]).min() > LIMITS.light_margin_mm
+        assert 0 < gap.min() - LIMITS.ball_wall_mm < 0.05  # and are no farther than they must
 
     def test_post_and_camera_stay_clear_over_the_swing(self, prototype: PrototypeLayout) -> None:
         view = prototype.array.camera
@@ -184,57 +133,42 @@ class TestPlaces:
             assert (post - prototype.balls.body_radius - 10).min() > LIMITS.ball_wall_mm - 1e-3
             assert (body - prototype.balls.body_radius - 30).min() > LIMITS.ball_wall_mm - 1e-3
 
-    def test_swing_is_the_minimum_and_less_than_greedy(self, prototype: PrototypeLayout) -> None:
-        assert prototype.placement.swing_bound == pytest.approx(prototype.placement.swing, abs=1e-3)
-        assert prototype.placement.swing < greedy_placement(prototype.problem).swing - DEGREE
-        assert prototype.placement.swing / DEGREE < 205
-
-    def test_outermost_is_that_of_the_edges(self, prototype: PrototypeLayout) -> None:
-        """By the seats' edges themselves, at both ends of the swing."""
-        frame = prototype.array.ellipsoid.frame()
-        far = 0.0
-        for angle in (-prototype.placement.swing / 2, prototype.placement.swing / 2):
+    def test_swing_is_the_minimum_less_than_greedy_and_outermost_that_of_the_edges(
+        self, prototype: PrototypeLayout
+    ) -> None:
+        placement, frame, far = prototype.placement, prototype.array.ellipsoid.frame(), 0.0
+        assert placement.swing_bound == pytest.approx(placement.swing, abs=1e-3)
+        assert placement.swing < greedy_placement(prototype.problem).swing - DEGREE
+        assert placement.swing / DEGREE < 205
+        for angle in (-placement.swing / 2, placement.swing / 2):
             _, out, across = (prototype.body_centres(angle) @ frame.T).T
-            half = np.arcsin(
-                (prototype.balls.body_radius + LIMITS.ball_wall_mm) / np.hypot(out, across)
-            )
+            reach = prototype.balls.body_radius + LIMITS.ball_wall_mm
+            half = np.arcsin(reach / np.hypot(out, across))
             far = max(far, (np.abs(np.arctan2(across, out)) + half).max())
-        assert prototype.placement.outermost == pytest.approx(far, abs=1e-6)
+        assert placement.outermost == pytest.approx(far, abs=1e-6)
 
 
 class TestStops:
     def test_every_mirror_is_served_within_the_limit(self, prototype: PrototypeLayout) -> None:
-        stops = prototype.stops
-        across = 2 * np.arcsin(
-            np.sin(np.abs(stops.azimuth_error) / 2)
-            * np.sin(prototype.groups.polar[prototype.fit.ball])
-        )
-        assert np.degrees(across).max() <= LIMITS.stop_error_deg + 1e-9
-        assert sum(len(stops.mirrors(i)) for i in range(len(stops))) == len(prototype.array)
-        assert min(len(stops.mirrors(i)) for i in range(len(stops))) > 0
-
-    def test_errors_are_those_of_the_balls_themselves(self, prototype: PrototypeLayout) -> None:
-        for i in range(0, len(prototype.array), 50):
-            apex = prototype.apices(prototype.stops.angle[prototype.stops.stop[i]])[
-                prototype.fit.ball[i]
-            ]
+        stops, ball = prototype.stops, prototype.fit.ball
+        sine = np.sin(np.abs(stops.azimuth_error) / 2) * np.sin(prototype.groups.polar[ball])
+        assert np.degrees(2 * np.arcsin(sine)).max() <= LIMITS.stop_error_deg + 1e-9
+        counts = [len(stops.mirrors(i)) for i in range(len(stops))]
+        assert sum(counts) == len(prototype.array)
+        assert min(counts) > 0
+        for i in range(0, len(prototype.array), 50):  # errors are those of the balls themselves
+            apex = prototype.apices(stops.angle[stops.stop[i]])[ball[i]]
             angle = np.arccos(np.clip(unit(apex) @ prototype.array.u[i], -1, 1))
-            assert prototype.stops.error[i] == pytest.approx(angle, abs=1e-7)
+            assert stops.error[i] == pytest.approx(angle, abs=1e-7)
 
-    def test_are_the_fewest_and_fewer_than_greedys(self, prototype: PrototypeLayout) -> None:
-        requests = stop_requests(
-            prototype.groups, prototype.array.azimuth, np.radians(LIMITS.stop_error_deg)
-        )
-        angle = requests.azimuth - prototype.placement.azimuth[requests.ball]
-        points, _ = min_stabbing_points(angle - requests.tolerance, angle + requests.tolerance)
-        assert len(points) == len(prototype.stops)
-        other = plan_stops(
-            prototype.groups,
-            prototype.array.polar,
-            requests,
-            greedy_placement(prototype.problem).azimuth,
-        )
-        assert len(prototype.stops) <= len(other)
+    def test_freed_azimuths_need_fewer_than_those_of_the_swing_alone(
+        self, prototype: PrototypeLayout
+    ) -> None:
+        groups, array = prototype.groups, prototype.array
+        requests = stop_requests(groups, array.azimuth, np.radians(LIMITS.stop_error_deg))
+        azimuth = min_swing_placement(prototype.problem).azimuth
+        other = plan_stops(groups, array.polar, requests, azimuth)
+        assert len(prototype.stops) < len(other)
 
     def test_other_half_with_the_object_turned(
         self, prototype: PrototypeLayout, paper_design: MirrorDesign
@@ -267,50 +201,32 @@ class TestAsked:
         assert within(len(auto))
         assert not within(len(auto) - 1)
 
-    def test_auto_has_fewer_balls_where_the_limits_cannot_be_kept(
-        self, small_design: MirrorDesign
-    ) -> None:
-        """No number is refused: all from many down to one are tried, each once."""
-        options = ["n=6", "auto_direction_max_deg=1e-9", "caps=false", "grade=G3"]
-        counts = list(ball_counts(load_spec(None, options), small_design))
-        assert counts == list(range(len(counts), 0, -1))
-
     def test_auto_tries_more_balls_than_needed_and_then_fewer(
         self, small_design: MirrorDesign
     ) -> None:
+        """Where the limits cannot be kept: all from many down to one, each once."""
+        options = ["n=6", "auto_direction_max_deg=1e-9", "caps=false", "grade=G3"]
+        counts = list(ball_counts(load_spec(None, options), small_design))
+        assert counts == list(range(len(counts), 0, -1))
         counts = list(ball_counts(small_design.spec, small_design))
         assert sorted(counts) == list(range(1, counts[0] + MORE_BALLS + 1))
         assert counts[: MORE_BALLS + 1] == sorted(counts[: MORE_BALLS + 1])
 
-    def test_no_post_gives_more_room(self, small_design: MirrorDesign) -> None:
-        problem = small(small_design, "post_diameter_mm=0", "camera_diameter_mm=0").problem
-        assert (problem.max_azimuth == np.pi).all()
-        assert (problem.min_azimuth == -np.pi).all()
-
 
 class TestRefused:
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
-            (["prototype.k=104"], "prototype.k is 104, but camera a has 103 mirrors"),
+    def test_what_cannot_be_built(self, small_design: MirrorDesign) -> None:
+        cases = (
+            ("prototype.k is 104, but camera a has 103 mirrors", "prototype.k=104"),
             (
-                ["prototype.k=16", "max_swing_deg=150"],
                 "found no place for 16 balls on one base within a swing of 150",
+                *("prototype.k=16", "max_swing_deg=150"),
             ),
-            (["camera_diameter_mm=500", "camera_length_mm=1000"], "camera_diameter_mm smaller"),
-            (["largest_ball_mm=0.9"], "no ball of grade G40 up to 0.9 mm"),
-            (['catalogues=["nowhere.csv"]'], "neither metric nor inch nor a file"),
-        ],
-    )
-    def test_what_cannot_be_built(
-        self, small_design: MirrorDesign, options: list[str], message: str
-    ) -> None:
-        with pytest.raises(SpecError) as caught:
-            small(small_design, *options)
-        assert message in str(caught.value)
-        assert "\n" not in str(caught.value)
-
-    def test_planar_mirrors(self) -> None:
+            ("camera_diameter_mm smaller", "camera_diameter_mm=500", "camera_length_mm=1000"),
+            ("no ball of grade G40 up to 0.9 mm", "largest_ball_mm=0.9"),
+        )
+        for message, *options in cases:
+            with pytest.raises(SpecError, match=message):
+                small(small_design, *options)
         spec = load_spec(None, ["n=4", "radius_rule=flat"])
         with pytest.raises(SpecError, match=r"needs curved mirrors.*traced or paper"):
             prototype_layout(spec, mirror_design(spec))

@@ -51,7 +51,7 @@ def problems(draw: st.DrawFn) -> PlacementProblem:
     return PlacementProblem(separation, low, high, -limit, limit, np.zeros(k), 2 * np.pi)
 
 
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(problems())
 def test_swing_is_the_minimum_of_all_orders(case: PlacementProblem) -> None:
     found = min_swing_placement(case)
@@ -60,14 +60,6 @@ def test_swing_is_the_minimum_of_all_orders(case: PlacementProblem) -> None:
     assert found.swing_bound == pytest.approx(expected, abs=3 * SLACK)
     assert case.satisfied_by(found.azimuth)
     assert greedy_placement(case).swing > found.swing - 3 * SLACK
-
-
-def test_three_of_a_kind_by_hand() -> None:
-    """The narrow one may go outside: 1.0 + 0.9 + 0.3 for the pair of wide ones is the minimum."""
-    separation = np.full((3, 3), 0.3) - 0.3 * np.eye(3)
-    found = min_swing_placement(problem(separation, np.array([1.0, 0.9, 0.5])))
-    assert found.swing == pytest.approx(2.2, abs=1e-4)
-    assert sorted(np.abs(np.diff(np.sort(found.azimuth))))[0] >= 0.3 - SLACK
 
 
 def test_balls_stay_clear_of_the_post() -> None:
@@ -83,13 +75,12 @@ def test_balls_stay_clear_of_the_post() -> None:
 
 
 def test_swing_beyond_the_drive_is_refused() -> None:
-    separation = np.array([[0, 0.5], [0.5, 0]])
-    half = np.array([1.0, 1.0])
-    assert min_swing_placement(problem(separation, half, max_swing=2.51)).swing == pytest.approx(
-        2.5, abs=1e-4
-    )
+    separation, half = np.array([[0, 0.5], [0.5, 0]]), np.array([1.0, 1.0])
+    found = min_swing_placement(problem(separation, half, max_swing=2.51))
+    assert found.swing == pytest.approx(2.5, abs=1e-4)
     with pytest.raises(SpecError, match=r"swing of 143 degrees.*max_swing_deg larger"):
         min_swing_placement(problem(separation, half, max_swing=2.49))
+    assert 5 * SLACK < SOLVER_MARGIN
 
 
 @pytest.mark.parametrize("count", [3, 300])
@@ -117,18 +108,7 @@ def test_of_equal_swings_the_minimum_outermost_azimuth() -> None:
     assert found.outermost == pytest.approx(1.4, abs=1e-4)
 
 
-def test_limits_hold_over_the_whole_swing() -> None:
-    """A ball at an azimuth a serves 0.1 to either side of zero by swings of a + 0.1."""
-    one = problem(np.zeros((1, 1)), np.array([0.1]), limit=1.0)
-    for azimuth, kept in ((0.44, True), (0.46, False), (-0.44, True), (-0.46, False)):
-        assert one.satisfied_by(np.array([azimuth])) == kept
-
-
-def test_margin_is_more_than_the_solvers_slack() -> None:
-    assert 5 * SLACK < SOLVER_MARGIN
-
-
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(problems(), st.integers(0, 2**32 - 1))
 def test_last_digits_of_the_limits_choose_nothing(case: PlacementProblem, seed: int) -> None:
     # They differ between computers, and most azimuths of such balls are free within an interval.

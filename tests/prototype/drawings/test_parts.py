@@ -2,6 +2,7 @@
 
 import math
 from collections import defaultdict
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -12,8 +13,7 @@ from tbcad.cad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
 from tbcad.cad.formats.entities import Circle, Dimension, Layer, Line, Polyline, Text, simple
 from tbcad.prototype.base.hub import SCREW_MM
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drawings.lamps import LAMP, lamp_sheet
-from tbcad.prototype.drawings.parts import PLATE, UPRIGHT, WHEEL, Listed, sheets
+from tbcad.prototype.drawings.parts import LAMP, PLATE, UPRIGHT, WHEEL, Listed, sheets
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.purchased.parts import load_parts
@@ -25,9 +25,7 @@ BILL = Listed("turtleback, n = 18", defaultdict(lambda: 41), defaultdict(lambda:
 
 @pytest.fixture(scope="module")
 def drawn(frame: FrameLayout, carrier: BaseLayout) -> dict[str, Sheet]:
-    assert frame.lamps is not None
-    lamps = lamp_sheet(frame.lamps, BILL)
-    return {sheet.name: sheet for sheet in (*sheets(frame, carrier, DRIVES[0], BILL), lamps)}
+    return {sheet.name: sheet for sheet in sheets(frame, carrier, DRIVES[0], BILL)}
 
 
 def cut_circles(sheet: Sheet) -> list[Circle]:
@@ -35,18 +33,15 @@ def cut_circles(sheet: Sheet) -> list[Circle]:
     return [one for one in entities if isinstance(one, Circle) and one.layer == Layer.CUT]
 
 
-def test_without_a_wheel_none_is_drawn(frame: FrameLayout, carrier: BaseLayout) -> None:
-    (direct,) = [one for one in DRIVES if one.coupling][:1]
-    assert len(sheets(frame, carrier, direct, BILL)) == 2
+def test_what_there_is_not_is_not_drawn(frame: FrameLayout, carrier: BaseLayout) -> None:
+    direct, bare = next(one for one in DRIVES if one.coupling), replace(frame, lamps=None)
+    assert [one.name for one in sheets(bare, carrier, direct, BILL)] == [PLATE, UPRIGHT]
 
 
 def test_the_plates_holes_are_at_full_size(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
     centres = [one.centre for one in cut_circles(drawn[PLATE])]
     assert np.array(centres) == pytest.approx(frame.holes - frame.corner)
     assert {round(one.radius, 9) for one in cut_circles(drawn[PLATE])} == {2.1}
-
-
-def test_the_table_has_every_hole(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
     texts = [one.text for one in simple(drawn[PLATE].entities) if isinstance(one, Text)]
     for place in (frame.holes - frame.corner).tolist():
         for value in place:
@@ -60,38 +55,32 @@ def test_the_wheels_holes_are_on_the_hubs(drawn: dict[str, Sheet], carrier: Base
     assert {round(2 * one.radius, 9) for one in holes} == {SCREW_MM}
 
 
-def test_the_uprights_length(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
-    outlines = [
-        one
-        for one in drawn[UPRIGHT].full_size()
-        if isinstance(one, Polyline) and one.layer == Layer.CUT
-    ]
-    (outline,) = outlines
-    assert np.ptp(outline.corners, axis=0) == pytest.approx([frame.length, 20])
+def outlines_of(sheet: Sheet) -> list[np.ndarray]:
+    lines = (one for one in sheet.full_size() if isinstance(one, Polyline))
+    return [np.array(one.corners) for one in lines if one.layer == Layer.CUT]
 
 
-def test_every_strip_of_a_lamp_is_drawn(drawn: dict[str, Sheet], frame: FrameLayout) -> None:
+def test_uprights_and_strips_have_their_lengths(
+    drawn: dict[str, Sheet], frame: FrameLayout
+) -> None:
+    (outline,) = outlines_of(drawn[UPRIGHT])
+    assert np.ptp(outline, axis=0) == pytest.approx([frame.length, 20])
     lamps = frame.lamps
     assert lamps is not None
-    outlines = [
-        np.array(one.corners)
-        for one in drawn[LAMP].full_size()
-        if isinstance(one, Polyline) and one.layer == Layer.CUT
-    ]
+    outlines = outlines_of(drawn[LAMP])
     assert [np.ptp(one, axis=0).tolist() for one in outlines] == [pytest.approx([50, 8])] * 2
     assert np.ptp(np.vstack(outlines), axis=0) == pytest.approx([lamps.length, lamps.width])
     words = [one.text for one in simple(drawn[LAMP].entities) if isinstance(one, Text)]
     assert any(text.startswith("Cut 8 pieces of 50 ± 0.5, 2 for each of 4 lamps") for text in words)
 
 
-@pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
-def test_no_text_meets_another_or_the_border(drawn: dict[str, Sheet], name: str) -> None:
-    check_texts(drawn[name])
-
-
-@pytest.mark.parametrize("name", [PLATE, WHEEL, UPRIGHT, LAMP])
-def test_no_line_leaves_the_border(drawn: dict[str, Sheet], name: str) -> None:
+@pytest.mark.parametrize(("name", "count"), [(PLATE, 2), (WHEEL, 3), (UPRIGHT, 3), (LAMP, 3)])
+def test_sheets_are_legible_and_dimensions_true(
+    drawn: dict[str, Sheet], name: str, count: int
+) -> None:
+    """No text over another, no line over the border; sizes at full size, as far as digits go."""
     sheet = drawn[name]
+    check_texts(sheet)
     ends = [
         end
         for one in simple(sheet.entities)
@@ -101,11 +90,7 @@ def test_no_line_leaves_the_border(drawn: dict[str, Sheet], name: str) -> None:
     assert np.min(ends, axis=0)[0] > LEFT_MM
     assert np.max(ends, axis=0)[0] < sheet.paper[0] - BORDER_MM
 
-
-@pytest.mark.parametrize(("name", "count"), [(PLATE, 2), (WHEEL, 3), (UPRIGHT, 3), (LAMP, 3)])
-def test_dimensions_measure_what_they_say(drawn: dict[str, Sheet], name: str, count: int) -> None:
-    """On the sheet at full size, as far as the digits of each go."""
-    found = [one for one in drawn[name].full_size() if isinstance(one, Dimension)]
+    found = [one for one in sheet.full_size() if isinstance(one, Dimension)]
     assert len(found) >= count
     for one in found:
         digits = len(one.size.partition(".")[2])

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.drive.balance import GRAVITY, BaseBalance
-from tbcad.prototype.drive.power_off import PowerOff, power_off
-from tbcad.prototype.homing.sizes import PIN_OUT_MM
+from tbcad.prototype.drive.travel import power_off
+from tbcad.records.prototype_drive import PowerOff
 
 # The axis is level along y; one kilogram 100 mm above it at base angle zero.
 FRAME = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -42,12 +43,9 @@ def test_energy_is_weight_by_height(low: float, high: float, height_mm: float) -
     assert found.fall_speed_deg_s == pytest.approx(math.degrees(speed))
 
 
-def test_ends_at_one_height_beside_the_lowest_point() -> None:
+def test_at_rest_with_a_worm_or_between_ends_of_one_height() -> None:
     """It swings from one end to the other and arrives with nothing."""
     assert fall(100, 260).fall_energy_j == pytest.approx(0, abs=1e-12)
-
-
-def test_a_worm_holds_the_base() -> None:
     found = fall(-90, 90, holds_itself=True)
     assert (found.fall_energy_j, found.fall_speed_deg_s) == (0, 0)
 

@@ -1,7 +1,6 @@
 """The program of random motions, run by the verification's controller."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +16,8 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import free_base_angles, home_angles, stop_sequence
-from tbcad.prototype.electronics.outputs import phases
-from tbcad.prototype.files.gcode import DECIMALS, duration_minutes, gcode_program, write_program
+from tbcad.prototype.electronics import phases
+from tbcad.prototype.files.gcode import DECIMALS, duration_minutes, gcode_program
 from tbcad.prototype.purchased.parts import load_parts
 
 LEDS, TRUNCATED = 4, 10.0**-DECIMALS
@@ -48,7 +47,7 @@ def drive() -> Drive:
     return choose_drive("nema17-belt", BaseTorques(450.0, 500.0, 1000.0), load_drives(load_parts()))
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @example(motion=MotionSpec())
 @given(motion=MOTIONS)
 def test_what_a_controller_does(layout: PrototypeLayout, drive: Drive, motion: MotionSpec) -> None:
@@ -100,19 +99,13 @@ def test_more_leds_than_outputs(layout: PrototypeLayout, drive: Drive) -> None:
         gcode_program(layout, drive, MotionSpec(), 8)
 
 
-def test_the_approach_ends_where_something_stands(small_design: MirrorDesign) -> None:
+def test_the_approach_ends_where_something_stands(
+    small_design: MirrorDesign, layout: PrototypeLayout
+) -> None:
     spec = load_spec(None, ["n=6", "prototype.k=5", "prototype.max_swing_deg=180"])
     tight = prototype_layout(spec, small_design)
     start = stop_sequence(tight, MotionSpec(approach_deg=20)).start
     assert start == pytest.approx(np.degrees(free_base_angles(tight)[0]))
     assert start == pytest.approx(-90)
-
-
-def test_a_start_out_of_reach(layout: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match=r"home_deg is 170, but the base is free from -.* to "):
         stop_sequence(layout, MotionSpec(home_deg=170))
-
-
-def test_written(tmp_path: Path) -> None:
-    write_program(tmp_path / "a.nc", ["G1 X1", "M2"])
-    assert (tmp_path / "a.nc").read_bytes() == b"G1 X1\nM2\n"

@@ -16,9 +16,9 @@ from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.split import UNCUT
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.frame.brackets import frame_axes
 from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
+from tbcad.prototype.frame.purchased import frame_axes
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import choose_part, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
@@ -126,15 +126,6 @@ class TestFrame:
         assert hub.back <= hub.socket < hub.front
         assert end <= frame.head.rear - PARTS["COLLAR-8"]["width_mm"]
 
-    def test_the_belt_is_tight_in_the_middle_of_the_slots(
-        self, around: Surroundings, frame: FrameLayout
-    ) -> None:
-        one = drive("nema17-belt")
-        (pinion,) = (item for item in frame.purchased if item.name == "pinion")
-        (body,) = pinion.added
-        assert isinstance(body, Cylinder)
-        assert norm(np.cross(body.start, around.base.frame[0])) == pytest.approx(one.centre_mm)
-
     def test_all_static_parts_are_clear(self, frame: FrameLayout) -> None:
         still = {item.name for item in (*frame.printed, *frame.purchased) if not item.rotates}
         assert set(frame.swept) == still
@@ -153,23 +144,18 @@ class TestFrame:
         assert min(found.light.values()) > 3
         assert whole.stage.swept > 20
 
-    def test_uprights_are_cut_from_what_is_sold(self, frame: FrameLayout) -> None:
+    def test_uprights_and_plate_are_what_is_sold(self, frame: FrameLayout) -> None:
         bars = [item for item in frame.purchased if item.name.startswith("upright")]
         assert len(bars) == 2
         assert frame.upright["length_mm"] >= frame.length
         assert frame.length == pytest.approx(frame.head.top - SMALL.prototype.frame.floor_mm)
-
-    def test_the_plate_lies_under_all_feet(self, frame: FrameLayout) -> None:
-        reach = np.ptp(frame.holes, axis=0)
-        assert frame.plate["length_mm"] > reach[0]
-        assert frame.plate["width_mm"] > reach[1]
+        assert (np.array(frame.plate.sizes[:2]) > np.ptp(frame.holes, axis=0)).all()
         away = norm(frame.holes[:, None] - frame.holes)
         assert away[~np.eye(len(away), dtype=bool)].min() > 15
 
-    @pytest.mark.parametrize("number", [0, 1, 2])
-    def test_a_motor_on_the_axis(self, small_prototype: PrototypeLayout, number: int) -> None:
+    def test_a_motor_on_the_axis(self, small_prototype: PrototypeLayout) -> None:
         direct = Surroundings.of(SMALL.prototype, small_prototype, "nema17-direct")
-        found = direct.frame(drive("nema17-direct", number))
+        found = direct.frame(drive("nema17-direct", 1))
         assert not any(item.name.startswith("bearing") for item in found.purchased)
         (motor,) = (item for item in found.purchased if item.name == "motor")
         pilot = motor.added[1]
@@ -207,22 +193,22 @@ class TestFrame:
         assert len(screws) == 4
         assert all(one.place @ w - one.part["length_mm"] > bottom for one in screws)
 
-    @pytest.mark.parametrize("one", [each for each in DRIVES if each.belt], ids=str)
-    def test_the_shaft_is_as_long_as_the_motor_has_it(
-        self, small_prototype: PrototypeLayout, one: Drive
+    def test_the_shaft_is_as_long_as_the_motor_has_it_with_the_belt_tight(
+        self, small_prototype: PrototypeLayout
     ) -> None:
         """24 mm from the face (OpenSCAD library NopSCADlib, stepper_motors.scad: NEMA17)."""
-        around = Surroundings.of(SMALL.prototype, small_prototype, one.name)
-        axes = frame_axes(around.base.frame[0])
-        head = bearing_head(SMALL.prototype.frame, around.base, one, axes, PARTS)
-        w, (motor, pinion) = around.base.frame[0], motor_and_pinion(head)
-        shaft = motor.added[2]
-        assert isinstance(shaft, Cylinder)
-        assert shaft.length == pytest.approx(24)
-        tip = float(shaft.start @ w) + shaft.length
-        front = float(pinion.start @ w)
-        inside = min(tip, front) - (front - pinion.length)
-        assert inside > pinion.length / 2  # or the set screws alone would carry the belt's pull
+        base = driven(small_prototype, "nema17-belt")[0]
+        axes, w = frame_axes(base.frame[0]), base.frame[0]
+        for one in (each for each in DRIVES if each.belt):
+            head = bearing_head(SMALL.prototype.frame, base, one, axes, PARTS)
+            motor, pinion = motor_and_pinion(head)
+            assert norm(np.cross(pinion.start, w)) == pytest.approx(one.centre_mm)
+            shaft = motor.added[2]
+            assert isinstance(shaft, Cylinder)
+            assert shaft.length == pytest.approx(24)
+            tip, front = float(shaft.start @ w) + shaft.length, float(pinion.start @ w)
+            inside = min(tip, front) - (front - pinion.length)
+            assert inside > pinion.length / 2  # or set screws alone would carry the belt's pull
 
     def test_no_camera_no_bracket(self, around: Surroundings) -> None:
         found = around.frame(drive("nema17-belt"), {"camera_diameter_mm": 0.0})
@@ -233,42 +219,27 @@ class TestFrame:
 
 
 class TestRefusals:
-    def test_too_near_to_the_base(self, around: Surroundings) -> None:
-        message = refusal(around, drive("nema17-belt"), clearance_mm=20.0)
-        assert "mm from the balls and base as they swing" in message
-        assert "prototype.largest_ball_mm smaller" in message
-
-    def test_camera_below_the_plate(self, around: Surroundings) -> None:
-        message = refusal(around, drive("nema17-belt"), {"camera_length_mm": 130.0})
-        assert "below the base plate" in message
-        assert "prototype.frame.floor_mm less than" in message
-
-    @pytest.mark.parametrize(
-        ("changed", "message"),
-        [
+    def test_what_does_not_fit(self, around: Surroundings) -> None:
+        belt = drive("nema17-belt")
+        cases: tuple[tuple[dict[str, Any], str], ...] = (
+            ({"clearance_mm": 20.0}, "prototype.largest_ball_mm smaller"),
+            ({"own": {"camera_length_mm": 130.0}}, "prototype.frame.floor_mm less than"),
             ({"camera_screw_mm": 12.0}, "too near to the pinhole"),
             ({"camera_screw_mm": 101.0}, "beyond the camera's end"),
             ({"floor_mm": -2000.0}, "no part with length_mm"),
             ({"flange_mm": 30.0}, "make prototype.frame.flange_mm smaller"),
-        ],
-    )
-    def test_sizes_that_do_not_fit(
-        self, around: Surroundings, changed: dict[str, Any], message: str
-    ) -> None:
-        assert message in refusal(around, drive("nema17-belt"), **changed)
-
-    def test_a_belt_too_short_for_the_bearings(self, around: Surroundings) -> None:
-        short = replace(drive("nema17-belt"), belt=PARTS["GT2-200-6"])
-        assert "would meet the bearings" in refusal(around, short, belt_travel_mm=40.0)
-
-    def test_a_camera_that_looks_aside(self, around: Surroundings) -> None:
+            (
+                {"one": replace(belt, belt=PARTS["GT2-200-6"]), "belt_travel_mm": 40.0},
+                "would meet the bearings",
+            ),
+        )
+        for changed, message in cases:
+            assert message in refusal(around, **{"one": belt, **changed})
         array = around.prototype.array
         aside = replace(array.camera, forward=np.array([0.0, 0.6, 0.8]))
         turned = replace(
             around, prototype=replace(around.prototype, array=replace(array, camera=aside))
         )
-        assert "second number of optics.camera_mm" in refusal(turned, drive("nema17-belt"))
-
-    def test_a_shaft_that_no_bearing_takes(self) -> None:
+        assert "second number of optics.camera_mm" in refusal(turned, belt)
         with pytest.raises(SpecError, match="set it to 8"):
             choose_part(PARTS, "bearings", "key", "set it to 8", "width_mm", bore_mm=9.0)

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad.cad.kernel.measures import volume
+from tbcad.cad.kernel.checks import volume
 from tbcad.core.geometry.vectors import norm
-from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.printer import PrinterSpec
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.frame.brackets import CLEARANCE_HOLE_MM
 from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
-from tbcad.prototype.printing.placing import PlacedSolid, component_solid, placed_component
+from tbcad.prototype.frame.purchased import CLEARANCE_HOLE_MM
+from tbcad.prototype.printed import PlacedSolid, component_solid, placed_component
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats
@@ -26,6 +25,7 @@ PRINTER = PrinterSpec()
 FRAME = SMALL.prototype.frame
 PARTS = load_parts()
 DRIVE = load_drives(PARTS)[0]
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def printed_solids(
@@ -33,10 +33,6 @@ def printed_solids(
 ) -> dict[str, PlacedSolid]:
     components = layout.printed if isinstance(layout, FrameLayout) else layout.components
     return {part.name: placed_component(part, printer, 0.1) for part in components}
-
-
-def purchased_solids(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
-    return {part.name: component_solid(part) for part in frame.purchased}
 
 
 def holes_of(part: PlacedSolid, size: float, way: Floats | None = None) -> list[Floats]:
@@ -57,7 +53,7 @@ def solids(frame: FrameLayout) -> dict[str, PlacedSolid]:
 
 @pytest.fixture(scope="module")
 def purchased(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
-    return purchased_solids(frame)
+    return {part.name: component_solid(part) for part in frame.purchased}
 
 
 class TestSolids:
@@ -141,19 +137,19 @@ class TestSolids:
                 assert norm(nearest[0] + nearest[1]) < 1e-6
                 assert norm(nearest[0]) >= 5
 
-    def test_the_clamp_holds_the_post(
-        self, solids: dict[str, PlacedSolid], stage: StageLayout
+    def test_the_clamp_holds_the_post_and_the_plates_holes_are_below_the_brackets(
+        self, solids: dict[str, PlacedSolid], stage: StageLayout, frame: FrameLayout
     ) -> None:
         radius = stage.sizes.post + FRAME.post_play_mm / 2
-        bores = [
-            (point, way)
-            for point, way, size in cylinders(solids["stage_foot"].shape)
-            if abs(size - radius) < 1e-9
-        ]
+        found = cylinders(solids["stage_foot"].shape)
+        bores = [(point, way) for point, way, size in found if abs(size - radius) < 1e-9]
         assert bores
         for point, way in bores:
             assert norm(point[:2]) < 1e-9
             assert abs(way[2]) == pytest.approx(1)
+        middles = np.array([p[:2] for part in solids.values() for p in holes_of(part, 2.75, UP)])
+        for hole in frame.holes @ frame.axes[:2, :2]:
+            assert norm(middles - hole).min() <= 5 + 1e-9  # half of the slots' travel
 
     def test_bought_bodies_have_their_volumes(
         self, purchased: dict[str, TopoDS_Shape], frame: FrameLayout
@@ -171,19 +167,6 @@ class TestSolids:
         length, width, thick = frame.plate.sizes
         holes = len(frame.holes) * np.pi * 2.1**2 * thick
         assert volume(purchased["plate"]) == pytest.approx(length * width * thick - holes, rel=1e-9)
-
-    def test_the_plates_holes_are_below_those_of_the_brackets(
-        self, solids: dict[str, PlacedSolid], frame: FrameLayout
-    ) -> None:
-        through = [
-            (point, radius)
-            for part in solids.values()
-            for point, way, radius in cylinders(part.shape)
-            if abs(way[2]) > 0.999 and abs(radius - 2.75) < 1e-9
-        ]
-        middles = np.array([point[:2] for point, _ in through])
-        for hole in frame.holes @ frame.axes[:2, :2]:
-            assert norm(middles - hole).min() <= 5 + 1e-9  # half of the slots' travel
 
 
 class TestClearance:
@@ -206,8 +189,3 @@ def allowed(pair: set[str]) -> float:
     if pair in ({"bearing_head", "bearing_front"}, {"bearing_head", "bearing_rear"}):
         return np.pi * 22 * 7 * -FRAME.bearing_fit_mm
     return 2.0
-
-
-def test_a_bed_too_small_is_refused(frame: FrameLayout) -> None:
-    with pytest.raises(SpecError, match="does not fit on the printer's bed"):
-        printed_solids(frame, PrinterSpec(bed_mm=(90.0, 90.0, 90.0)))

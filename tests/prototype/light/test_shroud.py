@@ -31,15 +31,15 @@ def corners(shroud: ShroudLayout, name: str) -> np.ndarray:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def test_panels_close_a_box(shroud: ShroudLayout) -> None:
+def test_panels_close_a_box_round_what_the_base_sweeps(
+    shroud: ShroudLayout, keep_out: KeepOut
+) -> None:
     every = np.stack([corners(shroud, panel.name[7:]) for panel in shroud.panels])
     outer = np.ptp(every.reshape(-1, 3), axis=0)
     inner = outer - 2 * shroud.sheet["thickness_mm"]
     card = sum(volume(body) for panel in shroud.panels for body in panel.component.added)
     assert card == pytest.approx(float(np.prod(outer) - np.prod(inner)))
 
-
-def test_what_the_base_sweeps_is_inside(shroud: ShroudLayout, keep_out: KeepOut) -> None:
     low, high = corners(shroud, "right")[1, 1], corners(shroud, "left")[0, 1]
     x = np.linspace(-150, 150, 31)
     for y in (low, high):
@@ -62,15 +62,12 @@ def test_patterns_have_panels_and_flaps(shroud: ShroudLayout) -> None:
         assert area == pytest.approx(np.prod(panel.size) + flaps - notch)
 
 
-def test_a_shroud_too_large_for_any_sheet(keep_out: KeepOut) -> None:
+def test_sheets_hold_the_panels_or_are_refused(shroud: ShroudLayout, keep_out: KeepOut) -> None:
     long = Component("bar", "bar", (box(np.zeros(3), np.array([1500.0, 10, 10]), np.eye(3)),))
     assert shroud_layout(LightSpec(), [long], keep_out, -238.0, PARTS) is None
     with pytest.raises(SpecError, match=r"no sheet in sheets\.csv is large enough .* of 1\d{3} mm"):
         shroud_layout(LightSpec(shroud=True), [long], keep_out, -238.0, PARTS)
     assert shroud_layout(LightSpec(shroud=False), [long], keep_out, -238.0, PARTS) is None
-
-
-def test_sheets_hold_the_panels(shroud: ShroudLayout) -> None:
     area = sum(np.prod(panel.cut_size) for panel in shroud.panels)
     sheet = shroud.sheet["length_mm"] * shroud.sheet["width_mm"]
     assert area / sheet <= shroud.sheets <= len(shroud.panels)

@@ -9,16 +9,13 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.primitives import (
-    SIDES,
     Cylinder,
-    Prism,
-    Revolved,
     box,
-    cylinder_between,
     enclosing_triangles,
 )
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.optics.reflection import reflection_points
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
@@ -29,12 +26,19 @@ from tbcad.prototype.keepout import (
     EXACT_MM,
     KeepOut,
     SweptSection,
-    keep_out_volume,
     min_distance,
 )
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
-from tbcad.prototype.stage.leds import hidden_by_object, virtual_cameras, visible
+from tbcad.prototype.stage.leds import (
+    MIN_SEEN,
+    NOISE_PX,
+    calibration_estimate,
+    hidden_by_object,
+    virtual_cameras,
+    visible,
+)
+from tests.mirror_arrays import mirror_array
 
 PARTS = load_parts()
 SIZED = load_spec(None).prototype
@@ -70,20 +74,16 @@ def refusal(stage_with: Callable[..., StageLayout]) -> Callable[..., str]:
 
 
 class TestStage:
-    def test_leds_are_where_the_spec_has_them_and_point_up(self, stage: StageLayout) -> None:
+    def test_leds_are_where_the_spec_has_them_clear_of_light_and_base(
+        self, stage: StageLayout, stage_with: Callable[..., StageLayout]
+    ) -> None:
         found = led_poses(stage)
         assert [name for name, _, _ in found] == ["led_1", "led_2", "led_3", "led_4"]
-        assert np.array([place for _, place, _ in found]).tolist() == [
-            list(place) for place in SIZED.stage.leds_mm
-        ]
+        assert [tuple(place) for _, place, _ in found] == list(SIZED.stage.leds_mm)
         assert all((direction == UP).all() for _, _, direction in found)
-
-    def test_it_is_clear_of_light_and_base(self, stage: StageLayout) -> None:
         assert stage.light > -GRAZING_MM
         assert stage.swept > FrameSpec().clearance_mm
         assert stage.sizes.post == 10.0
-
-    def test_a_stage_without_leds(self, stage_with: Callable[..., StageLayout]) -> None:
         bare = stage_with(leds_mm=[])
         assert led_poses(bare) == []
         names = [component.name for component in bare.components]
@@ -96,9 +96,18 @@ class TestStage:
         assert holes == pytest.approx(studs)
         assert holes[0] == pytest.approx(-holes[1])
 
-    @pytest.mark.parametrize(
-        ("changed", "message"),
-        [
+    def test_what_does_not_fit_is_refused(
+        self, refusal: Callable[..., str], keep_out: KeepOut
+    ) -> None:
+        def moved(number: int, *place: float) -> dict[str, object]:
+            places = list(SIZED.stage.leds_mm)
+            return {"leds_mm": [*places[: number - 1], place, *places[number:]]}
+
+        one_side = [(23.4, 0.0, -8.0), (18.8, 14.0, -6.0), (18.8, -14.0, -3.0), (10.4, 20.9, -8.0)]
+        level = [(x, y, -8.0) for x, y, _ in SIZED.stage.leds_mm]
+        disc = np.array([[-90.0, 0.0], [110.0, 0.0], [110.0, 150.0], [-90.0, 150.0]])
+        swept = replace(keep_out, sections=(SweptSection(disc, -np.pi, np.pi),))
+        cases: tuple[tuple[dict[str, object], str], ...] = (
             ({"post": 0.0}, "hollow hub is not supported"),
             ({"post": 6.0}, "8 or more"),
             ({"top_mm": -29.0}, "set prototype.stage.top_mm from"),
@@ -106,55 +115,21 @@ class TestStage:
             ({"disc_mm": 60.0}, "does not fit into the capture sphere"),
             ({"disc_mm": 6.0}, "no room for its studs"),
             ({"led": "LED-5"}, "LED 1 with its pillar reaches"),
-        ],
-    )
-    def test_what_does_not_fit_is_refused(
-        self, refusal: Callable[..., str], changed: dict[str, object], message: str
-    ) -> None:
-        assert message in refusal(**changed)
-
-    def test_a_post_in_the_light_or_in_the_base_is_refused(
-        self, refusal: Callable[..., str], keep_out: KeepOut
-    ) -> None:
-        below = replace(keep_out, used=keep_out.used + np.pi)
-        assert "mm inside the light of the balls" in refusal(keep_out=below)
-        disc = np.array([[-90.0, 0.0], [110.0, 0.0], [110.0, 150.0], [-90.0, 150.0]])
-        message = refusal(keep_out=replace(keep_out, sections=(SweptSection(disc, -np.pi, np.pi),)))
-        assert "the base comes within" in message
-        assert "prototype.post_diameter_mm or prototype.k smaller" in message
-
-    @pytest.mark.parametrize(
-        ("number", "place", "message"),
-        [
-            (1, (20.0, 17.5, -15.0), "LED 1 with its pillar reaches"),
-            (1, (10.6, 7.5, -22.0), "LED 1 is too low for its pocket"),
-            (3, (-3.4, 8.0, -13.5), "LED 3 is in the object's room: move it outward to 23.3 mm"),
-            (4, (5.1, 22.9, -3.0), "LED 4 collides with LED 3"),
-        ],
-    )
-    def test_unusable_leds_are_refused(
-        self,
-        refusal: Callable[..., str],
-        number: int,
-        place: tuple[float, float, float],
-        message: str,
-    ) -> None:
-        places = list(SIZED.stage.leds_mm)
-        places[number - 1] = place
-        assert message in refusal(leds_mm=places)
-
-    def test_leds_in_one_plane_are_refused(self, refusal: Callable[..., str]) -> None:
-        places = [(x, y, -8.0) for x, y, _ in SIZED.stage.leds_mm]
-        assert "nearly in one plane" in refusal(leds_mm=places)
-
-    def test_leds_on_one_side_of_the_object_are_refused(self, refusal: Callable[..., str]) -> None:
-        places = [(23.4, 0.0, -8.0), (18.8, 14.0, -6.0), (18.8, -14.0, -3.0), (10.4, 20.9, -8.0)]
-        message = refusal(leds_mm=places)
-        assert "of 4 LEDs past an object in its room" in message
-        assert "but needs 2" in message
-
-    def test_a_floor_too_high_is_refused(self, refusal: Callable[..., str]) -> None:
-        assert "make prototype.frame.floor_mm" in refusal(floor_mm=-60.0)
+            ({"floor_mm": -60.0}, "make prototype.frame.floor_mm"),
+            ({"leds_mm": level}, "nearly in one plane"),
+            ({"leds_mm": one_side}, "of 4 LEDs past an object in its room"),
+            (moved(1, 20.0, 17.5, -15.0), "LED 1 with its pillar reaches"),
+            (moved(1, 10.6, 7.5, -22.0), "LED 1 is too low for its pocket"),
+            (
+                moved(3, -3.4, 8.0, -13.5),
+                "LED 3 is in the object's room: move it outward to 23.3 mm",
+            ),
+            (moved(4, 5.1, 22.9, -3.0), "LED 4 collides with LED 3"),
+            ({"keep_out": replace(keep_out, used=keep_out.used + np.pi)}, "mm inside the light of"),
+            ({"keep_out": swept}, "prototype.post_diameter_mm or prototype.k smaller"),
+        )
+        for changed, message in cases:
+            assert message in refusal(**changed)
 
     def test_leds_are_seen_as_in_a_march_along_their_rays(
         self, small_prototype: PrototypeLayout, stage: StageLayout
@@ -209,15 +184,6 @@ class TestKeepOut:
                 share = rng.uniform(size=(len(rim), 1))
                 assert (keep_out.to_light(other + share * (rim - other)) < 1e-6).all()
 
-    @pytest.mark.parametrize("count", [0, 1, 50])
-    def test_points_are_measured_alike_alone(self, keep_out: KeepOut, count: int) -> None:
-        """Which bodies are passed over depends on the point before."""
-        points = np.random.default_rng(1).normal(size=(count, 3)) * 60
-        together = keep_out.to_light(points)
-        assert together.shape == (count,)
-        alone = [float(keep_out.to_light(point[None])[0]) for point in points]
-        assert together.tolist() == alone
-
     def test_swept_holds_carrier_and_balls_at_all_angles(
         self, small_prototype: PrototypeLayout, carrier: BaseLayout, keep_out: KeepOut
     ) -> None:
@@ -237,14 +203,6 @@ class TestKeepOut:
                 points = rotated_about_x(line, turn) @ carrier.frame
                 assert keep_out.to_swept(points).max() < 1e-6
 
-    def test_approach_widens_what_is_swept(
-        self, small_prototype: PrototypeLayout, carrier: BaseLayout
-    ) -> None:
-        near = keep_out_volume(small_prototype, carrier, CAPTURE, 0.0).sections[0]
-        far = keep_out_volume(small_prototype, carrier, CAPTURE, 0.1).sections[0]
-        assert far.low == pytest.approx(near.low - 0.1)
-        assert far.high == near.high
-
     def test_the_sphere_is_no_obstacle_to_itself(self, keep_out: KeepOut) -> None:
         inside = 0.9 * CAPTURE * unit(np.random.default_rng(7).normal(size=(50, 3)))
         assert (keep_out.to_light(inside) < 0).all()
@@ -261,30 +219,37 @@ def distance(point: np.ndarray, at: np.ndarray) -> np.ndarray:
     return norm(at - point)
 
 
-class TestBodies:
-    @pytest.mark.parametrize(
-        "body",
-        [
-            cylinder_between(np.array([1.0, 2.0, 3.0]), np.array([4.0, 6.0, 3.0]), 2.0),
-            Revolved(np.array([[0.0, 1.0], [0.0, 3.0], [2.0, 3.0], [2.0, 1.0]])),
-            Prism(np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]), np.array([0.0, 0, 3])),
-        ],
-    )
-    def test_triangles_enclose_and_close(self, body: object) -> None:
-        corners = enclosing_triangles(body)  # type: ignore[arg-type]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        # Of a closed surface each edge belongs to two triangles.
-        ends = np.round(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), 6)
-        edges = np.sort(ends.reshape(-1, 2, 3).view([("", float)] * 3)[..., 0], axis=1)
-        _, count = np.unique(edges, axis=0, return_counts=True)
-        assert (count == 2).all()
-        assert (norm(normal) > 1e-9).all()
+def test_the_covariance_is_that_of_centres_solved_from_noisy_highlights() -> None:
+    """Least squares on 400 noisy photographs of the LEDs that a mirror sees."""
+    array, mirror = mirror_array("n=6"), 20
+    domes, cameras = np.array(SIZED.stage.leds_mm), array.ellipsoid.camera_distance * array.u
+    seen = ~hidden_by_object(SIZED.stage, domes, cameras[[mirror]], CAPTURE)
+    leds, rng = domes[seen[0]], np.random.default_rng(2)
+    centre, radius = array.mirrors.centre[mirror], array.mirrors.radius[mirror]
+    pinhole = array.camera.pinhole
 
-    def test_round_bodies_are_inside_their_triangles(self) -> None:
-        body = Cylinder(np.zeros(3), UP, 2.0, 5.0)
-        middles = enclosing_triangles(body).mean(axis=1)
-        sides = middles[(middles[:, 2] > 0.1) & (middles[:, 2] < 4.9)]
-        assert norm(sides[:, :2]).min() >= 2.0 - 1e-9
-        assert norm(enclosing_triangles(body)[..., :2]).max() == pytest.approx(
-            2 / np.cos(np.pi / SIDES)
+    def highlights(centres: np.ndarray) -> np.ndarray:
+        radii = np.full(len(centres), radius)
+        points = [reflection_points(centres, radii, place, pinhole) for place in leds]
+        return np.concatenate([array.camera.project(point) for point in points], axis=1)
+
+    true = highlights(centre[None])
+    noisy = true + NOISE_PX * rng.normal(size=(400, true.shape[1]))
+    solved = np.repeat(centre[None], 400, axis=0)
+    for _ in range(6):
+        steps = [highlights(solved + 1e-4 * axis) for axis in np.eye(3)]
+        slope = np.stack([(one - highlights(solved)) / 1e-4 for one in steps], axis=2)
+        rest = noisy - highlights(solved)
+        solved += np.stack(
+            [np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(slope, rest, strict=True)]
         )
+    spread = np.sqrt(np.linalg.eigvalsh(np.cov(solved.T))[-1])
+    estimate = calibration_estimate(SIZED.stage, array, domes, CAPTURE)
+    assert spread == pytest.approx(estimate.worst[mirror], rel=0.1)
+    assert estimate.seen.min() >= MIN_SEEN
+    assert (estimate.across < estimate.worst).all()
+    # More LEDs tell more.
+    more = np.vstack([domes, [[0.0, -23.4, -6.0]]])
+    many = calibration_estimate(SIZED.stage, array, more, CAPTURE)
+    assert (many.worst <= estimate.worst * (1 + 1e-9)).all()
+    assert many.record().centre_um_median < estimate.record().centre_um_median

@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.core.spec.printer import PrinterSpec
 from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.keepout import KeepOut
-from tbcad.prototype.printing.placing import PlacedSolid, placed_component
+from tbcad.prototype.printed import PlacedSolid, placed_component
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout
 from tests.helpers import as_trimesh
@@ -22,13 +22,9 @@ PRINTER = PrinterSpec()
 SIZED = load_spec(None).prototype.stage
 
 
-def placed(stage: StageLayout, printer: PrinterSpec) -> dict[str, PlacedSolid]:
-    return {part.name: placed_component(part, printer, 0.1) for part in stage.components}
-
-
 @pytest.fixture(scope="module")
 def solids(stage: StageLayout) -> dict[str, PlacedSolid]:
-    return placed(stage, PRINTER)
+    return {part.name: placed_component(part, PRINTER, 0.1) for part in stage.components}
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +33,9 @@ def crown(solids: dict[str, PlacedSolid]) -> trimesh.Trimesh:
 
 
 class TestSolids:
-    def test_each_is_watertight(self, solids: dict[str, PlacedSolid]) -> None:
+    def test_each_is_watertight_and_has_its_volume(
+        self, solids: dict[str, PlacedSolid], stage: StageLayout
+    ) -> None:
         assert list(solids) == ["stage_disc", "stage_crown", "stage_post"]
         for part in solids.values():
             mesh = as_trimesh(part.shape, 0.01)
@@ -45,15 +43,10 @@ class TestSolids:
             assert mesh.is_winding_consistent
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
-
-    def test_volume_of_the_disc(self, solids: dict[str, PlacedSolid]) -> None:
-        disc = load_spec(None).prototype.stage.disc_mm / 2
+        disc, wall = SIZED.disc_mm / 2, StageSpec().wall_mm
         stud = min(STUD_MM, disc / 5) + STUD_PLAY_MM
         area = np.pi * (disc**2 - 2 * stud**2)
         assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)
-
-    def test_volume_of_the_post(self, solids: dict[str, PlacedSolid], stage: StageLayout) -> None:
-        wall = StageSpec().wall_mm
         tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (stage.sizes.joint - stage.foot)
         # The set screw's hole is nearly as long as the wall is thick.
         hole = np.pi * 1.4**2 * wall
@@ -122,4 +115,4 @@ class TestSolids:
 
     def test_a_bed_too_small_is_refused(self, stage: StageLayout) -> None:
         with pytest.raises(SpecError, match="stage_post does not fit"):
-            placed(stage, PrinterSpec(bed_mm=(120.0, 120.0, 120.0)))
+            placed_component(stage.components[2], PrinterSpec(bed_mm=(120.0,) * 3), 0.1)

@@ -19,7 +19,7 @@ from tbcad.errors import InputError
 from tbcad.output.foreign_files import foreign_files
 from tbcad.output.manifest import fingerprint
 from tbcad.report.page import pictures
-from tbcad.report.page.packing import KINDS, PackedArrays
+from tbcad.report.page.mirrors import KINDS, PackedArrays
 from tbcad.report.page.write import MAX_BYTES, page, write_report
 from tests.exported_files import read_csv
 

@@ -15,12 +15,11 @@ from tbcad.app.api import as_built
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.rig.calibrated_solids.files import colours, deviations, round_up
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import write_machine
-from tbcad.rig.runs.images import read_image
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.rig.calibrated_solids import colours, deviations, round_up
+from tbcad.rig.machine.machine import Machine, write_machine
+from tbcad.rig.runs import read_image
 from tests.machine_states import frames_of, machine_of, perturbed
 
 CENTRE = re.compile(r"CARTESIAN_POINT\('',\(([^)]*)\)\)")
@@ -144,10 +143,3 @@ class TestRefused:
         with pytest.raises(InputError, match=r"has 4 balls, .* has 5"):
             as_built(tmp_path / "known", export.folder, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
-
-    def test_a_calibration_that_names_no_export(
-        self, plan: Plan, built: Machine, tmp_path: Path
-    ) -> None:
-        write_machine(tmp_path / "machine.json", built, frames_of(plan))
-        with pytest.raises(InputError, match="name it with --exports"):
-            as_built(tmp_path, out=tmp_path / "out")

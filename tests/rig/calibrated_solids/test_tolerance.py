@@ -7,17 +7,16 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.plan import Plan
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.rig.calibrated_solids.tolerance import (
+from tbcad.rig.calibrated_solids import (
     as_built_tolerance,
     summary,
     tolerance_record,
     tolerance_table,
 )
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import write_machine
+from tbcad.rig.machine.machine import Machine, write_machine
 from tests.machine_states import frames_of, machine_of, perturbed
 
 
@@ -69,22 +68,12 @@ def test_table_record_and_words(export: ExportedDesign, plan: Plan, tmp_path: Pa
     assert record["share_good"] == found.share
     assert record["place_mm_median"] == pytest.approx(0.02)
     assert f"{found.coverage.min():.2f} mm" in summary(found)
-
-
-def test_mirrors_that_are_not_calibrated_are_named(
-    export: ExportedDesign, plan: Plan, tmp_path: Path
-) -> None:
-    calibration = calibrated(tmp_path / "c", machine_of(export, plan), plan, export, 0.02)
     rays = calibration / "rays.csv"
     lines = rays.read_text(encoding="utf-8").splitlines()
     rays.write_text("\n".join([lines[0], *lines[2:]]) + "\n", encoding="utf-8")
-    found = as_built_tolerance(calibration, export.folder, builds=5, seed=1)
-    assert found.absent == ("a0001",)
-    assert "1 mirrors are not calibrated" in summary(found)
-
-
-def test_refused(export: ExportedDesign, plan: Plan, tmp_path: Path) -> None:
-    calibration = calibrated(tmp_path / "c", machine_of(export, plan), plan, export, 0.02)
-    (calibration / "rays.csv").unlink()
+    few = as_built_tolerance(calibration, export.folder, builds=5, seed=1)
+    assert few.absent == ("a0001",)
+    assert "1 mirrors are not calibrated" in summary(few)
+    rays.unlink()
     with pytest.raises(InputError, match=r"rays\.csv is not there"):
         as_built_tolerance(calibration, export.folder, builds=5, seed=1)

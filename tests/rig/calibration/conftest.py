@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.study import designed_setup

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,36 +16,24 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import DARK, exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detection import Detection
-from tbcad.rig.calibration.estimate.covariance import covariance
 from tbcad.rig.calibration.estimate.jacobian import base_slopes
+from tbcad.rig.calibration.estimate.parameters import covariance
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.report.files import write_calibration
+from tbcad.rig.calibration.report.record import rays_table, residuals_table
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
-from tbcad.rig.calibration.report.tables import rays_table, residuals_table
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
 from tbcad.rig.machine.built import BuiltPrototype, random_build
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import TRUTH, read_machine, write_machine
-from tbcad.rig.runs.photographs import Run
+from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
 from tests.rig.calibration.machines import every_highlight
 
 BUILDS = 12
-FILES = {
-    "angles.csv",
-    "calibration.json",
-    "covariance.npz",
-    "machine.json",
-    "manifest.json",
-    "rays.csv",
-    "rays.png",
-    "residual_distribution.png",
-    "residuals.csv",
-    "residuals.png",
-    "spheres.csv",
-    "spheres.png",
-}
+BASIS = (
+    *("run", "exports", "export_sha256", "source", "geometry", "camera"),
+    *("photographs", "process", "lens", "measured_radii"),
+)
 
 
 def _off(found: Estimate, true: Machine) -> np.ndarray:
@@ -139,33 +126,6 @@ def test_a_few_noisy_highlights_are_not_enough(setup: Setup, detection: Detectio
     assert any("--measured" in step for step in judged.steps)
 
 
-BASIS = {
-    **{"run": "run", "exports": "exports", "export_sha256": {}, "source": "camera"},
-    **{"geometry": "prototype", "camera": "test", "lens": "estimated", "measured_radii": []},
-    "photographs": {"expected": 1, "usable": 1},
-    "process": {"name": "fdm", "title": "FDM", "given": False, "settings": []},
-}
-
-
-def test_files_are_the_same_each_time(calibrated: MachineCalibration, tmp_path: Path) -> None:
-    judged = verdict(calibrated)
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        write_calibration(tmp_path / name, calibrated, judged, BASIS)
-    assert {file.name for file in (tmp_path / "one").iterdir()} == FILES
-    for name in FILES:
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
-    machine, frames = read_machine(tmp_path / "one" / "machine.json")
-    assert machine.centre == pytest.approx(calibrated.found.machine.centre, abs=0)
-    assert frames == calibrated.setup.frames
-    record = json.loads((tmp_path / "one" / "calibration.json").read_text())
-    assert record["faults"] == [FAULT]
-    assert record["rays"]["mirrors"] == len(rays_table(calibrated).rows)
-    with np.load(tmp_path / "one" / "covariance.npz") as stored:
-        assert stored["sphere"].shape == (len(machine.radius), 4, 4)
-        assert len(stored["parameter"]) == len(calibrated.found.values)
-
-
 def test_frames_that_are_not_photographed_are_missing_mirrors(setup: Setup) -> None:
     half = tuple(frame for frame in setup.frames if frame.object_turn_deg == 0)
     size = setup.designed.camera.width_px, setup.designed.camera.height_px
@@ -182,70 +142,64 @@ def test_another_size_of_photographs(setup: Setup) -> None:
 
 
 @pytest.fixture(scope="module")
-def run_folder(setup: Setup, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_folder(
+    setup: Setup, built: BuiltPrototype, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """A run that is said to be simulated, with the machine that took it."""
     camera = setup.designed.camera
     picture = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
-    frames = setup.frames
-    names = [exposure_name(frame, "lit") for frame in frames]
+    names = [exposure_name(frame, "lit") for frame in setup.frames]
     folder = tmp_path_factory.mktemp("runs") / "first"
-    return write_run(folder, setup.export, frames, dict.fromkeys(names, picture), (DARK,))
+    write_run(folder, setup.export, setup.frames, dict.fromkeys(names, picture), (DARK,))
+    write_machine(folder / TRUTH, built.machine, setup.frames)
+    return folder
 
 
-def test_command(
-    setup: Setup,
+def test_command_and_its_files(
+    calibrated: MachineCalibration,
     detection: Detection,
     run_folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def found(run: Run, *_: object, **__: object) -> Detection:
-        assert len(run.exposures) == len(setup.frames)
-        return detection
-
-    monkeypatch.setattr(tbcad.rig.calibration.run, "detect", found)
-    out = tmp_path / "calibration"
-    words = ["calibrate", str(run_folder), "--exports", str(setup.export.folder), "--out", str(out)]
-    assert command(words) == 0
-    printed = capsys.readouterr().out
-    assert printed.startswith("good: ")
-    assert "process: fdm (the default)" in printed
-    record = json.loads((out / "calibration.json").read_text())
-    assert record["exports"] == str(setup.export.folder.resolve())
-    assert record["process"]["name"] == "fdm"
-    assert record["photographs"]["usable"] == len(setup.frames)
-    assert command([*words, "--force", "--measured", "9=20"]) == 2
-    assert re.search("allowed is ball 1 to 5", capsys.readouterr().err)
-    assert {file.name for file in out.iterdir()} == FILES
-
-
-def test_a_simulated_run_is_compared_with_its_build(
-    setup: Setup,
-    detection: Detection,
-    built: BuiltPrototype,
-    run_folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    """The build is recovered; the same calibration gives the same files."""
+    setup, out = calibrated.setup, tmp_path / "calibration"
     monkeypatch.setattr(tbcad.rig.calibration.run, "detect", lambda *_, **__: detection)
-    run, out = Path(shutil.copytree(run_folder, tmp_path / "run")), tmp_path / "calibration"
-    record = json.loads((run / "run.json").read_text())
-    (run / "run.json").write_text(json.dumps({**record, "source": "simulated"}))
-    write_machine(run / TRUTH, built.machine, setup.frames)
-    words = ["calibrate", str(run), "--exports", str(setup.export.folder), "--out", str(out)]
-    words += ["--format", "svg"]
+    exports = ("--exports", str(setup.export.folder), "--out", str(out))
+    words = ["calibrate", str(run_folder), *exports]
     assert command(words) == 0
     printed = " ".join(capsys.readouterr().out.split())
+    assert printed.startswith("good: ")
+    assert "process: fdm (the default)" in printed
     assert re.search(r"of \d+ errors that were simulated, (9\d|100)% are recovered", printed)
-    files = {name.replace(".png", ".svg") for name in FILES | {"recovered.csv", "recovered.png"}}
-    assert {file.name for file in out.iterdir()} == files
-    assert all(file.read_text().startswith("<?xml") for file in out.glob("*.svg"))
-    write_machine(run / TRUTH, built.machine, setup.frames[::-1])
-    assert command(words) == 2
-    assert "is a calibration already" in capsys.readouterr().err
-    assert command([*words, "--force"]) == 2
-    assert "truth.json is of another run" in capsys.readouterr().err
+    record = json.loads((out / "calibration.json").read_text())
+    assert record["exports"] == str(setup.export.folder.resolve())
+    assert (record["process"]["name"], record["faults"]) == ("fdm", [FAULT])
+    assert record["photographs"]["usable"] == len(setup.frames)
+    assert record["rays"]["mirrors"] == len(rays_table(calibrated).rows)
+    machine, frames = read_machine(out / "machine.json")
+    assert machine.centre == pytest.approx(calibrated.found.machine.centre, abs=0)
+    assert frames == setup.frames
+    with np.load(out / "covariance.npz") as stored:
+        assert stored["sphere"].shape == (len(machine.radius), 4, 4)
+        assert len(stored["parameter"]) == len(calibrated.found.values)
+
+    again = tmp_path / "again"
+    again.mkdir()
+    basis = {key: record[key] for key in BASIS}
+    write_calibration(again, calibrated, verdict(calibrated), basis)
+    files = {file.name for file in out.iterdir()} - {"recovered.csv", "recovered.png"}
+    assert {file.name for file in again.iterdir()} == files
+    for name in files - {"manifest.json"}:
+        assert (again / name).read_bytes() == (out / name).read_bytes(), name
+
+    assert command([*words, "--force", "--measured", "9=20"]) == 2
+    assert "allowed is ball 1 to 5" in capsys.readouterr().err
+    write_machine(run_folder / TRUTH, calibrated.found.machine, setup.frames[::-1])
+    for more, message in (((), "is a calibration already"), (("--force",), "of another run")):
+        assert command([*words, *more]) == 2
+        assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -266,8 +220,7 @@ def test_refused(
 ) -> None:
     named = [str(run_folder) if word == "RUN" else word for word in words]
     out = tmp_path / "calibration"
-    exports = ["--exports", str(setup.export.folder), "--out", str(out)]
-    assert command(["calibrate", *named, *exports]) == 2
+    assert command(["calibrate", *named, "--exports", str(setup.export.folder), "--out", str(out)])
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1

@@ -11,7 +11,7 @@ from tbcad.rig.calibration.estimate.solve import estimate
 from tbcad.rig.machine.machine import Highlights
 from tests.rig.calibration.machines import drawn, every_highlight, small_machine, small_prior
 
-BUILDS = 6
+BUILDS = 3
 
 
 @pytest.fixture(scope="module")

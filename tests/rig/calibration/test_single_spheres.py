@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
 
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import MIN_SEEN
 from tbcad.rig.calibration.calibrate import Setup
-from tbcad.rig.calibration.estimate.covariance import covariance
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.parameters import Block, covariance
 from tbcad.rig.calibration.led_layout import (
     best_layout,
     layout_cost,

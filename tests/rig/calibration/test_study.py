@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tbcad.common.results.study import Study, study_files
-from tbcad.light.simulate.scene.exported import ExportedDesign
+from tbcad.common.results import Study, study_files
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.led_layout import NUMBERS
 from tbcad.rig.calibration.study import (
     NOISES_PX,

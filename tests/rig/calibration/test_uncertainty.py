@@ -5,10 +5,9 @@ import pytest
 from scipy.stats import chi2
 
 from tbcad.core.geometry.vectors import dot, perpendicular_axes
-from tbcad.light.simulate.prototype.plan import HALF_TURN
-from tbcad.rig.calibration.estimate.covariance import covariance
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.rig.calibration.estimate.jacobian import base_slopes
-from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.calibration.estimate.parameters import Prior, covariance
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.rig.calibration.uncertainty import (

@@ -13,10 +13,8 @@ from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import home_angles
-from tbcad.prototype.electronics.outputs import lights, phases
-from tbcad.prototype.files import klipper
-from tbcad.prototype.files.gcode import gcode_program, write_program
-from tbcad.prototype.files.settings import settings, settings_lines, write_settings
+from tbcad.prototype.electronics import phases
+from tbcad.prototype.files.controllers import controller_files
 from tbcad.prototype.purchased.parts import load_parts
 from tests.exported_files import edit_json
 from tests.prototype_exports import write_export, write_stops
@@ -51,26 +49,13 @@ def export(
     write_export(folder, design, layout)
     angles = np.degrees(layout.stops.angle).tolist()
     write_stops(folder, angles, [WIND_UP_DEG] * len(angles))
-    write_program(folder / "rotation_plan.nc", gcode_program(layout, drive, motion, LEDS))
-    if motion.controller == "grblhal":
-        _write_klipper_files(folder, layout, drive, motion)
-    lines = settings_lines("settings", settings(drive, motion, home_angles(layout, motion)))
-    write_settings(folder / "grbl_settings.txt", lines)
+    for name, text in controller_files(layout, drive, motion, LEDS, "a design").items():
+        (folder / name).write_text(text)
     lit = [{"name": one.name, "output": one.output} for one in phases(LEDS, motion)]
     controller = {"firmware": motion.controller, "axis": motion.axis, "phases": lit}
     edit_json(folder / "prototype.json", lambda value: value.update(controller=controller))
     edit_json(folder / "design.json", lambda value: _quick(value, motion))
     return folder
-
-
-def _write_klipper_files(
-    folder: Path, layout: PrototypeLayout, drive: Drive, motion: MotionSpec
-) -> None:
-    program = gcode_program(layout, drive, motion, LEDS)
-    lines = klipper.klipper_program(program, motion, home_angles(layout, motion))
-    write_program(folder / klipper.PROGRAM, [*lines])
-    config = klipper.klipper_config(drive, motion, lights(LEDS, motion))
-    write_program(folder / klipper.CONFIG, [*config])
 
 
 def _quick(design: dict, motion: MotionSpec) -> None:

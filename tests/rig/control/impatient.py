@@ -1,4 +1,4 @@
-"""`tbcad` with shorter waits: the double answers at once, and its silence is noticed earlier.
+"""`tbcad` with shorter waits: the double answers at once, and what is lost is noticed earlier.
 
 python -m tests.rig.control.impatient WORDS... is the command in a process of its own.
 """
@@ -10,15 +10,14 @@ from importlib import import_module
 WAITS_S = {
     "grbl.STATUS_S": 0.02,
     "grbl.LOST_OK_S": 0.3,
-    "grbl.SILENCE_S": 1.0,
     "grbl.BANNER_S": 1.0,
     "grbl.LATE_S": 0.05,
-    "klipper.host.LOOK_S": 0.01,
-    "klipper.host.AGAIN_S": 0.01,
-    "klipper.host.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
-    "klipper.host.BACK_S": 1.0,
-    "cameras.choice.POLL_S": 0.01,
-    "cameras.choice.QUIET_S": 0.05,
+    "klipper.LOOK_S": 0.01,
+    "klipper.AGAIN_S": 0.01,
+    "klipper.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
+    "klipper.BACK_S": 1.0,
+    "chosen_camera.POLL_S": 0.01,
+    "chosen_camera.QUIET_S": 0.05,
 }
 """By name below `tbcad.rig.control`."""
 

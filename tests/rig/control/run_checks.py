@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from tbcad.rig.runs.photographs import read_photograph, read_run
+from tbcad.rig.runs import read_photograph, read_run
 from tests.rig.control.rig import SIZE, scene
 
 OUTPUTS = {"dark": (), "led_1": (1,), "led_2": (2,), "led_3": (3,), "led_4": (4,), "lit": (0,)}

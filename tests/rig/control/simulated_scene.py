@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tbcad.rig.runs.photographs import read_photograph, read_run
+from tbcad.rig.runs import read_photograph, read_run
 from tests.rig.control.grbl_double import Machine
 from tests.rig.control.rig import PICTURE_BYTES, SIZE, Rig, connected_rig
 from tests.rig.control.run_checks import OUTPUTS

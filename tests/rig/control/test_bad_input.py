@@ -3,12 +3,13 @@
 import errno
 import shutil
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control.port import opening_reason
+from tbcad.rig.control.messages import opening_reason
 from tests.exported_files import edit_json
 from tests.rig.control.grbl_double import BANNERS
 from tests.rig.control.rig import Rig
@@ -26,46 +27,26 @@ def words(control_export: Path, tmp_path: Path) -> list[str]:
     return ["run", str(control_export), "--yes", "--out", str(tmp_path / "run")]
 
 
-def test_no_port(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_ports_and_libraries(
+    words: list[str],
+    rig: Rig,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert "--port is missing" in refused(words, capsys)
-
-
-def test_port_that_is_not_there(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert "there is no such port" in refused([*words, "--port", "/dev/ttyNONE"], capsys)
+    assert "usermod -aG dialout" in opening_reason(OSError(errno.EACCES, "no"))
+    if find_spec("gphoto2"):
+        assert "no camera answers" in refused(rig.words(camera="gphoto2"), capsys)
+    for library, asked in (("gphoto2", rig.words(camera="gphoto2")), ("serial", rig.words())):
+        monkeypatch.setitem(sys.modules, library, None)
+        assert "pip install 'tbcad[machine]'" in refused(asked, capsys)
+    assert not rig.out.exists()
 
 
 def test_port_without_controller(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
     rig.controller.unplug()
     assert "the controller does not answer" in refused(rig.words(), capsys)
-    assert not rig.out.exists()
-
-
-@pytest.mark.parametrize(
-    ("number", "says"),
-    [(errno.EACCES, "usermod -aG dialout"), (errno.EBUSY, "another program uses it")],
-)
-def test_reason_of_a_port_that_cannot_be_opened(number: int, says: str) -> None:
-    assert says in opening_reason(OSError(number, "no"))
-
-
-def test_library_that_is_not_installed(
-    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "serial", None)
-    line = refused([*words, "--port", "/dev/ttyNONE"], capsys)
-    assert "pip install 'tbcad[machine]'" in line
-
-
-def test_gphoto_that_is_not_installed(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "gphoto2", None)
-    assert "pip install 'tbcad[machine]'" in refused(rig.words(camera="gphoto2"), capsys)
-
-
-def test_no_camera(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("gphoto2", reason="the extra `machine` is not installed")
-    assert "no camera answers" in refused(rig.words(camera="gphoto2"), capsys)
     assert not rig.out.exists()
 
 
@@ -128,12 +109,11 @@ def test_setting_that_a_board_has_not_is_as_good_as_off(rig: Rig) -> None:
         ("Grbl 0.9j ['$' for help]", "is neither grblHAL nor GRBL 1.1"),
     ],
 )
-@pytest.mark.parametrize("boots", [True, False])
 def test_controller_of_another_kind_is_sent_no_setting(
-    rig: Rig, greeting: str, says: str, boots: bool, capsys: pytest.CaptureFixture[str]
+    rig: Rig, greeting: str, says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rig.controller.firmware, rig.controller.greeting = "grbl", greeting
-    rig.controller.boots = boots
+    rig.controller.boots = "3.7" in greeting
     line = refused(rig.words("--send-settings"), capsys)
     assert says in line
     assert "put grblHAL on the board" in line

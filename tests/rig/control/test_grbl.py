@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import pytest
 
 from tbcad.rig.control.grbl import SYNC, Grbl
-from tbcad.rig.control.machine import ControllerReset, MachineFault
-from tbcad.rig.control.port import SerialPort
+from tbcad.rig.control.machine import MachineFault
+from tbcad.rig.control.messages import SerialPort, Status, parse
 from tests.rig.control.grbl_double import PLANNER, GrblDouble
 from tests.rig.control.rig import until
 
@@ -89,13 +89,6 @@ def test_hold_keeps_the_place(homed: Grbl, double: GrblDouble) -> None:
     assert -98 < double.machine.angle < 0
 
 
-def test_leaving_check_mode_is_a_reset(homed: Grbl) -> None:
-    """Why a run never sends it: what G92 set is forgotten."""
-    homed.command("$C")
-    with pytest.raises(ControllerReset, match="began anew at '\\$C'"):
-        homed.command("$C")
-
-
 def test_rest_of_a_line_of_a_killed_program_is_forgotten(double: GrblDouble) -> None:
     port = SerialPort(double.port)
     port.write(b"G1 X-1")
@@ -124,3 +117,27 @@ def test_line_stays_up_when_the_port_is_closed(double: GrblDouble) -> None:
         termios.tcsetattr(line, termios.TCSANOW, modes)
         SerialPort(double.port).close()
         assert not termios.tcgetattr(line)[2] & termios.HUPCL
+
+
+@pytest.mark.parametrize(
+    ("line", "kind", "code"),
+    [
+        ("GrblHAL 1.1f ['$' or '$HELP' for help]", "banner", 0),
+        ("[MSG:'$H'|'$X' to unlock]", "other", 0),
+        (">G54G20:ok", "other", 0),
+        ("okay", "other", 0),
+        ("<broken", "other", 0),
+    ],
+)
+def test_lines_as_the_manuals_show_them(line: str, kind: str, code: int) -> None:
+    found = parse(line)
+    assert (found.kind, found.code) == (kind, code)
+
+
+def test_status_reports() -> None:
+    found = parse("<Hold:0|MPos:5.000,2.000,0.000|FS:500,8000|WCO:1.500,0.000,0.000>").status
+    assert found is not None
+    assert (found.state, found.substate) == ("Hold", 0)
+    assert (found.place("MPos", "X"), found.place("WCO", "X")) == (5, 1.5)
+    assert found.place("WPos", "X") is found.place("MPos", "A") is None
+    assert parse("<Idle|MPos:5.0,x>").status == Status("Idle", None, {"MPos": ()})

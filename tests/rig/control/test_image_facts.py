@@ -8,7 +8,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import IFDRational, ImageFileDirectory_v2
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control.cameras.image_facts import EXIF, EXPOSURE, MAKE, MODEL, image_facts
+from tbcad.rig.control.camera import EXIF, EXPOSURE, MAKE, MODEL, image_facts
 from tbcad.rig.control.machine import CameraFault
 from tests.rig.control.rig import SIZE, Rig
 

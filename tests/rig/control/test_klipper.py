@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control.klipper.base import PIECE_S
+from tbcad.rig.control.klipper_base import PIECE_S
 from tests.rig.control.rig import Rig, until
 from tests.rig.control.run_checks import check_every_photograph, events
 
@@ -138,8 +138,9 @@ def test_shutdown_while_something_is_waited_for(
     check_every_photograph(klipper_rig.out, ALL)
 
 
-@pytest.mark.parametrize("act", ["let_go", "restart"])
-@pytest.mark.parametrize("line", [LED, "SET_PIN PIN=lamp VALUE=0"])
+@pytest.mark.parametrize(
+    ("act", "line"), [("let_go", LED), ("restart", "SET_PIN PIN=lamp VALUE=0")]
+)
 def test_motor_that_was_let_go(
     klipper_rig: Rig, act: str, line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -202,7 +203,7 @@ def test_moonraker_that_goes(klipper_rig: Rig, capsys: pytest.CaptureFixture[str
 def test_other_programs_motion_is_waited_for(
     klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tbcad.rig.control.klipper.host.LATE_S", -1000.0)
+    monkeypatch.setattr("tbcad.rig.control.klipper.LATE_S", -1000.0)
     controller = klipper_rig.controller
 
     def busy() -> None:

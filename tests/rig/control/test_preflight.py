@@ -12,15 +12,13 @@ from PIL import Image
 
 from tbcad.app.cli import run as tbcad
 from tbcad.errors import InputError
-from tbcad.records.exposure import PhaseTimes
 from tbcad.rig.control.base import Base
-from tbcad.rig.control.cameras.camera import Shot
-from tbcad.rig.control.cameras.choice import CommandCamera
-from tbcad.rig.control.cameras.image_facts import EXIF, EXPOSURE, ImageFacts
+from tbcad.rig.control.camera import EXIF, EXPOSURE, ImageFacts, Shot
+from tbcad.rig.control.chosen_camera import CommandCamera
 from tbcad.rig.control.machine import CameraFault
 from tbcad.rig.control.preflight import look, preflight
 from tbcad.rig.control.shooting import Photograph, common_settings, take
-from tbcad.rig.runs.photographs import read_run
+from tbcad.rig.runs import read_run
 from tests.rig.control import exposing_camera
 from tests.rig.control.exposing_camera import SIZE, radiance
 from tests.rig.control.rig import Rig, connected_rig, put, scene_of
@@ -169,12 +167,6 @@ def test_what_shines_in_the_dark_is_no_highlight() -> None:
     lamp = pixels(1.0, 3)
     assert look("led_1", lamp, lamp).highlights == 0
     assert look("led_1", lamp + pixels(0.6, 3, number=7) // 2, lamp).highlights == 2
-
-
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
-def test_times_that_are_none(seconds: float) -> None:
-    with pytest.raises(InputError, match="allowed are seconds above 0"):
-        PhaseTimes(lit_s=seconds)
 
 
 def png(image: np.ndarray) -> Shot:

@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.grbl import STATUS_S, Grbl
-from tbcad.rig.runs.photographs import read_run
+from tbcad.rig.runs import read_run
 from tests.rig.control.grbl_double import Machine
 from tests.rig.control.rig import Rig, put, scene_of
 from tests.rig.control.run_checks import OUTPUTS, check_every_photograph, events

@@ -3,7 +3,7 @@
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.runs.photographs import read_run
+from tbcad.rig.runs import read_run
 from tests.exported_files import edit_json
 from tests.rig.control.rig import Rig
 from tests.rig.control.run_checks import check_every_photograph

@@ -17,16 +17,15 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.light.simulate.prototype.plan import read_plan
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.drive.travel import home_angles
 from tbcad.rig.machine.designed import designed_prototype
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import read_machine
-from tbcad.rig.runs.photographs import read_photograph, read_run
+from tbcad.rig.machine.machine import Machine, read_machine
+from tbcad.rig.runs import read_photograph, read_run
 from tests.rig.control.conftest import export
 from tests.rig.control.run_checks import content, journal
 from tests.rig.control.simulated_scene import OperatedRig, operated_rig

@@ -7,9 +7,9 @@ import pytest
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import without_distortion
-from tbcad.light.simulate.prototype.plan import Plan
+from tbcad.light.simulate.prototype.run import Plan
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.rig.machine.built import BuiltPrototype, designed_build, draw_other_errors, random_build
+from tbcad.rig.machine.built import BuiltPrototype, draw_other_errors, random_build
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tests.prototype_exports import plan_of
@@ -70,9 +70,3 @@ def test_axis_and_spheres_tilt_together(designed: Machine, layout: PrototypeLayo
     built = still_build(designed, plan, Errors(axis_tilt=Error(0.01)))
     assert built.machine.centre @ built.machine.axis == pytest.approx(plan.centre @ plan.frame[0])
     assert norm(built.machine.axis - plan.frame[0]) > 1e-3
-
-
-def test_the_designed_build(designed: Machine, layout: PrototypeLayout) -> None:
-    built = designed_build(designed, plan_of(layout))
-    assert built.machine is designed
-    assert built.body_radius == pytest.approx(layout.balls.body_radius)

@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import norm, unit
-from tbcad.core.optics.camera import without_distortion
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import trace_balls
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.prototype.run import prototype_runs
-from tbcad.light.simulate.scene.exported import ExportedDesign
-from tbcad.records.exposure import Frame
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.photographed import machine_runs, stops_known
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, prototype_runs
+from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.rig.machine.designed import machine_runs, stops_known
 from tests.machine_states import frames_of, machine_of, perturbed
 
 
@@ -77,14 +73,3 @@ def test_another_number_of_balls_is_refused(export: ExportedDesign, plan: Plan) 
     few = replace(machine, centre=machine.centre[1:], radius=machine.radius[1:])
     with pytest.raises(InputError, match=f"has {len(plan) - 1} balls"):
         machine_runs(export, plan, few, frames_of(plan))
-
-
-def test_a_frame_beyond_the_plan_is_of_no_stop(plan: Plan) -> None:
-    frames = (Frame(object_turn_deg=0, stop=len(plan.angle) + 1, base_angle_deg=0.0),)
-    assert not stops_known(plan, frames).any()
-
-
-def test_the_designed_camera_is_the_shells(export: ExportedDesign, plan: Plan) -> None:
-    machine: Machine = machine_of(export, plan)
-    expected = without_distortion(export.reflectors[0].camera)
-    assert machine.camera.axes == pytest.approx(expected.axes)

@@ -10,12 +10,12 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import photograph
-from tbcad.light.simulate.prototype.plan import HALF_TURN
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.rig.machine.photographed import machine_run
+from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
+from tbcad.rig.machine.designed import machine_run
 from tbcad.rig.machine.shells import (
     designed_half,
     perfect_half,

@@ -6,7 +6,7 @@ import pytest
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera, without_distortion
 from tbcad.core.optics.led_dome import dome_images
-from tbcad.core.optics.pedestals.walls import NO_WALLS
+from tbcad.core.optics.pedestals.cells import NO_WALLS
 from tbcad.light.simulate.prototype.ball_rays import balls_between
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene

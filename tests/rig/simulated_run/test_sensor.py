@@ -56,11 +56,6 @@ def test_darkness_is_drawn_one_by_one_as_often_as_the_noise_says() -> None:
     assert count == pytest.approx(share * image.size, abs=4 * np.sqrt(share * image.size))
 
 
-def test_strong_read_noise_is_everywhere() -> None:
-    image = photographed(replace(SENSOR, read_electrons=80.0), None)
-    assert 0.2 < (image > 0).mean() < 0.5
-
-
 def test_saturation_and_bits() -> None:
     assert (photographed(SENSOR, 2.0) == 255).all()
     sixteen = photographed(replace(SENSOR, bits=16, noise=0.0), 0.5)

@@ -1,6 +1,7 @@
 import pickle
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -14,12 +15,17 @@ from tbcad.tolerancing.montecarlo.builds import (
     simulate,
     wilson_interval,
 )
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 
 SOME = Errors(sphere_centre=Error(0.02), camera_shift=Error(0.1), scale_axis=Error(0.001))
 BUILDS = 2 * BUILDS_PER_BATCH + 3
 ARRAYS = ("coverage", "pixels", "angle", "offset")
+M = 4
+ALL = Errors(**{field.name: Error(0.001) for field in fields(Errors)})
+# The foot moves where neighbours share a warp, see test_warp.
+NAMES = [field.name for field in fields(ShellDraws) if field.name != "foot"]
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +62,6 @@ def test_same_figures_with_any_workers(
     case: MonteCarloCase, result: ShellResult, run_batches: object
 ) -> None:
     assert same(simulate(case, BUILDS, run_batches), result)  # type: ignore[arg-type]
-
-
-def test_same_figures_in_any_batches(
-    case: MonteCarloCase, result: ShellResult, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tbcad.tolerancing.montecarlo.builds.BUILDS_PER_BATCH", 4)
-    assert same(simulate(case, BUILDS), result)
 
 
 def test_later_builds_continue_earlier_ones(case: MonteCarloCase, result: ShellResult) -> None:
@@ -102,19 +101,78 @@ def test_builds_without_errors_are_all_good(halves: EdgeModels) -> None:
         (5, 10, 0.2366, 0.7634),
         (81, 263, 0.2553, 0.3662),
         (1, 29, 0.0061, 0.1718),
+        (10, 10, 1 - 0.2775, 1.0),
     ],
 )
 def test_interval_of_wilson(good: int, count: int, low: float, high: float) -> None:
-    """The last two: R. G. Newcombe, Stat. Med. 17 (1998) 857-872, table I, method 3."""
+    """The third and fourth: R. G. Newcombe, Stat. Med. 17 (1998) 857-872, table I, method 3."""
     assert wilson_interval(good, count) == pytest.approx((low, high), abs=5e-5)
-
-
-def test_all_good_is_not_surely_all_good() -> None:
-    low, high = wilson_interval(10, 10)
-    assert (high, low) == (1.0, pytest.approx(1 - 0.2775, abs=5e-5))
 
 
 def test_yield_counts_builds_that_just_reach_the_target() -> None:
     found = estimate_yield(np.array([59.999, 60.0, 61.0, 10.0]), 60.0)
     assert found.share == 0.5
     assert found.low < 0.5 < found.high
+
+
+def test_a_build_is_the_same_alone_or_among_others() -> None:
+    together = draw(ALL, 5, range(7), M)
+    for half, alone in zip(together, draw(ALL, 5, range(4, 5), M), strict=True):
+        for name in NAMES:
+            assert np.array_equal(getattr(half, name)[4:5], getattr(alone, name)), name
+
+
+def test_builds_seeds_and_halves_differ() -> None:
+    a, b = draw(ALL, 5, range(2), M)
+    other, _ = draw(ALL, 6, range(2), M)
+    for name in NAMES:
+        assert np.all(getattr(a, name)[0] != getattr(a, name)[1]), name
+        assert np.all(getattr(a, name) != getattr(other, name)), name
+        assert np.all(getattr(a, name) != getattr(b, name)), name
+
+
+def test_kinds_are_drawn_apart() -> None:
+    """No error is another one over again."""
+    drawn = draw(ALL, 5, range(1), M)
+    alike = ("shell_shift", "shell_tilt", "camera_shift", "camera_tilt", "centre")
+    every = np.concatenate([getattr(half, name).ravel() for half in drawn for name in alike])
+    assert len(np.unique(every)) == len(every)
+
+
+@pytest.mark.parametrize("kind", ["sphere_centre", "scale_isotropic", "camera_tilt", "facets"])
+def test_without_one_kind_the_others_stay(kind: str) -> None:
+    """Sensitivities then compare the same builds."""
+    full, less = (
+        draw(errors, 5, range(2), M)[0] for errors in (ALL, replace(ALL, **{kind: Error()}))
+    )
+    changed = [
+        name for name in NAMES if not np.array_equal(getattr(full, name), getattr(less, name))
+    ]
+    goes_into = {"sphere_centre": "centre", "scale_isotropic": "scale", "facets": "facets"}
+    assert changed == [goes_into.get(kind, kind)]
+
+
+def test_normal_errors_have_mean_and_standard_deviation() -> None:
+    centre = draw(Errors(sphere_centre=Error(0.3, 0.1)), 1, range(200), 50)[0].centre
+    count = centre.size
+    assert centre.mean() == pytest.approx(0.1, abs=4 * 0.3 / np.sqrt(count))
+    assert centre.std() == pytest.approx(0.3, rel=4 / np.sqrt(2 * count))
+
+
+def test_uniform_errors_fill_their_half_width() -> None:
+    shift = draw(Errors(camera_shift=Error(0.3, 0.1, "uniform")), 1, range(400), M)[0].camera_shift
+    assert np.abs(shift - 0.1).max() <= 0.3
+    assert shift.min() < -0.19
+    assert shift.max() > 0.39
+    assert shift.std() == pytest.approx(0.3 / np.sqrt(3), rel=0.1)
+
+
+def test_what_one_build_or_one_shell_has_in_common() -> None:
+    a, b = draw(Errors(scale_axis=Error(0.01), coating=Error(0.02, 0.005)), 1, range(3), M)
+    assert np.array_equal(a.scale, b.scale)
+    assert len(np.unique(a.scale)) == 9
+    assert np.all(a.radius == a.radius[:, :1])
+    assert np.all(a.radius != b.radius)
+    isotropic, other = draw(Errors(scale_isotropic=Error(0.01)), 1, range(3), M)
+    assert np.all(isotropic.scale == isotropic.scale[:, :1])
+    assert np.all(isotropic.scale != other.scale)

@@ -1,7 +1,7 @@
 """What each kind of error costs alone, against losses that are known in closed form."""
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -51,14 +51,7 @@ def test_scaled_multiplies_spread_and_mean_and_nothing_else() -> None:
     assert scaled(MIXED, 1.0) == MIXED
 
 
-@pytest.mark.parametrize("mean", [0.0002 * LARGEST_FACTOR, 0.36, 0.05, 7.0, 600.0])
-def test_linear_loss(mean: float) -> None:
-    """What is left is room - times mean: the factor is the one over the other."""
-    found = tolerable_factor(Errors(facets=Error(0, mean)), 0.99, TARGET, synthetic(lambda x: x))
-    assert found == pytest.approx(ROOM / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
-
-
-@pytest.mark.parametrize("power", [0.5, 2.0, 3.0])
+@pytest.mark.parametrize("power", [0.5, 1.0, 3.0])
 @pytest.mark.parametrize("mean", [0.02, 0.4, 5.0])
 def test_bent_loss(power: float, mean: float) -> None:
     """The loss is the mean's power: the factor is the root of the room over the mean."""
@@ -76,7 +69,7 @@ def test_loss_with_a_cliff_is_bracketed() -> None:
     assert found == pytest.approx(3.0, rel=FACTOR_TOLERANCE)
 
 
-@pytest.mark.parametrize("count", [1, 7, 10, 100, 101])
+@pytest.mark.parametrize("count", [1, 10, 101])
 def test_share_is_good_exactly_where_it_is_reached(count: int) -> None:
     """For every share that so many builds can have, and those between."""
     worst = np.random.default_rng(count).normal(TARGET, 1, count)
@@ -87,16 +80,10 @@ def test_share_is_good_exactly_where_it_is_reached(count: int) -> None:
 
 
 def test_what_costs_nothing_may_be_anything() -> None:
-    assert (
-        tolerable_factor(Errors(facets=Error(1.0)), 0.99, TARGET, synthetic(lambda _: 0.0))
-        == np.inf
-    )
-
-
-def test_what_costs_far_too_little_may_be_anything() -> None:
-    """It would be reached at a million times."""
+    """Nor does what would be reached at a million times."""
     slight = Errors(facets=Error(0, ROOM / 1e6))
-    assert tolerable_factor(slight, 0.99, TARGET, synthetic(lambda x: x)) == np.inf
+    for loss in (lambda _: 0.0, lambda x: x):
+        assert tolerable_factor(slight, 0.99, TARGET, synthetic(loss)) == np.inf
 
 
 def test_design_that_falls_short_allows_nothing() -> None:
@@ -118,30 +105,6 @@ def test_quantile_of_the_builds_decides_not_their_mean() -> None:
     assert one.loss == pytest.approx(0.36 / 2)
     assert one.loss_at_yield == pytest.approx(0.36 * 0.75)
     assert one.tolerable_factor == pytest.approx(ROOM / (0.36 * 0.75), rel=FACTOR_TOLERANCE)
-
-
-def test_alone_asks_for_no_other_kind() -> None:
-    asked: list[Errors] = []
-
-    def worst(errors: Errors) -> np.ndarray:
-        asked.append(errors)
-        return np.full(3, TARGET + ROOM - errors.coating.mean)
-
-    one_at_a_time(MIXED, "coating", 0.9, TARGET, worst)
-    assert len(asked) > 3
-    for errors in asked:
-        assert replace(errors, coating=Error()) == Errors()
-
-
-def test_facets_of_a_build_are_linear(halves: EdgeModels) -> None:
-    """They are taken off the coverage, so the factor is what the design has to spare over them."""
-    worst = real(halves, 10)
-    spare = float(worst(Errors())[0]) - TARGET
-    assert spare > 0.5
-    one = one_at_a_time(MIXED, "facets", 0.99, TARGET, worst)
-    assert one.loss == pytest.approx(0.36, abs=1e-9)
-    assert one.loss_at_yield == pytest.approx(0.36, abs=1e-9)
-    assert one.tolerable_factor == pytest.approx(spare / 0.36, rel=FACTOR_TOLERANCE)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,10 @@ from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.windows import cell_windows
 from tbcad.core.spec.load import load_spec
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.prototype.run import PrototypeRun, prototype_runs
+from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.tolerancing.montecarlo.builds import CoverageResult, simulate
+from tbcad.tolerancing.montecarlo.builds import simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerancing.prototype.rays import (
@@ -157,16 +156,6 @@ class TestCoverage:
         whole = ~model.runs[0].halved
         assert a[whole] == pytest.approx(b[layout.twin][whole], abs=1e-6)
 
-    @pytest.mark.parametrize("kind", SPREAD)
-    def test_each_error_against_the_slow_model(
-        self, model: PrototypeWindows, runs: Runs, pictures: list[Picture], kind: str
-    ) -> None:
-        draws = draws_of(model, 1, **{kind: SPREAD[kind]})
-        diameter = coverage_of(model, draws)
-        still = coverage_of(model, draws_of(model, 1))
-        assert np.abs(diameter - still).max() > 20 * SAMPLED_MM
-        assert diameter[0] == pytest.approx(slow(model, runs, pictures, draws), abs=SAMPLED_MM)
-
     def test_all_errors_together_against_the_slow_model(
         self, model: PrototypeWindows, runs: Runs, pictures: list[Picture]
     ) -> None:
@@ -255,32 +244,11 @@ class TestMotions:
 
 
 class TestDraws:
-    def test_a_build_is_the_same_alone_and_among_others(self, model: PrototypeWindows) -> None:
-        of_model = model.is_cap, model.wind_up
-        many = draw_prototypes(Errors(**SPREAD), 3, range(5), *of_model)
-        one = draw_prototypes(Errors(**SPREAD), 3, [4], *of_model)
-        for field in fields(PrototypeDraws):
-            assert (getattr(many, field.name)[4] == getattr(one, field.name)[0]).all()
-
     def test_caps_are_off_as_made_and_balls_as_bought(self) -> None:
         cap = np.array([True, False])
         errors = Errors(sphere_radius=Error(mean=0.3), ball_radius=Error(mean=0.002))
         drawn = draw_prototypes(errors, 1, range(2), cap, np.zeros(3))
         assert drawn.radius.tolist() == [[0.3, 0.002]] * 2
-
-    def test_stops_of_both_runs_are_apart(self, model: PrototypeWindows) -> None:
-        angle = draws_of(model, 400, rotation_angle=Error(2e-3)).angle
-        assert angle.std() == pytest.approx(2e-3, rel=0.03)
-        assert abs(np.corrcoef(angle[:, 0].ravel(), angle[:, 1].ravel())[0, 1]) < 0.03
-
-    def test_gravity_turns_the_base_alike_in_both_runs(self, model: PrototypeWindows) -> None:
-        """All of it in each build, up to a factor of the build."""
-        angle = draws_of(model, 300, wind_up=Error(0.2, mean=1.0)).angle
-        factor = angle[:, 0] @ model.wind_up / (model.wind_up @ model.wind_up)
-        for run in (0, 1):
-            assert angle[:, run] == pytest.approx(np.outer(factor, model.wind_up), abs=1e-15)
-        assert factor.mean() == pytest.approx(1.0, abs=0.05)
-        assert factor.std() == pytest.approx(0.2, rel=0.15)
 
 
 class TestMonteCarlo:
@@ -290,20 +258,3 @@ class TestMonteCarlo:
         for field in fields(PrototypeResult):
             expected = getattr(whole, field.name)[17:]
             assert (getattr(later, field.name) == expected).all()
-
-    def test_results_say_what_is_in_them(self) -> None:
-        coverage = np.array([[61.0, 60.0, 62.0], [63.0, 64.0, 59.0]])
-        result = CoverageResult(coverage, np.array([[3.0, 4.0], [0.0, 2.0]]))
-        assert len(result) == 2
-        assert result.worst.tolist() == [60, 59]
-        assert result.worst_camera.tolist() == [1, 2]
-        assert result.quantiles([0, 0.5])[1].tolist() == [62, 62, 60.5]
-
-
-def test_windows_left_in_their_places_see_less(
-    small_design: MirrorDesign, plan: Plan, model: PrototypeWindows
-) -> None:
-    """Balls then stand aside of their windows' middles though nothing is off."""
-    fixed = prototype_model(reflectors(small_design), replace(plan, moved=False), model.wind_up)
-    apart, together = (coverage_of(one, draws_of(one, 1)) for one in (fixed, model))
-    assert np.median(apart) < np.median(together) - 10

@@ -4,37 +4,42 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tests.verify.corpus.copies import put
-from tests.verify.corpus.mutation import Job, Mutation, fails, refused
-from tests.verify.corpus.record_changes import manifest
+from tests.verify.corpus.broken_records import MANIFEST, manifest
+from tests.verify.corpus.copies import change, put
+from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
 
 ROWS = 40_000_000  # facets: two gigabytes
+NEEDED = (
+    *("design.json", "mirrors.csv", MANIFEST),
+    *("shell_b.stl", "shell_b.3mf", "shell_b.step"),
+)
 LONG = 84 + 50 * ROWS  # bytes
 
 
 def gone(name: str) -> Job:
-    return lambda folder: (folder / name).unlink() or ()
+    return lambda folder: (folder / name).unlink()
 
 
-def emptied(folder: Path) -> Sequence[str]:
-    for path in folder.iterdir():
-        path.unlink()
-    return ()
-
-
-def no_folder(folder: Path) -> Sequence[str]:
+def no_folder(folder: Path) -> None:
     shutil.rmtree(folder)
-    return ()
 
 
-def no_longer_a_folder(folder: Path) -> Sequence[str]:
+def no_longer_a_folder(folder: Path) -> None:
     shutil.rmtree(folder)
     folder.write_bytes(b"")
-    return ()
+
+
+def instead(name: str, how: Callable[[Path], object]) -> Job:
+    """Something that is no file in place of one."""
+
+    def job(folder: Path) -> None:
+        (folder / name).unlink()
+        how(folder / name)
+
+    return job
 
 
 def link_out(name: str) -> Job:
@@ -46,24 +51,6 @@ def link_out(name: str) -> Job:
         return [name]
 
     return job
-
-
-def loop(folder: Path) -> Sequence[str]:
-    (folder / "shell_a.stl").unlink()
-    (folder / "shell_a.stl").symlink_to("shell_a.stl")
-    return ()
-
-
-def pipe(folder: Path) -> Sequence[str]:
-    (folder / "shell_a.stl").unlink()
-    os.mkfifo(folder / "shell_a.stl")
-    return ()
-
-
-def directory(folder: Path) -> Sequence[str]:
-    (folder / "shell_a.step").unlink()
-    (folder / "shell_a.step").mkdir()
-    return ()
 
 
 def sparse(name: str, head: bytes, size: int = LONG) -> Job:
@@ -82,22 +69,6 @@ def headed(more: int) -> bytes:
     return b"corpus".ljust(80) + (ROWS + more).to_bytes(4, "little")
 
 
-def wrong_hash(files: dict) -> None:
-    files["shell_a.step"]["sha256"] = "0" * 64
-
-
-def wrong_size(files: dict) -> None:
-    files["shell_a.stl"]["size"] += 1
-
-
-def exchanged(files: dict) -> None:
-    files["shell_a.3mf"], files["shell_b.3mf"] = files["shell_b.3mf"], files["shell_a.3mf"]
-
-
-def outside(files: dict) -> None:
-    files["../outside.txt"] = {"size": 0, "sha256": ""}
-
-
 def one_bit(folder: Path) -> Sequence[str]:
     """A bit of an STL's heading, which nobody measures."""
     data = bytearray((folder / "shell_a.stl").read_bytes())
@@ -108,101 +79,106 @@ def one_bit(folder: Path) -> Sequence[str]:
 
 def again(name: str) -> Job:
     """The same bytes in another file: who did that may have done more."""
-    return lambda folder: put(folder, name, (folder / name).read_bytes()) or ()
+    return lambda folder: put(folder, name, (folder / name).read_bytes())
 
 
-def appended(folder: Path) -> Sequence[str]:
-    put(folder, "shell_b.stl", (folder / "shell_b.stl").read_bytes() + b"x")
-    return ()
+def exchanged(files: dict) -> None:
+    files["shell_a.3mf"], files["shell_b.3mf"] = files["shell_b.3mf"], files["shell_a.3mf"]
 
 
-def unsigned(mutation: Mutation) -> Mutation:
-    """The manifest itself is the point."""
-    return replace(mutation, signed=False)
-
-
-def during(stage: str, name: str, job: Job, file: str) -> Mutation:
-    words = (file, "changed while it was read")
-    return replace(refused(name, "any", job, *words), during=stage, signed=False)
-
-
-MANIFEST = "manifest.json"
-# Refused before anybody reads so much, the hash included; so nobody needs to sign them.
-SPARSE = tuple(
-    unsigned(refused(name, kind, sparse(file, head, size), *words))
-    for name, kind, file, head, size, words in (
-        ("2 GB of nothing for an STL", "STL", "shell_a.stl", b"", LONG, ("0 facets",)),
-        ("2 GB and a head that lies", "STL", "shell_a.stl", headed(1), LONG, ("truncated",)),
-        ("5 GB for an STL", "STL", "shell_a.stl", b"", 5 * 10**9, ("at most",)),
-        ("2 GB for a STEP", "STEP", "shell_a.step", b"ISO-10303-21;", LONG, ("at most",)),
-        ("2 GB for a table", "mirrors.csv", "mirrors.csv", b"id,", LONG, ("at most",)),
-        ("200 MB of nothing for a 3MF", "3MF", "shell_a.3mf", b"PK\3\4", LONG // 10, ("zip",)),
-    )
-)
+CHANGED = "changed while it was read"
+WHILE_READ = {  # by the stage at whose beginning it happens
+    "coverage": (
+        ("an STL replaced", again("shell_a.stl"), "shell_a.stl", CHANGED),
+        ("a table gone", gone("mirrors.csv"), "mirrors.csv", CHANGED),
+    ),
+    "STEP": (
+        ("a STEP replaced", again("shell_a.step"), "shell_a.step", CHANGED),
+        (
+            "an STL that grows",
+            lambda folder: change(folder, "shell_b.stl", lambda data: data + b"x"),
+            *("shell_b.stl", CHANGED),
+        ),
+    ),
+    "3MF": (("the manifest replaced", again(MANIFEST), MANIFEST, CHANGED),),
+}
 FILES: tuple[Mutation, ...] = (
-    refused("no such folder", "folder", no_folder, "no such folder"),
-    refused("a file for a folder", "folder", no_longer_a_folder, "not a folder"),
-    refused("an empty folder", "folder", emptied, "an empty folder, no build"),
-    refused("no design.json", "folder", gone("design.json"), "design.json: missing"),
-    refused("no mirrors.csv", "folder", gone("mirrors.csv"), "mirrors.csv: missing"),
-    refused("no manifest", "folder", gone(MANIFEST), "manifest.json: missing"),
-    refused("an STL missing", "folder", gone("shell_b.stl"), "shell_b.stl: missing"),
-    refused("a 3MF missing", "folder", gone("shell_b.3mf"), "shell_b.3mf: missing"),
-    refused("a STEP missing", "folder", gone("shell_b.step"), "shell_b.step: missing"),
-    refused("an STL linked from outside", "folder", link_out("shell_a.stl"), "leads out"),
-    refused("a STEP linked from outside", "folder", link_out("shell_a.step"), "leads out"),
-    refused("a table linked from outside", "folder", link_out("mirrors.csv"), "leads out"),
-    refused("an STL linked to itself", "folder", loop, "shell_a.stl"),
-    refused("a pipe for an STL", "folder", pipe, "shell_a.stl: not a regular file"),
-    refused("a folder for a STEP", "folder", directory, "shell_a.step: not a regular file"),
-    *SPARSE,
-    unsigned(fails("one bit, manifest as it was", "STL", one_bit, "manifest")),
-    unsigned(fails("a wrong hash", MANIFEST, manifest(wrong_hash), "manifest", "shell_a.step")),
-    unsigned(fails("a wrong size", MANIFEST, manifest(wrong_size), "manifest", "shell_a.stl")),
-    unsigned(fails("two files exchanged", MANIFEST, manifest(exchanged), "manifest", ".3mf")),
-    unsigned(
-        fails(
+    *refusing(
+        "folder",
+        ("none", no_folder, "no such folder"),
+        ("a file", no_longer_a_folder, "not a folder"),
+        (
+            "empty",
+            lambda folder: [path.unlink() for path in folder.iterdir()] and None,
+            "an empty folder, no build",
+        ),
+        *((f"no {name}", gone(name), f"{name}: missing") for name in NEEDED),
+        ("an STL linked from outside", link_out("shell_a.stl"), "leads out"),
+        ("a STEP linked from outside", link_out("shell_a.step"), "leads out"),
+        ("a table linked from outside", link_out("mirrors.csv"), "leads out"),
+        (
+            "an STL linked to itself",
+            instead("shell_a.stl", lambda path: path.symlink_to(path.name)),
+            "shell_a.stl",
+        ),
+        ("a pipe for an STL", instead("shell_a.stl", os.mkfifo), "shell_a.stl: not a regular file"),
+        (
+            "a folder for a STEP",
+            instead("shell_a.step", Path.mkdir),
+            "shell_a.step: not a regular file",
+        ),
+    ),
+    # Refused before anybody reads so much, the hash included; so nobody needs to sign them.
+    *refusing(
+        "long file",
+        ("2 GB of nothing for an STL", sparse("shell_a.stl", b""), "0 facets"),
+        ("2 GB and a head that lies", sparse("shell_a.stl", headed(1)), "truncated"),
+        ("5 GB for an STL", sparse("shell_a.stl", b"", 5 * 10**9), "at most"),
+        ("2 GB for a STEP", sparse("shell_a.step", b"ISO-10303-21;"), "at most"),
+        ("2 GB for a table", sparse("mirrors.csv", b"id,"), "at most"),
+        ("200 MB of nothing for a 3MF", sparse("shell_a.3mf", b"PK\3\4", LONG // 10), "zip"),
+        signed=False,
+    ),
+    *failing(
+        "manifest",
+        ("one bit of a heading, which nobody measures", one_bit, "manifest"),
+        (
+            "a wrong hash",
+            manifest(lambda files: files["shell_a.step"].update(sha256="0" * 64)),
+            *("manifest", "shell_a.step"),
+        ),
+        (
+            "a wrong size",
+            manifest(lambda files: files["shell_a.stl"].update(size=1)),
+            *("manifest", "shell_a.stl"),
+        ),
+        ("two files exchanged", manifest(exchanged), "manifest", ".3mf"),
+        (
             "an entry missing",
-            MANIFEST,
-            manifest(lambda f: f.pop("shell_a.3mf")),
-            "manifest",
-            "shell_a.3mf",
-        )
-    ),
-    unsigned(
-        fails(
+            manifest(lambda files: files.pop("shell_a.3mf")),
+            *("manifest", "shell_a.3mf"),
+        ),
+        (
             "an entry for nothing",
-            MANIFEST,
-            manifest(lambda f: f.update(x={"size": 1, "sha256": ""})),
-            "manifest",
-            "x",
-        )
+            manifest(lambda files: files.update(x={"size": 1, "sha256": ""})),
+            *("manifest", "x"),
+        ),
+        signed=False,
     ),
-    unsigned(refused("an entry outside", MANIFEST, manifest(outside), "not a plain file name")),
-    unsigned(
-        refused("no entries", MANIFEST, manifest(lambda f: f.clear()), "files is {}, allowed")
+    *refusing(
+        "manifest",
+        (
+            "an entry outside",
+            manifest(lambda files: files.update({"../x": {"size": 0, "sha256": ""}})),
+            "not a plain file name",
+        ),
+        ("no entries", manifest(lambda files: files.clear()), "files is {}, allowed"),
+        ("no hash", manifest(lambda files: files.update(x=1)), "files.x is 1, allowed"),
+        signed=False,
     ),
-    unsigned(
-        refused(
-            "an entry without a hash",
-            MANIFEST,
-            manifest(lambda f: f.update(x=1)),
-            "files.x is 1, allowed",
-        )
-    ),
-    during("coverage", "an STL replaced while read", again("shell_a.stl"), "shell_a.stl"),
-    during("STEP", "a STEP replaced while read", again("shell_a.step"), "shell_a.step"),
-    during("STEP", "an STL that grows", appended, "shell_b.stl"),
-    during("coverage", "a table gone while read", gone("mirrors.csv"), "mirrors.csv"),
-    during("3MF", "the manifest replaced while read", again(MANIFEST), MANIFEST),
-)
-HEAVY = (
-    replace(
-        fails("2 GB of facets without area", "STL", sparse("shell_a.stl", headed(0)), "facets"),
-        heavy=True,
-    ),
-    replace(
-        unsigned(refused("2 GB of nothing for a 3MF", "3MF", sparse("shell_a.3mf", b"PK"), "zip")),
-        heavy=True,
+    *(
+        mutation
+        for stage, rows in WHILE_READ.items()
+        for mutation in refusing("while read", *rows, during=stage, signed=False)
     ),
 )

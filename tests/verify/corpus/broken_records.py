@@ -2,232 +2,394 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from math import cos, radians, sin
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest.mock import patch
 
-from tests.verify.corpus.mutation import Mutation, fails, refused
-from tests.verify.corpus.record_changes import (
-    JSON,
-    MANIFEST,
-    TABLE,
-    angle,
-    apex,
-    as_text,
-    beyond_the_worst,
-    cell,
-    centre,
-    coat,
-    coverage,
-    cut_line,
-    design,
-    exchange,
-    figure,
-    first_part,
-    flange,
-    foot,
-    half,
-    json_file,
-    leave_out,
-    lines,
-    loose,
-    mirror,
-    mirror_spec,
-    mirrors,
-    no_meshes,
-    nothing_asked,
-    other_design,
-    pixels,
-    radius,
-    second_column,
-    second_key,
-    shell_spec,
-    shift_camera,
-    shift_one,
-    skew,
-    subdivision,
-    target,
-    turn,
-    twin,
-    without,
-    word,
-)
-from tests.verify.corpus.seam_designs import not_aimed
+import numpy as np
 
+from tbcad.core.mirrors.array import design as mirrors_of
+from tbcad.core.mirrors.radii import RadiusProblem
+from tbcad.core.optics.windows import seam_gaps
+from tbcad.core.spec.design import Spec
+from tbcad.output.build import write_export
+from tests.verify.corpus import part21
+from tests.verify.corpus.copies import change, load, load_mirrors, put, store, store_mirrors
+from tests.verify.corpus.facets import balls, read, write
+from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
+
+Record = dict[str, Any]
+JSON, TABLE, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
+
+
+def mirrors(how: Callable[[list[Record], str], object], named: int = 0) -> Job:
+    """Change the rows of mirrors.csv, given the id of a mirror."""
+
+    def job(folder: Path) -> Sequence[str]:
+        rows, name = load_mirrors(folder), balls(folder, "a")[0].id
+        how(rows, name)
+        store_mirrors(folder, rows)
+        return [name][:named]
+
+    return job
+
+
+def mirror(how: Callable[[Record], object]) -> Job:
+    """Change one row of mirrors.csv."""
+    return mirrors(lambda rows, name: how(row_of(rows, name)), 1)
+
+
+def json_file(name: str, how: Callable[[Record], object]) -> Job:
+    def job(folder: Path) -> None:
+        value = load(folder, name)
+        how(value)
+        store(folder, name, value)
+
+    return job
+
+
+def design(how: Callable[[Record], object]) -> Job:
+    """Change design.json; no mirror is concerned."""
+    return json_file(JSON, how)
+
+
+def part(**keys: object) -> Job:
+    """Other keys of the first part."""
+    return design(lambda value: value["parts"][0].update(keys))
+
+
+def spec(*path: str, **keys: object) -> Job:
+    """Other keys of a section of the spec."""
+
+    def how(value: Record) -> None:
+        section = value["spec"]
+        for name in path:
+            section = section[name]
+        section.update(keys)
+
+    return design(how)
+
+
+def manifest(how: Callable[[Record], object]) -> Job:
+    """Change the list of files in the manifest."""
+    return json_file(MANIFEST, lambda value: how(value["files"]))
+
+
+def as_text(name: str, how: Callable[[bytes], bytes]) -> Job:
+    return lambda folder: change(folder, name, how)
+
+
+def row_of(rows: list[Record], name: str) -> Record:
+    return next(row for row in rows if row["id"] == name)
+
+
+def exchange(folder: Path) -> Sequence[str]:
+    """Two ids exchanged, the STEP's names as they were."""
+    names = [ball.id for ball in balls(folder, "a")[:2]]
+
+    def how(rows: list[Record], _: str) -> None:
+        one, two = (row_of(rows, name) for name in names)
+        one["id"], two["id"] = two["id"], one["id"]
+
+    mirrors(how)(folder)
+    return names
+
+
+def word(new: bytes) -> Job:
+    """A cell of mirrors.csv, px in its sixth line."""
+
+    def how(data: bytes) -> bytes:
+        rows = data.split(b"\n")
+        cells = rows[5].split(b",")
+        cells[5] = new
+        return b"\n".join([*rows[:5], b",".join(cells), *rows[6:]])
+
+    return as_text(TABLE, how)
+
+
+def radius(by: float) -> Job:
+    """A radius, and the centre with it."""
+
+    def how(one: Record) -> None:
+        one["radius_mm"] += by
+        for axis in "xyz":
+            one["c" + axis] -= by * one["n" + axis]
+
+    return mirror(how)
+
+
+def apex(one: Record) -> None:
+    """A mirror a micrometre further out."""
+    for k in "pc":
+        for axis in "xyz":
+            one[k + axis] += 1e-3 * one["u" + axis]
+
+
+def times(key: str, share: float) -> Job:
+    """A figure of a mirror times a share."""
+    return mirror(lambda one: one.update({key: one[key] * share}))
+
+
+def second_column(data: bytes) -> bytes:
+    """Radii once more, of which another program may read the last."""
+    head, *rows = data.splitlines()
+    return b"\n".join([head + b",radius_mm", *(row + b",99.0" for row in rows)]) + b"\n"
+
+
+def second_key(name: str, key: str, value: str) -> Job:
+    """A key of a JSON object once more, before the others."""
+    return as_text(name, lambda data: data.replace(b"{", f'{{"{key}": {value},'.encode(), 1))
+
+
+def leave_out(rows: list[Record], name: str) -> None:
+    rows.remove(row_of(rows, name))
+
+
+def shift_camera(by: float, echo: bool) -> Job:
+    def how(value: Record) -> None:
+        for camera in value["cameras"]:
+            camera["pinhole_mm"][2] += by
+        if echo:
+            value["spec"]["optics"]["camera_mm"][2] += by
+
+    return design(how)
+
+
+def shift_one(value: Record) -> None:
+    value["cameras"][1]["pinhole_mm"][1] += 0.1
+
+
+def turn(value: Record) -> None:
+    """Both cameras look elsewhere, by 30 degrees."""
+    c, s = cos(radians(30)), sin(radians(30))
+    for camera in value["cameras"]:
+        forward, right = np.array(camera["forward"]), np.array(camera["right"])
+        camera["forward"] = (c * forward + s * np.cross(forward, right)).tolist()
+
+
+def angle(share: float, echo: bool) -> Job:
+    def how(value: Record) -> None:
+        for owner in (*value["cameras"], *([value["spec"]["camera"]] if echo else [])):
+            owner["hfov_deg"] *= share
+
+    return design(how)
+
+
+def pixels(value: Record) -> None:
+    """A sensor so coarse that some mirrors have no pixel."""
+    for owner in (*value["cameras"], value["spec"]["camera"]):
+        owner["width_px"], owner["height_px"] = 16, 16
+
+
+def coat(value: Record) -> None:
+    value["coating_mm"] += 0.02
+    value["spec"]["mirrors"]["coating_um"] += 20
+
+
+def above_the_worst(folder: Path) -> None:
+    """A target a hundredth of a millimetre above the worst mirror's own coverage."""
+    value = load(folder, JSON)
+    value["target_mm"] = min(row["coverage_mm"] for row in load_mirrors(folder)) + 0.01
+    value["spec"]["optics"]["capture_diameter_mm"] = value["target_mm"]
+    store(folder, JSON, value)
+
+
+def foot(value: Record) -> None:
+    value["foot_z_mm"] += 0.01
+
+
+def subdivision(value: Record) -> None:
+    value["spec"]["optics"]["n"] += 1
+
+
+def without(kind: str) -> Job:
+    """The record names no file of a kind, so nobody reads it; the manifest still lists it."""
+    return design(lambda value: [part.pop(kind) for part in value["parts"]])
+
+
+def other_design(folder: Path) -> None:
+    """All of one half's files are, consistently, those of a design larger by a thousandth."""
+    share = 1.001
+    write(folder, "a", (read(folder, "a") * np.float32(share)).astype(np.float32))
+    part21.edit(folder, "shell_a.step", lambda entities: part21.scale(entities, share))
+
+
+def not_aimed(folder: Path) -> Sequence[str]:
+    """All files are those of a design whose halves are aimed at the origin; the worst half."""
+    asked = Spec.model_validate(load(folder, JSON)["spec"])
+    with patch.object(RadiusProblem, "missing_aim", lambda _, cells: np.zeros(cells.mirrors)):
+        made = mirrors_of(asked)  # with the radii of outlines alone
+    with TemporaryDirectory() as other:
+        write_export(made, Path(other), ["shell"])
+        for file in Path(other).iterdir():
+            put(folder, file.name, file.read_bytes())
+    array = made.arrays[0]
+    gap = seam_gaps(array.cells, array.ellipsoid.pinhole, made.spec.optics.capture_diameter_mm / 2)
+    return [array.ids[int(gap.argmax())]]
+
+
+FOOT, SEAM = ("shell", "foot_flange"), ("shell", "seam_flange")
+RULES: dict[str, dict[str, Any]] = {
+    "paper": {"radius_rule": "paper"},
+    "flat": {"radius_rule": "flat"},
+    "another margin": {"margin_mm": 1.0},
+    "a larger margin of one mirror": {"own_margins_mm": [2.0] * 48 + [2.01]},
+    "margins of fewer mirrors": {"own_margins_mm": [2.0] * 48},
+    "margins below that of all": {"margin_mm": 2.1, "own_margins_mm": [2.0] * 49},
+    "larger mirrors": {"max_radius_widths": 100.0},
+}
+FIGURES = ("size_mm", "theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg")
+OPTICS = "spec.optics is missing"
 RECORDS: tuple[Mutation, ...] = (
-    fails("two ids exchanged", TABLE, exchange, "step surfaces"),
-    fails("a radius 20 um off", TABLE, mirror(radius(0.02)), "radius error"),
-    fails("a radius 1 nm off", TABLE, mirror(radius(1e-6)), "step surfaces"),
-    fails("a centre 10 nm off the normal", TABLE, mirror(centre), "poses"),
-    fails("a cell's area", TABLE, mirror(cell), "cell areas"),
-    *(
-        fails(f"a mirror's {key}", TABLE, mirror(figure(key)), "figures")
-        for key in ("size_mm", "theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg")
-    ),
-    fails("a mirror 1 um further out", TABLE, mirror(apex), "poses"),
-    fails(
-        "a mirror not in the record",
+    *failing(
         TABLE,
-        mirrors(leave_out, 0),
-        "mirrors found",
-        "1 not in the record",
-    ),
-    fails("a direction without its mirror", TABLE, mirrors(leave_out, 0), "directions", "1 vert"),
-    fails("a mirror twice in the record", TABLE, mirrors(twin, 0), "directions", "a9999"),
-    fails(
-        "an id twice in the record",
-        TABLE,
-        mirrors(lambda rows, _: rows[3].update(id="a0010"), 0),
-        "ids",
-        "a0010",
-    ),
-    fails("an odd id", TABLE, mirrors(lambda rows, _: rows[3].update(id="m 4"), 0), "ids", "m 4"),
-    fails(
-        "cameras 0.1 mm lower", JSON, design(shift_camera(-0.1, False)), "requirements", "pinhole"
-    ),
-    fails("cameras and spec 0.1 mm lower", JSON, design(shift_camera(-0.1, True)), "poses"),
-    fails("camera b 0.1 mm aside", JSON, design(shift_one), "requirements", "camera b pinhole 1"),
-    fails("cameras turned by 30 degrees", JSON, design(turn(30)), "frame margin"),
-    fails("another view angle", JSON, design(angle(0.99, False)), "requirements", "hfov"),
-    fails("a view angle half as wide, spec too", JSON, design(angle(0.5, True)), "frame margin"),
-    fails("a sensor of 16 x 16 pixels, spec too", JSON, design(pixels), "pixels, minimum"),
-    fails("a coat that is not there", JSON, design(coat), "radius error", "0.020"),
-    fails("a coat that is not there, by STEP", JSON, design(coat), "step surfaces", "0.02 mm"),
-    fails("a target not met", JSON, target(beyond_the_worst, True), "coverage, spheres"),
-    fails("a target not met on facets", JSON, target(beyond_the_worst, True), "coverage, facets"),
-    fails(
-        "a lower target than the spec's",
-        JSON,
-        target(lambda _: 30.0, False),
-        "requirements",
-        "target_mm",
-    ),
-    fails("the foot 10 um higher", JSON, design(foot), "step cells"),
-    fails("another n in the spec", JSON, design(subdivision), "directions", "without a mirror"),
-    fails("a mirror's coverage", TABLE, mirror(coverage), "recorded coverage"),
-    *(
-        fails(f"a wall of {mm:g} mm", JSON, design(shell_spec(wall_mm=mm)), "step wall", "3.000 mm")
-        for mm in (1.0, 2.9, 9.0)
-    ),
-    fails("20 bolts", JSON, design(flange("seam_flange", bolts=20)), "step holes", "not 20"),
-    fails("no dowels", JSON, design(flange("foot_flange", dowels=0)), "step holes", "not 0"),
-    fails(
-        "bolts of 10 mm", JSON, design(flange("foot_flange", bolt_hole_mm=10.0)), "step holes", "10"
-    ),
-    fails(
-        "a flange of 9 mm",
-        JSON,
-        design(flange("seam_flange", thickness_mm=9.0)),
-        "step holes",
-        "not 9",
-    ),
-    fails(
-        "a flange wider by 1 mm",
-        JSON,
-        design(flange("foot_flange", width_mm=13.0)),
-        "step holes",
-        "from its place",
-    ),
-    *(
-        fails(f"radius rule: {what}", JSON, design(mirror_spec(**keys)), "radius rule", "by rule")
-        for what, keys in (
-            ("paper", {"radius_rule": "paper"}),
-            ("flat", {"radius_rule": "flat"}),
-            ("another margin", {"margin_mm": 1.0}),
-            ("a larger margin of one mirror", {"own_margins_mm": [2.0] * 48 + [2.01]}),
-            ("margins of fewer mirrors", {"own_margins_mm": [2.0] * 48}),
-            ("margins below that of all", {"margin_mm": 2.1, "own_margins_mm": [2.0] * 49}),
-            ("larger mirrors", {"max_radius_widths": 100.0}),
-        )
-    ),
-    fails("a mesh error of 5 mm", JSON, design(loose(5.0)), "requirements", "mesh error"),
-    refused(
-        "a mesh error of 50 mm",
-        JSON,
-        design(loose(50.0)),
-        "spec.mesh.structure_error_mm is 50.0, allowed is a number from 0.002 to 5",
-    ),
-    refused("a spec that asks nothing", JSON, design(nothing_asked), "spec.optics is missing"),
-    refused(
-        "a second column of the same name",
-        TABLE,
-        as_text(TABLE, second_column),
-        "column radius_mm is there twice",
-    ),
-    refused(
-        "a second target", JSON, as_text(JSON, second_key("target_mm", "1.0")), "key target_mm is"
-    ),
-    replace(
-        refused(
-            "a second list of files",
-            MANIFEST,
-            as_text(MANIFEST, second_key("files", "{}")),
-            "key files is there twice",
+        ("two ids exchanged", exchange, "step surfaces"),
+        ("a radius 20 um off", radius(0.02), "radius error"),
+        ("a radius 1 nm off", radius(1e-6), "step surfaces"),
+        (
+            "a centre 10 nm off the normal",
+            mirror(lambda one: one.update(cy=one["cy"] + 1e-5)),
+            "poses",
         ),
+        ("a cell's area", times("cell_area_mm2", 1.0001), "cell areas"),
+        *((f"a mirror's {key}", times(key, 1 + 1e-6), "figures") for key in FIGURES),
+        ("a mirror 1 um further out", mirror(apex), "poses"),
+        ("a mirror not in the record", mirrors(leave_out), "mirrors found", "1 not in the record"),
+        ("a direction without its mirror", mirrors(leave_out), "directions", "1 vert"),
+        (
+            "a mirror twice in the record",
+            mirrors(lambda rows, name: rows.append(dict(row_of(rows, name), id="a9999"))),
+            *("directions", "a9999"),
+        ),
+        (
+            "an id twice in the record",
+            mirrors(lambda rows, _: rows[3].update(id="a0010")),
+            *("ids", "a0010"),
+        ),
+        ("an odd id", mirrors(lambda rows, _: rows[3].update(id="m 4")), "ids", "m 4"),
+        ("a mirror's coverage", times("coverage_mm", 1.05), "recorded coverage"),
+    ),
+    *failing(
+        JSON,
+        ("cameras 0.1 mm lower", shift_camera(-0.1, False), "requirements", "pinhole"),
+        ("cameras and spec 0.1 mm lower", shift_camera(-0.1, True), "poses"),
+        ("camera b 0.1 mm aside", design(shift_one), "requirements", "camera b pinhole 1"),
+        ("cameras turned by 30 degrees", design(turn), "frame margin"),
+        ("another view angle", angle(0.99, False), "requirements", "hfov"),
+        ("a view angle half as wide, spec too", angle(0.5, True), "frame margin"),
+        ("a sensor of 16 x 16 pixels, spec too", design(pixels), "pixels, minimum"),
+        ("a coat that is not there", design(coat), "radius error", "0.020"),
+        ("a coat that is not there, by STEP", design(coat), "step surfaces", "0.02 mm"),
+        ("a target not met", above_the_worst, "coverage, spheres"),
+        ("a target not met on facets", above_the_worst, "coverage, facets"),
+        (
+            "a lower target than the spec's",
+            design(lambda value: value.update(target_mm=30.0)),
+            *("requirements", "target_mm"),
+        ),
+        ("the foot 10 um higher", design(foot), "step cells"),
+        ("another n in the spec", design(subdivision), "directions", "without a mirror"),
+        *(
+            (f"a wall of {mm:g} mm", spec("shell", wall_mm=mm), "step wall", "3.000 mm")
+            for mm in (1.0, 2.9, 9.0)
+        ),
+        ("20 bolts", spec(*SEAM, bolts=20), "step holes", "not 20"),
+        ("no dowels", spec(*FOOT, dowels=0), "step holes", "not 0"),
+        ("bolts of 10 mm", spec(*FOOT, bolt_hole_mm=10.0), "step holes", "10"),
+        ("a flange of 9 mm", spec(*SEAM, thickness_mm=9.0), "step holes", "not 9"),
+        (
+            "a flange wider by 1 mm",
+            spec(*FOOT, width_mm=13.0),
+            *("step holes", "from its place"),
+        ),
+        *(
+            (f"radius rule: {what}", spec("mirrors", **keys), "radius rule", "by rule")
+            for what, keys in RULES.items()
+        ),
+        (
+            "a mesh error of 5 mm",
+            spec("mesh", structure_error_mm=5.0),
+            *("requirements", "mesh error"),
+        ),
+        (
+            "a part forgotten",
+            design(lambda value: value["parts"].pop()),
+            *("mirrors found", "missing: b0001"),
+        ),
+        ("no STEP", without("step"), "manifest", "shell_a.step"),
+        ("no 3MF", without("3mf"), "manifest", "shell_a.3mf"),
+        ("a part for the other camera", part(camera="b"), "mirrors found", "missing"),
+    ),
+    *failing(
+        "all",
+        ("seam mirrors with the old radii", not_aimed, "seam gap", "neither half sees"),
+        ("seam mirrors with the old radii, by coverage", not_aimed, "coverage, spheres"),
+        ("one half of another design", other_design, "centre error"),
+        ("one half of another design, by STEP", other_design, "step surfaces"),
+    ),
+    *refusing(
+        TABLE,
+        ("a second column", as_text(TABLE, second_column), "column radius_mm is there twice"),
+        ("NaN", word(b"nan"), TABLE, "line 6: px is nan, allowed"),
+        ("infinity", word(b"1e999"), TABLE, "line 6: px is 1e999"),
+        ("a word", word(b"left"), TABLE, "line 6: px is left"),
+        ("a field empty", word(b""), TABLE, "line 6: px is ''"),
+        ("a field too many", word(b"1.0,2.0"), TABLE, "line 6 has"),
+        (
+            "cut in a line",
+            as_text(TABLE, lambda b: b[: b.index(b"\n", len(b) // 2) + 30]),
+            *(TABLE, "truncated"),
+        ),
+        ("empty", as_text(TABLE, lambda _: b""), TABLE, "first line"),
+        ("no heading", as_text(TABLE, lambda b: b.partition(b"\n")[2]), TABLE, "first line"),
+    ),
+    *refusing(
+        JSON,
+        (
+            "a mesh error of 50 mm",
+            spec("mesh", structure_error_mm=50.0),
+            "spec.mesh.structure_error_mm is 50.0, allowed is a number from 0.002 to 5",
+        ),
+        ("a spec that asks nothing", design(lambda value: value["spec"].pop("optics")), OPTICS),
+        ("a second target", second_key(JSON, "target_mm", "1.0"), "key target_mm is"),
+        ("cut short", as_text(JSON, lambda b: b[: len(b) // 2]), JSON, "broken JSON"),
+        ("empty", as_text(JSON, lambda _: b""), JSON, "broken JSON"),
+        ("not UTF-8", as_text(JSON, lambda b: b"\xff" + b), JSON, "UTF-8"),
+        ("another program's", design(lambda value: value.update(schema="x")), "schema"),
+        (
+            "the version before",
+            design(lambda value: value.update(schema="tbcad-design/1")),
+            "schema is tbcad-design/1, this version verifies tbcad-design/2",
+        ),
+        ("a table outside", design(lambda value: value.update(mirrors="../m.csv")), "../m.csv"),
+        (
+            "axes that are no axes",
+            design(lambda value: value["cameras"][0].update(forward=[0.0, 0.1, 1.0])),
+            *(JSON, "forward and right"),
+        ),
+        (
+            "a sensor without columns",
+            design(lambda value: value["cameras"][0].update(width_px=0)),
+            "width_px",
+        ),
+        ("a target in words", design(lambda value: value.update(target_mm="60")), "target_mm"),
+        ("no parts", design(lambda value: value.update(parts=[])), "parts"),
+        ("a part outside", part(stl="../shell_a.stl"), "plain file name"),
+        ("a part at the root", part(step="/etc/hostname"), "plain file name"),
+        ("a part that is not there", part(**{"3mf": "x.3mf"}), "x.3mf", "missing"),
+    ),
+    *refusing(
+        MANIFEST,
+        ("a second list", second_key(MANIFEST, "files", "{}"), "key files is there twice"),
+        (
+            "another program's",
+            json_file(MANIFEST, lambda value: value.update(schema="x")),
+            "schema is x, this version verifies tbcad-manifest/1",
+        ),
+        ("that of a capture", json_file(MANIFEST, lambda v: v.update(kind="capture")), "kind"),
         signed=False,
     ),
-    refused(
-        "a manifest of another program",
-        MANIFEST,
-        json_file(MANIFEST, lambda m: m.update(schema="x")),
-        "schema is x, this version verifies tbcad-manifest/1",
-    ),
-    refused(
-        "a manifest of a capture",
-        MANIFEST,
-        json_file(MANIFEST, lambda m: m.update(kind="capture")),
-        "kind",
-    ),
-    fails("a part forgotten", JSON, design(no_meshes), "mirrors found", "missing: b0001"),
-    fails("no STEP in the record", JSON, design(without("step")), "manifest", "shell_a.step"),
-    fails("no 3MF in the record", JSON, design(without("3mf")), "manifest", "shell_a.3mf"),
-    fails("a part for the other camera", JSON, first_part(camera="b"), "mirrors found", "missing"),
-    fails("seam mirrors with the old radii", "all", not_aimed, "seam gap", "neither half sees"),
-    fails("seam mirrors with the old radii, by coverage", "all", not_aimed, "coverage, spheres"),
-    fails("one half of another design", "STL, 3MF, STEP", other_design, "centre error"),
-    fails("one half of another design, by STEP", "STL, 3MF, STEP", other_design, "step surfaces"),
-    refused(
-        "NaN in the table",
-        TABLE,
-        lines(word(b"nan")),
-        TABLE,
-        "line 6: px is nan, allowed",
-    ),
-    refused("infinity in the table", TABLE, lines(word(b"1e999")), TABLE, "line 6: px is 1e999"),
-    refused("a word in the table", TABLE, lines(word(b"left")), TABLE, "line 6: px is left"),
-    refused("a field empty in the table", TABLE, lines(word(b"")), TABLE, "line 6: px is ''"),
-    refused("a field too many in the table", TABLE, lines(word(b"1.0,2.0")), TABLE, "line 6 has"),
-    refused("the table cut short", TABLE, as_text(TABLE, cut_line), TABLE, "truncated"),
-    refused("the table empty", TABLE, as_text(TABLE, lambda _: b""), TABLE, "first line"),
-    refused("the table without its heading", TABLE, lines(lambda r: r[1:]), TABLE, "first line"),
-    refused("design.json cut short", JSON, as_text(JSON, half), JSON, "broken JSON"),
-    refused("design.json empty", JSON, as_text(JSON, lambda _: b""), JSON, "broken JSON"),
-    refused("design.json not UTF-8", JSON, as_text(JSON, lambda b: b"\xff" + b), JSON, "UTF-8"),
-    refused(
-        "design.json of another program", JSON, design(lambda d: d.update(schema="x")), "schema"
-    ),
-    refused(
-        "design.json of the version before",
-        JSON,
-        design(lambda d: d.update(schema="tbcad-design/1")),
-        "schema is tbcad-design/1, this version verifies tbcad-design/2",
-    ),
-    refused(
-        "mirrors in a file outside",
-        JSON,
-        design(lambda d: d.update(mirrors="../m.csv")),
-        "../m.csv",
-    ),
-    refused("axes that are no axes", JSON, design(skew), JSON, "forward and right"),
-    refused(
-        "a sensor without columns",
-        JSON,
-        design(lambda d: d["cameras"][0].update(width_px=0)),
-        "width_px",
-    ),
-    refused(
-        "a target that is a word", JSON, design(lambda d: d.update(target_mm="60")), "target_mm"
-    ),
-    refused("no parts", JSON, design(lambda d: d.update(parts=[])), "parts"),
-    refused("a part outside", JSON, first_part(stl="../shell_a.stl"), "plain file name"),
-    refused("a part at the root", JSON, first_part(step="/etc/hostname"), "plain file name"),
-    refused("a part that is not there", JSON, first_part(**{"3mf": "x.3mf"}), "x.3mf", "missing"),
 )

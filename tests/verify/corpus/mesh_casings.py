@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tbcad.types import Floats
-from tests.verify.corpus.facets import Corners
-from tests.verify.corpus.mesh_changes import Change
-from tests.verify.corpus.patches import Ball, patch, replaced
+from tests.verify.corpus.facets import Ball, Corners, patch, replaced
 
 WAY_MM = 0.05
 LARGEST_SIDE_MM = 3.0  # of the facets of a bore, across
@@ -71,7 +71,7 @@ def hanging(corners: Corners, _: list[Ball]) -> Corners:
     return replaced(corners, tip, tip - np.array([0, 0, WAY_MM]))
 
 
-def grown(way: float) -> Change:
+def grown(way: float) -> Callable[[Corners, list[Ball]], Corners]:
     """Both semi-axes of the back longer, mm."""
 
     def job(corners: Corners, every: list[Ball]) -> Corners:

@@ -1,13 +1,22 @@
-"""One way to break a good export, and what the verification must say then."""
+"""Ways to break a good export, what the verification must say then, and the trial of one."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-# Breaks a copy of a good export in place, and returns what the message must name (mirrors, files).
-Job = Callable[[Path], Sequence[str]]
+from tbcad_verify import BadExport
+from tbcad_verify.report.checks import Check
+from tbcad_verify.run.verify import VerifyOptions, verify
+
+from tests.verify.corpus.copies import copy, sign
+
+# Breaks a copy of a good export in place, and may return what the message must name.
+Job = Callable[[Path], Sequence[str] | None]
+HERE = VerifyOptions(write=False, apart=False)
 
 
 @dataclass(frozen=True)
@@ -25,7 +34,6 @@ class Mutation:
         unknown: the checks cannot be made, instead of being made and failing.
         during: the stage at whose beginning the job is done; empty: before the verification.
         signed: the manifest is written anew, so that measuring and not hashing must catch it.
-        heavy: wants gigabytes of memory; not for every test run.
         alone: no other check may fail.
     """
 
@@ -38,8 +46,10 @@ class Mutation:
     unknown: bool = False
     during: str = ""
     signed: bool = True
-    heavy: bool = False
     alone: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.name}"
 
 
 def fails(name: str, kind: str, job: Job, checks: str | tuple[str, ...], *words: str) -> Mutation:
@@ -52,6 +62,52 @@ def refused(name: str, kind: str, job: Job, *words: str) -> Mutation:
     return Mutation(name, kind, job, 2, (), words)
 
 
-def only(mutation: Mutation) -> Mutation:
-    """The same, of which no other check may say anything."""
-    return replace(mutation, alone=True)
+def failing(kind: str, *rows: tuple[Any, ...], **more: Any) -> tuple[Mutation, ...]:
+    """A table of mutations that are measured: name, job, check, words to be said."""
+    return tuple(replace(fails(name, kind, *rest), **more) for name, *rest in rows)
+
+
+def refusing(kind: str, *rows: tuple[Any, ...], **more: Any) -> tuple[Mutation, ...]:
+    """A table of mutations that are refused: name, job, words to be said."""
+    return tuple(replace(refused(name, kind, *rest), **more) for name, *rest in rows)
+
+
+def attempt(mutation: Mutation, export: Path, room: Path) -> str:
+    """Break a copy in a folder of its own, and verify it; what is wanting then, or empty."""
+    folder = copy(export, room / "export")
+    words = list(mutation.words)
+    if not mutation.during:
+        words += mutation.job(folder) or ()
+        if mutation.signed and (folder / "manifest.json").is_file():
+            sign(folder)
+
+    def progress(stage: str) -> None:
+        if stage == mutation.during:
+            mutation.job(folder)
+
+    try:
+        checks: Sequence[Check] = verify(folder, progress, HERE).checks
+    except BadExport as error:
+        wanting = _missing(words, str(error)) if mutation.status == 2 else f"refused: {error}"
+    else:
+        wanting = _verdict(mutation, words, checks)
+    shutil.rmtree(room)
+    return wanting
+
+
+def _verdict(mutation: Mutation, words: list[str], checks: Sequence[Check]) -> str:
+    bad = [check for check in checks if check.passed is not True]
+    mine = [c for c in bad if c.name in mutation.checks and (c.passed is None) == mutation.unknown]
+    said = "; ".join(f"{check.name} {check.passed}: {check.detail}" for check in bad)
+    if mutation.status != int(bool(bad)):
+        return f"another exit status: {said}"
+    if mutation.status and not mine:
+        return f"none of {', '.join(mutation.checks)} says so: {said}"
+    if mutation.alone and len(mine) < len(bad):
+        return f"another check says so too: {said}"
+    return _missing(words, "; ".join(check.detail for check in mine))
+
+
+def _missing(words: list[str], said: str) -> str:
+    lost = [word for word in words if word not in said]
+    return f"does not say {', '.join(map(repr, lost))}: {said}" if lost else ""

@@ -10,38 +10,58 @@ from pathlib import Path
 from typing import Any
 
 import ezdxf
-import numpy as np
 import trimesh
 
 from tests.exported_files import Rows, edit_csv
 from tests.verify.corpus.copies import change, load, put, store
 from tests.verify.corpus.mutation import Job
 
-Record = dict[str, Any]
 RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
-BALLS, BILL, HOLES = "balls.csv", "bom.csv", "plate_holes.csv"
+BALLS, HOLES = "balls.csv", "plate_holes.csv"
 SETTINGS = "grbl_settings.txt"
 PLATE, WHEEL, UPRIGHT, LAMP = (
     f"drawing_{name}.dxf" for name in ("plate", "wheel", "upright", "lamp")
 )
-KLIPPER = "rotation_plan_klipper.gcode"
+KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
 
 
-def record(
-    how: Callable[[Record], object], design: Callable[[Record], object] | None = None
-) -> Job:
-    """Change prototype.json, and design.json too."""
+DROP = object()
+
+
+def at(path: str, to: object = DROP, file: str = RECORD) -> Job:
+    """Another value at a path of keys, or what a function makes of it; or none.
+
+    Items of a list are named by number, or by what the first one's name or part begins with.
+    """
 
     def job(folder: Path) -> Sequence[str]:
-        for name, one in ((RECORD, how), (DESIGN, design)):
-            if one:
-                value = load(folder, name)
-                one(value)
-                store(folder, name, value)
+        value = inside = load(folder, file)
+        *keys, last = path.split("/")
+        for key in keys:
+            inside = inside[_place(inside, key)]
+        place = _place(inside, last)
+        if to is DROP:
+            del inside[place]
+        else:
+            inside[place] = to(inside[place]) if callable(to) else to
+        store(folder, file, value)
         return ()
 
     return job
+
+
+def _place(value: Any, key: str) -> str | int:
+    if isinstance(value, dict):
+        return key
+    if re.fullmatch(r"-?\d+", key):
+        return int(key)
+    names = [(one.get("name", ""), one.get("part", "")) for one in value]
+    return next(k for k, some in enumerate(names) if any(name.startswith(key) for name in some))
+
+
+def plus(by: float) -> Callable[[float], float]:
+    return lambda value: value + by
 
 
 def table(name: str, how: Callable[[Rows], object]) -> Job:
@@ -152,82 +172,20 @@ def glb(how: Callable[[trimesh.Scene], object]) -> Job:
     return job
 
 
-def bought(name: str, part: str) -> Job:
-    """A purchased body that is another part of the list."""
-
-    def how(value: Record) -> None:
-        next(one for one in value["bought"] if one["name"] == name)["part"] = part
-
-    return record(how)
-
-
-def magnet(part: str) -> Job:
-    """The first magnet is another one."""
-
-    def how(value: Record) -> None:
-        some = value["fasteners"]
-        next(one for one in some if one["part"].startswith("MAGNET"))["part"] = part
-
-    return record(how)
-
-
-def fastener(part: str, **values: object) -> Job:
-    """Other values of the first fastener of a part."""
-
-    def how(value: Record) -> None:
-        next(one for one in value["fasteners"] if one["part"] == part).update(values)
-
-    return record(how)
-
-
-def fastener_off(part: str, by: float) -> Job:
-    """The first fastener of a part recorded elsewhere."""
-
-    def how(value: Record) -> None:
-        one = next(one for one in value["fasteners"] if one["part"] == part)
-        one["position_mm"][0] += by
-
-    return record(how)
-
-
-def no_fastener(part: str) -> Job:
-    """The first fastener of a part is not in the record."""
-
-    def how(value: Record) -> None:
-        some = value["fasteners"]
-        some.remove(next(one for one in some if one["part"] == part))
-
-    return record(how)
-
-
 def mounted_in(body: str, key: str | None) -> Job:
     """The first fastener that presses on a body is mounted in another step, or in none."""
 
-    def how(value: Record) -> None:
+    def job(folder: Path) -> Sequence[str]:
+        value = load(folder, RECORD)
         name = next(one["name"] for one in value["fasteners"] if one["through"][0] == body)
         for step in value["assembly_steps"]:
             step["mounts"] = [one for one in step["mounts"] if one != name]
             if step["key"] == key:
                 step["mounts"].append(name)
+        store(folder, RECORD, value)
+        return ()
 
-    return record(how)
-
-
-def led(by: float, *, spec: bool) -> Job:
-    """An LED elsewhere in the record, and in the spec too."""
-
-    def how(value: Record) -> None:
-        value["leds"][0]["position_mm"][0] += by
-
-    def design(value: Record) -> None:
-        value["spec"]["prototype"]["stage"]["leds_mm"][0][0] += by
-
-    return record(how, design if spec else None)
-
-
-def stage_key(**values: object) -> Job:
-    """Other keys of the stage in the spec."""
-    return record(lambda _: None, lambda d: d["spec"]["prototype"]["stage"].update(values))
+    return job
 
 
 def spigot(cap: str, by: float) -> Job:
@@ -247,53 +205,6 @@ def spigot(cap: str, by: float) -> Job:
     return job
 
 
-def frame_key(**values: object) -> Job:
-    """Change keys of the section of the frame in design.json."""
-    return record(lambda _: None, lambda d: d["spec"]["prototype"]["frame"].update(values))
-
-
-def lamps(**values: object) -> Job:
-    """Change what the record has of the lamps."""
-    return record(lambda r: r["lamps"].update(values))
-
-
-def lamp_aside(number: int, by: float) -> Job:
-    """Move a lamp along x in the record, mm."""
-
-    def how(value: Record) -> None:
-        value["lamps"]["places"][number]["position_mm"][0] += by
-
-    return record(how)
-
-
-def unpainted(name: str) -> Job:
-    """Take a printed part's finish out of the record."""
-
-    def how(value: Record) -> None:
-        next(part for part in value["parts"] if part["name"] == name)["finish"] = None
-
-    return record(how)
-
-
-def _on_their_sides(value: Record) -> None:
-    value["lamps"]["level"] = not value["lamps"]["level"]
-
-
-lamps_on_their_sides = record(_on_their_sides)
-
-
-def no_lamps(value: Record) -> None:
-    value["lamps"] = None
-
-
-def no_panel(value: Record) -> None:
-    value["shroud"]["panels"].pop()
-
-
-def shiny_card(value: Record) -> None:
-    value["shroud"]["finish"] = "white"
-
-
 def flat_fold(space: Any) -> None:
     space.delete_entity(next(one for one in space.query("LINE") if one.dxf.layer == "fold"))
 
@@ -305,43 +216,6 @@ def drawn_away(name: str, x: float, y: float = 0.0, z: float = 0.0) -> Job:
         scene.geometry[scene.graph[name][1]].apply_translation([x, y, z])
 
     return glb(how)
-
-
-def picture(number: int, **values: float) -> Job:
-    """Change a picture of the gauge's marks."""
-    return record(lambda r: r["camera_place"]["pictures"][number].update(values))
-
-
-def mark_aside(by: float) -> Job:
-    """Move a near mark across the arm, mm."""
-
-    def how(value: Record) -> None:
-        value["camera_place"]["marks_mm"][0][0][1] += by
-
-    return record(how)
-
-
-def origin_of(name: str, by: float) -> Job:
-    """Move a printed part on the bed without its mesh, mm."""
-
-    def how(value: Record) -> None:
-        part = next(one for one in value["parts"] if one["name"] == name)
-        part["origin_mm"][0] += by
-
-    return record(how)
-
-
-def leds_on_one_side(value: Record) -> None:
-    for k, led in enumerate(value["leds"]):
-        led["position_mm"] = [-23.0, float(k), -5.0]
-
-
-def no_led(value: Record) -> None:
-    value["leds"].pop()
-
-
-def no_spec_led(value: Record) -> None:
-    value["spec"]["prototype"]["stage"]["leds_mm"].pop()
 
 
 def empty_step(text: str) -> str:
@@ -373,16 +247,6 @@ def shifted(key: str, by: float) -> Callable[[Rows], None]:
     def how(rows: Rows) -> None:
         for one in rows:
             one[key] = repr(float(one[key]) + by)
-
-    return how
-
-
-def nudged(node: str, by_mm: float) -> Callable[[trimesh.Scene], None]:
-    """One body of the GLB elsewhere."""
-
-    def how(scene: trimesh.Scene) -> None:
-        mesh = scene.geometry[scene.graph[node][1]]
-        mesh.vertices = mesh.vertices + np.array([by_mm, 0, 0])
 
     return how
 

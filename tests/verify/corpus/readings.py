@@ -9,38 +9,35 @@ import hashlib
 import io
 import pickle
 import stat
-import threading
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import manifold3d
-import numpy as np
 from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype import (
     assembly,
     bodies,
     camera_gauge_checks,
-    flat_drawing,
+    caps,
+    cut_checks,
+    fastener_checks,
     measured_parts,
-    measured_prototype,
+    seats,
     stage_checks,
 )
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.bodies import Bodies
+from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import gcode_checks, homing_checks, klipper_checks
-from tbcad_verify.prototype.fits import caps, fastener_checks, seats
 from tbcad_verify.prototype.light import lamp_light
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
-from tbcad_verify.prototype.light.ray_transfer import ray_transfer
-from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
+from tbcad_verify.prototype.light.ray_paths import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
@@ -68,19 +65,17 @@ PURE: dict[Any, tuple[str, ...]] = {
     verification: ("area_checks",),
     shell_checks: ("wall", "cells_of_export"),
     prototype_stages: ("measure_part", "joined_meshes"),
-    prototype_stages.inventory: ("read_solids",),
     prototype_stages.swing: ("_parts_apart",),
     measured_parts: ("manifold",),
-    assembly: ("manifold",),
-    bodies: ("_scene",),
+    assembly: ("manifold", "read_solids"),
+    bodies: ("_scene", "join_meshes", "build_scene"),
     camera_gauge_checks: ("joined_meshes", "build_scene"),
     caps: ("fit_sphere",),
-    flat_drawing: ("dxf_entities",),
+    cut_checks: ("dxf_entities",),
     fastener_checks: ("_hole_spans",),
     gcode_checks: ("run_program",),
     homing_checks: ("run_program",),
-    klipper_checks: ("run_program", "_run"),
-    measured_prototype: ("join_meshes", "build_scene"),
+    klipper_checks: ("run_klipper",),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
     stage_checks: ("joined_meshes", "build_scene"),
 }
@@ -104,68 +99,16 @@ def remembered() -> Iterator[None]:
         (lamp_light, "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )
-    kept = _Kept()
     with ExitStack() as stack:
         for module, name, key in keyed:
-            once = _Once(getattr(module, name), key, kept)
+            once = _Once(getattr(module, name), key)
             stack.enter_context(mock.patch.object(module, name, once))
         each = _EachOnce(step_file.examine_all)
         stack.enter_context(mock.patch.object(step_file, "examine_all", each))
         yield
 
 
-class _Kept:
-    """Results that are kept, with the arrays and records in them: none changes any more.
-
-    A digest has them by their identity, and all else by its content.
-    """
-
-    def __init__(self) -> None:
-        self._objects: dict[int, object] = {}
-
-    def __contains__(self, one: object) -> bool:
-        return id(one) in self._objects
-
-    def add(self, result: object, given: object) -> None:
-        """Keep a result, but what it was given: that is compared by its content."""
-        new = self._parts(result)
-        for part in self._parts(given):
-            new.pop(part, None)
-        self._objects |= new
-
-    def _parts(self, whole: object) -> dict[int, object]:
-        """All arrays, solids and records in a value that are not kept yet, by identity."""
-        found: dict[int, object] = {}
-        waiting = [whole]
-        while waiting:
-            one = waiting.pop()
-            if isinstance(one, list | tuple):
-                waiting += one
-            elif isinstance(one, dict):
-                waiting += one.values()
-            elif one in self or id(one) in found:
-                continue
-            elif isinstance(one, np.ndarray | manifold3d.Manifold):
-                found[id(one)] = one
-            elif is_dataclass(one):
-                found[id(one)] = one
-                waiting += vars(one).values()
-        return found
-
-    def digest(self, value: object) -> str:
-        stream = io.BytesIO()
-        _Pickler(stream, self).dump(value)
-        return hashlib.sha256(stream.getbuffer()).hexdigest()
-
-
 class _Pickler(pickle.Pickler):
-    def __init__(self, stream: io.BytesIO, kept: _Kept) -> None:
-        super().__init__(stream, pickle.HIGHEST_PROTOCOL)
-        self._kept = kept
-
-    def persistent_id(self, one: object) -> int | None:
-        return id(one) if one in self._kept else None
-
     def reducer_override(self, one: object) -> Any:
         if isinstance(one, Export):
             names = {field.name for field in fields(one)} - NOT_DERIVED_FROM
@@ -181,21 +124,20 @@ class _Pickler(pickle.Pickler):
 class _Once:
     """A function that keeps what it returned, by a key of its arguments; None: it is called."""
 
-    def __init__(self, work: Callable[..., Any], key: Callable[..., object], kept: _Kept) -> None:
-        self._work, self._key, self._kept = work, key, kept
-        self._found: dict[str, Any] = {}
-        self._busy: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
+    def __init__(self, work: Callable[..., Any], key: Callable[..., object]) -> None:
+        self._work, self._key = work, key
+        self._found: dict[bytes, Any] = {}
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         value = self._key(*given, **named)
         if value is None:
             return self._work(*given, **named)
-        key = self._kept.digest(value)
-        with self._busy[key]:
-            if key not in self._found:
-                self._found[key] = self._work(*given, **named)
-                self._kept.add(self._found[key], (given, named))
-            return self._found[key]
+        stream = io.BytesIO()
+        _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+        key = hashlib.sha256(stream.getbuffer()).digest()
+        if key not in self._found:
+            self._found[key] = self._work(*given, **named)
+        return self._found[key]
 
 
 class _EachOnce:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tbcad_verify.mesh.lines import (
+from tbcad_verify.mesh.vectors import (
     crossings,
     distances_to_segments,
+    dot,
     nearest_on_lines,
+    norm,
     rotation_angles,
 )
-from tbcad_verify.mesh.vectors import dot, norm, unit
 
 RNG = np.random.default_rng(8)
 
@@ -48,10 +49,6 @@ def test_distances_from_a_segment(x: tuple[float, ...], distance: float) -> None
     assert found[0] == pytest.approx(distance)
 
 
-def test_a_segment_without_length_is_a_point() -> None:
-    assert distances_to_segments(column(3, 4, 0), column(0, 0, 0), column(0, 0, 0))[0] == 5
-
-
 @pytest.mark.parametrize(("centre", "turns"), [((0, 0), 1), ((0.9, 0), 1), ((3, 0), 0)])
 def test_rotation_angles_add_up_to_the_winding_number(
     centre: tuple[float, float], turns: int
@@ -62,11 +59,3 @@ def test_rotation_angles_add_up_to_the_winding_number(
     for path, sign in ((circle, 1), (circle[:, ::-1], -1)):
         found = rotation_angles(axis, path, np.roll(path, -1, axis=1)).sum()
         assert found == pytest.approx(2 * np.pi * turns * sign, abs=1e-12)
-
-
-def test_rotation_angles_are_about_their_axis() -> None:
-    axis = unit(RNG.normal(size=(3, 30)))
-    x = np.cross(axis, RNG.normal(size=(3, 30)), axis=0)
-    angle = RNG.uniform(-3, 3, 30)
-    rotated = np.cos(angle) * x + np.sin(angle) * np.cross(axis, x, axis=0)
-    np.testing.assert_allclose(rotation_angles(axis, x + axis, rotated - axis), angle, atol=1e-12)

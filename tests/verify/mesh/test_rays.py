@@ -9,7 +9,7 @@ import pytest
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, join_meshes
 from tbcad_verify.mesh.rays import build_scene, first_hits, pixel_rows, row_chunks, with_image
 from tbcad_verify.record.export import read_export
-from tbcad_verify.shell.mirror_image import flipped_mesh
+from tbcad_verify.shell.measured_shell import flipped_mesh
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 

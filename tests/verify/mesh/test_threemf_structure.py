@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from tbcad_verify.mesh.threemf_structure import are_counted
+from tbcad_verify.mesh.threemf import are_counted
 
 VERTEX = b"vertex", (b"x", b"y", b"z")
 TRIANGLE = b"triangle", (b"v1", b"v2", b"v3")

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import trimesh
-from tbcad_verify.mesh.mass import mass_properties
-from tbcad_verify.mesh.mesh import Mesh, manifold_status, mesh_from_facets
+from tbcad_verify.mesh.mesh import Mesh, manifold_status, mass_properties, mesh_from_facets
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.printing.part_measures import PartMeasures, measure
 

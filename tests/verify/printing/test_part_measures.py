@@ -8,8 +8,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tbcad_verify.printing.part_measures import PartMeasures
-from tbcad_verify.printing.walls import thin_area
+from tbcad_verify.printing.part_measures import PartMeasures, thin_area
 from tbcad_verify.report.checks import Unknown
 
 from tests.verify.printing.printing_meshes import (
@@ -127,16 +126,6 @@ def test_a_needle_that_looks_askance_is_passed_over() -> None:
     assert found.walls.minimum == pytest.approx(10, abs=1e-4)
 
 
-def test_an_open_surface_has_no_wall() -> None:
-    half = box(10, 10, 10)
-    half.update_faces(half.face_normals[:, 2] > -0.5)
-    lid = trimesh.Trimesh(half.vertices, half.faces[half.face_normals[:, 2] > 0.5])
-    lid.vertices[0, 2] += 1  # so that it spans a hull
-    found = shape(lid)
-    assert found.walls.minimum == np.inf
-    assert found.status != "NoError"
-
-
 def test_points_in_a_plane_are_no_part() -> None:
     flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]], process=False)
     with pytest.raises(Unknown, match="flat"):
@@ -154,14 +143,6 @@ def drilled(drill: manifold3d.Manifold) -> PartMeasures:
     """A block of 20 x 20 x 10 about the origin without the drill."""
     solid = (manifold3d.Manifold.cube([20, 20, 10], True) - drill).to_mesh()
     return shape(trimesh.Trimesh(solid.vert_properties[:, :3], solid.tri_verts, process=False))
-
-
-def test_a_blind_hole() -> None:
-    drill = manifold3d.Manifold.cylinder(10, 1.5, 1.5, 48).translate([1, 2, 6])
-    found = drilled(drill.translate([0, 0, -4]))
-    assert found.holes.diameter == pytest.approx([3], abs=1e-4)
-    assert found.holes.middle[:, 0] == pytest.approx([1, 2, 3.5], abs=1e-4)
-    assert found.holes.depth == pytest.approx([3], abs=1e-4)
 
 
 def test_a_hole_with_a_round_bottom() -> None:
@@ -194,18 +175,6 @@ def test_an_open_hole_needs_three_quarters_of_its_turn(missing: float, count: in
     outline = np.vstack([[[-9, -9], [5, -9]], bite[::1], [[5, 9], [-9, 9]]])
     found = shape(plate(outline, [], 4)).holes
     assert found.diameter == pytest.approx([4] * count, abs=1e-4)
-
-
-def test_loose_shells() -> None:
-    found = shape(box(10, 10, 10), box(1, 1, 1, at=(20, 0, 0)), box(1, 1, 1, at=(0, 20, 0)))
-    assert (found.solids, found.cavities) == (3, 0)
-    assert found.mass.volume == pytest.approx(1002)
-
-
-def test_inside_out_is_a_cavity_and_has_no_wall() -> None:
-    found = shape(turned_inside_out(box(10, 10, 10)))
-    assert (found.solids, found.cavities) == (0, 1)
-    assert found.mass.volume == pytest.approx(-1000)
 
 
 BASE = shape(flange())

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.printing.assessment import assess, print_check, to_row
+from tbcad_verify.printing.orientations import best_rotation, silhouette
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import overhang_area, place, pose_text
 from tbcad_verify.printing.profile import Profile, load
-from tbcad_verify.printing.rotating_callipers import best_rotation, silhouette
 
 from tests.verify.printing.printing_meshes import (
     box,
@@ -75,11 +75,6 @@ def test_a_long_plate_fits_an_oblong_bed_at_one_angle(degrees: float) -> None:
     found = place(shape(box(110, 10, 3)), bed(*sides, 3.01))
     assert found.pose.fits
     assert found.pose.size == pytest.approx([*sides, 3], abs=1e-3)
-
-
-def test_a_cube_that_stands_on_a_corner_is_laid_down() -> None:
-    cube = shape(turned(box(20, 20, 20), 33, (1, 2, 3)))
-    assert place(cube, bed(20, 20, 20)).pose.fits
 
 
 def test_a_rod_fits_only_tilted() -> None:
@@ -152,22 +147,6 @@ def test_the_overhang_of_a_tilted_plate(lean: float, share: float) -> None:
     """One face of 40 x 20 leans 30 degrees; the edge of 20 x 1 below looks down by 60."""
     mesh = mesh_of(turned(box(1, 20, 40), 30, (0, 1, 0)))
     assert area(mesh, lean) == pytest.approx(20 * 1 + share * 800, rel=1e-5)
-
-
-def test_what_lies_on_the_bed_does_not_hang() -> None:
-    assert area(mesh_of(box(10, 10, 10)), 45) == 0
-    stepped = mesh_of(box(10, 10, 10), box(4, 4, 4, at=(20, 0, 0)))
-    assert area(stepped, 45) == pytest.approx(16, rel=1e-6)
-
-
-def test_no_overhang_where_none_needs_support() -> None:
-    found = assess("t.stl", shape(tee()), load("sls"))
-    assert found.placement.overhang is None
-    assert to_row(found)["overhang_share"] is None
-
-
-def test_without_overhang_the_lowest_way_to_lie() -> None:
-    assert place(shape(box(3, 20, 30)), load("sls")).pose.size[2] == pytest.approx(3, abs=1e-5)
 
 
 def test_a_good_part() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -44,14 +43,6 @@ def test_the_first_file_explains_every_key() -> None:
     lines = (folder / "fdm.toml").read_text().splitlines()
     given = {line.split(" = ")[0] for line in lines if " = " in line and line[0] != "#"}
     assert given == set(Profile.model_fields)
-
-
-def test_a_users_file(file: Path) -> None:
-    mine = load(str(file))
-    assert mine.bed_mm == (200, 210.5, 250)
-    assert mine.overhang_deg == 50
-    assert mine.cavities
-    assert mine.max_triangles is None
 
 
 BAD = [
@@ -106,23 +97,12 @@ def test_names_that_are_none(name: str, message: str) -> None:
     assert str(caught.value).isprintable()
 
 
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.toml")
-    with pytest.raises(BadProfile, match="not a regular file"):
-        load(str(tmp_path / "pipe.toml"))
-
-
 def test_a_file_that_is_too_large(file: Path) -> None:
     file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD)), encoding="utf-8")
     assert load(str(file)).name == "mine"
     file.write_text(GOOD + "#" * (MAX_BYTES - len(GOOD) + 1), encoding="utf-8")
     with pytest.raises(BadProfile, match=f"larger than the {MAX_BYTES} bytes"):
         load(str(file))
-
-
-def test_a_byte_order_mark(file: Path) -> None:
-    file.write_text(GOOD, encoding="utf-8-sig")
-    assert load(str(file)).name == "mine"
 
 
 def test_no_text(file: Path) -> None:

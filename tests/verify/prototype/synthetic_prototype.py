@@ -45,7 +45,7 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "plate holes", "drawings"),
     *("fasteners", "fastener holes", "key access", "homing", "controller settings", "klipper"),
-    *("camera mount", "camera gauge", "camera place", "cap tilt", "shroud", "radius rule"),
+    *("camera mount", "camera gauge", "cap tilt", "shroud", "radius rule"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
     *("fall energy", "object room", "leds seen"),
@@ -319,17 +319,8 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         low = float((corners @ TURN)[..., 2].min())
         origin = np.array([3.0, -2.0, -low])
         files[f"{name}.stl"] = stl((corners @ TURN + origin).astype(np.float32))
-        entries.append(
-            {
-                "name": name,
-                "stl": f"{name}.stl",
-                "role": role,
-                "finish": None,
-                "ball": ball,
-                "axes": TURN.tolist(),
-                "origin_mm": origin.tolist(),
-            }
-        )
+        entry = {"name": name, "stl": f"{name}.stl", "role": role, "finish": None, "ball": ball}
+        entries.append(entry | {"axes": TURN.tolist(), "origin_mm": origin.tolist()})
     for k, ball_ in enumerate(balls):
         if k != CAP:
             whole = trimesh.creation.uv_sphere(ball_.body, count=[32, 32])
@@ -363,14 +354,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         },
         "fasteners": [],
         "assembly_steps": [],
-        "bought": [
-            {
-                "name": "motor",
-                "part": "NEMA17-40",
-                "turns": False,
-                "finish": None,
-            }
-        ],
+        "bought": [{"name": "motor", "part": "NEMA17-40", "turns": False, "finish": None}],
         "lamps": None,
         "shroud": None,
         "drawings": [],

@@ -25,7 +25,7 @@ PRINT = "afternoon-print"
 
 @pytest.mark.parametrize("drive", DRIVES, ids=lambda drive: f"{drive.name} {drive.motor.name}")
 def test_torque_and_ratio_are_those_of_the_lists(drive: Drive) -> None:
-    holding = MOTORS[drive.motor.name].torque
+    holding = MOTORS[drive.motor.name]
     ratio = WORM_RATIO if drive.name == "stage-60" else drive.ratio
     assert drive.holds_nmm == pytest.approx(holding * ratio * EFFICIENCY[drive.name])
     assert drive.steps_per_deg(8) == pytest.approx(FULL_STEPS * 8 * ratio / 360)
@@ -112,7 +112,7 @@ def test_motor_and_belt_yield() -> None:
 def test_both_sides_of_a_belt_pull_at_the_shaft() -> None:
     """Of equal wheels in one direction: 1.2 and 0.2 of the pull; life by the cube (ISO 281)."""
     assert drive_checks._shaft_load(EQUAL, 500.0) == pytest.approx(1.4 * 50.0)
-    assert drive_checks._shaft_limit(MOTORS["NEMA17-40"]) == pytest.approx(22 * 60 ** (1 / 3))
+    assert drive_checks._shaft_limit("NEMA17-40") == pytest.approx(22 * 60 ** (1 / 3))
 
 
 @pytest.mark.designs

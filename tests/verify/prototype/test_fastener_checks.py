@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tbcad_verify.prototype.fits.fastener_checks import _faults, _is_filled, size_of
+from tbcad_verify.prototype.fastener_checks import faults_of, is_filled, size_of
 from tbcad_verify.record.prototype_sections import PlacedFastener
 from tbcad_verify.step.solids_text import RoundFace, TextSolid
 
@@ -49,7 +49,7 @@ def placed(**changed: Any) -> PlacedFastener:
 
 
 def faults(one: PlacedFastener, some: Mapping[str, TextSolid], *others: PlacedFastener) -> str:
-    return "; ".join(_faults(one, [one, *others], some))
+    return "; ".join(faults_of(one, [one, *others], some))
 
 
 def test_a_screw_in_its_place_has_no_fault() -> None:
@@ -94,9 +94,9 @@ def test_an_insert_is_gripped_by_a_diameter() -> None:
 
 def test_a_hole_is_filled_from_its_axis_or_a_slot_from_its_middle() -> None:
     slot = [face(5.0, 0, 8, 2.75), face(15.0, 0, 8, 2.75)]
-    assert all(_is_filled(placed(), one, slot) for one in slot)
+    assert all(is_filled(placed(), one, slot) for one in slot)
     beside = placed(position_mm=[11.0, 5.0, 9.0])
-    assert not any(_is_filled(beside, one, slot) for one in slot)
+    assert not any(is_filled(beside, one, slot) for one in slot)
 
 
 def test_sizes_follow_from_names() -> None:

@@ -10,8 +10,8 @@ import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.flange_holes import Flange, Hole, HoleLimits, flanges, hole_faults
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.casing import read_casing
 from tbcad_verify.step.part21 import StepTable
+from tbcad_verify.step.solids_text import read_casing
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 LIMITS = HoleLimits(size=1e-6, place=1e-3)

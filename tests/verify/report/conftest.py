@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.report.checks import Check
-from tbcad_verify.report.key_figures import KEY_FIGURES
+from tbcad_verify.report.methods import KEY_FIGURES
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import verify
 

@@ -15,7 +15,6 @@ from tbcad_verify.report.checks import (
     attempt,
     each_at_most,
     exactly,
-    finite,
     guarded,
     guarded_each,
     informative,
@@ -72,11 +71,6 @@ def test_lists_are_short(more: int, end: str) -> None:
     assert said.endswith(" and 1 more") == (more > 0)
 
 
-def test_the_worst_are_those_of_most_badness() -> None:
-    bad, badness = np.array([True, True, False]), np.array([1.0, 2.0, 3.0])
-    assert worst_offenders("abc", np.zeros(3), "mm", bad, ".0f", badness) == "b 0 mm, a 0 mm"
-
-
 def test_what_breaks_is_unknown() -> None:
     def breaks(*_: object) -> Check:
         raise ValueError("no\nlines")
@@ -90,7 +84,3 @@ def test_what_breaks_is_unknown() -> None:
     assert require(0, "why") == 0
     with pytest.raises(Unknown, match="why"):
         require(None, "why")
-
-
-def test_only_finite_numbers_are_kept() -> None:
-    assert [finite(value) for value in (1, -math.inf, math.nan)] == [1, None, None]

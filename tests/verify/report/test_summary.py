@@ -8,19 +8,19 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rich.console import Console
 from tbcad_verify import main
-from tbcad_verify.programs.answers import skipped
-from tbcad_verify.report.as_made import AsMade, ProcessYield
+from tbcad_verify.programs.program_query import skipped
 from tbcad_verify.report.checks import Check
-from tbcad_verify.report.key_figures import KEY_FIGURES, LABEL_WIDTH, key_figures
 from tbcad_verify.report.methods import (
     AS_BUILT,
     ELSE,
     EXPORT,
+    KEY_FIGURES,
+    LABEL_WIDTH,
     UNKNOWN,
+    key_figures,
     methods,
     remedy,
     remedy_by_name,
@@ -89,12 +89,6 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
 
 
-def test_processes_that_are_all_good_fit(long_report: Report) -> None:
-    good = (ProcessYield(name, 1.0, 123.456) for name in ("diamond", "cnc", "sla", "fdm", "sls"))
-    lines = fits(shown(replace(long_report, as_made=AsMade(50, tuple(good)))))
-    assert "  diamond 100% 123, cnc 100% 123, sla 100% 123, fdm 100% 123, sls 100% 123" in lines
-
-
 def test_every_key_figure_has_room(long_report: Report) -> None:
     text = "\n".join(fits(shown(replace(long_report, note=""))))
     assert all(one.label in text for one in KEY_FIGURES)
@@ -131,17 +125,6 @@ def test_a_failure_says_what_where_and_what_to_do(shell_report: Report) -> None:
     assert "hfov_deg" in lines[2]
 
 
-def test_a_figure_that_just_misses_is_told_from_its_limit(shell_report: Report) -> None:
-    checks = tuple(
-        replace(check, measured=39.9991, passed=False)
-        if check.name == "coverage, facets"
-        else check
-        for check in shell_report.checks
-    )
-    text = shown(replace(shell_report, checks=checks))
-    assert "coverage, facets: 39.9991 mm, at least 40" in text
-
-
 def test_the_worst_comes_first_and_remedies_are_shared(shell_report: Report) -> None:
     names = ("watertight", "manifest", "coverage, facets", "coverage, spheres", "poses", "folds")
     lines = fits(shown(broken(shell_report, lambda check: check.name in names)))
@@ -173,6 +156,13 @@ def test_a_failing_export(
     assert written["pass"] is False
 
 
+def test_a_printer_that_was_asked_for_is_a_key_figure(shell_report: Report) -> None:
+    asked = broken(shell_report, lambda check: check.name == "print fdm", True, "")
+    checks = tuple(replace(one, limit=0.0) for one in asked.checks if one.name == "print fdm")
+    assert "print fdm" not in shown(shell_report)
+    assert "print fdm" in shown(replace(asked, checks=asked.checks + checks))
+
+
 def test_full_shows_every_check_and_ends_like_the_summary(shell_report: Report) -> None:
     lines = fits(shown(shell_report, "full"))
     assert "\n".join(lines).endswith(shown(shell_report).rstrip())
@@ -193,11 +183,6 @@ def test_printers_take_a_line_each_and_parts_share_their_problem(shell_report: R
     ]
     text = shown(replace(shell_report, printing=tuple(rows)), "full")
     assert "sla (resin): 1 of 3 parts can be made\n  not a, c: 1 mm off\n" in text
-
-
-def test_a_printer_that_was_asked_for_is_a_key_figure(export_folder: Path) -> None:
-    report = verify(export_folder, options=replace(IN_PROCESS, printers=("fdm",), write=False))
-    assert "print fdm" in shown(report)
 
 
 def test_json_has_the_documented_keys(long_report: Report) -> None:
@@ -278,15 +263,3 @@ def test_outputs_exclude_each_other(
     assert len(shown.err.splitlines()) == 1
     assert "only one of them" in shown.err
     assert not (export_folder / "verify.json").exists()
-
-
-def test_figures_that_nobody_could_measure(shell_report: Report) -> None:
-    blank = {name: np.full_like(column, np.nan) for name, column in shell_report.measured.items()}
-    checks = tuple(
-        replace(check, passed=None, measured=None, detail="took more than 1 s")
-        for check in shell_report.checks
-    )
-    lines = fits(shown(replace(shell_report, checks=checks, measured=blank)))
-    assert len(lines) <= MAX_LINES
-    assert lines[0].startswith("FAIL: unknown: ")
-    assert UNKNOWN in " ".join(lines)

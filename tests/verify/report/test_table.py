@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 from tbcad_verify import main
-from tbcad_verify.programs.answers import skipped
+from tbcad_verify.programs.program_query import skipped
 from tbcad_verify.report.checks import Check, at_most, informative, unknown
-from tbcad_verify.report.table import table
-from tbcad_verify.report.text import WIDTH
+from tbcad_verify.report.text import WIDTH, table
 
 
 def shown(*checks: Check) -> list[str]:

@@ -44,12 +44,6 @@ def test_a_good_end(tmp_path: Path) -> None:
     assert done.seconds > 0
 
 
-def test_late_words_are_not_lost(tmp_path: Path) -> None:
-    done = python(tmp_path, "print('x' * 300_000 + 'end')")
-    assert done.text.endswith("xend\n")
-    assert len(done.text) == 300_004
-
-
 def test_hanging_is_cut_short(tmp_path: Path) -> None:
     start = time.monotonic()
     done = python(tmp_path, "import time; print('soon', flush=True); time.sleep(900)", Limits(2))
@@ -72,12 +66,6 @@ def test_grandchildren_do_not_outlive_a_child(tmp_path: Path, rest: str, reason:
     done = python(tmp_path, SPAWN + rest, Limits(2))
     assert done.reason == reason
     assert time.monotonic() - start < 600
-    assert gone_soon(int(done.text))
-
-
-def test_ignoring_polite_signals_does_not_help(tmp_path: Path) -> None:
-    body = "import os, signal, time; signal.signal(15, signal.SIG_IGN); print(os.getpid(), "
-    done = python(tmp_path, body + "flush=True); time.sleep(900)", Limits(2))
     assert gone_soon(int(done.text))
 
 

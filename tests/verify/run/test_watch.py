@@ -59,12 +59,6 @@ def test_a_stage_without_an_end_is_unknown(failure: str) -> None:
     assert results.checks[2].detail == f"not reached: {broken!r} {reason}"
 
 
-def test_a_worker_that_ends_is_left_as_it_is() -> None:
-    results = watched("well")
-    assert results.stages == list(STAGES)
-    assert results.checks == [CHECK]
-
-
 def test_a_refusal_is_raised() -> None:
     with pytest.raises(BadExport, match="the file is bad"):
         watched("refuses")
@@ -137,26 +131,3 @@ def test_too_little_time_is_no_pass(export_folder: Path) -> None:
     assert "unknown: reading" in report.verdict
     assert len(report.verdict) < 160
     assert re.search(r"and \d+ more$", report.verdict)
-
-
-def test_a_file_replaced_while_it_is_read(export_folder: Path) -> None:
-    """With the very same bytes, in another file: who did that may have done more."""
-
-    def replace(stage: str) -> None:
-        if stage == "coverage":
-            copy = export_folder / "copy"
-            copy.write_bytes((export_folder / "shell_a.stl").read_bytes())
-            copy.replace(export_folder / "shell_a.stl")
-
-    with pytest.raises(BadExport, match=r"shell_a\.stl: changed while it was read"):
-        verify(export_folder, replace, VerifyOptions(apart=False))
-    assert not (export_folder / NAME).exists()
-
-
-def test_a_file_removed_while_it_is_read(export_folder: Path) -> None:
-    def remove(stage: str) -> None:
-        if stage == "coverage":
-            (export_folder / "mirrors.csv").unlink()
-
-    with pytest.raises(BadExport, match=r"mirrors\.csv: changed"):
-        verify(export_folder, remove, VerifyOptions(apart=False))

@@ -25,14 +25,13 @@ from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.step.mandrel_checks import mandrel_comparisons, mandrel_step_checks
 from tbcad_verify.step.step_file import read_step_files
 
-from tbcad.cad.formats.stl import write_stl
+from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_a_mesh
-from tbcad.shell.mandrel_files import camera_a_mandrel_mesh
+from tbcad.shell.files import camera_a_mandrel_mesh, camera_a_mesh
 from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 
 SETTINGS = ["n=4", "shell.negative=true", "width_px=200", "height_px=150"]
@@ -142,14 +141,6 @@ def with_a_long_foot(mesh: Mesh) -> Mesh:
     return changed(mesh, vertices)
 
 
-def inside_out(mesh: Mesh) -> Mesh:
-    return Mesh(mesh.vertices, mesh.triangles[:, ::-1])
-
-
-def with_a_facet_less(mesh: Mesh) -> Mesh:
-    return Mesh(mesh.vertices, np.delete(mesh.triangles, 1000, axis=0))
-
-
 @pytest.mark.parametrize(
     ("change", "found"),
     [
@@ -157,8 +148,6 @@ def with_a_facet_less(mesh: Mesh) -> Mesh:
         (mirrored_in_y, "mandrel mirrors"),
         (with_a_dent, "mandrel mirrors"),
         (with_a_long_foot, "mandrel body"),
-        (inside_out, "signed volume"),
-        (with_a_facet_less, "watertight"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
@@ -176,16 +165,6 @@ def test_a_broken_mesh_is_refused(
 def test_an_unchanged_mesh_is_not(folder: Path, setup: OpticalSetup, mirrors: MirrorDesign) -> None:
     write_stl(folder / STL, camera_a_mandrel_mesh(mirrors))
     assert failing(folder, setup) == {}
-
-
-def test_a_missing_mirror_is_named(
-    folder: Path, setup: OpticalSetup, mirrors: MirrorDesign
-) -> None:
-    mesh = camera_a_mandrel_mesh(mirrors)
-    array, vertices = mirrors.arrays[0], mesh.vertices.copy()
-    vertices[np.linalg.norm(vertices - array.mirrors.apex[20], axis=1).argmin()] *= 0.999
-    write_stl(folder / STL, changed(mesh, vertices))
-    assert array.ids[20] in failing(folder, setup)["mandrel mirrors"]
 
 
 def test_the_shell_is_no_negative(folder: Path, setup: OpticalSetup, mirrors: MirrorDesign) -> None:
@@ -222,11 +201,6 @@ def rewritten(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 def test_another_draft_is_refused(folder: Path, setup: OpticalSetup) -> None:
     rewritten(folder, lambda one: one["mandrels"][0].update(draft_deg=25.0))
     assert {*failing(folder, setup)} == {"mandrel draft, deviation from record"}
-
-
-def test_another_pull_is_refused(folder: Path, setup: OpticalSetup) -> None:
-    rewritten(folder, lambda one: one["mandrels"][0].update(pull=[1.0, 0.0, 0.0]))
-    assert "mandrel draft, deviation from record" in failing(folder, setup)
 
 
 def test_a_pull_is_a_unit_vector(folder: Path) -> None:

@@ -14,14 +14,14 @@ from tbcad_verify.printing.part_measures import PartMeasures, measure
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import require
 from tbcad_verify.shell import light, pixels
-from tbcad_verify.shell.measured_shell import ShellPart, measure_shells
-from tbcad_verify.shell.mirror_image import (
+from tbcad_verify.shell.measured_shell import (
     FLIP,
+    ShellPart,
     flipped_measures,
-    is_image_of_camera,
     is_mirror_image,
+    measure_shells,
 )
-from tbcad_verify.shell.optics import OpticalSetup, set_up
+from tbcad_verify.shell.optics import OpticalSetup, is_image_of_camera, set_up
 
 from tests.verify.synthetic_export import Cells
 

@@ -16,15 +16,13 @@ from tbcad_verify.mesh.stl import read_facets
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Check
 from tbcad_verify.run.processes import Processes
-from tbcad_verify.run.verify import verify
 from tbcad_verify.shell.integrity import mesh_ends_checks
 from tbcad_verify.shell.measured_shell import measure_shells
 from tbcad_verify.step.kernel.reading import transferred
 from tbcad_verify.step.shell_checks import shell_comparisons, shell_step_checks
 from tbcad_verify.step.step_file import read_step_files
 
-from tests.verify.optical_setups import IN_PROCESS
-from tests.verify.synthetic_export import FOOT, facets_of, mirrored, sign, stl
+from tests.verify.synthetic_export import FOOT, facets_of, mirrored, stl
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 X, Z = 0, 2
@@ -84,17 +82,6 @@ def test_a_half_that_stops_short_is_refused(export_folder: Path, axis: int, said
     facets[:, :, axis] += np.float32(0.02)
     (export_folder / "shell_a.stl").write_bytes(stl(facets))
     assert f"0.02 mm {said}" in ends(record)["shell_a.stl"].detail
-
-
-def test_the_whole_verification_refuses_tips_that_are_mirror_images(export_folder: Path) -> None:
-    broken = tipped(facets_of(export_folder / "shell_a.stl"), Z, -0.16)
-    (export_folder / "shell_a.stl").write_bytes(stl(broken))
-    (export_folder / "shell_b.stl").write_bytes(stl(mirrored(broken)))
-    report = verify(sign(export_folder), options=IN_PROCESS)
-    failed = [(one.name, one.file) for one in report.checks if one.passed is False]
-    assert [one for one in failed if one[0] == "mesh seam and foot"] == [
-        ("mesh seam and foot", f"shell_{half}.stl") for half in "ab"
-    ]
 
 
 def test_parts_that_are_no_halves_may_be_anywhere(export_folder: Path) -> None:

@@ -24,11 +24,18 @@ from OCP.GProp import GProp_GProps
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
-from tbcad_verify.step.kernel.arcs import between_arcs
-from tbcad_verify.step.kernel.box import OUTWARD, box, reach_of_face
 from tbcad_verify.step.kernel.measures import _integrated, measure_face, moments_of
 from tbcad_verify.step.kernel.reading import read_solid
-from tbcad_verify.step.kernel.topology import corners_of, each, faces_of, triple
+from tbcad_verify.step.kernel.shapes import (
+    OUTWARD,
+    between_arcs,
+    box,
+    corners_of,
+    each,
+    faces_of,
+    reach_of_face,
+    triple,
+)
 
 PLACE = gp_Ax2(gp_Pnt(30, -20, 10), gp_Dir(0, 0, 1))
 

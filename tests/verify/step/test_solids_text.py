@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step import part21
-from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.solids_text import (
+    Casing,
     RoundFace,
-    distance_to_line,
     holes,
+    read_casing,
     read_solids,
+    wall,
 )
 
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
@@ -44,18 +44,6 @@ def test_a_solid_has_its_product_name_and_corners(text: str) -> None:
     assert corners[:, 0].min() == pytest.approx(0, abs=1e-9)
 
 
-def test_below_geometry_is_nothing_that_counts(
-    text: str, casing: Casing, sample: Export, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = read_solids(text)["shell_a"]
-    monkeypatch.setattr(part21, "GEOMETRY", frozenset())
-    slow = read_solids(text)["shell_a"]
-    assert np.array_equal(found.corners, slow.corners)
-    assert repr(found.faces) == repr(slow.faces)
-    everything = read_casing(StepTable(text), frozenset(sample.mirrors.ids))
-    assert np.array_equal(casing.valleys, everything.valleys)
-
-
 def test_holes_are_those_of_the_design(sample: Export, text: str) -> None:
     faces, shell = read_solids(text)["shell_a"].faces, sample.spec.shell
     for diameter, count in (
@@ -67,12 +55,6 @@ def test_holes_are_those_of_the_design(sample: Export, text: str) -> None:
         assert {round(hole.depth, 6) for hole in found} == {shell.seam_flange.thickness_mm}
         assert {round(hole.radius, 6) for hole in found} == {diameter / 2}
     assert holes(faces, 1.0, 1e-6) == []
-
-
-def test_the_middle_of_a_hole_is_in_its_flange(casing: Casing, sample: Export) -> None:
-    seam = [hole for hole in casing.holes if abs(hole.axis[0]) > 0.5]
-    half = sample.spec.shell.seam_flange.thickness_mm / 2
-    assert {round(float(hole.point[0]), 6) for hole in seam} == {half}
 
 
 def test_the_wall_is_the_design_s(casing: Casing, sample: Export) -> None:
@@ -89,11 +71,6 @@ def test_what_is_no_shell_is_unknown(text: str) -> None:
         read_casing(StepTable(text.replace("SURFACE_OF_REVOLUTION", "PLANE")), frozenset())
     with pytest.raises(Unknown, match="no product's"):
         read_solids(text.replace("PRODUCT(", "PRODUCTS("))
-
-
-def test_distance_to_a_line() -> None:
-    z = np.array([0.0, 0.0, 1.0])
-    assert distance_to_line(np.array([4.0, 6.0, 9.0]), np.array([1.0, 2.0, 5.0]), z) == 5
 
 
 def test_faces_of_one_hole_are_counted_once_and_of_two_twice() -> None:

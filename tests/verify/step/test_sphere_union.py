@@ -108,11 +108,6 @@ def test_a_mirror_without_neighbours_is_open() -> None:
         assert np.isnan(closed_form_cells(UP, UP, np.array([k]), NO_WALLS).area).all()
 
 
-def test_no_mirror_at_all() -> None:
-    none = np.zeros((0, 3))
-    assert len(closed_form_cells(none, none, np.zeros(0), np.eye(3, 4)).area) == 0
-
-
 def test_what_comes_out_behind_the_neighbours_is_not_the_mirror() -> None:
     """Six small balls fence a large one; beyond them its front comes out again."""
     angle = np.arange(6) * PI / 3
@@ -177,13 +172,6 @@ def test_area_as_recorded(name: str, camera: str) -> None:
     export = as_export(made(name))
     it = cells_of_export(export, camera, coated=True)
     np.testing.assert_allclose(it.area, recorded(export, camera), rtol=1e-11)
-
-
-def test_area_as_recorded_in_the_sample() -> None:
-    export = read_export(SAMPLE)
-    for camera in ("a", "b"):
-        area = cells_of_export(export, camera).area
-        np.testing.assert_allclose(area, recorded(export, camera), rtol=1e-11)
 
 
 def test_area_under_the_coat() -> None:

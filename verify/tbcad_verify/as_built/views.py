@@ -8,7 +8,6 @@ import numpy as np
 
 from tbcad_verify.as_built.machine import AsBuilt
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.lines import nearest_on_lines
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
     ReflectedRays,
@@ -16,11 +15,11 @@ from tbcad_verify.mesh.surfaces import (
     prepare_for_rays,
     reflect,
 )
-from tbcad_verify.mesh.vectors import cross, dot, norm, unit
+from tbcad_verify.mesh.vectors import cross, dot, nearest_on_lines, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage
 from tbcad_verify.prototype.light.pinhole_cells import MirrorSpheres, cell_outlines
-from tbcad_verify.prototype.light.ray_transfer import rotated
+from tbcad_verify.prototype.light.ray_paths import rotated
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -83,11 +82,7 @@ def half_views(
 ) -> HalfViews:
     """Trace the outlines of all windows of a run whose stops were measured.
 
-    Args:
-        context: the record.
-        machine: where camera and base are.
-        half: the run.
-        centre: (3, K) of the balls with the base at angle zero, mm.
+    `centre`: (3, K) of the balls with the base at angle zero, mm.
     """
     known = np.flatnonzero(half.frame >= 0)
     views = HalfViews(*(np.full(len(half.ids), np.nan) for _ in range(3)))

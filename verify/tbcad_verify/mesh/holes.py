@@ -59,12 +59,7 @@ class FacetPatches:
 
 
 def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
-    """Find every round hole of which three quarters of the full turn are there.
-
-    Args:
-        mesh: a closed solid, outward.
-        edges: of the mesh.
-    """
+    """Find every round hole of which three quarters of the full turn are there."""
     bent = _bent(edges)
     half, bend = edges.half[bent], -edges.angle[bent]
     links = np.concatenate([half, edges.half[_flat(edges)]])
@@ -172,10 +167,8 @@ def _extent(along: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
 def fit_circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
     """Least-squares circle of each group; not finite where the points lie on a line.
 
-    Args:
-        points: (2, N).
-        group: (N,) 0 ... G - 1, each with at least one point.
-        count: G.
+    `points`: (2, N).
+    `group`: (N,) 0 ... G - 1, each with at least one point.
 
     Returns:
         (2, G) centres and (G,) radii.
@@ -200,10 +193,8 @@ def fit_circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floa
 def widest_gaps(angle: Floats, group: Groups, count: int) -> Floats:
     """(G,) the widest gap between neighbouring angles of each group, rad; 2 pi of empty groups.
 
-    Args:
-        angle: (N,) from -pi to pi; those that are not finite are left out.
-        group: (N,) 0 ... G - 1.
-        count: G.
+    `angle`: (N,) from -pi to pi; those that are not finite are left out.
+    `group`: (N,) 0 ... G - 1.
     """
     angle, group = angle[np.isfinite(angle)], group[np.isfinite(angle)]
     order = np.lexsort((angle, group))

@@ -141,10 +141,7 @@ def in_threads(
 ) -> list[Result]:
     """Results in the items' order, whatever the threads do.
 
-    Args:
-        work: done on each item.
-        items: what to work on.
-        stop: ends what the threads wait for; called when one fails, or at an interrupt.
+    `stop`: ends what the threads wait for; called when one fails, or at an interrupt.
     """
     if THREADS == 1:
         return [work(item) for item in items]

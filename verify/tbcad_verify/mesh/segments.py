@@ -101,9 +101,7 @@ def _beside_flat(mesh: Mesh, edges: Edges) -> Bools:
 def count_folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
     """How many edges fold the surface back onto itself; a solid one can make has none.
 
-    Args:
-        edges: of a mesh.
-        nearest: facets closer than this to a full turn lie back to back, rad.
+    `nearest`: facets closer than this to a full turn lie back to back, rad.
     """
     turned = np.abs(edges.angle) - edges.noise > np.pi - nearest
     return int(turned.sum())

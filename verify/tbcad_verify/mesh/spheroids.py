@@ -15,10 +15,8 @@ HALVINGS = 60
 def growth(semi_axes: Floats, camera: Camera, point: Floats) -> Floats:
     """(N,) by how much both semi-axes must grow for the spheroid to pass through points, mm.
 
-    Args:
-        semi_axes: of the camera's ellipsoid along its axis and across it, (2,) mm.
-        camera: whose pinhole and the origin are its foci.
-        point: (3, N) mm.
+    `semi_axes`: of the camera's ellipsoid along its axis and across it, (2,) mm.
+    `point`: (3, N) mm.
     """
     offset = point - camera.pinhole[:, None] / 2
     along = dot(offset, unit(camera.pinhole[:, None]))

@@ -26,10 +26,6 @@ class Facets:
 def read_facets(folder: Path, name: str) -> tuple[Facets, FileBytes]:
     """Facets of a binary STL, and the bytes they came from.
 
-    Args:
-        folder: the export, resolved.
-        name: the file in it.
-
     Raises:
         BadExport: ASCII, a size that does not follow from the count (found out before the file
             is read), no facets, or numbers that are not finite.

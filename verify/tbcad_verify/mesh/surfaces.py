@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.lines import nearest_on_lines
-from tbcad_verify.mesh.vectors import dot, norm, take
+from tbcad_verify.mesh.vectors import dot, nearest_on_lines, norm, take
 from tbcad_verify.types import Floats
 
 
@@ -121,10 +120,7 @@ def nearest_on_rays(rays: ReflectedRays) -> Floats:
 def distance_before_mirror(surfaces: PreparedSurfaces, d: Floats, reach: Floats) -> Floats:
     """(N,) minimum distances from the origin of rays d (3, N) up to where they meet the mirror.
 
-    Args:
-        surfaces: whose origin the rays start from.
-        d: directions.
-        reach: (N,) how many lengths of d lie before the mirror.
+    `reach`: (N,) how many lengths of d lie before the mirror.
     """
     return norm(nearest_on_lines(surfaces.origin[:, None], d, last=reach))
 

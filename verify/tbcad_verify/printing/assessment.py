@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.printing.part_measures import PartMeasures
+from tbcad_verify.printing.part_measures import PartMeasures, thin_area
 from tbcad_verify.printing.placement import SLACK_MM, BedPlacement, place, pose_text
 from tbcad_verify.printing.profile import Profile
-from tbcad_verify.printing.walls import thin_area
 from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative
 from tbcad_verify.types import Floats
 
@@ -40,13 +39,7 @@ class PrintAssessment:
 
 
 def assess(part: str, measures: PartMeasures, profile: Profile) -> PrintAssessment:
-    """Compare a part with a profile.
-
-    Args:
-        part: name of its STL in the export.
-        measures: of the part.
-        profile: of the machine.
-    """
+    """Compare a part with a profile."""
     placement = place(measures, profile)
     problems = (*_mesh_problems(measures, profile), *_size_problems(measures, profile, placement))
     uncut = uncut_edge_length(measures, profile)
@@ -110,12 +103,7 @@ def print_name(part: str, profile: Profile) -> CheckName:
 
 
 def print_check(one: PrintAssessment, required: bool) -> Check:
-    """The check of one part on one machine.
-
-    Args:
-        one: assessed.
-        required: whether the user asked for this printer: then a problem fails, else it informs.
-    """
+    """The check of one part on one machine."""
     name = print_name(one.part, one.profile)
     count, detail = float(len(one.problems)), "; ".join(one.problems)
     if required:

@@ -10,10 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
-from tbcad_verify.printing.orientations import HullView
+from tbcad_verify.printing.orientations import HullView, best_rotation
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.profile import Profile
-from tbcad_verify.printing.rotating_callipers import best_rotation
 from tbcad_verify.types import Floats
 
 SLACK_MM = 1e-3  # below any machine's precision, and the error of float32
@@ -111,11 +110,8 @@ def _overhangs(measures: PartMeasures, poses: list[Pose], profile: Profile) -> l
 def overhang_area(mesh: Mesh, double: Floats, down: Floats, lean_rad: float) -> float:
     """Area of facets that lean more than allowed and do not lie on the bed, mm^2.
 
-    Args:
-        mesh: a part's.
-        double: (F,) twice the facets' areas, mm^2.
-        down: (3,) unit, the direction that points down.
-        lean_rad: maximum lean from the vertical without support: 0 for walls, pi/2 for ceilings.
+    `double`: (F,) twice the facets' areas, mm^2.
+    `down`: (3,) unit, the direction that points down.
     """
     limit = math.sin(min(lean_rad + UNCERTAINTY_RAD, math.pi / 2))
     below = np.flatnonzero(np.einsum("in,i->n", mesh.area, down) > limit * double)

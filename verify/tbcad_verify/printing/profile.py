@@ -101,10 +101,6 @@ def load(name_or_path: str) -> Profile:
 def parse(where: str, text: str) -> Profile:
     """A profile from TOML text.
 
-    Args:
-        where: named in errors.
-        text: the TOML.
-
     Raises:
         BadProfile: as `load`.
     """

@@ -7,16 +7,16 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 
-from tbcad_verify.programs import admesh, freecad, gmsh, prusa
-from tbcad_verify.programs.answers import skipped
-from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, sandbox
+from tbcad_verify.programs.mesh_programs import ADMESH, PRUSA_3MF, PRUSA_SLICES, PRUSA_STL
+from tbcad_verify.programs.program_query import ExpectedPart, ProgramQuery, sandbox, skipped
+from tbcad_verify.programs.step_programs import FREECAD, GMSH
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import Check, guarded
 from tbcad_verify.run.child import Limits
 from tbcad_verify.types import Progress
 
 PROCESSES = 2
-QUERIES = (freecad.STEP, gmsh.STEP, prusa.STL, prusa.THREEMF, prusa.SLICES, admesh.STL)
+QUERIES = (FREECAD, GMSH, PRUSA_STL, PRUSA_3MF, PRUSA_SLICES, ADMESH)
 
 
 def check_with_programs(
@@ -31,12 +31,8 @@ def check_with_programs(
     The checks of a program that is not installed are skipped: see `is_skipped`. Those of one that
     crashes, runs out of time or gives no clear answer are unknown. An interrupt kills all of them.
 
-    Args:
-        folder: the export; its files should have been compared with the manifest before.
-        parts: of the export.
-        seconds: time limit of one run of one program.
-        progress: called with program and file before each run, from several threads.
-        queries: what is asked.
+    `folder`: the export; its files should have been compared with the manifest before.
+    `progress`: called with program and file before each run, from several threads.
 
     Raises:
         BadExport: the folder is missing or is no folder.

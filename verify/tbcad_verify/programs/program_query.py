@@ -1,19 +1,50 @@
-"""What one program is asked about one kind of file, and the sandbox that it runs in."""
+"""What one program is asked about one kind of file, the sandbox that it runs in, and its answers.
+
+What a program does not answer clearly is unknown.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tbcad_verify.record.files import locate
-from tbcad_verify.report.checks import Check, CheckName, check_names
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    check_names,
+    exactly,
+    informative,
+    unknown,
+)
 from tbcad_verify.run.child import Limits, Outcome, run
 
 Command = tuple[str, ...]  # a program's absolute path and first arguments; empty: it is absent
+SKIPPED = "skipped: "
+NO_ANSWER = "ended without error, but left no readable answer"
+SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
+# The end of our scripts inside programs. They define `look`, which returns figures, and `message`.
+SCRIPT_END = """
+try:
+    answer = look()
+except BaseException as error:
+    answer = {"error": type(error).__name__ + ": " + message(error)}
+with open("answer.json", "w") as stream:
+    json.dump(answer, stream)
+sys.exit(3 if "error" in answer else 0)
+"""
+MAX_ANSWER = 100_000  # bytes
+SHOWN = 160  # characters of a program's own message
 
 
 @dataclass(frozen=True)
@@ -73,13 +104,6 @@ def sandbox(
 ) -> Iterator[Sandbox]:
     """A sandbox that is deleted afterwards.
 
-    Args:
-        command: how the program's command line starts.
-        folder: the export, resolved.
-        file: name inside it.
-        kind: ending of the copy's name.
-        limits: of the run.
-
     Raises:
         BadExport: the file is no regular file inside the export.
     """
@@ -89,3 +113,101 @@ def sandbox(
         copy = private / f"given.{kind}"
         shutil.copyfile(original, copy)
         yield Sandbox(command, private, copy, file, limits)
+
+
+def skipped(check: CheckName, reason: str) -> Check:
+    """A check that could not be made: no failure, and no figure either."""
+    return informative(check, math.nan, SKIPPED + reason)
+
+
+def is_skipped(check: Check) -> bool:
+    """Whether `skipped` made it: it should not be shown like a pass."""
+    return check.measured is None and check.detail.startswith(SKIPPED)
+
+
+def volume_check(check: CheckName, measured: float, part: ExpectedPart) -> Check:
+    """A check that a volume, mm^3, is the same as the mesh's."""
+    if not math.isfinite(part.volume + part.volume_error):
+        return unknown(check, "the mesh's volume is unknown")
+    detail = f"{measured:.6g} mm^3, but the mesh has {part.volume:.6g}"
+    return at_most(check, abs(measured - part.volume), part.volume_error, detail)
+
+
+def mesh_checks(
+    names: Sequence[CheckName], parts: float, volume: float, part: ExpectedPart
+) -> list[Check]:
+    """One part; the mesh's volume."""
+    return [
+        exactly(names[0], parts, 1, "must be one"),
+        volume_check(names[1], volume, part),
+    ]
+
+
+def solid_checks(
+    names: Sequence[CheckName], figures: Mapping[str, float], part: ExpectedPart
+) -> tuple[Check, Check, Check]:
+    """One solid; every mirror a face on an exact sphere, and nothing else; the mesh's volume.
+
+    `figures`: of solids, spheres and volume.
+    """
+    solids, spheres, volume = names
+    count = figures["spheres"]
+    return (
+        exactly(solids, figures["solids"], 1, "must be one"),
+        informative(spheres, count, "no mirrors: any number is allowed")
+        if part.spheres is None
+        else exactly(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
+        volume_check(volume, figures["volume"], part),
+    )
+
+
+def text_of(outcome: Outcome) -> str:
+    """The output of a program that ended without error.
+
+    Raises:
+        Unknown: it did not.
+    """
+    if outcome.reason:
+        raise Unknown(outcome.reason)
+    if outcome.code != 0:
+        raise Unknown(_gave_up(outcome, _last_line(outcome.text)))
+    return outcome.text
+
+
+def script_figures(outcome: Outcome, folder: Path, keys: Sequence[str]) -> dict[str, float]:
+    """The numbers that a script of ours wrote inside a program, as a JSON object.
+
+    Raises:
+        Unknown: it crashed, broke or left no such answer.
+    """
+    answer = _object(folder / "answer.json") if outcome.code is not None else {}
+    if outcome.code and isinstance(answer.get("error"), str):
+        raise Unknown(_gave_up(outcome, _last_line(answer["error"])))
+    text_of(outcome)
+    if not all(_is_number(answer.get(key)) for key in keys):
+        raise Unknown(NO_ANSWER)
+    return {key: float(answer[key]) for key in keys}
+
+
+def _object(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as stream:
+            value = json.loads(stream.read(MAX_ANSWER))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def _is_number(value: Any) -> bool:
+    good = isinstance(value, int | float) and not isinstance(value, bool)
+    return good and abs(value) < 1e300  # False for NaN too
+
+
+def _gave_up(outcome: Outcome, last: str) -> str:
+    return f"gave up with exit status {outcome.code}" + (f": {last}" if last else "")
+
+
+def _last_line(text: str) -> str:
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
+    lines = ["".join(c for c in line if c.isprintable()).strip() for line in plain.splitlines()]
+    return ([line for line in lines if line] or [""])[-1][:SHOWN]

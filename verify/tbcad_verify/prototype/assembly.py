@@ -1,32 +1,58 @@
-"""The assembly file: every part must be drawn where its own file and the record have it.
+"""The assembly as STEP and as GLB: its bodies are those of the record and of the parts' own files.
 
-Purchased parts have no file of their own. Their shapes are taken from the assembly, and must not
-obstruct the base.
+Purchased parts have no file of their own. Their shapes are taken from the assembly.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
-from tbcad_verify.record.files import read
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
+from tbcad_verify.record.export import Export
+from tbcad_verify.record.files import MAX_TEXT_BYTES, read
+from tbcad_verify.record.prototype_sections import PrintedPart
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    guarded,
+    no_faults,
+    short_list,
+)
+from tbcad_verify.step import part_checks
+from tbcad_verify.step.solids_text import TextSolid, holes, read_solids
+from tbcad_verify.step.step_file import StepFile, known
 from tbcad_verify.types import Floats, Ints
 
 Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
-CHECKS = {"assembly": "mm"}
+CHECKS = {"inventory": "faults", "leds as designed": "faults", "assembly step": "mm"}
+BOXES = {"assembly": "mm"}
+TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
+VIEWS = frozenset({"capture_sphere", "camera_view"})
+TOOL = "tool"  # role of parts that are not in the assembly
 SUNK = ("INSERT-", "DOWEL-", "MAGNET-", "LED-")  # fasteners that stand out of nothing
 OFF_MM = 0.25  # the assembly is meshed coarsely
+SAME_MM = 1e-6  # of corners in two STEP files
+SINGLE_MM = 2e-3  # of the same corner in the GLB, whose numbers are single precision
+CLAIM_SHARE = 1e-5  # see `PartComparison.claim`
 METRE_MM = 1000.0
+UPWARD = np.array([0.0, 0.0, 1.0])
 # glTF's y is up: rows that its x, y and z are in the frame of the shell.
 UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+# Radius of an LED's pocket, and height of its dome's centre over the pocket's floor, mm. Usual T-1
+# and T-1 3/4: flange 3.8 and 5.9, height 5.4 and 8.7, dome 3 and 5; play 0.1 all round.
+LEDS = {"LED-3": (3.8 / 2 + 0.1, 5.4 - 1.5), "LED-5": (5.9 / 2 + 0.1, 8.7 - 2.5)}
 
 
 def assembly_meshes(context: PrototypeContext) -> dict[str, Shape]:
@@ -40,70 +66,6 @@ def assembly_meshes(context: PrototypeContext) -> dict[str, Shape]:
         raise Unknown("there is no GLB of the assembly")
     data = read(context.export.folder, name).data.tobytes()
     return {title: _welded(*shape) for title, shape in _shapes(data)}
-
-
-def checks(
-    names: list[CheckName],
-    context: PrototypeContext,
-    parts: list[MeasuredPart],
-    drawn: dict[str, Shape],
-) -> list[Check]:
-    """The box of every part and ball, against its own mesh's or the record's."""
-    placed = of_roles(parts, "base", "cap", "stage", "frame")
-    boxes = {part.part.name: _box(part.placed_mesh.points) for part in placed}
-    balls = context.prototype.balls
-    for k in np.flatnonzero(~balls.cap).tolist():
-        middle, radius = balls.columns("bx", 3)[:, k], balls.body_radius_mm[k]
-        boxes[f"ball_{k + 1}"] = np.stack([middle - radius, middle + radius])
-    error = {title: _box_error(box, drawn.get(title)) for title, box in boxes.items()}
-    error |= {one.name: 0.0 if one.name in drawn else np.inf for one in context.prototype.bought}
-    wrong = sorted(title for title, value in error.items() if value > OFF_MM)
-    detail = f"missing or elsewhere: {short_list(wrong)}"
-    return [at_most(names[0], max(error.values()), OFF_MM, detail)]
-
-
-def fixed_solids(context: PrototypeContext, drawn: dict[str, Shape]) -> list[tuple[str, Any]]:
-    """Names and manifold3d solids of panels and what is bought that do not rotate with the base.
-
-    Raises:
-        Unknown: one is missing, or no closed solid.
-    """
-    shroud = context.prototype.shroud
-    names = [one.name for one in context.prototype.bought if not one.turns]
-    names += [panel.name for panel in shroud.panels] if shroud else []
-    solids = [(name, _solid(name, drawn)) for name in names]
-    return [*solids, *fastener_solids(context, drawn, turns=False)]
-
-
-def fastener_solids(
-    context: PrototypeContext, drawn: dict[str, Shape], *, turns: bool
-) -> list[tuple[str, Any]]:
-    """All screws and nuts that rotate with the base, or all others, as one solid with a name.
-
-    Inserts, dowels, magnets and LEDs are inside of what holds them.
-
-    Raises:
-        Unknown: one is missing, or no closed solid.
-    """
-    import manifold3d
-
-    some = [
-        one.name
-        for one in context.prototype.fasteners
-        if one.turns == turns and not one.part.startswith(SUNK)
-    ]
-    title = "fasteners of the base" if turns else "fasteners of stage and frame"
-    solids = [_solid(name, drawn) for name in some]
-    return [(title, manifold3d.Manifold.compose(solids))] if solids else []
-
-
-def _solid(name: str, drawn: dict[str, Shape]) -> Any:
-    if name not in drawn:
-        raise Unknown(f"the assembly lacks {name}")
-    solid = manifold(*drawn[name])
-    if solid.status().name != "NoError":
-        raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
-    return solid
 
 
 def _shapes(data: bytes) -> Iterable[tuple[str, Shape]]:
@@ -131,9 +93,217 @@ def _welded(points: Floats, faces: NDArray[np.int64]) -> Shape:
     return ordered[first], number[faces]
 
 
+def assembly_solids(context: PrototypeContext) -> dict[str, TextSolid]:
+    """Solids of the STEP assembly, by name.
+
+    Raises:
+        Unknown: there is none, or it cannot be read.
+    """
+    return _solids(context, context.prototype.assembly.step)
+
+
+def part_solids(context: PrototypeContext) -> dict[str, TextSolid]:
+    """Solids of the STEP files of all parts that are in the assembly, by name.
+
+    Raises:
+        Unknown: a file has no solid of its part's name, or cannot be read.
+    """
+    found: dict[str, TextSolid] = {}
+    for part in context.prototype.parts:
+        if part.role != TOOL:
+            solids = _solids(context, part.step)
+            if list(solids) != [part.name]:
+                raise Unknown(f"{part.step} holds {short_list(list(solids))}, not {part.name}")
+            found |= solids
+    return found
+
+
+def _solids(context: PrototypeContext, file: str) -> dict[str, TextSolid]:
+    if not file:
+        raise Unknown("there is no STEP file")
+    return read_solids(read(context.export.folder, file, MAX_TEXT_BYTES).text())
+
+
+def checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    drawn: dict[str, Shape],
+    solids: dict[str, TextSolid],
+    own: dict[str, TextSolid],
+) -> list[Check]:
+    """Everything is there, everywhere, and in the same place.
+
+    Of the GLB (`drawn`), the STEP assembly (`solids`) and the parts' own STEP files (`own`).
+    """
+    inventory, leds, same = names
+    return [
+        no_faults(inventory, _inventory_faults(context, drawn, solids)),
+        no_faults(leds, _led_faults(context, solids.get("stage_crown"))),
+        _same_places(same, context, drawn, solids, own),
+    ]
+
+
+def _inventory_faults(
+    context: PrototypeContext, drawn: dict[str, Shape], solids: dict[str, TextSolid]
+) -> Iterator[str]:
+    """What the assembly has too little or too much, and what turns without need."""
+    prototype = context.prototype
+    panels = prototype.shroud.panels if prototype.shroud else ()
+    names = {part.name for part in prototype.parts if part.role != TOOL} | VIEWS
+    names |= {f"ball_{k + 1}" for k in np.flatnonzero(~prototype.balls.cap)}
+    names |= {one.name for one in (*prototype.bought, *prototype.fasteners, *panels)}
+    for found, what in (
+        (set(drawn), f"body in {prototype.assembly.glb}"),
+        (set(solids), f"solid in {prototype.assembly.step}"),
+    ):
+        yield from (f"{what} {name} is missing" for name in sorted(names - found))
+        yield from (f"{what} {name} is not asked for" for name in sorted(found - names))
+    for one in prototype.bought:
+        if one.turns != (one.name in TURNING):
+            yield f"{one.name} turns" if one.turns else f"{one.name} does not turn"
+
+
+def _led_faults(context: PrototypeContext, crown: TextSolid | None) -> Iterator[str]:
+    """Every LED has its pocket in the crown, where the centre of its dome is to be."""
+    leds, pockets = context.prototype.leds, list[Floats]()
+    if crown is not None and leds:
+        radius, to_dome = LEDS[context.export.spec.prototype.stage.led]
+        pockets = [
+            hole.point + (to_dome - hole.depth / 2) * UPWARD
+            for hole in holes(crown.faces, radius, SAME_MM)
+            if abs(hole.axis @ UPWARD) > 1 - SAME_MM
+        ]
+    if len(pockets) != len(leds):
+        yield f"{len(leds)} LEDs, the crown has {len(pockets)} pockets"
+    for led in leds:
+        distance = [np.abs(led.position - pocket).max() for pocket in pockets]
+        if not min(distance, default=np.inf) <= SAME_MM:
+            yield f"{led.name} has no pocket"
+
+
+def _same_places(
+    name: CheckName,
+    context: PrototypeContext,
+    drawn: dict[str, Shape],
+    solids: dict[str, TextSolid],
+    own: dict[str, TextSolid],
+) -> Check:
+    """Corners of the STEP assembly are those of the parts' own files, and of the GLB."""
+    errors: dict[str, float] = {}
+    for title in own.keys() & solids.keys():
+        one, two = own[title].corners, solids[title].corners
+        same = one.shape == two.shape
+        # Both have all digits, and their limit is stricter in this share.
+        errors[title] = float(np.abs(one - two).max(initial=0)) if same else np.inf
+        errors[title] *= SINGLE_MM / SAME_MM
+    for title in solids.keys() & drawn.keys():
+        distance = np.asarray(cKDTree(drawn[title][0]).query(solids[title].corners)[0])
+        errors[title] = max(errors.get(title, 0.0), float(distance.max(initial=0)))
+    for title, centre, radius in _balls(context):
+        faces = solids[title].faces if title in solids else ()
+        off = [
+            float(max(np.abs(face.point - centre).max(), abs(face.radius - radius)))
+            for face in faces
+            if face.kind == "sphere"
+        ]
+        errors[title] = max(off, default=np.inf)
+    wrong = sorted(title for title, error in errors.items() if not error <= SINGLE_MM)
+    worst = max(errors.values(), default=np.inf)
+    return at_most(name, worst, SINGLE_MM, f"elsewhere, or of another shape: {short_list(wrong)}")
+
+
+def _balls(context: PrototypeContext) -> Iterator[tuple[str, Floats, float]]:
+    """Name, centre and radius of the balls that are no caps."""
+    balls = context.prototype.balls
+    for k in np.flatnonzero(~balls.cap).tolist():
+        yield f"ball_{k + 1}", balls.columns("bx", 3)[:, k], float(balls.body_radius_mm[k])
+
+
+def box_checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    parts: list[MeasuredPart],
+    drawn: dict[str, Shape],
+) -> list[Check]:
+    """The box of every part and ball in the GLB, against its own mesh's or the record's."""
+    placed = of_roles(parts, "base", "cap", "stage", "frame")
+    boxes = {part.part.name: _box(part.placed_mesh.points) for part in placed}
+    boxes |= {name: np.stack([at - radius, at + radius]) for name, at, radius in _balls(context)}
+    error = {title: np.inf for title in boxes.keys() - drawn.keys()}
+    for title in boxes.keys() & drawn.keys():
+        error[title] = float(np.abs(_box(drawn[title][0]) - boxes[title]).max())
+    error |= {one.name: 0.0 if one.name in drawn else np.inf for one in context.prototype.bought}
+    wrong = sorted(title for title, value in error.items() if value > OFF_MM)
+    detail = f"missing or elsewhere: {short_list(wrong)}"
+    return [at_most(names[0], max(error.values()), OFF_MM, detail)]
+
+
 def _box(points: Floats) -> Floats:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def _box_error(box: Floats, shape: Shape | None) -> float:
-    return float(np.abs(_box(shape[0]) - box).max()) if shape is not None else float("inf")
+def fixed_solids(context: PrototypeContext, drawn: dict[str, Shape]) -> list[tuple[str, Any]]:
+    """Names and manifold3d solids of panels and what is bought that do not rotate with the base.
+
+    Raises:
+        Unknown: one is missing, or no closed solid.
+    """
+    shroud = context.prototype.shroud
+    names = [one.name for one in context.prototype.bought if not one.turns]
+    names += [panel.name for panel in shroud.panels] if shroud else []
+    solids = [(name, closed_solid(name, drawn)) for name in names]
+    return [*solids, *fastener_solids(context, drawn, turns=False)]
+
+
+def fastener_solids(
+    context: PrototypeContext, drawn: dict[str, Shape], *, turns: bool
+) -> list[tuple[str, Any]]:
+    """All screws and nuts that rotate with the base, or all others, as one solid with a name.
+
+    Inserts, dowels, magnets and LEDs are inside of what holds them.
+
+    Raises:
+        Unknown: one is missing, or no closed solid.
+    """
+    import manifold3d
+
+    some = [one for one in context.prototype.fasteners if one.turns == turns]
+    solids = [closed_solid(one.name, drawn) for one in some if not one.part.startswith(SUNK)]
+    title = "fasteners of the base" if turns else "fasteners of stage and frame"
+    return [(title, manifold3d.Manifold.compose(solids))] if solids else []
+
+
+def closed_solid(name: str, drawn: Mapping[str, Shape]) -> Any:
+    """One body as manifold3d has it.
+
+    Raises:
+        Unknown: it is missing, or no closed solid.
+    """
+    if name not in drawn:
+        raise Unknown(f"the assembly lacks {name}")
+    solid = manifold(*drawn[name])
+    if solid.status().name != "NoError":
+        raise Unknown(f"{name} of the assembly is no closed solid ({solid.status().name})")
+    return solid
+
+
+def part_step_checks(
+    export: Export, masses: dict[str, MassProperties], files: dict[str, StepFile | Unknown]
+) -> list[Check]:
+    """All checks of the STEP files of printed parts, against figures of the placed meshes."""
+
+    def compared(part: PrintedPart) -> list[Check]:
+        file, mass = known(files[part.name]), masses.get(part.name)
+        comparison = part_checks.PartComparison(
+            part.name, file, mass, export.mesh_error_mm, CLAIM_SHARE
+        )
+        return part_checks.run_checks(part_checks.CHECKS, part.step, comparison)
+
+    return [
+        check
+        for part in export.printed
+        if part.step
+        for check in guarded(
+            part_checks.names_of(part_checks.CHECKS, part.step), partial(compared, part)
+        )
+    ]

@@ -1,6 +1,7 @@
-"""All bodies of the assembly as rays meet them: those of the base at any angle, and the others.
+"""All bodies as rays meet them, and the balls where their pads put them.
 
-Their shapes are those of the assembly's GLB, whose bodies are compared with the parts' own files.
+Of the base at any angle, and of the others. Shapes of what is bought are those of the assembly's
+GLB, whose bodies are compared with the parts' own files.
 """
 
 from __future__ import annotations
@@ -10,13 +11,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tbcad_verify.mesh.mesh import indexed_mesh, join_meshes
+from tbcad_verify.mesh.rays import RayScene, build_scene
+from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.assembly import VIEWS, Shape
+from tbcad_verify.prototype.caps import MeasuredCap
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.prototype.seats import MeasuredSeat
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.types import Bools, Floats, Ints
 
 OWN = ("camera",)  # body that its own rays start in
-NOT_BODIES = frozenset({"capture_sphere", "camera_view"})
 SWUNG = ("base", "cap")  # roles of printed parts that turn with the base
 LEAST_ANGLES = 7
 LIFT_MM = 1e-3
@@ -60,10 +67,7 @@ class AssembledBodies:
 
     def without(self, names: Iterable[str]) -> Bodies:
         """All but some that are named."""
-        bodies, swung = (
-            self.drawn.keys() - NOT_BODIES - set(names),
-            turning(self.context, self.drawn),
-        )
+        bodies, swung = self.drawn.keys() - VIEWS - set(names), turning(self.context, self.drawn)
         return Bodies(self, tuple(sorted(bodies & swung)), tuple(sorted(bodies - swung)))
 
 
@@ -101,7 +105,7 @@ class Bodies:
 
     def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
         """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
-        back = self.context.base_rotation(np.array([-angle])).as_matrix()[0].T
+        back = self._back(angle)
         one, near = self.turning.first(origin @ back, along @ back)
         two, far = self.still.first(origin, along)
         other = np.where(two < 0, -1, two + len(self.turning.names))
@@ -109,14 +113,17 @@ class Bodies:
         counts = np.bincount(np.where(near < far, one, other) + 1, minlength=len(names))
         return {name: count for name, count in zip(names, counts.tolist(), strict=True) if count}
 
-    def blocked(self, starts: Floats, ends: Floats, angle: float) -> np.ndarray:
+    def blocked(self, starts: Floats, ends: Floats, angle: float) -> Bools:
         """(N,) whether something lies between points (N, 3) at a base angle, rad."""
-        along = unit((ends - starts).T).T
+        along, back = unit((ends - starts).T).T, self._back(angle)
         length = np.linalg.norm(ends - starts, axis=1)
-        back = self.context.base_rotation(np.array([-angle])).as_matrix()[0].T
         near = self.turning.first(starts @ back, along @ back)[1]
         far = self.still.first(starts + LIFT_MM * along, along)[1]
         return np.asarray(np.minimum(near, far) < length - LIFT_MM)
+
+    def _back(self, angle: float) -> Floats:
+        """(3, 3) that rows are multiplied by, from the ground to the base."""
+        return np.asarray(self.context.base_rotation(np.array([-angle])).as_matrix()[0].T)
 
 
 def stage_bodies(context: PrototypeContext) -> frozenset[str]:
@@ -152,3 +159,83 @@ def _scene(shapes: Mapping[str, Shape]) -> BodyScene:
     scene.run(one, one)  # the first call commits
     owner = np.repeat(np.arange(len(shapes)), [len(some) for some in faces])
     return BodyScene(scene, owner, tuple(shapes))
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """Bodies that may obstruct the light of the balls."""
+
+    scene: RayScene | None  # all of them; None without any
+    owner: Ints  # (F + 1,) number of each facet's body; -1 at the end, for no facet
+    names: tuple[str, ...]  # of the bodies
+
+
+@dataclass(frozen=True)
+class MeasuredPrototype:
+    """The prototype as its files define it, seen from its base at angle zero.
+
+    Pinhole and capture sphere lie on the axis, so they stay where they are.
+    """
+
+    context: PrototypeContext  # the record
+    centre: Floats  # (3, K) of the reflecting spheres, mm
+    radius: Floats  # (K,) of them, mm
+    body: Floats  # (3, K) centres of the spheres that lie on the pads, mm
+    body_radius: Floats  # (K,) mm
+    mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
+    rotating: Obstacles  # base, caps, and what is fastened to them
+    fixed: Obstacles  # all else
+
+
+def measure_prototype(
+    context: PrototypeContext,
+    seats: list[MeasuredSeat],
+    caps: list[MeasuredCap],
+    parts: list[MeasuredPart],
+    drawn: Mapping[str, Shape],
+) -> MeasuredPrototype:
+    """Put balls on their pads, and caps as they were measured; what is bought is as drawn.
+
+    Raises:
+        Unknown: a centre, a cap or a mesh is not known.
+    """
+    balls = context.prototype.balls
+    if missing := [seat.reason for seat in seats if seat.reason]:
+        raise Unknown(missing[0])
+    body, radius = np.array([seat.centre for seat in seats]).T.copy(), balls.radius_mm.copy()
+    centre, body_radius = body.copy(), balls.body_radius_mm.copy()
+    without = {*np.flatnonzero(balls.cap).tolist()} - {cap.ball for cap in caps}
+    if without:
+        raise Unknown(f"no part is the cap of ball {min(without) + 1}")
+    for cap in caps:
+        # The cap's body lies on the pads, wherever the cap's own file has it.
+        centre[:, cap.ball] += cap.front.centre - cap.body.centre
+        radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
+    normal = unit(balls.columns("nx", 3))
+    surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
+    bought = drawn.keys() - {*VIEWS, *OWN, *(part.part.name for part in parts)}
+    bought = {name for name in bought if not name.startswith("ball_")}
+    swung = turning(context, ())
+    return MeasuredPrototype(
+        context,
+        centre,
+        radius,
+        body,
+        body_radius,
+        prepare_for_rays(context.pinhole, surfaces),
+        _obstacles(of_roles(parts, "base", "cap"), drawn, bought & swung),
+        _obstacles(of_roles(parts, "stage", "frame"), drawn, bought - swung),
+    )
+
+
+def _obstacles(
+    parts: list[MeasuredPart], drawn: Mapping[str, Shape], bought: set[str]
+) -> Obstacles:
+    meshes = {part.part.name: part.placed_mesh for part in parts}
+    shapes = [(name, *drawn[name]) for name in sorted(bought)]
+    meshes |= {name: indexed_mesh(points, faces.astype(np.int32)) for name, points, faces in shapes}
+    if not meshes:
+        return Obstacles(None, np.full(1, -1), ())
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
+    scene = build_scene(join_meshes([*meshes.values()]))
+    return Obstacles(scene, np.append(owner, -1), tuple(meshes))

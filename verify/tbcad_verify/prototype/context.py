@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad_verify.mesh.lines import axis_frame
+from tbcad_verify.mesh.vectors import axis_frame
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.record.prototype import Prototype
@@ -37,6 +37,11 @@ class PrototypeContext:
     def radius(self) -> float:
         """Radius of the capture sphere, mm."""
         return self.export.target_mm / 2
+
+    @property
+    def moved(self) -> bool:
+        """Whether pictures are moved along with their balls when they are merged."""
+        return self.export.spec.prototype.picture == "moved"
 
     @cached_property
     def frame(self) -> Floats:

@@ -8,8 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import MassProperties, mass_properties
-from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, join_meshes, mesh_from_facets
+from tbcad_verify.mesh.mesh import (
+    MassProperties,
+    Mesh,
+    Topology,
+    examine_topology,
+    join_meshes,
+    mass_properties,
+    mesh_from_facets,
+)
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
@@ -17,11 +24,11 @@ from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
-    Unknown,
     at_most,
     check_names,
     guarded,
     reason_of,
+    require,
     unknown,
 )
 from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
@@ -55,9 +62,7 @@ class MeasuredPart:
         Raises:
             Unknown: there is none.
         """
-        if self.placed is None:
-            raise Unknown(self.reason)
-        return self.placed
+        return require(self.placed, self.reason)
 
     @cached_property
     def solid(self) -> Any:
@@ -77,7 +82,9 @@ def measure_part(part: PrintedPart, facets: Facets) -> MeasuredPart:
         edges = measure_edges(mesh)
         topology = examine_topology(mesh, facets)
         placed = put_back(mesh, part)
-        placed_mass = replace(mass_properties(placed), bend=_bend(mesh, edges))
+        length = norm(half_edge_vectors(mesh, edges.half)[1])
+        bend = float((length * np.abs(edges.angle)).sum())
+        placed_mass = replace(mass_properties(placed), bend=bend)
     except Exception as error:
         reason = reason_of(error)
         return MeasuredPart(part, [unknown(name, reason) for name in solid + pose], reason)
@@ -112,11 +119,6 @@ def of_roles(parts: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
     return [part for part in parts if part.part.role in roles]
 
 
-def stl_names(parts: list[MeasuredPart], *roles: str) -> str:
-    """Names of the STL files of some roles, as checks name several files."""
-    return ", ".join(part.part.stl for part in of_roles(parts, *roles))
-
-
 def joined_meshes(parts: list[MeasuredPart]) -> tuple[Mesh, Ints]:
     """Placed meshes as one, and the part that each facet belongs to.
 
@@ -147,8 +149,3 @@ def manifold(points: Floats, faces: Any) -> Any:
 
     mesh = manifold3d.Mesh64(np.ascontiguousarray(points), faces.astype(np.uint64))
     return manifold3d.Manifold(mesh)
-
-
-def _bend(mesh: Mesh, edges: Edges) -> float:
-    length = norm(half_edge_vectors(mesh, edges.half)[1])
-    return float((length * np.abs(edges.angle)).sum())

@@ -1,67 +1,53 @@
-"""The record of a prototype checked by itself: frame, seats, and balls on the ellipsoid."""
+"""Balls on the ellipsoid, and the rotation plan: every mirror has its picture, by ball and stop."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections import Counter
+from collections.abc import Callable, Iterator
 
-from tbcad_verify.mesh.lines import polar_and_azimuth, wrapped
-from tbcad_verify.mesh.vectors import dot, norm, unit
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tbcad_verify.mesh.vectors import dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.control.gcode_checks import program_check
 from tbcad_verify.record.poses import POSE_MM
-from tbcad_verify.record.prototype import BALLS, RECORD
-from tbcad_verify.record.prototype_tables import Balls
+from tbcad_verify.record.prototype import BALLS, PLAN, PROGRAM, STOPS
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
-    at_most,
+    Unknown,
     each_at_most,
     guarded_each,
-    short_list,
+    no_faults,
 )
-from tbcad_verify.types import Bools, Floats
+from tbcad_verify.types import Ints
 
-PAD_UM = 10.0  # largest error of a ball's centre that its pads may cause
 DENSITIES_G_MM3 = 1.5e-3, 20e-3  # of anything that balls are made of
-TOLERANCE = 1e-9  # mm, radians, and of unit vectors
+SAME_DIRECTION = 1e-9
+TURNS = (0.0, 180.0)
 CHECKS = (
-    ("prototype requirements", RECORD, "unlike the design"),
     ("ball positions", BALLS, "mm off"),
     ("ball sizes", BALLS, "balls"),
+    ("plan mirrors", PLAN, "missing, doubled or foreign"),
+    ("plan twins", PLAN, "mirrors"),
+    ("plan stops", STOPS, "faults"),
+    ("plan program", PROGRAM, "faults"),
 )
 
 
 def checks(context: PrototypeContext) -> list[Check]:
-    """The frame is the camera's, and every ball is where it must be."""
-    return guarded_each(CHECKS, (_requirements, _positions, _sizes), context)
+    """Balls against the design; plan, stops and program against mirrors, balls and each other."""
+    jobs = map(_counted, (_size_faults, _mirror_faults, _twin_faults, _stop_faults))
+    return guarded_each(CHECKS, (_positions, *jobs, program_check), context)
 
 
-def _requirements(name: CheckName, context: PrototypeContext) -> Check:
-    """Target and frame, against the design that the export carries."""
-    prototype, export = context.prototype, context.export
-    errors = {
-        "target_mm": abs(prototype.target_mm - export.target_mm),
-        "frame": float(np.abs(prototype.frame.rows - context.frame).max()),
-        "seats": _off_unit(np.array([seat.axis for seat in prototype.seats])),
-        "pads": _off_unit(np.array([seat.normals for seat in prototype.seats])),
-    }
-    errors["picture"] = float(export.spec.prototype.picture != prototype.picture)
-    wrong = sorted(what for what, error in errors.items() if not error <= TOLERANCE)
-    return at_most(name, len(wrong), 0, f"not as designed: {short_list(wrong)}")
-
-
-def _off_unit(vectors: Floats) -> float:
-    return float(np.abs(np.linalg.norm(vectors, axis=-1) - 1).max())
+def _counted(faults: Callable[[PrototypeContext], Iterator[str]]) -> Callable[..., Check]:
+    return lambda name, context: no_faults(name, faults(context))
 
 
 def _positions(name: CheckName, context: PrototypeContext) -> Check:
-    errors = position_errors(context)
-    names = context.prototype.balls.names(np.arange(errors.size))
-    reason = "off the ellipsoid, not at its angles, not bisecting, or a centre off the normal: "
-    return each_at_most(name, names, errors, POSE_MM, "mm", reason)
-
-
-def position_errors(context: PrototypeContext) -> Floats:
-    """(K,) largest deviation of each ball from the design, mm; angles as lengths at 1 mm.
+    """Largest deviation of each ball from the design, mm; angles as lengths at 1 mm.
 
     The apex lies on the ellipsoid, at the recorded polar angle and azimuth; the normal is a unit
     vector and bisects the directions to both foci; the reflecting sphere's centre lies on it, one
@@ -71,41 +57,106 @@ def position_errors(context: PrototypeContext) -> Floats:
     p, n, c, b = (balls.columns(key, 3) for key in ("px", "nx", "cx", "bx"))
     double_a = 2 * np.sqrt(context.export.semi_minor_mm**2 + (context.pinhole**2).sum() / 4)
     polar, azimuth = polar_and_azimuth(context.frame, p)
-    depth = dot(p - b, n)
-    worst = np.max(
+    errors = np.max(
         [
             np.abs(norm(p) + norm(pinhole - p) - double_a),
             np.abs(polar - np.radians(balls.polar_deg)),
             np.abs(wrapped(azimuth - np.radians(balls.azimuth_deg))),
             norm(unit(unit(pinhole - p) - unit(p)) - n),
             norm(c - (p - balls.radius_mm * n)),
-            norm(b - (p - depth * n)),
+            norm(b - (p - dot(p - b, n) * n)),
         ],
         axis=0,
     )
-    return np.asarray(worst)
+    reason = "off the ellipsoid, not at its angles, not bisecting, or a centre off the normal: "
+    names = balls.names(np.arange(errors.size))
+    return each_at_most(name, names, errors, POSE_MM, "mm", reason)
 
 
-def _sizes(name: CheckName, context: PrototypeContext) -> Check:
-    balls = context.prototype.balls
-    bad = np.flatnonzero(~_has_its_size(balls))
-    return at_most(
-        name, bad.size, 0, f"no ball, or no cap, of its diameter: {short_list(balls.names(bad))}"
-    )
-
-
-def _has_its_size(balls: Balls) -> Bools:
-    """(K,) a ball reflects with all of its diameter; a cap's front is flatter than its body.
+def _size_faults(context: PrototypeContext) -> Iterator[str]:
+    """A ball reflects with all of its diameter; a cap's front is flatter than its body.
 
     A ball has the mass of a solid, a cap has none of its own.
     """
+    balls = context.prototype.balls
     radius, body, half = balls.radius_mm, balls.body_radius_mm, balls.diameter_mm / 2
     p, c, b = (balls.columns(key, 3) for key in ("px", "cx", "bx"))
-    ball = (np.abs(radius - half) <= POSE_MM) & (np.abs(body - half) <= POSE_MM)
-    ball &= norm(b - c) <= POSE_MM
+    good = np.abs(body - half) <= POSE_MM
     density, (least, most) = balls.mass_g / (np.pi / 6 * balls.diameter_mm**3), DENSITIES_G_MM3
+    ball = (np.abs(radius - half) <= POSE_MM) & (norm(b - c) <= POSE_MM)
     ball &= (density >= least) & (density <= most)
     depth = dot(p - b, balls.columns("nx", 3))
-    cap = (np.abs(body - half) <= POSE_MM) & (body <= radius)
-    cap &= (depth > 0) & (depth <= body + POSE_MM) & np.isnan(balls.mass_g)
-    return np.where(balls.cap, cap, ball)
+    cap = (body <= radius) & (depth > 0) & (depth <= body + POSE_MM) & np.isnan(balls.mass_g)
+    bad = np.flatnonzero(~(good & np.where(balls.cap, cap, ball)))
+    yield from (f"{name} has not its diameter, or no mass of it" for name in balls.names(bad))
+
+
+def _mirror_faults(context: PrototypeContext) -> Iterator[str]:
+    """Each of this camera's mirrors once with the object at 0 degrees, all others once at 180.
+
+    Rows are numbered, and name balls that exist.
+    """
+    plan, rows = context.prototype.plan, context.export.mirrors
+    for turn in TURNS:
+        of_camera = (rows.camera == context.prototype.camera) == (turn == 0)
+        expected = [rows.ids[k] for k in np.flatnonzero(of_camera).tolist()]
+        count = Counter(plan.mirror[k] for k in np.flatnonzero(plan.turn == turn).tolist())
+        yield from (name for name in expected if count[name] != 1)
+        yield from sorted(set(count) - set(expected))
+    rows_that_are = {
+        "at another object angle": ~np.isin(plan.turn, TURNS),
+        "of no ball": (plan.ball < 1) | (plan.ball > len(context.prototype.balls)),
+        "out of order": plan.order != np.arange(1, len(plan) + 1),
+    }
+    for what, bad in rows_that_are.items():
+        yield from (f"row {k + 1} {what}" for k in np.flatnonzero(bad).tolist())
+
+
+def twins(context: PrototypeContext) -> Ints:
+    """(m,) row of mirrors.csv of the mirror that each one shows with the object at 180 degrees.
+
+    Rotated by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
+
+    Raises:
+        Unknown: there is no mirror in that direction.
+    """
+    rows = context.export.mirrors
+    u = rows.columns("ux", 3)
+    others = np.flatnonzero(rows.camera != context.prototype.camera)
+    if not others.size:
+        raise Unknown("there is no other camera")
+    rotated = u[:, context.mirror_rows] * np.array([[-1.0], [-1.0], [1.0]])
+    distance, nearest = map(np.asarray, cKDTree(u[:, others].T).query(rotated.T))
+    if not distance.max() <= SAME_DIRECTION:
+        missing = context.mirror_ids[int(distance.argmax())]
+        raise Unknown(f"no mirror of the other camera is {missing} rotated by 180 degrees")
+    return np.asarray(others[nearest])
+
+
+def _twin_faults(context: PrototypeContext) -> Iterator[str]:
+    """With the object at 180 degrees, each mirror uses the ball and stop of its twin."""
+    plan, rows, first = context.prototype.plan, context.export.mirrors, context.plan_rows
+    at_180 = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
+    ids = [rows.ids[k] for k in twins(context).tolist()]
+    row = np.array([at_180.get(name, -1) for name in ids])
+    same = row >= 0
+    for column in (plan.ball, plan.angle, plan.stop):
+        same &= column[row] == column[first]
+    yield from (f"{ids[k]} by another ball or stop" for k in np.flatnonzero(~same).tolist())
+
+
+def _stop_faults(context: PrototypeContext) -> Iterator[str]:
+    """Stops are numbered, ascending, within the swing, and as the plan has them."""
+    stops, plan = context.prototype.stops, context.prototype.plan
+    low, high = context.prototype.swing
+    if not (stops.stop == np.arange(1, len(stops) + 1)).all():
+        yield "not numbered from 1"
+    if not (np.diff(stops.angle) > 0).all():
+        yield "angles do not ascend"
+    beyond = np.flatnonzero((stops.angle < low) | (stops.angle > high))
+    yield from (f"stop {k + 1} beyond the swing" for k in beyond.tolist())
+    known = (plan.stop >= 1) & (plan.stop <= len(stops))
+    unlike = np.flatnonzero(~known | (stops.angle[np.where(known, plan.stop, 1) - 1] != plan.angle))
+    yield from (f"row {k + 1} of the plan at another angle" for k in unlike.tolist())
+    unused = sorted({*range(1, len(stops) + 1)} - {*plan.stop.tolist()})
+    yield from (f"stop {number} is not in the plan" for number in unused)

@@ -45,43 +45,32 @@ def checks(
 ) -> list[Check]:
     """Room and LEDs against the parts of stage and frame.
 
-    Args:
-        names: of the checks.
-        context: the export.
-        fixed: parts of stage and frame.
+    Every LED is inside the capture sphere and not in the stage's material. The distance of the
+    farthest from the stage informs: an LED in its pocket has a wall close by.
     """
-    room, seen, *in_place = names
-    volume, inside = _volume_in_room(context, fixed)
-    free = at_most(room, volume, ROOM_MM3, f"in the object's room: {short_list(inside)}")
-    if not context.prototype.leds:
-        return [free, *(informative(name, 0, "no LEDs") for name in names[1:])]
+    room, seen, inside, free, on_stage = names
+    leds, stage = context.prototype.leds, of_roles(fixed, "stage")
+    volume, filled = _volume_in_room(context, fixed)
+    empty = at_most(room, volume, ROOM_MM3, f"in the object's room: {short_list(filled)}")
+    if not leds:
+        return [empty, *(informative(name, 0, "no LEDs") for name in names[1:])]
     counted = (~_hidden_by_room(context) & ~_hidden_by_parts(context, fixed)).sum(axis=0)
-    few = worst_offenders(
-        tuple(context.mirror_ids), counted.astype(np.float64), "", counted < NEEDED, ".0f"
-    )
-    past = at_least(seen, int(counted.min()), NEEDED, f"seen past an object in its room: {few}")
-    return [free, past, *_led_checks(in_place, context, of_roles(fixed, "stage"))]
-
-
-def _led_checks(
-    names: list[CheckName], context: PrototypeContext, stage: list[MeasuredPart]
-) -> list[Check]:
-    """Every LED is inside the capture sphere and not in the stage's material.
-
-    The distance of the farthest from the stage informs: an LED in its pocket has a wall close by.
-    """
-    inside, free, on_stage = names
-    leds = context.prototype.leds
+    ids, few = context.mirror_ids, counted < NEEDED
+    few_text = worst_offenders(ids, counted.astype(np.float64), "", few, ".0f")
     beyond = [led.name for led in leds if np.linalg.norm(led.position) > context.radius]
-    sphere = at_most(inside, len(beyond), 0, f"the camera may not see {short_list(beyond)}")
+    made = [
+        empty,
+        at_least(seen, int(counted.min()), NEEDED, f"seen past an object in its room: {few_text}"),
+        at_most(inside, len(beyond), 0, f"the camera may not see {short_list(beyond)}"),
+    ]
     if not stage:
-        return [sphere, *(informative(name, 0, "no stage") for name in (free, on_stage))]
+        return [*made, *(informative(name, 0, "no stage") for name in (free, on_stage))]
     mesh, facet = joined_meshes(stage)
     distance = [distance_to_facets(led.position, mesh, np.arange(facet.size)) for led in leds]
     sunk = [led.name for led in leds if _is_in_material(stage, led.position)]
     k = int(np.argmax(distance))
     return [
-        sphere,
+        *made,
         at_most(free, len(sunk), 0, f"in the material of the stage: {short_list(sunk)}"),
         informative(on_stage, distance[k], f"{leds[k].name} is farthest from the stage"),
     ]
@@ -113,19 +102,14 @@ def _volume_in_room(
     height = max(high - low - LIFT_MM, LIFT_MM)
     room = manifold3d.Manifold.cylinder(height, radius, radius, ROOM_SIDES)
     room = room.translate([0.0, 0.0, low + LIFT_MM])
-    volumes = {
-        part.part.name: (part.solid ^ room).volume() for part in fixed if _near(part, radius, low)
-    }
+    volumes = {}
+    for part in fixed:
+        least, most = (end(part.placed_mesh.points, axis=0) for end in (np.min, np.max))
+        if (least[:2] < radius).all() and (most[:2] > -radius).all() and most[2] > low:
+            volumes[part.part.name] = (part.solid ^ room).volume()
     leds = [led.name for led in context.prototype.leds if np.hypot(*led.position[:2]) < radius]
     names = [name for name, volume in volumes.items() if volume > ROOM_MM3 / max(len(volumes), 1)]
     return float(sum(volumes.values())) + len(leds), names + leds
-
-
-def _near(part: MeasuredPart, radius: float, low: float) -> bool:
-    """Whether a part's box meets the room's."""
-    points = part.placed_mesh.points
-    least, most = points.min(axis=0), points.max(axis=0)
-    return bool((least[:2] < radius).all() and (most[:2] > -radius).all() and most[2] > low)
 
 
 def _sights(context: PrototypeContext) -> tuple[Floats, Floats]:

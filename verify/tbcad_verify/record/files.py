@@ -64,10 +64,6 @@ def open_folder(folder: Path) -> Path:
 def locate(folder: Path, name: str) -> Path:
     """The path of a regular file inside the export, and never of anything outside it.
 
-    Args:
-        folder: the export, resolved.
-        name: path from the export's own lists, relative, with forward slashes.
-
     Raises:
         BadExport: the name leaves the folder, or the file is missing, no regular file or too big.
     """
@@ -111,11 +107,8 @@ def read(
 ) -> FileBytes:
     """Read a whole file once, and hash what was read.
 
-    Args:
-        folder: the export, resolved.
-        name: path inside it.
-        limit: largest size allowed, bytes.
-        expect: called with name, size and the first bytes before the rest is read; may refuse.
+    `limit`: largest size allowed, bytes.
+    `expect`: called with name, size and the first bytes before the rest is read; may refuse.
 
     Raises:
         BadExport: as `locate`, over the limit, or the file changed while it was read.

@@ -1,8 +1,9 @@
-"""Where the holes of a shell's flanges belong, worked out from the spec and the back.
+"""Planes in which a shell or a negative must end, and where the holes of its flanges belong.
 
 Bolts and dowels lie at even distances along a section of a spheroid that is half a flange's width
 larger than the back: the seam flange's in the plane of its far face, the foot flange's in the plane
-of the foot.
+of the foot. The other half lies beyond the seam x = 0, the table or the base below the foot: what
+sticks out by a tenth of a millimetre keeps the joint open.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.record.export import Camera, Export
+from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.spec import FlangeSpec
-from tbcad_verify.report.checks import Unknown
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, short_list
 from tbcad_verify.types import Floats
 
 X, Y, Z = range(3)
@@ -54,10 +55,7 @@ class HoleLimits:
 def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flange]:
     """Both flanges of one camera's half.
 
-    Args:
-        export: the record.
-        camera: of the half.
-        beyond: by how much the back's semi-axes exceed the ellipsoid's, mm.
+    `beyond`: by how much the back's semi-axes exceed the ellipsoid's, mm.
 
     Raises:
         Unknown: the back does not reach the flanges.
@@ -168,3 +166,40 @@ def _others(have: Floats, flange: Flange, size: float) -> list[float]:
     """Diameters that no hole of a flange should have."""
     known = np.abs(have[:, None] - flange.diameter).min(axis=1, initial=np.inf) <= size
     return [float(one) for one in np.unique(have[~known].round(6))]
+
+
+def has_joining_planes(export: Export, part: Part) -> bool:
+    """Whether a part is one camera's half: other parts may be anywhere."""
+    return part.camera in export.cameras
+
+
+def ends_check(
+    name: CheckName,
+    export: Export,
+    part: Part,
+    box: tuple[Sequence[float], Sequence[float]],
+    limit: float,
+) -> Check:
+    """A half ends in the planes of seam and foot, neither beyond nor short of them.
+
+    `box`: its minimum and maximum x, y, z, mm.
+    `limit`: mm.
+    """
+    beyond = _beyond(export, part, box)
+    worst = max(abs(way) for way in beyond.values())
+    told = [_told(plane, way) for plane, way in beyond.items() if not abs(way) <= limit]
+    return at_most(name, worst, limit, f"{part.name} ends {short_list(told)}")
+
+
+def _beyond(
+    export: Export, part: Part, box: tuple[Sequence[float], Sequence[float]]
+) -> dict[str, float]:
+    """How far a half reaches beyond each plane, mm; negative: how far it falls short."""
+    low, high = box
+    side = float(np.sign(export.cameras[part.camera].pinhole[X]))
+    nearest = low[X] if side > 0 else -high[X]
+    return {"seam": -nearest, "foot": export.foot_z_mm - low[Z]}
+
+
+def _told(plane: str, way: float) -> str:
+    return f"{abs(way):.3g} mm {'beyond' if way > 0 else 'short of'} the {plane}"

@@ -23,11 +23,8 @@ def blind_hole_faults(
 ) -> list[str]:
     """What is wrong with the holes of one camera's negative.
 
-    Args:
-        holes: of its seam (along x) and its foot (along z).
-        export: the record.
-        camera: of the negative.
-        limits: by how much sizes and places may be off.
+    `holes`: of its seam (along x) and its foot (along z).
+    `limits`: by how much sizes and places may be off.
     """
     shell = export.spec.shell
     faults: list[str] = []

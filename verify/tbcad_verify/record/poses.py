@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tbcad_verify.mesh.lines import axis_frame, polar_and_azimuth, wrapped
 from tbcad_verify.mesh.surfaces import reflect_directions
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import axis_frame, dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, OpticsSpec

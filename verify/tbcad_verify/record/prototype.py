@@ -14,9 +14,11 @@ from pydantic import Field, model_validator
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype_sections import (
+    MOST,
     Angle,
     Assembly,
     AssemblyStep,
+    Balls,
     CameraPlace,
     Drawing,
     Frame,
@@ -24,16 +26,12 @@ from tbcad_verify.record.prototype_sections import (
     Lamps,
     Led,
     PlacedFastener,
+    Plan,
+    PlateHoles,
     PrintedPart,
     PurchasedBody,
     Seat,
     Shroud,
-)
-from tbcad_verify.record.prototype_tables import (
-    MOST,
-    Balls,
-    Plan,
-    PlateHoles,
     Stops,
 )
 from tbcad_verify.record.validation import (
@@ -111,9 +109,7 @@ class Prototype(Strict):
 def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
     """Read prototype.json and its tables.
 
-    Args:
-        folder: the export, resolved.
-        cameras: ids that the design has.
+    `cameras`: ids that the design has.
 
     Raises:
         BadExport: anything missing, foreign, malformed, not finite or absurd.

@@ -111,10 +111,6 @@ class PartFiles(Strict):
 def parse_json(blob: FileBytes, schema: str) -> dict[str, Any]:
     """The JSON object in a file.
 
-    Args:
-        blob: the file.
-        schema: that the object must name.
-
     Raises:
         BadExport: broken JSON, NaN or infinities, a key twice, no object, or another schema.
     """
@@ -157,13 +153,7 @@ def fault(
     error: ValidationError,
     where: Callable[[tuple[int | str, ...]], str] = key_path,
 ) -> str:
-    """The first fault of a value that does not fit: its place, the value, and what is allowed.
-
-    Args:
-        model: that the value was validated with.
-        error: why it does not fit.
-        where: names the place of a value.
-    """
+    """The first fault of a value that does not fit: its place, the value, and what is allowed."""
     # An unknown key first: it is often why another is missing.
     faults = sorted(
         error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden"

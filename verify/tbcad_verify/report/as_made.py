@@ -37,7 +37,8 @@ def as_made_lines(as_made: AsMade | None) -> list[str]:
         return [NOT_SIMULATED]
     if not as_made.processes:
         return [f"Can be made: not simulated, {as_made.reason}"]
-    good, others = [], []
+    good: list[str] = []
+    others: list[str] = []
     for one in as_made.processes:
         words = f"{one.process} {one.share:.0%} {one.coverage_mm:.3g}"
         (good if one.share >= GOOD else others).append(words)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -34,11 +34,7 @@ class Check:
 def at_most(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a figure does not exceed its limit; NaN fails.
 
-    Args:
-        check: name, file, unit.
-        measured: figure.
-        limit: largest allowed.
-        detail: kept when it fails.
+    `check`: name, file, unit.
     """
     return _limited(check, measured, limit, measured <= limit, detail, AT_MOST)
 
@@ -51,6 +47,12 @@ def at_least(check: CheckName, measured: float, limit: float, detail: str = "") 
 def exactly(check: CheckName, measured: float, limit: float, detail: str = "") -> Check:
     """A check that a figure has its only allowed value; NaN fails."""
     return _limited(check, measured, limit, measured == limit, detail, EXACTLY)
+
+
+def no_faults(check: CheckName, faults: Iterable[str]) -> Check:
+    """A check that counts faults; the detail names the first."""
+    found = list(faults)
+    return at_most(check, len(found), 0, short_list(found))
 
 
 def informative(check: CheckName, measured: float, detail: str = "") -> Check:
@@ -66,9 +68,7 @@ def unknown(check: CheckName, reason: str) -> Check:
 def check_names(units: Mapping[str, str], file: str) -> list[CheckName]:
     """Name, file and unit of every check of one file.
 
-    Args:
-        units: unit of each check, by name.
-        file: where, inside the export.
+    `units`: unit of each check, by name.
     """
     return [(name, file, unit) for name, unit in units.items()]
 
@@ -117,13 +117,9 @@ def worst_offenders(
 ) -> str:
     """The worst few of what is bad, by name and figure, and how many more there are.
 
-    Args:
-        names: N.
-        values: (N,) figures.
-        unit: of the figures.
-        bad: (N,) true for what is to be named.
-        form: format of a figure.
-        badness: (N,) largest for the worst; None: the values.
+    `values`: (N,) figures.
+    `bad`: (N,) true for what is to be named.
+    `badness`: (N,) largest for the worst; None: the values.
     """
     order = np.argsort(-(values if badness is None else badness), kind="stable")
     worst = order[bad[order]]

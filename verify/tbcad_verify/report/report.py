@@ -17,11 +17,16 @@ from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.report.as_made import AsMade
 from tbcad_verify.report.checks import Check, finite
-from tbcad_verify.report.key_figures import key_figures
-from tbcad_verify.report.methods import remedy
+from tbcad_verify.report.methods import key_figures, remedy
 from tbcad_verify.report.summary import summary
-from tbcad_verify.report.table import printer_lines, table
-from tbcad_verify.report.text import WIDTH, changed_files, changed_lines, listed_names
+from tbcad_verify.report.text import (
+    WIDTH,
+    changed_files,
+    changed_lines,
+    listed_names,
+    printer_lines,
+    table,
+)
 from tbcad_verify.types import Floats
 
 DIGITS = 9
@@ -120,10 +125,8 @@ class Report:
     def show(self, console: Console, output: Output = "summary") -> None:
         """Print the result.
 
-        Args:
-            console: to print to.
-            output: "summary" (at most thirteen lines), "full" (every check before it), "quiet" (the
-                verdict, and what was changed), or "json" (the summary for other programs).
+        `output`: "summary" (at most thirteen lines), "full" (every check before it), "quiet" (the
+        verdict, and what was changed), or "json" (the summary for other programs).
         """
         if output == "full":
             self._show_all(console)

@@ -13,8 +13,7 @@ from rich.text import Text
 from tbcad_verify.programs import is_skipped
 from tbcad_verify.report.as_made import as_made_lines
 from tbcad_verify.report.checks import Check
-from tbcad_verify.report.key_figures import KEY_FIGURES, KeyFigure, checks_named, key_figures
-from tbcad_verify.report.methods import remedy
+from tbcad_verify.report.methods import KEY_FIGURES, KeyFigure, checks_named, key_figures, remedy
 from tbcad_verify.report.text import (
     MORE,
     WIDTH,

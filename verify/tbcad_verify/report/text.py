@@ -1,13 +1,18 @@
-"""Figures, limits, lists and changed files as text of limited width.
-
-Files that people read may be edited: a change is told, and fails only where that is asked for.
-"""
+"""All checks as a table for people, 80 columns wide, their figures in words, and printers."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
 
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from tbcad_verify.programs import is_skipped
 from tbcad_verify.report.checks import AT_LEAST, AT_MOST, EXACTLY, Check, at_most
 
 WIDTH = 80  # columns of everything that is shown
@@ -16,6 +21,11 @@ PAPER = ("paper", "manifest.json", "files")
 CHANGED = "changed since the build: "
 _EXPONENT_FROM = 1e6  # figures below are shown without an exponent
 SIGNS = {AT_MOST: "<=", AT_LEAST: ">=", EXACTLY: "="}
+# Columns of a row: check, result, measured, limit with unit. With the gaps they make 80.
+WIDTHS = (26, 7, 21, 23)
+SPAN_DIGITS = 3  # of the smallest and the largest of several figures
+INDENT = 4
+STYLES = {"FAIL": "red", "unknown": "yellow", "skipped": "yellow", "pass": "green"}
 
 
 def figure(value: float | None, digits: int = 4) -> str:
@@ -69,3 +79,100 @@ def strictly(checks: Iterable[Check]) -> list[Check]:
         else check
         for check in checks
     ]
+
+
+def table(checks: Sequence[Check]) -> Group:
+    """One row for each check below the name of its file; files with the same result share one.
+
+    What is to be said about a check is on lines of its own below its row.
+    """
+    return Group(*_renderables(checks))
+
+
+def _renderables(checks: Sequence[Check]) -> Iterator[RenderableType]:
+    for files, groups in groupby(_groups(checks), _files):
+        yield Text(files or "all files", style="bold")
+        for group in groups:
+            yield _row(group)
+            if group[0].detail:
+                yield Padding(Text(group[0].detail), (0, 0, 0, INDENT), expand=False)
+
+
+def _row(group: Sequence[Check]) -> Table:
+    first, state = group[0], _state(group[0])
+    row = Table.grid(padding=(0, 1, 0, 0), pad_edge=False)
+    for width, side in zip(WIDTHS, ("left", "left", "right", "left"), strict=True):
+        row.add_column(width=width, justify=side, overflow="fold")  # type: ignore[arg-type]
+    row.add_row(
+        Text(first.name),
+        Text(state, style=STYLES.get(state, "")),
+        _span([check.measured for check in group]),
+        Text(_limit(group)),
+    )
+    return row
+
+
+def _files(group: Sequence[Check]) -> str:
+    return group[0].file if len(group) == 1 else f"{len(group)} files"
+
+
+def _groups(checks: Sequence[Check]) -> list[list[Check]]:
+    """Checks that pass with the same detail for several files together; all others alone."""
+    groups: dict[tuple[object, ...], list[Check]] = {}
+    for k, check in enumerate(checks):
+        key = (check.name, check.unit, check.limit is None, check.detail)
+        groups.setdefault(key if check.passed else (k,), []).append(check)
+    return list(groups.values())
+
+
+def _span(values: Sequence[float | None]) -> str:
+    """A figure, or the smallest and the largest."""
+    known = sorted({value for value in values if value is not None})
+    if len(known) < 2:
+        return "".join(map(figure, known))
+    ends = (figure(value, SPAN_DIGITS) for value in (known[0], known[-1]))
+    return " ... ".join(dict.fromkeys(ends))
+
+
+def _limit(group: Sequence[Check]) -> str:
+    """The limit with its sign and unit, or the smallest and the largest."""
+    first = group[0]
+    if first.limit is None:
+        return first.unit
+    return f"{SIGNS[first.bound]} {_span([check.limit for check in group])} {first.unit}".rstrip()
+
+
+def _state(check: Check) -> str:
+    if check.passed is None:
+        return "unknown"
+    if not check.passed:
+        return "FAIL"
+    if is_skipped(check):
+        return "skipped"
+    return "info" if check.limit is None else "pass"
+
+
+def printer_lines(printing: Sequence[Mapping[str, Any]]) -> list[str]:
+    """For each printer how many parts it can make; parts with the same problems share a line."""
+    printers = dict.fromkeys(row["profile"] for row in printing)
+    return [
+        line
+        for name in printers
+        for line in _printer(name, [row for row in printing if row["profile"] == name])
+    ]
+
+
+def _printer(name: str, rows: Sequence[Mapping[str, Any]]) -> Iterable[str]:
+    good = [row for row in rows if not row["problems"]]
+    yield f"{name} ({rows[0]['material']}): {len(good)} of {len(rows)} parts can be made"
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        if row["problems"]:
+            reasons.setdefault("; ".join(map(_short, row["problems"])), []).append(row["part"])
+    for reason, parts in reasons.items():
+        yield f"  not {', '.join(parts)}: {reason}"
+
+
+def _short(problem: str) -> str:
+    """The problem without what follows a colon, such as every size of the part and the bed."""
+    return problem.partition(": ")[0]

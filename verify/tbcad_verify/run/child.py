@@ -46,11 +46,6 @@ def run(command: Sequence[str], folder: Path, limits: Limits) -> Outcome:
 
     The program has no input and no screen. Its home is in the folder, so that the user's settings
     neither matter nor change. Processes that it started are killed when it ends.
-
-    Args:
-        command: absolute path of the program, and its arguments.
-        folder: an existing private folder.
-        limits: of time and output.
     """
     if limits.stop.is_set():
         return Outcome(None, "", 0.0, "stopped")

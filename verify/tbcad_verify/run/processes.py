@@ -49,9 +49,7 @@ class Processes(ThreadPoolExecutor):
     def __init__(self, number: int, seconds: float | None = None) -> None:
         """Work with so many processes at most.
 
-        Args:
-            number: of processes.
-            seconds: time limit of a call between what it reports; None: there is none.
+        `seconds`: time limit of a call between what it reports; None: there is none.
         """
         super().__init__(number)
         self.seconds = seconds
@@ -84,11 +82,8 @@ class Processes(ThreadPoolExecutor):
     ) -> Any:
         """Call a function in a process and wait for its result.
 
-        Args:
-            work: function of a module.
-            arguments: are copied.
-            heard: is called with each value that the function reports: by another function, its
-                last argument.
+        `heard`: is called with each value that the function reports: by another function, its
+        last argument.
 
         Raises:
             ProcessEnded: the process ended before.

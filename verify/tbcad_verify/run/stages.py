@@ -33,9 +33,8 @@ from tbcad_verify.shell.integrity import (
     record_checks,
 )
 from tbcad_verify.shell.mandrel import mandrel_results
-from tbcad_verify.shell.measured_shell import ShellPart, measure_shells
+from tbcad_verify.shell.measured_shell import ShellPart, flipped_measures, measure_shells
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
-from tbcad_verify.shell.mirror_image import flipped_measures
 from tbcad_verify.shell.optics import OpticalSetup, set_up
 
 SHELL_STAGES = (
@@ -63,11 +62,7 @@ def run_stages(
 ) -> None:
     """Run all stages, and hand over what each measures.
 
-    Args:
-        folder: what `tbcad build` wrote.
-        printers: profiles that every part must suit; without any, the built-in ones inform only.
-        sink: takes the results.
-        beside: does the prototype's stages while the shells' are done here.
+    `printers`: profiles that every part must suit; without any, the built-in ones inform only.
 
     Raises:
         BadExport: the folder is not a readable export, or a profile cannot be used.
@@ -160,10 +155,8 @@ def _shell_measures(
 ) -> PartMeasures:
     """What printers need to know of a shell; of a mirror image it is known already.
 
-    Args:
-        shell: to measure.
-        measured: shells before it.
-        first: scene of the first of two, if the second is its image.
+    `measured`: shells before it.
+    `first`: scene of the first of two, if the second is its image.
     """
     original = measured.get(shell.image_of.name) if shell.image_of else None
     if original and shell.mesh and shell.mass:

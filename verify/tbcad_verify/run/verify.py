@@ -17,7 +17,7 @@ import numpy as np
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
-from tbcad_verify.prototype.step_files import part_step_checks
+from tbcad_verify.prototype.assembly import part_step_checks
 from tbcad_verify.record.export import TEXTS, Export, listed_names, read_export
 from tbcad_verify.record.files import open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
@@ -74,10 +74,7 @@ def verify(
 ) -> Report:
     """Verify an export, and write verify.json into it.
 
-    Args:
-        folder: what `tbcad build` wrote.
-        progress: called with the name of each stage before it starts.
-        options: what else to verify, and how.
+    `progress`: called with the name of each stage before it starts.
 
     Raises:
         BadExport: the folder is not a readable export, or cannot be written to; nothing is
@@ -134,12 +131,7 @@ def watch(
 ) -> None:
     """Do stages in a process, which sends their results; those that it does not end are unknown.
 
-    Args:
-        titles: of all stages, in order.
-        results: are added to.
-        seconds: time limit of one stage.
-        stages: function of a module; takes the arguments, and what receives results.
-        arguments: of it.
+    `stages`: function of a module; takes the arguments, and what receives results.
 
     Raises:
         BadExport: the folder is not a readable export.

@@ -12,11 +12,10 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import MassProperties
-from tbcad_verify.mesh.mesh import Topology
+from tbcad_verify.mesh.mesh import MassProperties, Topology
 from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.files import digest, listing
-from tbcad_verify.record.joining_planes import ends_check, has_joining_planes
+from tbcad_verify.record.flange_holes import ends_check, has_joining_planes
 from tbcad_verify.record.poses import (
     POSE_MM,
     contradictions,
@@ -64,12 +63,7 @@ ENDS = {"mesh seam and foot": "mm"}
 
 
 def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> list[Check]:
-    """Every listed file is there with its size and sha256; paper and other files are listed.
-
-    Args:
-        export: the record.
-        parsed: size and sha256 of files as they were when they were parsed.
-    """
+    """Every listed file is there with its size and sha256; paper and other files are listed."""
     changed = [
         name
         for name, listed in sorted(export.manifest.items())
@@ -157,11 +151,7 @@ def mesh_ends_checks(
     Both planes are exact in a mesh, whatever its chords: only float32 moves a corner, by half a
     step of its largest coordinates.
 
-    Args:
-        export: the record.
-        part: the half.
-        mass: of its mesh.
-        reason: why the mass is None.
+    `reason`: why the mass is None.
     """
     if not has_joining_planes(export, part):
         return []

@@ -8,7 +8,6 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.lines import crossings
 from tbcad_verify.mesh.rays import (
     RayScene,
     distances_to_planes,
@@ -25,7 +24,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect,
     reflect_directions,
 )
-from tbcad_verify.mesh.vectors import dot, norm
+from tbcad_verify.mesh.vectors import crossings, dot, norm
 from tbcad_verify.record.export import Camera
 from tbcad_verify.types import Floats, Ints
 

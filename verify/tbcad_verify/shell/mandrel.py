@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.holes import RoundHoles, round_holes
-from tbcad_verify.mesh.mass import mass_properties
-from tbcad_verify.mesh.mesh import Mesh, examine_topology, mesh_from_facets
+from tbcad_verify.mesh.mesh import Mesh, examine_topology, mass_properties, mesh_from_facets
 from tbcad_verify.mesh.rays import build_scene, first_hits
 from tbcad_verify.mesh.segments import Edges, count_folds, measure_edges, rounding
 from tbcad_verify.mesh.stl import Facets
@@ -75,11 +74,7 @@ def mandrel_results(
 ) -> Results:
     """All checks of one negative's mesh, and its mass.
 
-    Args:
-        export: the record.
-        mandrel: what it says of the negative.
-        facets: of its STL.
-        setup: gives what was found on the shells; may raise `Unknown`.
+    `setup`: gives what was found on the shells; may raise `Unknown`.
     """
     mesh, no_mesh = attempt(lambda: mesh_from_facets(facets))
     topology = guarded(
@@ -104,14 +99,7 @@ def mandrel_results(
 def mandrel_checks(
     export: Export, mandrel: Mandrel, mesh: Mesh, setup: OpticalSetup
 ) -> list[Check]:
-    """Everything that is measured on one negative's mesh but its topology.
-
-    Args:
-        export: the record.
-        mandrel: what it says of the negative.
-        mesh: of the negative.
-        setup: the shells.
-    """
+    """Everything that is measured on one negative's mesh but its topology."""
     shared = _shared(mesh, setup.mesh, _shell_mirrors(setup, mandrel.camera), len(export.mirrors))
     modelled = export.mirrors.surfaces().coated(-export.coating_mm)
     mirrors, surface, body, draft, recorded, pull = check_names(CHECKS, mandrel.stl)

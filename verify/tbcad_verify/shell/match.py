@@ -41,13 +41,8 @@ def match(
     The middle of a long patch may be nearer to another mirror's apex. So of what is left a mirror
     gets the patch that its camera sees at its apex.
 
-    Args:
-        mirrors: the record.
-        recovery: all parts' patches, K.
-        mesh: all parts.
-        camera: (K,) the camera that each patch's part is for.
-        seen: (M,) the patch that each mirror's camera sees in line with its apex; -1 for none.
-        coating_mm: the coat that the mesh does not show.
+    `camera`: (K,) the camera that each patch's part is for.
+    `seen`: (M,) the patch that each mirror's camera sees in line with its apex; -1 for none.
     """
     segment = np.full(len(mirrors), -1, dtype=np.intp)
     for name in np.unique(mirrors.camera):

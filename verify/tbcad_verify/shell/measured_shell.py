@@ -1,29 +1,41 @@
-"""The meshes of the shells, measured one by one; a mirror image of the first is not again."""
+"""The meshes of the shells, measured one by one; a mirror image of the first is not again.
+
+Camera b's shell is camera a's, reflected in x = 0. Where the facets in both files are the same to
+the last bit but for the sign of x and the order of each facet's corners, every figure of one
+follows from the other's; where a single bit differs, nothing does.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mass import MassProperties, mass_properties
-from tbcad_verify.mesh.mesh import Mesh, Topology, examine_topology, mesh_from_facets
+from tbcad_verify.mesh.holes import RoundHoles
+from tbcad_verify.mesh.mesh import (
+    MassProperties,
+    Mesh,
+    Topology,
+    examine_topology,
+    mass_properties,
+    mesh_from_facets,
+)
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.segments import Edges, measure_edges
 from tbcad_verify.mesh.stl import Facets
+from tbcad_verify.mesh.surfaces import Surfaces
+from tbcad_verify.printing.orientations import part_hull
+from tbcad_verify.printing.part_measures import PartMeasures, WallThickness
 from tbcad_verify.record.export import Export, Part
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
-from tbcad_verify.shell.mirror_image import (
-    FLIP,
-    flipped_edges,
-    flipped_mass,
-    flipped_mesh,
-    flipped_recovery,
-    is_mirror_image,
-)
-from tbcad_verify.shell.optics import pinhole_of
+from tbcad_verify.shell.optics import FLIP, pinhole_of
 from tbcad_verify.shell.recover import Recovery, recover
+from tbcad_verify.types import Floats
+
+# The half-edge between the same two corners when a facet's three are taken in reverse.
+REVERSED = np.array([1, 0, 2])
 
 
 @dataclass(frozen=True)
@@ -97,3 +109,75 @@ def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
     )
     reason = no_mesh or no_recovery or no_topology or no_mass
     return ShellPart(part, mesh, edges, topology, mass, recovery, no_topology, no_recovery, reason)
+
+
+def is_mirror_image(one: Facets, other: Facets) -> bool:
+    """Whether two files hold the same facets, in the same order, but for the reflection."""
+    flip = FLIP.astype(np.float32)
+    return (
+        one.corners.shape == other.corners.shape
+        and np.array_equal(one.corners[:, ::-1] * flip, other.corners)
+        and np.array_equal(one.normals * flip, other.normals)
+    )
+
+
+def flipped_mesh(mesh: Mesh) -> Mesh:
+    """The mesh of the mirror image, its facets and vertices in the same order."""
+    twin = _reversed_half_edges(mesh.twin).reshape(-1, 3)[:, REVERSED].ravel().astype(np.int32)
+    faces = np.ascontiguousarray(mesh.faces[:, ::-1])
+    return Mesh(mesh.points * FLIP, faces, twin, _flipped_columns(mesh.area))
+
+
+def flipped_edges(edges: Edges) -> Edges:
+    """The edges of the mirror image, in the order of their half-edges."""
+    half = _reversed_half_edges(edges.half).astype(np.intp)
+    order = np.argsort(half)
+    return Edges(half[order], edges.angle[order], edges.noise[order])
+
+
+def flipped_mass(mass: MassProperties) -> MassProperties:
+    """Volume, area, centroid and box of the mirror image."""
+    low, high = [-mass.high[0], *mass.low[1:]], [-mass.low[0], *mass.high[1:]]
+    centroid = [-mass.centroid[0], *mass.centroid[1:]]
+    return replace(mass, centroid=centroid, low=low, high=high)
+
+
+def flipped_recovery(recovery: Recovery) -> Recovery:
+    """The patches of the mirror image, under the same numbers."""
+    fits = recovery.fits
+    surfaces = Surfaces(
+        _flipped_columns(fits.surfaces.point),
+        _flipped_columns(fits.surfaces.normal),
+        fits.surfaces.curvature,
+    )
+    middle, normal = _flipped_columns(fits.middle), _flipped_columns(fits.normal)
+    return replace(recovery, fits=replace(fits, surfaces=surfaces, middle=middle, normal=normal))
+
+
+def flipped_measures(measures: PartMeasures, mesh: Mesh, mass: MassProperties) -> PartMeasures:
+    """What a printer needs to know of the mirror image, given its mesh and mass."""
+    walls, holes = measures.walls, measures.holes
+    return replace(
+        measures,
+        mesh=mesh,
+        mass=mass,
+        walls=WallThickness(walls.thickness, walls.share, walls.minimum, walls.where * FLIP),
+        holes=RoundHoles(
+            holes.diameter,
+            _flipped_columns(holes.middle),
+            _flipped_columns(holes.axis),
+            holes.depth,
+            holes.wall,
+        ),
+        hull=part_hull(mesh.points),
+    )
+
+
+def _flipped_columns(columns: Floats) -> Floats:
+    """Mirror images of points or directions (3, N)."""
+    return np.asarray(columns * FLIP[:, None])
+
+
+def _reversed_half_edges(half: NDArray[np.integer]) -> NDArray[np.integer]:
+    """Numbers of half-edges after each facet's corners are reversed; -1 stays."""
+    return np.where(half < 0, -1, half - half % 3 + REVERSED[half % 3])

@@ -68,12 +68,7 @@ class MeshCasing:
 
 
 def casing_checks(setup: OpticalSetup, holes: Mapping[str, RoundHoles]) -> list[Check]:
-    """Wall and holes of every camera's half that has a STEP, against the spec.
-
-    Args:
-        setup: all parts.
-        holes: found in each part's mesh, by the name of the part.
-    """
+    """Wall and holes of every camera's half that has a STEP, against the spec."""
     return [
         check
         for number, part in enumerate(setup.export.parts)
@@ -95,10 +90,6 @@ def _is_cased(export: Export, part: Part) -> bool:
 
 def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
     """Valleys and back of one part.
-
-    Args:
-        setup: all parts.
-        number: of the part.
 
     Raises:
         Unknown: no mirrors meet, or no ray leaves through a back.

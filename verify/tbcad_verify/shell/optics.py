@@ -14,12 +14,12 @@ from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
 from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match, owners
-from tbcad_verify.shell.mirror_image import is_image_of_camera
 from tbcad_verify.shell.recover import Recovery, join_recoveries
 from tbcad_verify.types import Floats, Ints
 
 # The apex of a halved mirror is on the cut; this much beside it only one half is seen.
 ASIDE_MM = 0.01
+FLIP = np.array([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -130,12 +130,7 @@ def set_up(
 ) -> OpticalSetup:
     """Join all parts, match their mirrors with the record, and get ready for rays.
 
-    Args:
-        export: with the record.
-        meshes: of all parts.
-        recoveries: of all parts.
-        second_is_image: whether there are two parts, the second the mirror image of the first.
-        first: of the first part's mesh; None: the second is put into Embree too.
+    `first`: of the first part's mesh; None: the second is put into Embree too.
     """
     mesh, recovery = join_meshes(meshes), join_recoveries(recoveries)
     counts = [item.segments.count for item in recoveries]
@@ -167,6 +162,17 @@ def _symmetric(export: Export, matches: Match, patches: int) -> bool:
     own, others = (matches.segment[export.mirrors.camera == key] for key in (name, other_name))
     return is_image_of_camera(other, one) and np.array_equal(
         np.where(own < 0, own, own + patches), others
+    )
+
+
+def is_image_of_camera(other: Camera, one: Camera) -> bool:
+    """Whether one camera's pixels see along the mirror images of the other's, in any order."""
+    across = one.right * FLIP
+    same = [(one.pinhole * FLIP, other.pinhole), (one.forward * FLIP, other.forward)]
+    return (
+        (one.width, one.height, one.hfov_deg) == (other.width, other.height, other.hfov_deg)
+        and all(np.array_equal(*pair) for pair in same)
+        and (np.array_equal(across, other.right) or np.array_equal(-across, other.right))
     )
 
 

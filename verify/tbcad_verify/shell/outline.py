@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.fits import SurfaceFits
-from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
@@ -22,7 +21,7 @@ from tbcad_verify.mesh.surfaces import (
     reflect,
     reflect_directions,
 )
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
 from tbcad_verify.record.poses import VirtualCameras
 from tbcad_verify.shell.recover import Recovery, follows_fit
 from tbcad_verify.types import Bools, Floats, Ints
@@ -54,13 +53,9 @@ def trace_outline(
 ) -> Outline:
     """Sample the outlines of selected mirrors.
 
-    Args:
-        mesh: all parts.
-        recovery: patches of that mesh, K.
-        owner: (K,) recorded mirror of each patch, -1 for none.
-        coating_mm: the coat on mirrors that the mesh does not show.
-        selected: (M,) true for mirrors of the camera in question.
-        halved: (M,) true for mirrors that the seam cuts.
+    `owner`: (K,) recorded mirror of each patch, -1 for none.
+    `selected`: (M,) true for mirrors of the camera in question.
+    `halved`: (M,) true for mirrors that the seam cuts.
     """
     label = recovery.segments.label
     half, beyond = _outline_edges(mesh, label, owner, selected)
@@ -125,11 +120,7 @@ def winding_numbers(
     The sign is dropped. What is not about 1 does not surround the object's middle at all, however
     far from it. The cut between two halves is left out: it runs through the middle.
 
-    Args:
-        outline: of one camera.
-        lines: reflected at the samples.
-        virtual: pairs halves.
-        u: (3, M) directions of the virtual cameras.
+    `u`: (3, M) directions of the virtual cameras.
     """
     axis = u[:, outline.mirror]
     # Across each ray, turned with it to lie across the axis: a ray at a right angle to the axis

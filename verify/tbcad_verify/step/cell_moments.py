@@ -30,10 +30,6 @@ MAX_PIECES = 64
 def cell_moments(maps: SurfaceMaps, arcs: MapArcs) -> tuple[Floats, Floats]:
     """Integrals over the cells of M maps by Gauss-Legendre quadrature along their arcs.
 
-    Args:
-        maps: of the mirrors.
-        arcs: that bound the cells.
-
     Returns:
         Area (M,), mm^2, and first moment (3, M) of d = x - p about each mirror's apex p, in its own
         axes right, up, normal, mm^3.

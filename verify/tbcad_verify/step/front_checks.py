@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Camera, Export, Part
-from tbcad_verify.record.joining_planes import ends_check
+from tbcad_verify.record.flange_holes import ends_check
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.report.checks import (
     Check,

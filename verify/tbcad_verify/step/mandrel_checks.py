@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export, Mandrel
 from tbcad_verify.record.flange_holes import Hole, HoleLimits, X, Z
 from tbcad_verify.record.mandrel_holes import blind_hole_faults
@@ -18,7 +18,6 @@ from tbcad_verify.report.checks import (
     at_most,
     short_list,
 )
-from tbcad_verify.step.casing import bores
 from tbcad_verify.step.front_checks import (
     CELL_SHARE,
     FrontComparison,
@@ -34,6 +33,7 @@ from tbcad_verify.step.part_checks import (
     Checks,
 )
 from tbcad_verify.step.pedestals import fronts
+from tbcad_verify.step.solids_text import bores
 from tbcad_verify.step.step_file import StepFaces, StepFile, known, load
 
 PLANE_MM = 1e-8  # of the joining planes and the bottoms of holes
@@ -60,13 +60,7 @@ def mandrel_step_checks(
     masses: dict[str, MassProperties],
     comparisons: dict[str, MandrelComparison | Unknown],
 ) -> list[Check]:
-    """All checks of the negatives' STEP files.
-
-    Args:
-        export: the record.
-        masses: of the meshes, by part.
-        comparisons: by part.
-    """
+    """All checks of the negatives' STEP files."""
     return each_checked(export, export.mandrels, CHECKS, masses, comparisons)
 
 

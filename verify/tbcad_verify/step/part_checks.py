@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, guarded_each, short_list
 from tbcad_verify.step.step_file import StepFile
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.report.checks import Unknown
-from tbcad_verify.step.arc_loops import partners
+from tbcad_verify.step.cell_boundaries import partners
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.step_file import StepFaces
 from tbcad_verify.types import Bools, Floats, Ints
@@ -114,12 +114,9 @@ def wall_errors(
     The largest of the plane's distance from the bottom, the difference of the normals, and the
     error of the bottom's depth; infinite for what is no wall of a groove.
 
-    Args:
-        grooves: of the file.
-        light: the mirrors as they reflect.
-        pinhole: (3,) mm.
-        bounds: (2, 4) planes of seam and foot.
-        width: of the grooves, mm.
+    `pinhole`: (3,) mm.
+    `bounds`: (2, 4) planes of seam and foot.
+    `width`: of the grooves, mm.
     """
     start, end = (grooves.bottom[corner] for corner in grooves.corner)
     along = _unit(end - start)

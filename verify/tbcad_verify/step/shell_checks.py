@@ -1,4 +1,9 @@
-"""A STEP file compared with the mesh, the record, the closed form, and its own claims."""
+"""A STEP file compared with the mesh, the record, the closed form, and its own claims.
+
+Of the radii, rule "traced" gives every mirror the coverage that is asked for, with the margin of
+the spec or one of its own, unless the mirror has the largest radius allowed; "paper" gives it the
+radius of equation 2; "flat" gives it none.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +13,9 @@ from functools import partial
 
 import numpy as np
 
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export, Part
 from tbcad_verify.record.flange_holes import HoleLimits, flanges, hole_faults
-from tbcad_verify.record.radius_rule import RULE, rule_check
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -21,8 +25,8 @@ from tbcad_verify.report.checks import (
     guarded,
     require,
     short_list,
+    worst_offenders,
 )
-from tbcad_verify.step.casing import Casing, read_casing, wall
 from tbcad_verify.step.front_checks import (
     CELL_SHARE,
     FrontComparison,
@@ -39,15 +43,19 @@ from tbcad_verify.step.part_checks import (
     Checks,
 )
 from tbcad_verify.step.pedestals import Grooves, fronts
+from tbcad_verify.step.solids_text import Casing, read_casing, wall
 from tbcad_verify.step.sphere_union import cells_of_export
 from tbcad_verify.step.step_file import StepFile, known, load
-from tbcad_verify.types import Floats
+from tbcad_verify.types import Bools, Floats
 
 WALL_MM = 1e-3  # the deepest point may lie between corners
 HOLE_LIMITS = HoleLimits(size=1e-6, place=1e-3)  # lengths along a section are sums of chords
 COVERAGE_MM = 0.1  # spheres fitted to coarse facets, and outlines between their corners
 COVERAGE = ("recorded coverage", "mirrors.csv", "mm")
 AREAS = ("cell areas", "mirrors.csv", "of the area")
+RULE_MM = 1e-3  # by which a coverage may be off; the search for radii ends at a tenth of it
+RULE_SHARE = 1e-6  # of a radius
+RULE = ("radius rule", "mirrors.csv", "mirrors")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +69,7 @@ class ShellComparison(FrontComparison):
 def shell_comparisons(
     export: Export, files: dict[str, StepFile | Unknown]
 ) -> dict[str, ShellComparison | Unknown]:
-    """Each shell's STEP file with all that it is compared with but its mesh, or why not, by part.
-
-    Args:
-        export: the record.
-        files: as read, by part.
-    """
+    """Each shell's STEP file with all that it is compared with but its mesh, or why not."""
     return each_compared(export.parts, files, partial(_comparison, export))
 
 
@@ -79,12 +82,7 @@ def shell_step_checks(
 ) -> list[Check]:
     """All checks of all STEP files that the record names.
 
-    Args:
-        export: the record.
-        masses: of the meshes, by part.
-        comparisons: by part.
-        coverage: (M,) mm, as measured on spheres.
-        areas: what `area_checks` gives.
+    `coverage`: (M,) mm, as measured on spheres.
     """
     checks = each_checked(export, export.parts, CHECKS, masses, comparisons)
     recorded = [*areas]
@@ -147,3 +145,54 @@ CHECKS: Checks = {
     "step holes": ("faults", _holes),
     **MASS_CHECKS,
 }
+
+
+def rule_check(export: Export) -> Check:
+    """The radii are those of the spec's rule, margin and largest radius."""
+    mirrors, rule = export.mirrors, export.spec.mirrors.radius_rule
+    good = {"flat": _flat, "paper": _paper, "traced": _traced}[rule](export)
+    detail = worst_offenders(mirrors.ids, mirrors.radius_mm, "mm", ~good, ".6g")
+    return at_most(RULE, int((~good).sum()), 0, f"radii not by rule {rule}: {detail}")
+
+
+def _flat(export: Export) -> Bools:
+    return export.mirrors.flat
+
+
+def _paper(export: Export) -> Bools:
+    """Equation 2 of the paper, where it gives a radius and none above the largest."""
+    mirrors, largest = export.mirrors, _largest(export)
+    half = np.radians(mirrors.theta1_deg - mirrors.theta0_deg) / 2
+    curvature = np.maximum(np.sin(half) / mirrors.size_mm, 1 / largest)
+    return np.asarray(np.abs(mirrors.radius_mm * curvature - 1) <= RULE_SHARE)
+
+
+def _traced(export: Export) -> Bools:
+    mirrors, largest = export.mirrors, _largest(export)
+    margin = _margins(export)
+    beyond = mirrors.coverage_mm - (export.target_mm + margin)
+    # Where spheres of the largest radius would not meet, tbcad makes them flatter still.
+    at_largest = mirrors.radius_mm >= largest * (1 - RULE_SHARE)
+    good = (np.abs(beyond) <= RULE_MM) | (at_largest & (beyond >= -RULE_MM))
+    return np.asarray(good & (margin >= export.spec.mirrors.margin_mm))
+
+
+def _margins(export: Export) -> Floats:
+    """(M,) margin of each mirror, mm; NaN where there are own margins for another number of them.
+
+    Both cameras' mirrors have the same, in the order of the file.
+    """
+    mirrors, own = export.mirrors, export.spec.mirrors.own_margins_mm
+    if not own:
+        return np.full(len(mirrors.camera), export.spec.mirrors.margin_mm)
+    margins = np.full(len(mirrors.camera), np.nan)
+    for camera in set(mirrors.camera.tolist()):
+        rows = np.flatnonzero(mirrors.camera == camera)
+        if len(rows) == len(own):
+            margins[rows] = own
+    return margins
+
+
+def _largest(export: Export) -> Floats:
+    """(M,) largest radius of each mirror, mm."""
+    return export.spec.mirrors.max_radius_widths * export.mirrors.size_mm

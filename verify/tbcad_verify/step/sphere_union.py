@@ -18,8 +18,12 @@ import numpy as np
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import dot
 from tbcad_verify.record.export import Export
-from tbcad_verify.step.arc_loops import arc_loops, front_pieces
-from tbcad_verify.step.cell_boundaries import CellBoundaries, cell_boundaries
+from tbcad_verify.step.cell_boundaries import (
+    CellBoundaries,
+    arc_loops,
+    cell_boundaries,
+    front_pieces,
+)
 from tbcad_verify.step.cell_moments import cell_moments
 from tbcad_verify.step.map_arcs import free_arcs
 from tbcad_verify.step.pedestals import Grooves
@@ -80,11 +84,7 @@ def cells_of_export(
     `coated`. A row without a radius is a plane. The walls are the seam x = 0, of which the camera
     has the side of its pinhole, and the foot plane. The recorded `cell_area_mm2` is the coated one.
 
-    Args:
-        export: the record.
-        camera: whose mirrors.
-        grooves: that end mirrors on pedestals; None where neighbouring spheres meet.
-        coated: the cells of the reflecting surfaces.
+    `grooves`: that end mirrors on pedestals; None where neighbouring spheres meet.
     """
     mine = np.flatnonzero(export.mirrors.camera == camera)
     side = float(np.copysign(1.0, export.cameras[camera].pinhole[0]))

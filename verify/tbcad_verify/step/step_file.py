@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.mass import MassProperties
+from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
@@ -94,10 +94,6 @@ def load(folder: Path, name: str) -> FileBytes:
 def read_step_files(export: Export, processes: Processes) -> dict[str, StepFile | Unknown]:
     """The STEP files of all parts, or why one is not known, by part.
 
-    Args:
-        export: the record.
-        processes: that read them.
-
     Raises:
         BadExport: a file is missing, foreign or truncated.
     """
@@ -109,10 +105,8 @@ def read_step_files(export: Export, processes: Processes) -> dict[str, StepFile 
 def examine_all(blobs: Sequence[FileBytes], processes: Processes) -> list[StepFile | Unknown]:
     """Read the bytes of files as text and by the kernel, from private copies.
 
-    Args:
-        blobs: the files.
-        processes: one that crashes, or is stopped, makes the file that it was at unknown, and no
-            other.
+    `processes`: one that crashes, or is stopped, makes the file that it was at unknown, and no
+    other.
     """
     with tempfile.TemporaryDirectory(prefix="tbcad-step-") as name:
         paths = [Path(name) / f"part{k}.step" for k in range(len(blobs))]

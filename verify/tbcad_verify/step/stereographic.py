@@ -103,11 +103,9 @@ def map_circles(maps: SurfaceMaps, number: Ints, others: Surfaces, spread: float
 def plane_circles(maps: SurfaceMaps, point: Floats, normal: Floats, real: Bools) -> MapCircles:
     """What planes of its own, and last the horizon, leave of each of M maps: (M, K + 1) circles.
 
-    Args:
-        maps: of the mirrors.
-        point: (M, K, 3) mm, on the planes.
-        normal: (M, K, 3) unit, to the side that is kept.
-        real: (M, K) false for places in the table without a plane.
+    `point`: (M, K, 3) mm, on the planes.
+    `normal`: (M, K, 3) unit, to the side that is kept.
+    `real`: (M, K) false for places in the table without a plane.
     """
     mine = maps.surfaces
     gamma = np.einsum("mkx,mkx->mk", normal, mine.point.T[:, None] - point)

@@ -11,7 +11,7 @@ from tbcad.app.cli.app import app, command
 from tbcad.app.cli.output_mode import Full, Json, Quiet, output_mode, print_json
 from tbcad.common.screen import report_console, stages
 from tbcad.errors import InputError
-from tbcad.options.builds import BuildOptions, VerificationOptions
+from tbcad.options.builds import BuildOptions, ReportOptions, VerificationOptions
 from tbcad.options.checks import check_is_calibration
 from tbcad.options.shared import Exports, ForceFile, JsonResult
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tbcad_verify.report.report import Output
 
     from tbcad.app.doctor import Finding
+
 
 # About as many stages has a build, without and with its verification.
 SHELL_STAGES, PROTOTYPE_STAGES, VERIFICATION_STAGES = (5, 14), (9, 27), 19
@@ -174,3 +175,18 @@ def _show_finding(finding: "Finding") -> None:
     if finding.remedy:
         row.add_row("", "->", escape(finding.remedy))
     report_console().print(row, highlight=False)
+
+
+@command()
+def report(options: ReportOptions) -> int:
+    """Write report.html: verdict, 3D view, map of the virtual cameras, tables, pictures.
+
+    One file that opens from disk in any browser, without a network. tbcad build writes it too;
+    write it again after a new verification, or to add pictures. Exit code 0, or 2 for bad input.
+    """
+    from tbcad.app.api import report_page
+
+    with stages(2) as screen:
+        file = report_page(options.on(screen))
+    typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
+    return 0

@@ -1,6 +1,5 @@
 """Designs: one to begin with, and the search for a better one."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,7 +58,7 @@ def init(
     from tbcad.output.single_files import check_file
 
     check_file(file, force)
-    from tbcad.app.reference.template import design_template
+    from tbcad.app.reference.keys import design_template
 
     replace_files(file.parent, {file.name: design_template(design).encode()})
     typer.echo(f"{file}: written; build it by tbcad build {file}")
@@ -68,7 +67,7 @@ def init(
 
 def _about_designs() -> dict[str, str]:
     """The designs that come with tbcad, with the first paragraph that each says of itself."""
-    from tbcad.core.spec.files import read_text
+    from tbcad.core.spec.csv_rows import read_text
     from tbcad.core.spec.load import shipped_designs
 
     about = {}
@@ -89,7 +88,7 @@ def optimize(options: OptimizeOptions, json: JsonResult = False) -> int:
     from tbcad.app.api import optimize as searched
 
     with stages(2) as screen:
-        result = searched(replace(options, progress=screen.stage, detail=screen.detail))
+        result = searched(options.on(screen))
     if json:
         print_json(_record(result, options.files))
         return 0

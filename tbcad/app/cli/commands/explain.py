@@ -51,8 +51,7 @@ def explain(
 
 def _checks() -> "Iterator[ReferenceEntry]":
     """The checks of the verification, as it describes them itself."""
-    from tbcad_verify.report.key_figures import KEY_FIGURES
-    from tbcad_verify.report.methods import AS_BUILT, EXPORT, methods, remedy_by_name
+    from tbcad_verify.report.methods import AS_BUILT, EXPORT, KEY_FIGURES, methods, remedy_by_name
 
     from tbcad.app.reference.entries import ReferenceEntry
 

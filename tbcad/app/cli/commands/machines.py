@@ -1,6 +1,5 @@
 """The built machine: simulated, calibrated, merged, drawn."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,12 +32,10 @@ def simulate_run(options: SimulateRunOptions) -> int:
     these photographs should find.
     """
     from tbcad.app.api import simulate_run as simulate
-    from tbcad.rig.machine.record import truth_file
+    from tbcad.rig.machine.machine import truth_file
 
     with stages(2) as screen:
-        run = simulate(
-            replace(options, progress=screen.stage, detail=screen.detail, answer=screen.note)
-        )
+        run = simulate(options.on(screen))
     record = run.record
     count = len(record.frames) * len(record.phases)
     typer.echo(
@@ -58,7 +55,7 @@ def calibrate(options: CalibrateOptions, json: JsonResult = False) -> int:
     from tbcad.app.api import calibrate as calibrated
 
     with stages(4) as screen:
-        written = calibrated(replace(options, progress=screen.stage, detail=screen.detail))
+        written = calibrated(options.on(screen))
     if json:
         found = [{"folder": str(one.folder), **one.record} for one in written.every]
         print_json({"schema": "tbcad-calibrations/1", "calibrations": found})
@@ -81,7 +78,7 @@ def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
 
     out = Path(options.out)
     with stages(1) as screen:
-        solved = solve_intrinsics(replace(options, progress=screen.stage, detail=screen.detail))
+        solved = solve_intrinsics(options.on(screen))
     if json:
         print_json(_lens_record(solved, out))
         return 0
@@ -129,7 +126,7 @@ def merge(options: MergeOptions, json: JsonResult = False) -> int:
     from tbcad.app.api import merge as merged
 
     with stages(2) as screen:
-        record = merged(replace(options, progress=screen.stage, detail=screen.detail))
+        record = merged(options.on(screen))
     out = options.folder
     files = f"{out}: the light field as lightfield.h5, pictures, capture.json with all of this"
     print_result(record, [*_merge_lines(record), files], json)
@@ -186,7 +183,7 @@ def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
     from tbcad.app.api import as_built as written
 
     with stages(1) as screen:
-        record = written(replace(options, progress=screen.stage))
+        record = written(options.on(screen))
     if json:
         print_json(record)
         return 0

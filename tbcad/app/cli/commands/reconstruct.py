@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tbcad.app.cli.app import command
+from tbcad.app.cli.endings import Stopped
 from tbcad.app.cli.output_mode import print_result
-from tbcad.app.cli.stopping import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.captures import ReconstructOptions

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.app.cli.app import app
-from tbcad.app.cli.commands.compared_pictures import (
+from tbcad.app.cli.commands.picture_files import (
     check_pictures,
     compared_files,
     scene_of,
@@ -126,7 +126,7 @@ def _truth(
 ) -> "Bytes":
     """The ray-traced picture of the lens; of a pinhole without samples of one."""
     from tbcad.light.simulate.capture.photograph import to_bytes
-    from tbcad.light.simulate.views.ground_truth import lens_picture
+    from tbcad.light.simulate.views.refocus import lens_picture
 
     if samples == 0:
         return true_picture(scene, at)

@@ -11,6 +11,7 @@ from tbcad.app.cli.app import command
 from tbcad.app.cli.output_mode import print_json
 from tbcad.errors import InputError
 from tbcad.options.runs import Preflight, RunOptions
+from tbcad.options.shared import exposures
 
 
 @command()
@@ -47,13 +48,13 @@ def run(
     all photographs are there. 1: some are missing, or the run stopped; --resume goes on. 2: bad
     input, or the preflight finds an exposure that will not do.
     """
-    options.size(), options.seconds()  # refused first
+    options.size(), exposures(options.exposure_leds_s, options.exposure_lit_s)  # refused first
     if preflight_only and (no_preflight or options.resume):
         other = "--resume" if options.resume else "--no-preflight"
         raise InputError(f"--preflight-only goes without {other}: leave one of both out")
     if dry_run:
-        from tbcad.rig.control.outcome import dry_run_lines, dry_run_record
         from tbcad.rig.control.run import dry_run as planned
+        from tbcad.rig.control.selection import dry_run_lines, dry_run_record
 
         found = planned(options)
         if json:
@@ -70,7 +71,7 @@ def run(
         )
     from tbcad.app.api import run as photograph
     from tbcad.common.screen import stages
-    from tbcad.rig.control.outcome import outcome_lines, preflight_lines
+    from tbcad.rig.control.selection import outcome_lines, preflight_lines
 
     look: Preflight = "only" if preflight_only else "off" if no_preflight else "first"
     ask = _yes if yes else _asked

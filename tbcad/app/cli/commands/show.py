@@ -98,7 +98,7 @@ def show(
 
     start = Query(azimuth, elevation, distance, width=width, height=height)
     if turntable is not None:
-        from tbcad.light.viewer.turntable import check_turntable_path
+        from tbcad.light.viewer.render import check_turntable_path
 
         check_turntable_path(turntable, force)
     from tbcad.light.viewer.render import capture_mm
@@ -203,7 +203,7 @@ def _serve(server: "ViewServer") -> int:
 def _write_turntable(
     shown: _Shown, out: Path, start: "Query", views: tuple[int, int], json: bool
 ) -> int:
-    from tbcad.light.viewer.turntable import Turntable, even_elevations, write_turntable
+    from tbcad.light.viewer.render import Turntable, even_elevations, write_turntable
 
     columns, rows = views
     elevations = even_elevations(rows, start.elevation)

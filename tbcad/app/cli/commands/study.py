@@ -21,7 +21,7 @@ from tbcad.options.shared import (
 
 if TYPE_CHECKING:
     from tbcad.core.spec.design import Spec
-    from tbcad.light.simulate.capture.pixel_counts import Sensor
+    from tbcad.light.simulate.capture.photograph import Sensor
     from tbcad.light.simulate.scene.object import SceneObject
     from tbcad.light.simulate.views.viewpoints import StudyMethod
 
@@ -64,8 +64,8 @@ def resolution_command(
     scheduler: Scheduler = None,
 ) -> Work:
     """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
+    from tbcad.studies.paper import n_range
     from tbcad.studies.resolution import parse_ratio, resolution
-    from tbcad.studies.sweep import n_range
 
     ns, counted = n_range(first, last), _sensors(sensors, spec)
     wanted = tuple(parse_ratio(text) for text in dict.fromkeys(ratios or ("1:1", "1:4", "4:1")))
@@ -81,8 +81,8 @@ def capture_area_command(
     scheduler: Scheduler = None,
 ) -> Work:
     """Measure how large an object flat and convex mirrors can see whole (Fig. 5c)."""
-    from tbcad.studies.capture_area import capture_area
-    from tbcad.studies.sweep import n_range
+    from tbcad.studies.elevation import capture_area
+    from tbcad.studies.paper import n_range
 
     ns = n_range(first, last)
     return partial(capture_area, spec, ns, scheduler=scheduler)
@@ -174,7 +174,7 @@ def prototype_command(
 ) -> Work:
     """Compare views from the prototype's merged photographs with those of the full shell."""
     check_is_object(object_file, up, unit)
-    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
     from tbcad.studies.prototype_vs_shell import prototype_vs_shell
 
@@ -216,7 +216,7 @@ def low_pass_command(
 ) -> Work:
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
     check_is_object(object_file, up, unit)
-    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import viewpoints_around
     from tbcad.studies.low_pass import ELEVATIONS_DEG, BlurOptions, low_pass
 
@@ -234,7 +234,7 @@ def low_pass_command(
 @of_export
 def calibration_command(folder: Path) -> Work:
     """Find how well rays are known after calibration, by LEDs, noise and process (5.2)."""
-    from tbcad.light.simulate.scene.exported import read_export
+    from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.rig.calibration.study import calibration_study
 
     export = read_export(folder)
@@ -261,7 +261,7 @@ def _subject(
 
 def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:
     """The sensors that are wanted, each once; by default those of Table II for the design."""
-    from tbcad.light.simulate.capture.pixel_counts import parse_sensor
+    from tbcad.light.simulate.capture.photograph import parse_sensor
     from tbcad.studies.resolution import default_sensors
 
     return tuple(map(parse_sensor, dict.fromkeys(given or ()))) or default_sensors(spec)

@@ -8,9 +8,9 @@ import typer
 from tbcad.app.cli.app import command
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
+from tbcad.options.builds import ToleranceOptions
 from tbcad.options.checks import check_is_calibration, check_is_export
 from tbcad.options.shared import JsonResult, Out, PlotFormatOption
-from tbcad.options.tolerances import ToleranceOptions
 
 
 @command()
@@ -42,11 +42,11 @@ def tolerance(
                 "--as-built is about no process: leave out --process, --margins and --set"
             )
         return _as_built(options, as_built, out, json)
-    from tbcad.app.api.tolerances import checked_process
-    from tbcad.app.api.tolerances import tolerance as analyse
+    from tbcad.app.api.verification import checked_process
+    from tbcad.app.api.verification import tolerance as analyse
 
     checked_process(options)  # before heavy libraries are loaded
-    from tbcad.common.results.study import check_study_folder, write_study
+    from tbcad.common.results import check_study_folder, write_study
     from tbcad.tolerancing.report import json_text, summary_text, tolerance_study
     from tbcad.tolerancing.stages import TABLES
 
@@ -71,9 +71,8 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
     from json import dumps
 
     from tbcad.common.atomic_files import replace_files
-    from tbcad.common.results.study import check_study_folder
-    from tbcad.common.results.tables import csv_text
-    from tbcad.rig.calibrated_solids.tolerance import (
+    from tbcad.common.results import check_study_folder, csv_text
+    from tbcad.rig.calibrated_solids import (
         as_built_tolerance,
         summary,
         tolerance_record,

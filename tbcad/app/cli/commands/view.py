@@ -1,21 +1,23 @@
 """Synthesise views from a light field."""
 
-from math import isnan
+from math import isnan, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
 from tbcad.app.cli.app import app
-from tbcad.app.cli.commands.compared_pictures import (
+from tbcad.app.cli.commands.picture_files import (
+    ViewFiles,
     check_pictures,
+    field_view,
     has_object,
     scene_of,
     true_picture,
     viewpoint_of,
     write_compared,
+    write_depth,
 )
-from tbcad.app.cli.commands.view_files import ViewFiles, field_view, write_depth
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.checks import check_is_capture
@@ -35,9 +37,9 @@ from tbcad.options.shared import (
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
     from tbcad.light.reflectance.environment import Environment
-    from tbcad.light.reflectance.field_file import Relit
+    from tbcad.light.reflectance.transport import Relit
     from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.scene.point_lights import PointLights
+    from tbcad.light.simulate.scene.lamps import PointLights
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.types import Bytes, Progress
@@ -134,8 +136,11 @@ def view(
     by_default = method is None and surface is None and light is None
     choice = _choice("field" if by_default and files.of_field else method, surface)
     from tbcad.light.reconstruction.field import wanted_field
+    from tbcad.light.reflectance.environment import read_environment
     from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.sequence import sequence_frame
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+    from tbcad.light.simulate.views.viewpoints import image_quality
 
     check_pictures(capture_folder, out, force, light)
     files.check(out, choice.method, force, (capture_folder, light))
@@ -144,10 +149,10 @@ def view(
         raise InputError("--frame has its own light and place: leave out --light and --surface")
     if choice.surface == "object" and not has_object(capture_folder):
         raise InputError(f"{capture_folder} has no object: leave out --surface object")
-    wanted = None if light is None else _environment(light, light_turn, light_format)
+    wanted = None if light is None else read_environment(light, radians(light_turn), light_format)
     with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
-        source = stored if frame is None else _frame(stored, capture_folder, frame)
+        source = stored if frame is None else sequence_frame(stored, capture_folder, frame)
         at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
         scene, tiles = scene_of(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
@@ -172,17 +177,11 @@ def view(
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
     write_compared(out, picture, truth, (choice.method, "ray-traced"))
     if same_lamps is not None:
-        ssim = _ssim(same_lamps, picture)
+        ssim = image_quality(same_lamps, picture).ssim
         if not isnan(ssim):
             typer.echo(f"SSIM {ssim:.4f} against one lit by the same lamps")
     files.tell()
     return 0
-
-
-def _frame(source: "LightField", folder: Path, number: int) -> "LightField":
-    from tbcad.light.simulate.capture.sequence import sequence_frame
-
-    return sequence_frame(source, folder, number)
 
 
 def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
@@ -197,16 +196,8 @@ def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["S
     return lit_when_turned(scene, angle), camera_before_turn(at, angle)
 
 
-def _environment(light: Path, turn_deg: float, kind: LightFormat | None) -> "Environment":
-    from math import radians
-
-    from tbcad.light.reflectance.environment import read_environment
-
-    return read_environment(light, radians(turn_deg), kind)
-
-
 def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
-    from tbcad.light.reflectance.field_file import open_reflectance, relit
+    from tbcad.light.reflectance.transport import open_reflectance, relit
 
     with open_reflectance(folder) as reflectance:
         return relit(source, reflectance, wanted)
@@ -216,18 +207,12 @@ def _lit_truths(
     scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
 ) -> tuple["Bytes", "Bytes | None"]:
     """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
-    from tbcad.light.reflectance.field_file import TRUE_LIGHTS, lit_scene
+    from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene
 
     def truth(lights: "PointLights") -> "Bytes":
         return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
 
     return truth(wanted.far_lights(TRUE_LIGHTS)), truth(relit.lamps) if relit.points else None
-
-
-def _ssim(truth: "Bytes", picture: "Bytes") -> float:
-    from tbcad.light.simulate.views.viewpoints import image_quality
-
-    return image_quality(truth, picture).ssim
 
 
 def _check_light(
@@ -273,13 +258,7 @@ def _view(
 ) -> "Bytes":
     """The picture by nearest rays or blended, and files of the depth that is found for it.
 
-    Args:
-        fields: the light field, and the one of the same rays whose colours are shown.
-        at: the viewpoint.
-        choice: how.
-        scene: the object.
-        files: of the depth.
-        progress: called with what the depth needs first.
+    The fields are the light field, and the one of the same rays whose colours are shown.
     """
     from tbcad.light.depth.depth_map import depth_views
     from tbcad.light.simulate.scene.ray_casting import depth_along_rays

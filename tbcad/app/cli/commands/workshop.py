@@ -1,6 +1,5 @@
 """What is bought, printed and put together: heavy libraries are imported inside the commands."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,9 +8,9 @@ import typer
 from tbcad.app.cli.app import app, command
 from tbcad.app.cli.output_mode import print_json, print_result
 from tbcad.common.screen import stages
+from tbcad.options.builds import InspectionOptions
 from tbcad.options.checks import check_is_export, check_is_folder
 from tbcad.options.shared import Design, Exports, ForceFile, JsonResult, Out, Settings
-from tbcad.options.tolerances import InspectionOptions
 
 
 @app.command()
@@ -72,7 +71,7 @@ def inspection(options: InspectionOptions, json: JsonResult = False) -> int:
 
     out = Path(options.out)
     with stages(3) as screen:
-        record = inspect(replace(options, progress=screen.stage))
+        record = inspect(options.on(screen))
     if json:
         print_json(record)
         return 0
@@ -109,8 +108,8 @@ def parts(
 
     Without --full the rows are those that cost most. Exit code 0, or 2 for bad input.
     """
-    from tbcad.prototype.files.bom_view import read_parts_list
-    from tbcad.prototype.purchased.prices import load_prices
+    from tbcad.prototype.files.bom import read_parts_list
+    from tbcad.prototype.purchased.parts import load_prices
 
     check_is_folder(folder)
     listed = read_parts_list(folder, load_prices([str(prices)]) if prices else None)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.core.geometry.vectors import dot, unit
-from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.cells import Cells, rings_of
 from tbcad.core.optics.power_diagram import PLANES, NotRegularError, half_edges
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
@@ -21,16 +21,14 @@ from tbcad.types import Bools, Floats, Ints
 # Depth of a groove below the lowest mirror at its corners, in widths of the groove: walls lean by 1
 # in 8 or little more, so the groove drains, and a mirror that is off moves its edge little.
 DEPTH_WIDTHS = 4.0
-# Corners on a bounding plane lie within rounding of it.
-ON_PLANE_MM = 1e-9
+ON_PLANE_MM = 1e-9  # corners on a bounding plane lie within rounding of it
 
 
 @dataclass(frozen=True)
 class CellPairs:
     """All pairs of a cell and a neighbour, or a bounding plane, over e of them."""
 
-    # the cell that has their border counter-clockwise (from outside), and the other face, (e, 2)
-    faces: Ints
+    faces: Ints  # the cell that has the border counter-clockwise (outside), the other, (e, 2)
     triangles: Ints  # at the start and the end of the border, (e, 2)
     half_edges: Ints  # of the triangles, that of the first face and its twin, (e, 2)
 
@@ -40,11 +38,8 @@ class Corners:
     """Corners c of the borders; those of very short borders are joined."""
 
     flat: Floats  # where planar mirrors meet, mm, (c, 3)
-    # above the corner of a groove's bottom, on the lowest of the mirrors there, mm, (c, 3)
-    top: Floats
-    # the corner of the groove's bottom, mm, (c, 3); where no groove ends, the corner of the mirror
-    # there
-    bottom: Floats
+    top: Floats  # above a groove's bottom, on the lowest mirror there, mm, (c, 3)
+    bottom: Floats  # of the groove, mm, (c, 3); the mirror's where no groove ends
 
 
 @dataclass(frozen=True)
@@ -52,13 +47,9 @@ class Borders:
     """Borders between two cells, or a cell and a bounding plane, over k of them."""
 
     pair: Ints  # index of the pair of cells, (k,)
-    # the cell that has the border counter-clockwise (from outside) from start to end, and the other
-    # face, (k, 2)
-    faces: Ints
+    faces: Ints  # the cell that has it counter-clockwise (outside), and the other, (k, 2)
     ends: Ints  # corners at which it starts and ends, (k, 2)
-    # for either face, the unit normal into its cell of the plane that ends it, (k, 2, 3); zero for
-    # a bounding plane
-    normal: Floats
+    normal: Floats  # of the planes that end both cells, inward, (k, 2, 3); zero for bounds
 
     def between_mirrors(self, mirrors: int) -> Bools:
         """Which borders (k,) lie between two of the mirrors."""
@@ -108,18 +99,10 @@ def cell_pairs(cells: Cells) -> CellPairs:
 def pedestal_layout(
     flat: Cells, mirrors: Surfaces, pairs: CellPairs, corner: Ints, pinhole: Floats, groove: float
 ) -> PedestalLayout:
-    """Corners and borders for grooves seen from a pinhole.
+    """Corners and borders for grooves of a width (mm) seen from a pinhole, between m mirrors.
 
-    Args:
-        flat: cells of planar mirrors with the same apices.
-        mirrors: m of them.
-        pairs: of the cells.
-        corner: that each triangle's corner becomes, of c corners, (t,).
-        pinhole: of the camera, mm, (3,).
-        groove: width of the grooves, mm.
-
-    Raises:
-        NotRegularError: there is no mirror above the end of a groove.
+    The flat cells are those of planar mirrors with the same apices, the corner (t,) is what each
+    triangle's becomes. NotRegularError if there is no mirror above the end of a groove.
     """
     between = corner[pairs.triangles]
     pair = np.flatnonzero(between[:, 0] != between[:, 1])
@@ -142,10 +125,7 @@ def pedestal_layout(
 
 
 def _sag(flat: Cells, mirrors: Surfaces, corner: Ints, point: Floats, down: Floats) -> Floats:
-    """Distance (c,) down from the planar mirrors' corners to the lowest of the mirrors there.
-
-    Not finite where the line down misses a mirror's sphere.
-    """
+    """Distance (c,) from planar mirrors' corners down to the lowest mirror; or not finite."""
     triangle, column = np.nonzero(flat.triangles < flat.mirrors)
     mirror, at = flat.triangles[triangle, column], corner[triangle]
     value, slope = (
@@ -167,10 +147,7 @@ def _bounding_normals(cells: Cells, faces: Ints) -> Floats:
 
 
 def _joined_points(cells: Cells, corner: Ints) -> tuple[Floats, Ints]:
-    """Mean points of joined corners (c, 3), and the bounding plane each lies on, -1 for none.
-
-    A corner on both planes counts as on the second.
-    """
+    """Mean points of joined corners (c, 3), and the last bounding plane they lie on, or -1."""
     count = np.bincount(corner)[:, None]
     top = np.column_stack([np.bincount(corner, column) for column in cells.corners.T]) / count
     plane = np.full(len(top), -1)
@@ -229,3 +206,56 @@ def _walls(
     rise = np.min([dot(corners.top[e] - corners.bottom[e], up) for e in ends.T], axis=0)
     lean = (groove / 2 / rise)[:, None] * up
     return unit(np.stack([across - lean, -across - lean], axis=1))
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Sides of all mirrors on pedestals, q of them, cell after cell, counter-clockwise outside."""
+
+    offsets: Ints  # where each cell's sides start, (m + 1,)
+    cell: Ints  # (q,)
+    border: Ints  # (q,)
+    back: Ints  # whether the cell follows the border from end to start, (q,)
+    following: Ints  # next side of the cell, (q,)
+    corner: Ints  # at which each side starts, (q,)
+    normal: Floats  # of the plane that ends the cell, into the cell, (q, 3)
+    point: Floats  # where the side starts on the mirror, mm, (q, 3)
+    length: Floats  # on the mirror or between the grooves' bottoms, the shorter, mm, (q,)
+
+
+def outline_sides(layout: PedestalLayout, surfaces: Surfaces) -> Sides:
+    """Sides of m mirrors, then two planes; NotRegularError if one lies below a groove's end."""
+    cells, corners, borders = layout.flat, layout.corners, layout.borders
+    side = np.full(3 * len(cells.triangles), -1)
+    side[layout.pairs.half_edges[borders.pair]] = np.arange(2 * len(borders.pair)).reshape(-1, 2)
+    offsets, sides = rings_of(cells.triangles, cells.mirrors, side)
+    border, back = sides // 2, sides % 2
+    cell = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
+    following = np.arange(len(sides)) + 1
+    following[offsets[1:] - 1] = offsets[:-1]
+    corner, normal = borders.ends[border, back], borders.normal[border, back]
+    before = np.empty_like(normal)
+    before[following] = normal
+    bottom = corners.bottom[corner]
+    point = _above(surfaces, cell, bottom, np.cross(before, normal))
+    height = np.where(_grooved(layout)[corner], -surfaces.value(cell, bottom), 1)
+    if not height.min() > 0:
+        raise NotRegularError(f"a groove ends {-height.min():.3g} mm above a mirror")
+    along = unit(corners.flat[corner[following]] - corners.flat[corner])
+    length = np.minimum(*(dot(line[following] - line, along) for line in (point, bottom)))
+    return Sides(offsets, cell, border, back, following, corner, normal, point, length)
+
+
+def _grooved(layout: PedestalLayout) -> Bools:
+    """At which corners (c,) a groove ends."""
+    inner = layout.borders.between_mirrors(layout.flat.mirrors)
+    return np.isin(np.arange(len(layout.corners.top)), layout.borders.ends[inner])
+
+
+def _above(surfaces: Surfaces, mirror: Ints, bottom: Floats, line: Floats) -> Floats:
+    """Where lines (q, 3) through points (q, 3) below surfaces (q,), or near them, leave them."""
+    line, value = unit(line), surfaces.value(mirror, bottom)
+    slope = dot(line, surfaces.gradient(mirror, bottom))
+    line *= np.where(slope < 0, -1.0, 1.0)[:, None]
+    root = np.abs(slope) + np.sqrt(slope**2 - 2 * surfaces.curvature[mirror] * value)
+    return np.asarray(bottom - (2 * value / root)[:, None] * line)

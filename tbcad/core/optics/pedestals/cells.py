@@ -10,14 +10,15 @@ from functools import cached_property
 
 import numpy as np
 
-from tbcad.core.geometry.vectors import FLIP_X
-from tbcad.core.optics.cells import Arcs, Cells, plane_sections
-from tbcad.core.optics.pedestals.borders import ON_PLANE_MM, PedestalLayout
+from tbcad.core.geometry.vectors import FLIP_X, dot
+from tbcad.core.optics.cells import Arcs, Cells, arc_steps, plane_sections
+from tbcad.core.optics.pedestals.borders import ON_PLANE_MM, PedestalLayout, Sides, outline_sides
 from tbcad.core.optics.pedestals.plan import PedestalPlan, planned
-from tbcad.core.optics.pedestals.sides import Sides, outline_sides
 from tbcad.core.optics.power_diagram import PLANES, NotRegularError
 from tbcad.core.optics.surfaces import Surfaces, planes
 from tbcad.types import Bools, Floats, Ints
+
+MIDDLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -59,23 +60,17 @@ class PedestalCells(Cells):
     def with_mirrors(self, mirrors: Surfaces) -> "PedestalCells":
         """Other mirrors (m of them) on the same pedestals: borders and grooves stay.
 
-        Raises:
-            NotRegularError: a mirror lies below the bottom of its grooves.
+        NotRegularError if a mirror lies below the bottom of its grooves.
         """
         bounding = self.surfaces.subset(slice(self.mirrors, self.mirrors + PLANES))
         return _cells(self.layout, mirrors.joined(bounding))
 
 
 def pedestal_cells(plan: PedestalPlan, mirrors: Surfaces) -> PedestalCells:
-    """Cells of mirrors on pedestals.
+    """Cells of m mirrors on pedestals, by the plan for mirrors with these apices.
 
-    Args:
-        plan: of pedestals for mirrors with these apices.
-        mirrors: m of them.
-
-    Raises:
-        NotRegularError: the grooves leave no outline of a mirror, or a pedestal sticks out beyond
-            a bounding plane.
+    NotRegularError if the grooves leave no outline of a mirror, or a pedestal sticks out beyond a
+    bounding plane.
     """
     layout = plan.layout_for(mirrors)
     cells = _cells(layout, layout.with_planes(mirrors))
@@ -102,7 +97,8 @@ class _Assembly:
 
     def cells(self) -> PedestalCells:
         """All faces and edges."""
-        sides, across = self.sides, self._across
+        sides = self.sides
+        across = self.layout.borders.faces[sides.border, 1 - sides.back]
         has_wall = across < len(self.surfaces) - PLANES
         wall = np.flatnonzero(has_wall)
         start = self.layout.corners.bottom[sides.corner[wall]]
@@ -121,26 +117,19 @@ class _Assembly:
             wall_rings[wall],
         )
 
-    @property
-    def _across(self) -> Ints:
-        """The face across each side, (q,)."""
-        return np.asarray(self.layout.borders.faces[self.sides.border, 1 - self.sides.back])
-
     def _edges(self, surfaces: Surfaces, beyond: Ints, has_wall: Bools) -> tuple[Arcs, Ints]:
         """All edges, and four sides for each side of a cell: those of its wall, if it has one.
 
         First come the sides themselves, then the walls' upright edges, then the grooves' bottoms.
-
-        Args:
-            surfaces: with the walls.
-            beyond: face across each side: its wall or a bounding plane, (q,).
-            has_wall: which sides have one, (q,).
+        Beyond each side lies its wall or a bounding plane, (q,).
         """
         sides, q = self.sides, len(self.sides.cell)
         before = np.empty(q, dtype=np.int64)
         before[sides.following] = np.arange(q)
         upright = np.flatnonzero(has_wall | has_wall[before])
-        forward, backward = self._both_sides(has_wall)
+        # The sides on the two walls of each groove, the one that follows its border first.
+        order = np.lexsort((sides.back[has_wall], sides.border[has_wall]))
+        forward, backward = np.flatnonzero(has_wall)[order].reshape(-1, 2).T
         bottom = q + sides.corner
         left = np.concatenate([sides.cell, beyond[upright], beyond[forward]])
         right = np.concatenate([beyond, beyond[before[upright]], beyond[backward]])
@@ -155,12 +144,6 @@ class _Assembly:
         rings = [2 * np.arange(q) + 1, 2 * down, along, 2 * down[sides.following] + 1]
         return arcs, np.column_stack(rings)
 
-    def _both_sides(self, has_wall: Bools) -> tuple[Ints, Ints]:
-        """The sides on the two walls of each groove, the one that follows its border first."""
-        back, border = self.sides.back[has_wall], self.sides.border[has_wall]
-        side, order = np.flatnonzero(has_wall), np.lexsort((back, border))
-        return side[order][0::2], side[order][1::2]
-
     def _curves(self, surfaces: Surfaces, start: Ints, end: Ints) -> tuple[Floats, Floats]:
         """Control polygons and weights: arcs on the mirrors first, the others straight."""
         sides, q = self.sides, len(self.sides.cell)
@@ -169,3 +152,111 @@ class _Assembly:
         points, weight = np.stack([a, (a + b) / 2, b], axis=1), np.ones(len(start))
         points[:q], weight[:q] = plane_sections(surfaces, sides.cell, sides.normal, a[:q], b[:q])
         return points, weight
+
+
+@dataclass(frozen=True)
+class GrooveWalls:
+    """Walls of one half, w of them, mirror after mirror; none where neighbouring spheres meet."""
+
+    mirror: Ints  # that each ends, (w,)
+    table: Floats  # middle of that mirror's edge, normal into its cell, curvature 0, (w, 7)
+
+    @classmethod
+    def of_planes(cls, mirror: Ints, point: Floats, normal: Floats) -> "GrooveWalls":
+        """Walls that end mirrors (w,) at planes through points, with normals, (w, 3) each."""
+        return cls(mirror, np.column_stack([point, normal, np.zeros(len(mirror))]))
+
+    @classmethod
+    def none(cls) -> "GrooveWalls":
+        """No walls: mirrors end where neighbouring spheres meet."""
+        return cls.of_planes(np.arange(0), np.empty((0, 3)), np.empty((0, 3)))
+
+    def __len__(self) -> int:
+        return len(self.mirror)
+
+    @property
+    def point(self) -> Floats:
+        """Middle of the mirror's edge at each wall, mm, (w, 3)."""
+        return self.table[:, :3]
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normals into the mirrors' cells, (w, 3)."""
+        return self.table[:, 3:6]
+
+    def first_of_mirrors(self, mirrors: int) -> Ints:
+        """Where the walls of each of m mirrors begin, and where those of the last end, (m + 1,)."""
+        return np.searchsorted(self.mirror, np.arange(mirrors + 1))
+
+    def of_mirrors(self, mirrors: int) -> tuple[Ints, Floats]:
+        """For loops: where the walls of m mirrors begin, (m + 1,), points and normals, (w, 6)."""
+        return self.first_of_mirrors(mirrors), np.ascontiguousarray(self.table[:, :6])
+
+    def joined(self, other: "GrooveWalls") -> "GrooveWalls":
+        """These walls and others, mirror after mirror."""
+        mirror = np.concatenate([self.mirror, other.mirror])
+        order = np.argsort(mirror, kind="stable")
+        return GrooveWalls(mirror[order], np.concatenate([self.table, other.table])[order])
+
+    def flipped(self, signs: Floats) -> "GrooveWalls":
+        """These walls with points and normals times -1 or 1 along the axes, (3,)."""
+        return GrooveWalls.of_planes(self.mirror, self.point * signs, self.normal * signs)
+
+
+NO_WALLS = GrooveWalls.none()
+
+
+def groove_walls(cells: Cells) -> GrooveWalls:
+    """The walls of a camera's cells, in the order of `PedestalCells.walls`."""
+    if not isinstance(cells, PedestalCells):
+        return NO_WALLS
+    first = len(cells.surfaces) - len(cells.walls)
+    edge = cells.wall_rings[:, 0] // 2
+    point = cells.arcs.at(edge, np.full(len(edge), MIDDLE))
+    return GrooveWalls.of_planes(cells.walls[:, 0], point, -cells.surfaces.normal[first:])
+
+
+@dataclass(frozen=True)
+class WallMoments:
+    """Integrals over w walls."""
+
+    area: Floats  # mm^2, (w,)
+    first: Floats  # integral of the place, from the origin, mm^3, (w, 3)
+    normal: Floats  # out of the solid, (w, 3)
+
+    @property
+    def volume(self) -> float:
+        """Between the origin and all walls, mm^3: a third of the integral of x.n."""
+        return float(dot(self.first, self.normal).sum()) / 3
+
+    @property
+    def volume_moment(self) -> Floats:
+        """Integral of x over that volume, mm^4, (3,): x.n is the same all over a wall."""
+        height = dot(self.first, self.normal) / self.area
+        return np.asarray((height[:, None] * self.first).sum(axis=0)) / 4
+
+
+def wall_moments(cells: PedestalCells, origin: Floats) -> WallMoments:
+    """Moments of the walls about an origin (3,), mm.
+
+    A wall is taken as triangles with one corner at an end of the groove's bottom. Those along the
+    arc are infinitely thin: Gauss's rule adds them up to rounding.
+    """
+    normal = cells.surfaces.normal[cells.mirrors + PLANES :]
+    near, far = _bottoms(cells, origin)
+    arc = cells.wall_rings[:, 0] // 2
+    x, step = arc_steps(cells.arcs, arc)
+    x = np.concatenate([x - origin, ((cells.arcs.points[arc, 2] - origin + far) / 2)[:, None]], 1)
+    step = np.concatenate([step, (far - cells.arcs.points[arc, 2] + origin)[:, None]], axis=1)
+    # Arcs turn counter-clockwise about their walls seen from the light.
+    area = dot(np.cross(x - near[:, None], step), normal[:, None]) / 2
+    middle = near[:, None] + (x - near[:, None]) * 2 / 3
+    return WallMoments(area.sum(axis=1), np.einsum("wk,wkx->wx", area, middle), normal)
+
+
+def _bottoms(cells: PedestalCells, origin: Floats) -> tuple[Floats, Floats]:
+    """Ends of the groove's bottom below the start and the end of each wall's arc, two (w, 3)."""
+    bottom = cells.wall_rings[:, 2]
+    ends: Ints = np.stack([cells.arcs.start, cells.arcs.end])[:, bottom // 2]
+    near, far = np.where(bottom % 2 == 0, ends, ends[::-1])
+    return cells.corners[near] - origin, cells.corners[far] - origin

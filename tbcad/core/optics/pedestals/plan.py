@@ -18,9 +18,9 @@ from tbcad.core.optics.pedestals.borders import (
     CellPairs,
     PedestalLayout,
     cell_pairs,
+    outline_sides,
     pedestal_layout,
 )
-from tbcad.core.optics.pedestals.sides import outline_sides
 from tbcad.core.optics.power_diagram import (
     PLANES,
     NotRegularError,
@@ -31,8 +31,7 @@ from tbcad.core.optics.power_diagram import (
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Bools, Floats, Ints
 
-# Each round joins some corners or moves some away from a plane.
-MAX_ROUNDS = 100
+MAX_ROUNDS = 100  # each round joins some corners or moves some away from a plane
 MIN_SIDES = 3
 # Sides of planar mirrors that are shorter than so many grooves vanish. At bounding planes, where
 # sides change with a mirror's height, the limit is higher by this share of the mirrors' pitch.
@@ -49,13 +48,9 @@ RISE_SHARE = 0.25
 def without_crowded_rims(cells: Cells, corner: Ints, rise: float) -> Cells:
     """Cells in which fewer joined corners on a bounding plane have a third mirror.
 
-    Args:
-        cells: of planar mirrors.
-        corner: that each triangle's corner becomes when short borders' corners are joined, (t,).
-        rise: how much longer a groove to a plane becomes, mm.
-
-    Returns:
-        The same object when there is no such corner.
+    Of planar cells, and the corner that each triangle's becomes when those of short borders are
+    joined, (t,). Grooves to a plane become longer by the rise, mm. The same object if there is no
+    such corner.
     """
     short = _vanishing(_borders_with_planes(cells), cells, corner)
     short = _shortest_of_each(short, cells, corner[short // 3])
@@ -64,15 +59,9 @@ def without_crowded_rims(cells: Cells, corner: Ints, rise: float) -> Cells:
 
 
 def with_longer_grooves_to_planes(cells: Cells, too_near: Bools, rise: float) -> Cells:
-    """Cells whose corners that are too near to a bounding plane (t,) are farther from it.
+    """Planar cells whose corners too near to a bounding plane (t,) are farther, by a rise, mm.
 
-    Args:
-        cells: of planar mirrors.
-        too_near: which triangles' corners are, (t,).
-        rise: how much longer the groove from there to the plane becomes, mm.
-
-    Returns:
-        The same object when no groove runs from such a corner to a plane.
+    The same object if no groove runs from such a corner to a plane.
     """
     _, twin = half_edges(cells.triangles)
     edge = _grooves_to_planes(cells)
@@ -127,11 +116,7 @@ def _flipped(cells: Cells, edge: Ints) -> Cells:
 
 
 def _raised(cells: Cells, edge: Ints, rise: float) -> Cells:
-    """Cells whose grooves to a plane (e,) begin farther from it, toward the mirror above.
-
-    Returns:
-        The same object when there are none.
-    """
+    """Cells whose grooves to a plane (e,) begin farther from it, toward the mirror above."""
     if not len(edge):
         return cells
     _, twin = half_edges(cells.triangles)
@@ -161,11 +146,7 @@ class PedestalPlan:
         return cls(flat, pairs, length < groove, pinhole, groove)
 
     def layout_for(self, mirrors: Surfaces) -> PedestalLayout:
-        """Where the pedestals of mirrors (m of them) stand.
-
-        Raises:
-            NotRegularError: the grooves leave no outline of a mirror.
-        """
+        """Where the pedestals of m mirrors stand; NotRegularError if one has no outline."""
         plan, layout = _joined(self, mirrors, WIDTHS, 0.0)
         if plan.flat is self.flat:
             return layout
@@ -180,11 +161,7 @@ class PedestalPlan:
 
     @property
     def corner(self) -> Ints:
-        """Numbers of corners, one for each triangle (t,); joined ones share theirs.
-
-        Raises:
-            NotRegularError: that leaves a mirror fewer than three sides.
-        """
+        """Corner of each triangle (t,), joined or not; NotRegularError if a mirror has too few."""
         count, mirrors = len(self.flat.triangles), self.flat.mirrors
         joined = self.pairs.triangles[self.short]
         graph = coo_array((np.ones(len(joined)), joined.T), shape=(count, count))
@@ -198,16 +175,10 @@ class PedestalPlan:
 def pedestal_plan(
     surfaces: Surfaces, triangles: Ints, pinhole: Floats, groove: float
 ) -> PedestalPlan:
-    """Plan of pedestals for mirrors with the apices of some.
+    """Plan of pedestals for mirrors with the apices of some, with grooves of a width above 0, mm.
 
-    Args:
-        surfaces: of m mirrors, then the two bounding planes.
-        triangles: a dual triangulation that is right or nearly so, (t, 3).
-        pinhole: of the camera, mm, (3,).
-        groove: width of the grooves at the mirrors' corners, mm, above 0.
-
-    Raises:
-        NotRegularError: the planes bound no proper cells, or the grooves leave none.
+    Surfaces are m mirrors, then the two bounding planes; the dual triangulation (t, 3) is right or
+    nearly so. NotRegularError if planes bound no proper cells, or grooves leave none.
     """
     return planned(_flattened(surfaces, triangles, pinhole), pinhole, groove)
 
@@ -231,12 +202,8 @@ def _joined(
 ) -> tuple[PedestalPlan, PedestalLayout]:
     """Plan and layout without short sides, nor grooves that end too near to a bounding plane.
 
-    Args:
-        plan: to start from.
-        mirrors: m of them.
-        widths: sides are at least so many grooves long; grooves end half of that before a plane,
-            or half a groove where that is less.
-        share: those at a bounding plane are longer by this share of the mirrors' pitch.
+    Sides are at least so many grooves long, those at a bounding plane by a share of the mirrors'
+    pitch more; grooves end half of that before a plane, or half a groove where that is less.
     """
     more = share * plan.pitch
     rise = RISE_SHARE * (plan.groove + more)
@@ -258,10 +225,7 @@ def _joined(
 
 
 def _short_pairs(layout: PedestalLayout, mirrors: Surfaces, limit: float, more: float) -> Ints:
-    """Pairs of cells whose border is a mirror's side shorter than a limit, mm.
-
-    At a bounding plane the limit is higher by a length, mm.
-    """
+    """Pairs of cells whose border is shorter than a limit, at bounding planes by more, mm."""
     sides = outline_sides(layout, layout.with_planes(mirrors))
     at_plane = np.any(layout.on_planes[layout.borders.ends[sides.border]], axis=1)
     short = sides.length < limit + more * at_plane

@@ -13,7 +13,7 @@ and `mirrors` with u, apex, normal (m, 3) and curvature (m,), float64, and boxes
 columns x0, x1 and rows y0, y1, ends excluded, that hold all of a mirror's pixels.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -24,12 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.cad.formats.hdf5 import StoredGroup, opened_hdf5
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.photograph import RowBand
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, seen_by, to_bytes
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.rays import Shift, TracedRays, part_tracer, unit_directions
+from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.types import Floats
 
 NAME = "lightfield.h5"
@@ -44,6 +47,7 @@ PIXEL_ARRAYS: dict[str, tuple[tuple[int, ...], str]] = {
     "direction": ((3,), "f4"),
 }
 MIRROR_ARRAYS = ("u", "apex", "normal", "curvature", "boxes")
+PartTracer = Callable[[range, range, Shift], TracedRays]
 
 
 @dataclass(frozen=True)
@@ -88,8 +92,7 @@ class LightField:
 
         The file is closed at the end of a `with` block, by `close`, or when nothing of it is used.
 
-        Raises:
-            InputError: it cannot be read, or is no light field of this schema.
+        InputError: it cannot be read, or is no light field of this schema.
         """
         file = Path(path) / NAME if Path(path).is_dir() else Path(path)
         if not file.is_file():
@@ -115,8 +118,7 @@ class LightField:
     def read(path: Path | str) -> "LightField":
         """Read a whole file, or the file in a folder that `tbcad capture` wrote, into memory.
 
-        Raises:
-            InputError: as `open`.
+        InputError: as `open`.
         """
         with LightField.open(path) as stored:
             frames = {
@@ -158,13 +160,7 @@ def light_field_in_memory(
     capture_mm: float,
     facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> LightField:
-    """A light field that is in no file.
-
-    Args:
-        photographs: each camera with the bands of its picture.
-        capture_mm: diameter of the capture sphere.
-        facts: how it was made.
-    """
+    """A light field that is in no file, from each camera with the bands of its picture."""
     frames = {}
     for reflector, bands in photographs:
         parts = [band_arrays(band) for band in bands]
@@ -213,3 +209,32 @@ def _numbers(values: Any, shape: tuple[int, ...]) -> Floats:
     if result.shape != shape or not np.isfinite(result).all():
         raise ValueError("numbers are missing or not finite")
     return result
+
+
+@dataclass(frozen=True)
+class TracedFrame(CameraFrame):
+    """A frame without arrays: its pixels are those of a photograph with one ray a pixel."""
+
+    trace: PartTracer  # gives the rays of rows and columns after the mirrors
+    scene: Scene  # the object
+
+    def read(self, rows: slice, columns: slice = slice(None)) -> dict[str, NDArray[Any]]:
+        """All arrays of a part of the picture, traced anew."""
+        lines = range(*rows.indices(self.camera.height_px))
+        across = range(*columns.indices(self.camera.width_px))
+        direction = unit_directions(self.camera, lines)[:, across.start : across.stop]
+        traced = self.trace(lines, across, CENTRE)
+        rays, colour = seen_by(self.camera, traced, np.ascontiguousarray(direction), self.scene)
+        return band_arrays(RowBand(lines, rays, to_bytes(colour)))
+
+
+def traced_light_field(design: MirrorDesign, scene: Scene) -> LightField:
+    """The light field of a design whose pixels are traced when they are read."""
+    frames: dict[str, CameraFrame] = {
+        at.camera_id: TracedFrame(
+            *(at.camera, at.u, at.mirrors, at.boxes(), MappingProxyType({})),
+            *(part_tracer(at), scene),
+        )
+        for at in reflectors(design)
+    }
+    return LightField(frames, design.spec.optics.capture_diameter_mm, {})

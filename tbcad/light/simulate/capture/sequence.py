@@ -21,12 +21,8 @@ from scipy.spatial.transform import Rotation
 from tbcad.cad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.files import COMPRESSION_LEVEL, chunked, filtered_chunk
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
-from tbcad.light.simulate.capture.light_field_writer import (
-    COMPRESSION_LEVEL,
-    chunked,
-    filtered_chunk,
-)
 from tbcad.light.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.light.simulate.parallel import chunks, in_threads
 from tbcad.light.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, colours_along
@@ -102,15 +98,9 @@ def kept_pixels(frame: CameraFrame, radius: float) -> Ints:
 
 
 def sequence_frame(source: LightField, folder: Path, number: int) -> LightField:
-    """The light field of one frame of a sequence, its colours in memory.
+    """The light field of one frame, from 0, of a capture's sequence, its colours in memory.
 
-    Args:
-        source: the light field of the capture.
-        folder: of the capture.
-        number: of the frame, from 0.
-
-    Raises:
-        InputError: there is no sequence or no such frame, or the file is damaged.
+    InputError: there is no sequence or no such frame, or the file is damaged.
     """
     read = partial(_frames, source=source, number=number)
     with _opened(folder, read) as frames:
@@ -120,8 +110,7 @@ def sequence_frame(source: LightField, folder: Path, number: int) -> LightField:
 def frame_count(folder: Path) -> int:
     """Number of frames of the sequence of a capture.
 
-    Raises:
-        InputError: there is no sequence, or the file is damaged.
+    InputError: there is no sequence, or the file is damaged.
     """
 
     def count(store: StoredGroup) -> int:
@@ -167,14 +156,10 @@ def turns(count: int, whole: float) -> Floats:
 def write_turning(
     folder: Path, source: LightField, scene: Scene, angles: Floats, progress: Progress
 ) -> dict[str, Any]:
-    """Write a sequence of the object at some angles, and return what is in it.
+    """Write a sequence of the object at angles about z (t,), radians, and return what is in it.
 
-    Args:
-        folder: of the capture.
-        source: its light field.
-        scene: the object, in the built-in light.
-        angles: about z, radians, (t,).
-        progress: called with each frame.
+    It goes to the folder of a capture, whose light field is `source`; the light is the built-in
+    one.
     """
     facts = {"frames": len(angles), "turns_deg": np.degrees(angles).tolist()}
     with create_sequence(folder, source, facts) as writer:
@@ -201,8 +186,7 @@ def _rays(source: LightField, writer: SequenceWriter, name: str) -> tuple[Floats
 def turn_of_frame(folder: Path, number: int) -> float:
     """The angle of a frame, radians.
 
-    Raises:
-        InputError: the sequence does not say how far the object turned.
+    InputError: the sequence does not say how far the object turned.
     """
     with open_hdf5(folder / NAME, SCHEMA, "sequence", AGAIN, lambda store: store.facts) as facts:
         turned: Any = facts.get("turns_deg")

@@ -1,8 +1,7 @@
 """The contents of an object's file, whatever its format."""
 
-import warnings
 from base64 import b64decode
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any, Literal, NamedTuple
@@ -11,9 +10,10 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.cad.formats.images.pictures import Picture, picture_of
-from tbcad.common.srgb import srgb
-from tbcad.errors import InputError, PlausibilityWarning
+from tbcad.cad.formats.pictures import picture_of
+from tbcad.cad.formats.pixels import Picture
+from tbcad.common.colours import srgb
+from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats, Ints
 
 Up = Literal["y", "z"]
@@ -21,9 +21,6 @@ Up = Literal["y", "z"]
 LEAST_OF_BYTES, ROUNDING = 2.0, 1e-3
 UNITS_MM = {"um": 0.001, "mm": 1.0, "cm": 10.0, "in": 25.4, "ft": 304.8, "m": 1000.0}
 MAX_PICTURE_BYTES = 1 << 30
-# An object in inches that fits the capture sphere is 25.4 times smaller than was meant.
-SMALL_SHARE = 1 / 20
-LIKELY_UNITS_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 
 
 @dataclass(frozen=True)
@@ -70,8 +67,7 @@ def shown_shares(values: NDArray[Any]) -> Floats:
 
     Whole numbers of other types are taken for bytes, and real ones if the largest is at least 2.
 
-    Raises:
-        InputError: they are out of range.
+    InputError: they are out of range.
     """
     largest = {"u1": 255, "u2": 65535}.get(values.dtype.str[-2:])
     if largest is None:
@@ -110,13 +106,8 @@ def without_facets(points: int) -> InputError:
 def triangles(counts: Ints, points: Floats) -> tuple[Ints, Ints]:
     """Cut polygons into triangles; those that are not convex are cut by their outline.
 
-    Args:
-        counts: corners of each polygon, (p,).
-        points: of all corners, one polygon after the other, (sum of counts, 3).
-
-    Returns:
-        Numbers of corners (t, 3) of triangles, and their polygons (t,), ascending. Polygons of one
-        or two corners give none.
+    Of the numbers of corners (p,) and all corners one polygon after the other, (sum, 3): numbers of
+    corners (t, 3), and their polygons (t,), ascending. Polygons of one or two corners give none.
     """
     begin = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
     number = np.maximum(counts - 2, 0)
@@ -162,8 +153,7 @@ def _cut(points: Floats) -> NDArray[Any]:
 def file_beside(mesh: Path, name: str) -> Path:
     """The file that a mesh names, or the one with its base name beside the mesh.
 
-    Raises:
-        InputError: there is none in the folder of the mesh; links that lead out do not count.
+    InputError: there is none in the folder of the mesh; links that lead out do not count.
     """
     folder = mesh.parent.resolve()
     parts = PureWindowsPath(name.strip().strip('"')).parts  # takes both kinds of slashes
@@ -226,41 +216,3 @@ def shown_bytes(picture: Picture) -> Bytes:
     elif picture.dtype != np.uint8:
         picture = np.rint(255 * srgb(picture.astype(np.float64).clip(0, 1))).astype(np.uint8)
     return np.ascontiguousarray(np.dstack([picture] * 3) if picture.ndim == 2 else picture)
-
-
-def warn_of_small_object(
-    name: str, size_mm: float, capture_mm: float, other_units: Iterable[str]
-) -> None:
-    """Warn of an object whose size is likely to be in another unit.
-
-    Args:
-        name: of the object.
-        size_mm: longest side of the box that holds it.
-        capture_mm: diameter of the capture sphere.
-        other_units: in which it would have the size of an object.
-    """
-    if size_mm >= SMALL_SHARE * capture_mm:
-        return
-    units = " or ".join(f"--unit {unit}" for unit in other_units) or "another --unit"
-    _warn(
-        f"{name} is {size_mm:.3g} mm large, the capture sphere {capture_mm:g} mm: give {units}, "
-        "scale it, or use --fit"
-    )
-
-
-def warn_of_left_out(name: str, what: Sequence[str]) -> None:
-    """Warn of what an object's file names that was not found, not understood or left out."""
-    _warn(f"{name}: {'; '.join(what)}")
-
-
-def units_that_fit(size: float, capture_mm: float) -> list[str]:
-    """Units in which a size is that of an object that fills a good part of the capture sphere."""
-    return [
-        name
-        for name, mm in LIKELY_UNITS_MM.items()
-        if SMALL_SHARE * capture_mm <= size * mm <= capture_mm
-    ]
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, PlausibilityWarning, stacklevel=3)

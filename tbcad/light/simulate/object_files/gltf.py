@@ -3,52 +3,71 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.object_files.contents import ObjectFile, uri_bytes, without_facets
-from tbcad.light.simulate.object_files.gltf_meshes import Accessors, Materials, primitive_part
+from tbcad.light.simulate.object_files.contents import (
+    ObjectFile,
+    uri_bytes,
+    without_facets,
+)
+from tbcad.light.simulate.object_files.gltf_meshes import (
+    CUT_OFF,
+    DRACO,
+    TRANSFORM,
+    WEBP,
+    GltfFile,
+    Json,
+    primitive_part,
+)
 from tbcad.types import Floats
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
 MOST_NODES = 100_000
-READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_transform",
-        "EXT_texture_webp"}  # fmt: skip
+READ = {DRACO, TRANSFORM, WEBP, "KHR_mesh_quantization"}
 ONLY_LOOKS = "KHR_materials_"  # gloss, glass, cloth ...: of the surface, not of its colour
 REMEDY = {
     "EXT_meshopt_compression": "gltfpack without -c, or gltf-transform copy",
     "KHR_texture_basisu": "gltf-transform with textures as PNG",
 }
+AS_MODELLED = "are left out: it stands as it was modelled"
 
 
 def read_gltf(path: Path) -> ObjectFile:
     """Read all triangles of the file's scene, in the frame of the scene.
 
-    Raises:
-        InputError: it is no glTF 2.0, damaged, needs an extension that is not read, or has none.
+    InputError: it is no glTF 2.0, damaged, needs an extension that is not read, or has none.
     """
     document, binary = _document(path)
     if str(document.get("asset", {}).get("version", "2")).split(".")[0] != "2":
         raise InputError("it is not version 2 of glTF: export it again")
-    _check_extensions(document)
-    accessors = Accessors(document, _buffers(path, document, binary))
-    notes = list[str]()
-    materials = Materials(path, document, accessors, notes)
+    for name in document.get("extensionsRequired", []):
+        if name not in READ and not name.startswith(ONLY_LOOKS):
+            how = REMEDY.get(name, "another exporter")
+            raise InputError(f"it needs {name}, which is not read: write it without, as by {how}")
+    file = GltfFile(path, document, _buffers(path, document, binary))
     parts = []
     for mesh, matrix in _placed_meshes(document):
         for primitive in document["meshes"][mesh]["primitives"]:
-            part = primitive_part(primitive, accessors, materials, notes)
+            part = primitive_part(file, primitive)
             if part is not None:
                 parts.append(part.moved(matrix))
     if not parts:
         raise without_facets(0)
-    _note_motion(document, notes)
-    return ObjectFile(parts, list(dict.fromkeys(notes)), "m", "y")
+    primitives = (p for mesh in document["meshes"] for p in mesh["primitives"])
+    for found, note in (
+        (document.get("skins"), f"bones {AS_MODELLED}"),
+        (any("targets" in p for p in primitives), f"morph targets {AS_MODELLED}"),
+        (document.get("animations"), "animations are left out"),
+    ):
+        if found:
+            file.notes.append(note)
+    return ObjectFile(parts, list(dict.fromkeys(file.notes)), "m", "y")
 
 
-def _document(path: Path) -> tuple[dict[str, Any], bytes]:
+def _document(path: Path) -> tuple[Json, bytes]:
     """The JSON, and the binary chunk of a .glb."""
     data, binary = path.read_bytes(), b""
     if data.startswith(MAGIC):
@@ -70,25 +89,18 @@ def _document(path: Path) -> tuple[dict[str, Any], bytes]:
     return document, binary
 
 
-def _check_extensions(document: dict[str, Any]) -> None:
-    for name in document.get("extensionsRequired", []):
-        if name not in READ and not name.startswith(ONLY_LOOKS):
-            how = REMEDY.get(name, "another exporter")
-            raise InputError(f"it needs {name}, which is not read: write it without, as by {how}")
-
-
-def _buffers(path: Path, document: dict[str, Any], binary: bytes) -> list[bytes]:
+def _buffers(path: Path, document: Json, binary: bytes) -> list[bytes]:
     found = []
     for buffer in document.get("buffers", []):
         uri = buffer.get("uri")
         data = binary if uri is None else uri_bytes(path, uri)
         if len(data) < buffer["byteLength"]:
-            raise InputError("one of its buffers is cut off: copy it again")
+            raise InputError(CUT_OFF)
         found.append(data)
     return found
 
 
-def _placed_meshes(document: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
+def _placed_meshes(document: Json) -> Iterator[tuple[int, Floats]]:
     """Meshes of the scene by number, with their matrices (4, 4); all meshes without a scene."""
     scenes = document.get("scenes", [])
     if not scenes:
@@ -108,23 +120,12 @@ def _placed_meshes(document: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
         queue += [(child, matrix) for child in node.get("children", [])]
 
 
-def _matrix(node: dict[str, Any]) -> Floats:
+def _matrix(node: Json) -> Floats:
     """From a node to the one above it (section 3.5.3): translation, rotation, scale."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    from scipy.spatial.transform import Rotation
-
     matrix = np.eye(4)
     turn = Rotation.from_quat(node.get("rotation", (0, 0, 0, 1))).as_matrix()
     matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
     matrix[:3, 3] = node.get("translation", (0, 0, 0))
     return matrix
-
-
-def _note_motion(document: dict[str, Any], notes: list[str]) -> None:
-    if document.get("skins"):
-        notes.append("bones are left out: it stands as it was modelled")
-    if any("targets" in p for mesh in document["meshes"] for p in mesh["primitives"]):
-        notes.append("morph targets are left out: it stands as it was modelled")
-    if document.get("animations"):
-        notes.append("animations are left out")

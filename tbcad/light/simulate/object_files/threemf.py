@@ -18,8 +18,7 @@ GREY = 0.8  # of facets without a colour beside some that have one
 def read_3mf(path: Path) -> ObjectFile:
     """Read all meshes that the file builds, where it puts them.
 
-    Raises:
-        InputError: lib3mf cannot read it, or it builds no mesh.
+    InputError: lib3mf cannot read it, or it builds no mesh.
     """
     import lib3mf
 

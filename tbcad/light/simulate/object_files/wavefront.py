@@ -1,8 +1,9 @@
 """OBJ files with their MTL files (Wavefront, Advanced Visualizer, appendix B, 1995)."""
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from tbcad.types import Floats, Ints
 OPTIONS = re.compile(r"((?:-[a-z]+(?:\s+(?:on|off|[-+.\de]+|[rgbmlz]))+\s+)*)(.*)", re.IGNORECASE)
 IGNORED = {"bump", "norm", "disp", "refl", "map_bump", "map_ks", "map_ke", "map_d", "map_ns",
            "map_pr", "map_pm", "map_ka", "decal"}  # fmt: skip
+TABLES = ("v", "vt", "vn")
 LEFT_OUT = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
 
 
@@ -35,92 +37,77 @@ class _Material:
     picture: str | None = None
 
 
-@dataclass
-class _Lines:
-    """The lines of a file by their kind; facets with the material in force."""
+class _Facets(NamedTuple):
+    """Lines of facets, the material in force at each, and how many v, vt and vn are before it."""
 
-    v: list[str] = field(default_factory=list)
-    vt: list[str] = field(default_factory=list)
-    vn: list[str] = field(default_factory=list)
-    facets: list[str] = field(default_factory=list)
-    material: list[str | None] = field(default_factory=list)
-    known: list[tuple[int, int, int]] = field(default_factory=list)
-    libraries: list[str] = field(default_factory=list)
-    left_out: set[str] = field(default_factory=set)
+    corners: list[list[str]]
+    material: list[str]
+    known: list[tuple[int, ...]]
 
 
 def read_obj(path: Path) -> ObjectFile:
     """Read a mesh, a part for each material.
 
-    Raises:
-        InputError: it is no OBJ file, or its facets name corners that do not exist.
+    InputError: it is no OBJ file, or its facets name corners that do not exist.
     """
-    lines = _lines(text_of(path.read_bytes()))
-    notes = [f"its {what} are left out" for what in sorted(lines.left_out)]
-    if not lines.facets:
-        raise without_facets(len(lines.v))
-    vertices = _table(lines.v, "v", 3)
-    points, colours = vertices[:, :3], _vertex_colours(vertices)
-    counts, index = _corners(lines)
-    faces, polygon = triangles(counts, points[index[:, 0]])
-    materials = _materials(path, lines.libraries, notes)
-    names, which = np.unique(np.array([m or "" for m in lines.material]), return_inverse=True)
+    tables: dict[str, list[str]] = {"v": [], "vt": [], "vn": [], "mtllib": []}
+    facets, left_out, material = _Facets([], [], []), set[str](), ""
+    text = text_of(path.read_bytes())
+    for line in text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
+        key, _, rest = line.strip().replace("\t", " ").partition(" ")
+        if key in tables:
+            tables[key].append(rest.strip())
+        elif key in {"f", "fo"}:
+            facets.corners.append(rest.partition("#")[0].split())
+            facets.material.append(material)
+            facets.known.append(tuple(len(tables[name]) for name in TABLES))
+        elif key == "usemtl":
+            material = rest.strip()
+        elif key in LEFT_OUT:
+            left_out.add(LEFT_OUT[key])
+    notes = [f"its {what} are left out" for what in sorted(left_out)]
+    if not facets.corners:
+        raise without_facets(len(tables["v"]))
+    vertices = _table(tables, "v", 3)
+    # many programs write colours behind places: v x y z r g b
+    colours = shown_shares(vertices[:, -3:]) if vertices.shape[1] in (6, 7) else None
+    counts, index = _corners(facets, [len(tables[name]) for name in TABLES])
+    faces, polygon = triangles(counts, vertices[index[:, 0], :3])
+    materials = _materials(path, tables["mtllib"], notes)
+    names, which = np.unique(np.array(facets.material), return_inverse=True)
     parts = []
     for k, name in enumerate(names.tolist()):
         own = index[faces[which[polygon] == k]]
-        parts.append(_part(path, lines, points, colours, own, name, materials, notes))
+        part, vertex = _part(tables, vertices[:, :3], own)
+        uv = None
+        if tables["vt"] and not (own[..., 1] < 0).any():
+            uv = _table(tables, "vt", 2)[:, :2][own[..., 1]]
+        if name and materials is not None and name not in materials:
+            notes.append(f"its material {name} is in no MTL file")
+        corner = None if colours is None else colours[vertex][part.faces]
+        used = (materials or {}).get(name, _Material())
+        parts.append(_coloured(path, part, uv, corner, used, notes))
     return ObjectFile([part for part in parts if len(part.faces)], list(dict.fromkeys(notes)))
 
 
-def _lines(text: str) -> _Lines:
-    found, material = _Lines(), None
-    for line in text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
-        key, _, rest = line.strip().replace("\t", " ").partition(" ")
-        match key:
-            case "v":
-                found.v.append(rest)
-            case "vt":
-                found.vt.append(rest)
-            case "vn":
-                found.vn.append(rest)
-            case "f" | "fo":
-                found.facets.append(rest.partition("#")[0])
-                found.material.append(material)
-                found.known.append((len(found.v), len(found.vt), len(found.vn)))
-            case "usemtl":
-                material = rest.strip()
-            case "mtllib":
-                found.libraries.append(rest.strip())
-            case _ if key in LEFT_OUT:
-                found.left_out.add(LEFT_OUT[key])
-    return found
-
-
-def _table(lines: list[str], what: str, columns: int) -> Floats:
+def _table(tables: dict[str, list[str]], name: str, columns: int) -> Floats:
     """Numbers of lines, (n, columns or more); short lines are refused, others cut to the least."""
-    rows = [line.partition("#")[0].split() for line in lines]
+    rows = [line.partition("#")[0].split() for line in tables[name]]
     width = min((len(row) for row in rows), default=columns)
     if width < columns:
-        raise InputError(f"a line of {what} has fewer than {columns} numbers")
+        raise InputError(f"a line of {name} has fewer than {columns} numbers")
     return np.array([row[:width] for row in rows], dtype=np.float64).reshape(-1, width)
 
 
-def _vertex_colours(vertices: Floats) -> Floats | None:
-    """Colours (v, 3) behind places, as many programs write them: v x y z r g b."""
-    return shown_shares(vertices[:, -3:]) if vertices.shape[1] in (6, 7) else None
-
-
-def _corners(lines: _Lines) -> tuple[Ints, Ints]:
+def _corners(facets: _Facets, limits: list[int]) -> tuple[Ints, Ints]:
     """Corners of each polygon (p,), and of them all vertex, texture place and normal, (c, 3).
 
     Numbers are from 0; -1 where there is none. Negative ones in the file count back from the line.
     """
-    split = [line.split() for line in lines.facets]
-    counts = np.array([len(corners) for corners in split], dtype=np.int64)
-    index = _index([token for corners in split for token in corners])
-    known = np.repeat(np.array(lines.known, dtype=np.int64), counts, axis=0)
+    counts = np.array([len(corners) for corners in facets.corners], dtype=np.int64)
+    index = _index([token for corners in facets.corners for token in corners])
+    known = np.repeat(np.array(facets.known, dtype=np.int64), counts, axis=0)
     index = np.where(index > 0, index - 1, np.where(index < 0, known + index, -1))
-    limits = np.array([len(lines.v), len(lines.vt), len(lines.vn)])
     if (index[:, 0] < 0).any() or (index >= limits).any() or (index < -1).any():
         raise InputError("its facets name corners that do not exist: it is damaged")
     return counts, index
@@ -141,34 +128,21 @@ def _index(tokens: list[str]) -> Ints:
     return index
 
 
-def _part(
-    path: Path, lines: _Lines, points: Floats, colours: Floats | None, index: Ints, name: str,
-    materials: dict[str, _Material] | None, notes: list[str],
-) -> ObjectPart:  # fmt: skip
-    """Facets of one material; index (f, 3, 3) by corner, and vertex, texture place and normal."""
-    key = index[..., 0].ravel() * (len(lines.vn) + 1) + index[..., 2].ravel() + 1
+def _part(tables: dict[str, list[str]], points: Floats, index: Ints) -> tuple[ObjectPart, Ints]:
+    """Facets by corner, and vertex, texture place and normal, (f, 3, 3); and their vertices."""
+    normals = np.concatenate([np.zeros((1, 3)), _table(tables, "vn", 3)[:, :3]])
+    key = index[..., 0].ravel() * len(normals) + index[..., 2].ravel() + 1
     own, faces = np.unique(key, return_inverse=True)
-    vertex, normal = np.divmod(own, len(lines.vn) + 1)
-    normals = np.concatenate([np.zeros((1, 3)), _table(lines.vn, "vn", 3)[:, :3]])[normal]
-    part = ObjectPart(points[vertex], faces.reshape(-1, 3), normals if lines.vn else None)
-    uv = _coordinates(lines, index)
-    return _coloured(path, part, uv, colours, vertex, name, materials, notes)
-
-
-def _coordinates(lines: _Lines, index: Ints) -> Floats | None:
-    if not lines.vt or (index[..., 1] < 0).any():
-        return None
-    return _table(lines.vt, "vt", 2)[:, :2][index[..., 1]]
+    vertex, normal = np.divmod(own, len(normals))
+    shaded = normals[normal] if tables["vn"] else None
+    return ObjectPart(points[vertex], faces.reshape(-1, 3), shaded), vertex
 
 
 def _coloured(
-    path: Path, part: ObjectPart, uv: Floats | None, colours: Floats | None, own: Ints, name: str,
-    materials: dict[str, _Material] | None, notes: list[str],
+    path: Path, part: ObjectPart, uv: Floats | None, colours: Floats | None, material: _Material,
+    notes: list[str],
 ) -> ObjectPart:  # fmt: skip
     """The part with its texture, else colours of its corners, else its material's."""
-    material = (materials or {}).get(name, _Material())
-    if name and materials is not None and name not in materials:
-        notes.append(f"its material {name} is in no MTL file")
     if material.picture is not None and uv is None:
         notes.append(f"it names the texture {material.picture}, but has no texture coordinates")
     elif material.picture is not None:
@@ -179,7 +153,7 @@ def _coloured(
     elif uv is not None and material.colour is None and colours is None:
         notes.append("it has texture coordinates, but names no texture (map_Kd)")
     if colours is not None:
-        return replace(part, colours=colours[own][part.faces], source="vertex colours")
+        return replace(part, colours=colours, source="vertex colours")
     if material.colour is not None:
         return replace(part, colours=even(material.colour, len(part.faces)),
                      source="colours of materials (Kd)")  # fmt: skip

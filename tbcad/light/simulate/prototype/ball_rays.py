@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.common.compiled import compiled
 from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.camera import LensCamera
-from tbcad.core.optics.pedestals.walls import NO_WALLS, GrooveWalls
+from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.core.optics.reflection import reflect
 from tbcad.light.simulate.capture.photograph import Samples, sample_shifts, to_bytes
 from tbcad.light.simulate.prototype.run import PrototypeRun
@@ -57,21 +57,9 @@ def trace_own_ball(run: PrototypeRun, direction: Floats, stop: Ints, ball: Ints)
 
 
 def ball_hits(
-    pinhole: Floats,
-    balls: Floats,
-    direction: Floats,
-    stop: Ints,
-    walls: GrooveWalls = NO_WALLS,
+    pinhole: Floats, balls: Floats, direction: Floats, stop: Ints, walls: GrooveWalls = NO_WALLS
 ) -> BallHits:
-    """What unit directions (n, 3) from a pinhole (3,) meet.
-
-    Args:
-        pinhole: mm, (3,).
-        balls: at each stop, (s, k, 8): see PrototypeRun.
-        direction: (n, 3).
-        stop: from 0, (n,).
-        walls: that end the balls as mirrors on pedestals, if any.
-    """
+    """What unit directions (n, 3) meet at stops (n,): balls (s, k, 8) as of PrototypeRun."""
     ends = walls.of_mirrors(balls.shape[1])
     ball, distance = _first_ball(pinhole, direction, stop, balls, ends)
     return _reflected(pinhole, direction, ball, distance, balls[stop, np.maximum(ball, 1) - 1])

@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import without_distortion
-from tbcad.light.simulate.capture.photograph import (
-    CENTRE,
-    RowBand,
-    Samples,
-    Tracer,
-    row_bands,
-)
+from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, Samples, Tracer, row_bands
 from tbcad.light.simulate.parallel import in_batches, in_threads
 from tbcad.light.simulate.prototype.ball_rays import (
     BallHits,
@@ -45,12 +39,7 @@ class StopPhotographs(Protocol):
     """The photographs of a run's stops, real or simulated."""
 
     def colours(self, stop: int, places: Floats) -> Bytes | None:
-        """Colours (n, 3) of a stop's photograph between its pixels; None where there is none.
-
-        Args:
-            stop: number of the stop, from 0.
-            places: columns and rows; whole numbers are pixel centres, (n, 2).
-        """
+        """Colours (n, 3) of a stop, from 0, at columns and rows (n, 2); None without one."""
 
 
 InFront = Callable[[Ints, Floats, Floats], Bools]
@@ -79,13 +68,10 @@ class MergePlan:
 def merge_plan(
     run: PrototypeRun, object_radius: float, in_front: InFront, direct_stop: int = 0
 ) -> MergePlan:
-    """Prepare a merge.
+    """Prepare a merge of a run.
 
-    Args:
-        run: for camera a's mirrors or camera b's.
-        object_radius: of a sphere about the origin that holds the object, mm.
-        in_front: where the object itself is before the balls.
-        direct_stop: whose photograph shows the object itself, from 0.
+    The object is in a sphere about the origin of `object_radius`, mm; the photograph of
+    `direct_stop`, from 0, shows it itself.
     """
     return MergePlan(
         run,
@@ -103,18 +89,17 @@ def merge_photographs(
 ) -> Iterator[RowBand]:
     """Bands of the merged picture from top to bottom, as those of tbcad.light.simulate.capture.
 
-    Args:
-        plan: of the merge.
-        photographs: of the run's stops.
-        progress: called with each step.
-
     Where a rotated direction leaves the photograph, or meets something else than its ball, and
     where a stop has no photograph, there is no ray and no colour. What is on no mirror shows the
     object itself, or nothing.
     """
     picture, shown = _resampled(plan, photographs, progress)
     known = replace(plan, ball=np.where(shown[plan.stop], plan.ball, NO_BALL))
-    yield from merged_bands(known, partial(_resampled_colours, picture), progress)
+
+    def colours(rows: range, some: Bools) -> Bytes:
+        return np.asarray(picture[rows.start : rows.stop].reshape(-1, 3) * some[:, None])
+
+    yield from merged_bands(known, colours, progress)
 
 
 def merged_bands(
@@ -122,10 +107,7 @@ def merged_bands(
 ) -> Iterator[RowBand]:
     """Bands of the merged picture from top to bottom.
 
-    Args:
-        plan: of the merge.
-        colours: gives colours (n, 3) of a band, from its rows and where they show something, (n,).
-        progress: called with each step.
+    `colours` gives colours (n, 3) of a band, from its rows and where they show something, (n,).
     """
     height = plan.run.reflector.camera.height_px
     yield from in_batches(
@@ -235,10 +217,6 @@ def _band(plan: MergePlan, colours: Callable[[range, Bools], Bytes], rows: range
     return RowBand(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
 
 
-def _resampled_colours(picture: Bytes, rows: range, shown: Bools) -> Bytes:
-    return np.asarray(picture[rows.start : rows.stop].reshape(-1, 3) * shown[:, None])
-
-
 @dataclass(frozen=True)
 class SimulatedPhotographs:
     """What the photographs of a run's stops show of a scene."""
@@ -258,19 +236,9 @@ class SimulatedPhotographs:
 
 
 def merge_run(
-    run: PrototypeRun,
-    scene: Scene,
-    samples: Samples = 1,
-    progress: Progress = lambda _: None,
+    run: PrototypeRun, scene: Scene, samples: Samples = 1, progress: Progress = lambda _: None
 ) -> Iterator[RowBand]:
-    """Bands of the merged picture from top to bottom.
-
-    Args:
-        run: for camera a's mirrors or camera b's.
-        scene: the object.
-        samples: a pixel of the photographs is the mean of these rays.
-        progress: called with each step.
-    """
+    """Bands of the merged picture; pixels of photographs are means of `samples`."""
     photographs = SimulatedPhotographs(run, scene, samples)
     plan = merge_plan(run, scene.radius, photographs.in_front)
     yield from merge_photographs(plan, photographs, progress)

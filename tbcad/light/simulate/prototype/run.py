@@ -1,4 +1,4 @@
-"""One run of the base through its stops, seen from the object.
+"""The prototype's plan as an export says it, and its runs through all stops, seen from the object.
 
 The second half is photographed with the object turned by 180 degrees about z. In the frame of the
 object the prototype is turned instead: its camera is then where the shell's camera b is, and each
@@ -8,17 +8,193 @@ ball in the place of one of camera b's mirrors. Both runs differ only in where t
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
+from tbcad.cad.formats.checked_files import REBUILD, columns
 from tbcad.core.geometry.rotations import rotated
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera, without_distortion
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.light.simulate.prototype.plan import HALF_TURN, Plan
-from tbcad.light.simulate.scene.reflector import Reflector, SubstitutedReflector
+from tbcad.errors import InputError
+from tbcad.light.simulate.scene.reflector import (
+    ROUNDING,
+    ExportedDesign,
+    Reflector,
+    SubstitutedReflector,
+)
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.tables import BallRow, PictureRow
 from tbcad.types import Floats, Ints
+
+# Of lengths in mm after rounding in a text file.
+ROUNDING_MM = 1e-6
+APEX, NORMAL = "px py pz", "nx ny nz"
+ERROR_DEG = 1e-6
+HALF_TURN = np.array([-1.0, -1.0, 1.0])
+"""Factors that turn points and vectors by 180 degrees about z."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Balls on the base at angle zero, and how they stand in for m mirrors of each camera.
+
+    The first row of `ball` and `stop` is for camera a's mirrors, the second for camera b's: they
+    are photographed in a second run by the same camera, with the object turned by 180 degrees.
+    """
+
+    frame: Floats  # rows: the axis that the base turns about, azimuth zero, and the third, (3, 3)
+    apex: Floats  # of the balls, mm, (k, 3)
+    normal: Floats  # inward unit normals there, (k, 3)
+    radius: Floats  # of the reflecting spheres, mm, (k,)
+    body_centre: Floats  # of the spheres in the seats, mm, (k, 3); a ball's own, if no cap
+    body_radius: Floats  # mm, (k,)
+    moved: bool  # whether a mirror's window moves along with its ball
+    angle: Floats  # of the base at each stop, radians, (s,)
+    ball: Ints  # that stands in, from 0, (2, m)
+    stop: Ints  # at which it does, from 0, (2, m)
+    # whether balls are ended by walls, so that a pixel of one never shows another: those of a shell
+    # with mirrors on pedestals
+    parted: bool = False
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    @property
+    def centre(self) -> Floats:
+        """Centres of the reflecting spheres, mm, (k, 3)."""
+        return self.apex - self.radius[:, None] * self.normal
+
+
+def read_plan(exported: ExportedDesign) -> Plan:
+    """Read balls and plan of a folder that `tbcad build` wrote with a prototype.
+
+    InputError: there is none, or what it says cannot be.
+    """
+    record, table, plan_file = (
+        exported.folder / name for name in (NAME, BallRow.FILE, PictureRow.FILE)
+    )
+    document = Prototype.read(record)
+    balls, pictures = BallRow.read(exported.folder), PictureRow.read(exported.folder)
+    frame = np.array([document.frame.axis, document.frame.zero, document.frame.third])
+    _check_frame(record, exported, frame)
+    _check_balls(table, balls)
+    mirrors = len(exported.reflectors[0])
+    ball, stop = _served(plan_file, pictures, len(balls), mirrors)
+    plan = Plan(
+        frame=frame,
+        apex=columns(balls, APEX),
+        normal=columns(balls, NORMAL),
+        radius=columns(balls, "radius_mm")[:, 0],
+        body_centre=columns(balls, "bx by bz"),
+        body_radius=columns(balls, "body_radius_mm")[:, 0],
+        moved=document.picture == "moved",
+        angle=np.radians(_angles(plan_file, pictures)),
+        ball=ball,
+        stop=stop,
+    )
+    _check_errors(plan_file, pictures, plan, exported)
+    return plan
+
+
+def _check_frame(path: Path, exported: ExportedDesign, frame: Floats) -> None:
+    a, b = exported.reflectors
+    pinhole = a.camera.pinhole
+    offset = norm(pinhole) * frame[0] - pinhole
+    if np.abs(frame @ frame.T - np.eye(3)).max() > ROUNDING or np.linalg.det(frame) < 0:
+        raise InputError(f"{path}: frame is not square and right-handed: {REBUILD}")
+    if norm(offset) > ROUNDING_MM:
+        raise InputError(f"{path}: frame.axis does not point at the pinhole of camera a: {REBUILD}")
+    if norm(b.camera.pinhole - HALF_TURN * pinhole) > ROUNDING_MM:
+        raise InputError(
+            f"{path}: camera b is not where the object turned by 180 degrees about z has camera "
+            "a, so one camera cannot take both halves: set y of optics.camera_mm to 0"
+        )
+
+
+def _check_balls(path: Path, balls: list[BallRow]) -> None:
+    if not balls:
+        raise InputError(f"{path}: no balls, at least one is needed: {REBUILD}")
+    number, radius = columns(balls, "number radius_mm").T
+    apex, normal, centre = (columns(balls, names) for names in (APEX, NORMAL, "cx cy cz"))
+    faults = (
+        (number != np.arange(1, len(balls) + 1), "is out of order"),
+        (np.abs(norm(normal) - 1) > ROUNDING, "has a normal of another length than 1"),
+        (
+            norm(apex - radius[:, None] * normal - centre) > ROUNDING_MM,
+            "has a centre that is not its radius behind its apex",
+        ),
+    )
+    for wrong, what in faults:
+        if wrong.any():
+            raise InputError(f"{path}: ball {int(np.argmax(wrong)) + 1} {what}: {REBUILD}")
+
+
+def _angles(path: Path, pictures: list[PictureRow]) -> Floats:
+    """Base angle at each stop, degrees, (s,)."""
+    angles: dict[int, float] = {}
+    for one in pictures:
+        if angles.setdefault(one.stop, one.base_angle_deg) != one.base_angle_deg:
+            raise InputError(f"{path}: stop {one.stop} has two base angles: {REBUILD}")
+    stops = sorted(angles)
+    if stops != list(range(1, len(stops) + 1)):
+        raise InputError(f"{path}: stops are not numbered from 1 without a gap: {REBUILD}")
+    angle = np.array([angles[stop] for stop in stops])
+    if (np.diff(angle) <= 0).any():
+        raise InputError(f"{path}: base angles do not rise from stop to stop: {REBUILD}")
+    return angle
+
+
+def _served(path: Path, pictures: list[PictureRow], balls: int, mirrors: int) -> tuple[Ints, Ints]:
+    """Ball and stop, from 0, of each mirror of camera a and of camera b, (2, m)."""
+    ball_and_stop = np.full((2, 2, mirrors), -1, dtype=np.int64)
+    for row, one in enumerate(pictures, 1):
+        turn, wrong = one.object_turn_deg, ""
+        camera, mirror = int(turn != 0), int(one.mirror[1:]) - 1
+        if turn not in (0, 180):
+            wrong = f"has object_turn_deg {turn:g}, allowed is 0 or 180"
+        elif one.ball > balls:
+            wrong = f"names ball {one.ball}, allowed is 1 to {balls}"
+        elif one.mirror[0] != "ab"[camera] or not 0 <= mirror < mirrors:
+            wrong = (
+                f"shows {one.mirror}, allowed with the object turned by {turn:g} degrees is "
+                f"{_name(camera, 0)} to {_name(camera, mirrors - 1)}"
+            )
+        elif ball_and_stop[0, camera, mirror] >= 0:
+            wrong = f"shows {one.mirror} a second time"
+        if wrong:
+            raise InputError(f"{path}: row {row} {wrong}: {REBUILD}")
+        ball_and_stop[:, camera, mirror] = one.ball - 1, one.stop - 1
+    missing = np.argwhere(ball_and_stop[0] < 0)
+    if missing.size:
+        raise InputError(f"{path} does not show mirror {_name(*missing[0].tolist())}: {REBUILD}")
+    return ball_and_stop[0], ball_and_stop[1]
+
+
+def _name(camera: int, mirror: int) -> str:
+    return f"{'ab'[camera]}{mirror + 1:04d}"
+
+
+def _check_errors(
+    path: Path, pictures: list[PictureRow], plan: Plan, exported: ExportedDesign
+) -> None:
+    """The balls must stand where the plan says: as far from each mirror's direction as it says."""
+    said = np.zeros(plan.ball.shape)
+    for one in pictures:
+        said[int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1] = one.error_deg
+    a, b = exported.reflectors
+    u = np.stack([a.u, b.u * HALF_TURN])
+    apex = rotated(plan.apex[plan.ball], plan.frame[0], plan.angle[plan.stop])
+    apart = norm(apex / norm(apex)[..., None] - u)
+    off = np.abs(np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1))) - said)
+    camera, mirror = np.unravel_index(off.argmax(), off.shape)
+    if off[camera, mirror] > ERROR_DEG:
+        raise InputError(
+            f"{path}: {_name(int(camera), int(mirror))} has error_deg {said[camera, mirror]:g}, "
+            f"but its ball is {off[camera, mirror]:.3g} degrees off that: {REBUILD}"
+        )
 
 
 @dataclass(frozen=True)
@@ -51,8 +227,10 @@ def prototype_runs(
 ) -> tuple[PrototypeRun, PrototypeRun]:
     """Both runs as designed: for camera a's mirrors, and for camera b's, the object turned."""
     camera = without_distortion(reflectors[0].camera)
+    place = partial(rotated, axis=plan.frame[0], angle=plan.angle[:, None])
+    balls = balls_at_stops(plan, plan.centre, plan.radius, place)
     a, b = (
-        prototype_run(reflector, plan, half, camera, _designed_balls(plan))
+        prototype_run(reflector, plan, half, camera, balls)
         for half, reflector in enumerate(reflectors)
     )
     return a, b
@@ -61,22 +239,20 @@ def prototype_runs(
 def prototype_run(
     reflector: Reflector, plan: Plan, half: int, camera: LensCamera, balls: Floats
 ) -> PrototypeRun:
-    """One run of a prototype whose camera and balls are where they are.
+    """One run of a prototype whose camera and balls (s, k, 8) are where they are, in its own frame.
 
-    Args:
-        reflector: the shell's camera and mirrors.
-        plan: which ball stands in for which mirror.
-        half: 0 for camera a's mirrors, 1 for camera b's, the object turned.
-        camera: that takes the photographs, in the frame of the prototype.
-        balls: at each stop, in the frame of the prototype, as of `PrototypeRun`, (s, k, 8).
+    `half` is 0 for camera a's mirrors, 1 for camera b's, the object turned.
     """
     flip = HALF_TURN if half else np.ones(3)
-    balls, camera = balls * np.concatenate([flip, [1.0], flip, [1.0]]), _turned(camera, flip)
+    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    camera = replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
     ball, stop = plan.ball[half], plan.stop[half]
     centre, radius = balls[stop, ball, :3], balls[stop, ball, 3]
     apex = reflection_points(centre, radius, np.zeros(3), camera.pinhole)
     normal = (apex - centre) / radius[:, None]
-    window = reflector.mirrors.apex if plan.moved else _designed_apex(plan, half) * flip
+    window = reflector.mirrors.apex
+    if not plan.moved:
+        window = rotated(plan.apex[ball], plan.frame[0], plan.angle[stop]) * flip
     return PrototypeRun(
         reflector=reflector,
         camera=camera,
@@ -92,13 +268,10 @@ def prototype_run(
 def balls_at_stops(
     plan: Plan, centre: Floats, radius: Floats, place: Callable[[Floats], Floats]
 ) -> Floats:
-    """Balls as of `PrototypeRun`, (s, k, 8).
+    """Balls as of `PrototypeRun`, (s, k, 8), from spheres (k, 3), (k,) at base angle zero, mm.
 
-    Args:
-        plan: says where the sphere in the seat is, from the reflecting one, and how much larger.
-        centre: of the reflecting spheres at base angle zero, mm, (k, 3).
-        radius: of the reflecting spheres, mm, (k,).
-        place: moves points of the base (s, k, 3) from angle zero to the stops.
+    The plan says where the sphere in the seat is, from the reflecting one, and how much larger;
+    `place` moves points of the base (s, k, 3) from angle zero to the stops.
     """
     shape = (len(plan.angle), len(plan))
     front, body = (
@@ -119,33 +292,13 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
 
 
-def _designed_balls(plan: Plan) -> Floats:
-    place = partial(rotated, axis=plan.frame[0], angle=plan.angle[:, None])
-    return balls_at_stops(plan, plan.centre, plan.radius, place)
-
-
-def _designed_apex(plan: Plan, half: int) -> Floats:
-    """Apices of the balls in place of a half's mirrors, where they are designed to be, (m, 3)."""
-    return rotated(plan.apex[plan.ball[half]], plan.frame[0], plan.angle[plan.stop[half]])
-
-
-def _turned(camera: LensCamera, flip: Floats) -> LensCamera:
-    return replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
-
-
 def _window_rotations(
     window: Floats, window_pinhole: Floats, apex: Floats, pinhole: Floats
 ) -> Floats:
-    """Rotation of each window along with its ball, (m, 3, 3).
+    """Rotation of each window along with its ball, (m, 3, 3), of apices (m, 3) and pinholes (3,).
 
     The direction to one apex becomes that to the other, and the plane of incidence of the light
     from the origin stays one (tbcad.core.optics.windows).
-
-    Args:
-        window: apices that the windows are about, mm, (m, 3).
-        window_pinhole: that sees them, mm, (3,).
-        apex: of the balls in their places, mm, (m, 3).
-        pinhole: that sees the balls, mm, (3,).
     """
     before, after = _sight(window, window_pinhole), _sight(apex, pinhole)
     return np.asarray(np.swapaxes(before, 1, 2) @ after)

@@ -1,5 +1,6 @@
 """The object before the cameras from a file: in millimetres, z up, with the file's colours."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -8,17 +9,14 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from tbcad.core.geometry.smallest_sphere import smallest_sphere
+from tbcad.core.geometry.round_cones import smallest_sphere
 from tbcad.core.geometry.vectors import norm
-from tbcad.errors import InputError
+from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.simulate.object_files.contents import (
     UNITS_MM,
     ObjectFile,
     ObjectPart,
     Up,
-    units_that_fit,
-    warn_of_left_out,
-    warn_of_small_object,
     without_facets,
 )
 from tbcad.light.simulate.object_files.normals import (
@@ -40,6 +38,9 @@ MAX_TEXTURE_BYTES = 2 << 30
 MAX_COORDINATE_MM = 1e9
 # Larger than the capture sphere by less than rounding in a file: not too large.
 ROUNDING = 1e-6
+# An object in inches that fits the capture sphere is 25.4 times smaller than was meant.
+SMALL_SHARE = 1 / 20
+LIKELY_UNITS_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 # Facets of less than this share of their longest side squared are lines.
 LEAST_AREA = 1e-12
 PATTERN, PLAIN = "the built-in pattern", "plain grey"
@@ -58,11 +59,7 @@ class ObjectOptions:
     unit: Unit | None = None  # of the file; None: as the file or its format says, else mm
 
     def __post_init__(self) -> None:
-        """Refuse what is none of these.
-
-        Raises:
-            InputError: it is not.
-        """
+        """Refuse what is none of these; InputError: it is not."""
         for name, value, allowed in (
             ("paint", self.paint, get_args(Paint)),
             ("up", self.up, (None, *get_args(Up))),
@@ -91,13 +88,9 @@ def load_object(
     options: ObjectOptions | None = None,
     told: Progress | None = None,
 ) -> SceneObject:
-    """Read a triangle mesh.
+    """Read a triangle mesh: PLY, STL, OBJ, OFF, GLB, glTF or 3MF, its textures in the same folder.
 
-    Args:
-        path: PLY, STL, OBJ, OFF, GLB, glTF or 3MF; its textures must be in the same folder.
-        capture_mm: diameter of the capture sphere.
-        options: how it is taken.
-        told: called with a line that says which unit, axis and colours were taken.
+    `told` is called with a line that says which unit, axis and colours were taken.
 
     Raises:
         InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
@@ -110,25 +103,23 @@ def load_object(
     with np.errstate(all="ignore"):  # what is not finite is refused, in words
         found = read_object_file(path)
         unit, up = asked.unit or found.unit or "mm", asked.up or found.up or "z"
-        parts = [_in_frame(part, UNITS_MM[unit], up) for part in found.parts]
+        turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) if up == "y" else np.eye(3)
+        matrix = np.eye(4)  # to millimetres, z up
+        matrix[:3, :3] = UNITS_MM[unit] * turn
+        parts = [part.moved(matrix) for part in found.parts]
     mesh = _Mesh.of(path, parts)
-    points = _fitted(mesh.points, capture_mm) if asked.fit else mesh.points
+    points = mesh.points
+    if asked.fit:  # the smallest sphere about them becomes the capture sphere
+        middle, reach = smallest_sphere(points)
+        points = np.asarray((points - middle) * (capture_mm / 2 / reach))
     _check_size(path, points, capture_mm, unit)
     colours, notes = _painted(path, mesh, found, asked.paint)
     reading = Reading(unit, up, colours.pop("text"), tuple(notes))
     if notes:
-        warn_of_left_out(path.name, notes)
+        _warn(f"{path.name}: {'; '.join(notes)}")
     if told is not None:
         told(reading.line(path.name))
     return SceneObject(path.name, points, mesh.faces, mesh.normals, reading=reading, **colours)
-
-
-def _in_frame(part: ObjectPart, unit_mm: float, up: str) -> ObjectPart:
-    """The part in millimetres, z up."""
-    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) if up == "y" else np.eye(3)
-    matrix = np.eye(4)
-    matrix[:3, :3] = unit_mm * turn
-    return part.moved(matrix)
 
 
 @dataclass(frozen=True)
@@ -216,7 +207,8 @@ def _shown(path: Path, points: Floats, faces: Ints) -> Ints:
 
 def _check_size(path: Path, points: Floats, capture_mm: float, unit: str) -> None:
     size, reach = np.ptp(points, axis=0), 2 * float(norm(points).max())
-    other = units_that_fit(float(size.max()) / UNITS_MM[unit], capture_mm)
+    sizes = {name: size.max() / UNITS_MM[unit] * mm for name, mm in LIKELY_UNITS_MM.items()}
+    other = [one for one, mm in sizes.items() if SMALL_SHARE * capture_mm <= mm <= capture_mm]
     if reach > capture_mm * (1 + ROUNDING):
         raise InputError(
             f"{path} does not fit the capture sphere: it is {size[0]:.4g} x {size[1]:.4g} x "
@@ -224,13 +216,16 @@ def _check_size(path: Path, points: Floats, capture_mm: float, unit: str) -> Non
             f"{capture_mm / 2:g}: move or scale it, "
             f"{''.join(f'give --unit {name}, ' for name in other)}or use --fit"
         )
-    warn_of_small_object(path.name, float(size.max()), capture_mm, other)
+    if size.max() < SMALL_SHARE * capture_mm:
+        units = " or ".join(f"--unit {name}" for name in other) or "another --unit"
+        _warn(
+            f"{path.name} is {size.max():.3g} mm large, the capture sphere {capture_mm:g} mm: give "
+            f"{units}, scale it, or use --fit"
+        )
 
 
-def _fitted(points: Floats, capture_mm: float) -> Floats:
-    """Points moved and scaled so that the smallest sphere about them is the capture sphere."""
-    middle, reach = smallest_sphere(points)
-    return np.asarray((points - middle) * (capture_mm / 2 / reach))
+def _warn(text: str) -> None:
+    warnings.warn(text, PlausibilityWarning, stacklevel=3)
 
 
 def _painted(

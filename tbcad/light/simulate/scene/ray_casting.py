@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.scene.lamps import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.object import SceneObject, pattern
-from tbcad.light.simulate.scene.point_lights import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
 
@@ -50,9 +50,7 @@ class RayHits:
 def embree_scene(points: NDArray[Any], faces: NDArray[Any] | None = None) -> Any:
     """A scene of facets, ready for queries from several threads, which release the lock.
 
-    Args:
-        points: corners, mm, (v, 3); or, without faces, facets by their corners, (f, 3, 3).
-        faces: corners of the facets, (f, 3).
+    Of corners (v, 3), mm, and faces (f, 3); or, without faces, of facets' corners (f, 3, 3).
     """
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene

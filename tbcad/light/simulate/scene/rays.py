@@ -1,4 +1,4 @@
-"""Rays of pixels off the exact mirrors: where each meets its mirror, and its direction after."""
+"""Rays of pixels: of cameras that look at the object, and off the exact mirrors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tbcad.common.compiled import compiled
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
+from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.types import Bools, Floats, Ints
 
@@ -19,6 +20,8 @@ AT_PINHOLE = np.zeros(3)
 
 # A point on the edge of two cells lies on both spheres but for rounding.
 ROUNDING_MM = 1e-9
+# Size of a picture in diameters of the capture sphere.
+FRAME_MARGIN = 1.05
 
 
 @dataclass(frozen=True)
@@ -49,12 +52,9 @@ class TracedRays:
 
 
 def pixel_directions(view: Camera, rows: range, shift: Shift = (0.0, 0.0)) -> Floats:
-    """Directions (h, w, 3) through pixels, their component along `forward` one.
+    """Directions (h, w, 3) through pixels of rows, their component along `forward` one.
 
-    Args:
-        view: the camera.
-        rows: rows of the band.
-        shift: from the pixels' centres, in pixels: to the right and down.
+    `shift`: from the pixels' centres, in pixels, to the right and down.
     """
     columns, lines = _lattice(view, rows, shift)
     return np.asarray(columns + lines[:, None])
@@ -69,12 +69,8 @@ def unit_directions(
 ) -> Floats:
     """Unit vectors (h, w, 3) toward what pixels see at a depth, from a place beside the pinhole.
 
-    Args:
-        view: the camera.
-        rows: rows of the band.
-        shift: from the pixels' centres, in pixels: to the right and down.
-        depth: along `forward`, mm; it matters beside the pinhole only.
-        aside: place less the pinhole, mm, (3,).
+    `shift` as of `pixel_directions`; `depth` is along `forward`, mm; `aside`: the place less the
+    pinhole, mm, (3,).
     """
     return _toward(*_lattice(view, rows, shift), depth, aside)
 
@@ -278,3 +274,43 @@ def _reflect(
                 slope += d * normal[j]
             for j in range(3):
                 reflected[y, x, j] = direction[y, x, j] / length - 2 * slope * normal[j]
+
+
+def camera_around_object(
+    azimuth: float,
+    elevation: float,
+    distance: float,
+    capture_mm: float,
+    size: tuple[int, int] = (640, 480),
+    hfov: float | None = None,
+) -> Camera:
+    """A pinhole camera that looks at the origin, z up.
+
+    Azimuth about z from x, elevation above z = 0 and angle of view across the columns in radians;
+    without `hfov` the capture sphere fills the shorter side but for a small margin. `size`: columns
+    and rows. InputError for a viewpoint below the hemisphere of virtual cameras, or in the object.
+    """
+    if not 0 <= elevation <= np.pi / 2:
+        raise InputError(
+            f"--elevation {np.degrees(elevation):g} is not on the hemisphere that the mirrors "
+            "see: allowed is 0 to 90 degrees"
+        )
+    if not capture_mm / 2 < distance < np.inf:
+        raise InputError(
+            f"--distance {distance:g} is inside the object's capture sphere: allowed is more than "
+            f"{capture_mm / 2:g} mm"
+        )
+    if not np.isfinite(azimuth):
+        raise InputError("--azimuth is not a number: give degrees")
+    horizontal = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    forward = -np.cos(elevation) * horizontal - np.sin(elevation) * np.array([0.0, 0.0, 1.0])
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    if hfov is None:
+        tangent = np.tan(np.arcsin(capture_mm / 2 / distance))
+        hfov = float(2 * np.arctan(FRAME_MARGIN * tangent * size[0] / min(size)))
+    return Camera(-distance * forward, forward, right, *size, hfov)
+
+
+def view_directions(view: Camera, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
+    """Unit directions (h, w, 3) of all pixels."""
+    return unit_directions(view, range(view.height_px), shift)

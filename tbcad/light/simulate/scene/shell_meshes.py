@@ -18,7 +18,6 @@ from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.light.simulate.scene.rays import (
     MirrorNumbers,
@@ -26,7 +25,7 @@ from tbcad.light.simulate.scene.rays import (
     pixel_directions,
     reflect_pixels,
 )
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.types import Floats, Ints
 
 MAX_FILE_BYTES = 4 << 30  # bytes
@@ -53,8 +52,7 @@ class ShellMeshes:
 def read_shell_meshes(export: ExportedDesign) -> ShellMeshes:
     """Read both shells' STL files.
 
-    Raises:
-        InputError: they are not there, cannot be read, or lack mirrors.
+    InputError: they are not there, cannot be read, or lack mirrors.
     """
     coat = export.spec.mirrors.coating_um / 1000
     corners, owners, surfaces = [], [], []
@@ -127,8 +125,7 @@ def _frames(normal: Floats) -> Floats:
 def read_facets(path: Path) -> Floats:
     """Corners (f, 3, 3) of the facets of a shell's STL file, mm.
 
-    Raises:
-        InputError: it is not there, or cannot be read.
+    InputError: it is not there, or cannot be read.
     """
     import trimesh
 

@@ -113,14 +113,10 @@ def _tile(frame: CameraFrame, index: int) -> MirrorTile | None:
     valid = valid.ravel()
     colour, origin, direction = (np.pad(one, BORDER).reshape(-1, 3) for one in found[1])
     pinhole, spread = convergence_point(origin[valid], direction[valid])
-    middle = _middle(valid, height, width)
-    return MirrorTile((height, width), valid, colour, origin, direction, pinhole, spread, middle)
-
-
-def _middle(valid: Bools, height: int, width: int) -> int:
     pixel = np.flatnonzero(valid)
     row, column = np.divmod(pixel, width)
-    return int(pixel[((2 * row - height) ** 2 + (2 * column - width) ** 2).argmin()])
+    middle = int(pixel[((2 * row - height) ** 2 + (2 * column - width) ** 2).argmin()])
+    return MirrorTile((height, width), valid, colour, origin, direction, pinhole, spread, middle)
 
 
 def convergence_point(

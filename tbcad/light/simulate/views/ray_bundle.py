@@ -1,4 +1,4 @@
-"""Captured rays near some target rays, and the search for the best one of a mirror.
+"""Captured rays near some target rays, and the nearest of them (section 4.2 of the paper).
 
 All rays of one mirror nearly meet in one point, its virtual pinhole. So a ray that passes that
 point at distance e, at depth L, is at least e / sqrt(1 + (L / s)^2) from all of them in the
@@ -40,13 +40,7 @@ class TwoPlane:
         direction: NDArray[np.floating],
         valid: Bools | None = None,
     ) -> Floats:
-        """Rays as points (n, 4); NaN where too oblique, or not valid.
-
-        Args:
-            origin: mm, (n, 3).
-            direction: unit vectors, (n, 3).
-            valid: which rays there are, (n,); all of them if None.
-        """
+        """Rays (n, 3), mm, as points (n, 4); NaN where too oblique, or not `valid` (n,)."""
         origin, direction = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
         valid = np.ones(len(direction), dtype=np.bool_) if valid is None else valid
         result = np.empty((len(direction), 4))
@@ -178,13 +172,7 @@ def boxes_around(targets: Floats, count: int) -> Floats:
 
 @compiled
 def mirrors_near_boxes(pinholes: Floats, boxes: Floats, limit: float) -> Ints:
-    """Mirrors (c,) whose rays may be within a limit of a target ray in any of some boxes.
-
-    Args:
-        pinholes: as in `RayBundle`, (k, 4).
-        boxes: middles and half sides, (r, 2, 4).
-        limit: mm.
-    """
+    """Mirrors (c,) with rays within a limit of targets in boxes (r, 2, 4): middles, half sides."""
     kept = np.empty(len(pinholes), dtype=np.int64)
     count = 0
     for k in range(len(pinholes)):
@@ -202,3 +190,86 @@ def mirrors_near_boxes(pinholes: Floats, boxes: Floats, limit: float) -> Ints:
                 count += 1
                 break
     return kept[:count]
+
+
+def nearest_rays(bundle: RayBundle, targets: Floats) -> Ints:
+    """Pixel (n,) of the bundle nearest to each target (n, 4); -1 beyond the bundle's limit.
+
+    Any order of the targets gives the same pixels; neighbours one after the other take less time.
+    """
+    # That far a ray may pass the virtual pinhole, for each mm of its distance from the target.
+    reach = np.sqrt(1 + bundle.pinholes[:, 2] ** 2)
+
+    def pixels(part: slice) -> Ints:
+        arrays = bundle.points, bundle.tiles, bundle.pinholes, reach
+        return _nearest(*arrays, targets[part], bundle.limit)
+
+    parts = in_threads(pixels, chunks(len(targets), RAYS_PER_CHUNK))
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
+
+
+@compiled
+def _nearest(
+    points: Floats, tiles: Ints, pinholes: Floats, reach: Floats, targets: Floats, limit: float
+) -> Ints:
+    boxes = boxes_around(targets, RAYS_PER_RUN)
+    near_chunk = mirrors_near_boxes(pinholes, boxes, limit)
+    near, previous = near_chunk, -1
+    last = tiles[:, 3].copy()
+    result = np.full(len(targets), -1, dtype=np.int64)
+    for i in range(len(targets)):
+        x, y, a, b = targets[i, 0], targets[i, 1], targets[i, 2], targets[i, 3]
+        if i % RAYS_PER_RUN == 0:
+            run = boxes[i // RAYS_PER_RUN : i // RAYS_PER_RUN + 1]
+            near = near_chunk[mirrors_near_boxes(pinholes[near_chunk], run, limit)]
+        best, owner = limit, -1
+        for rank in range(-1, len(near)):  # first the mirror of the previous target
+            k = previous if rank < 0 else near[rank]
+            if k < 0 or (rank >= 0 and k == previous):
+                continue
+            depth = pinholes[k, 2]
+            across, down = x + depth * a - pinholes[k, 0], y + depth * b - pinholes[k, 1]
+            beyond = best * reach[k] + pinholes[k, 3]
+            if across * across + down * down > beyond * beyond or last[k] < 0:
+                continue
+            # What is found is no bound for later targets: where the descent ends at the edge of a
+            # mirror's pixels, the nearest may be much nearer.
+            pixel, squared = _descend(points, tiles[k, 2], last[k], x, y, a, b)
+            last[k] = pixel
+            if squared < best * best:
+                best, result[i], owner = np.sqrt(squared), pixel, k
+        previous = owner
+    return result
+
+
+@compiled
+def _descend(
+    points: Floats, width: int, start: int, x: float, y: float, a: float, b: float
+) -> tuple[int, float]:
+    """The pixel nearer to (x, y, a, b) than all its neighbours, and its squared distance.
+
+    By steps from pixel to pixel.
+
+    Numbers instead of parts of arrays: numba counts who uses an array, which takes longer than
+    the distances.
+    """
+    pixel = start
+    best = _squared_distance(points, pixel, x, y, a, b)
+    while True:
+        nearer = pixel
+        for row in (pixel - width, pixel, pixel + width):
+            for other in (row - 1, row, row + 1):
+                squared = _squared_distance(points, other, x, y, a, b)
+                if squared < best:  # never so for NaN
+                    best, nearer = squared, other
+        if nearer == pixel:
+            return pixel, best
+        pixel = nearer
+
+
+@compiled
+def _squared_distance(points: Floats, pixel: int, x: float, y: float, a: float, b: float) -> float:
+    across, down = points[pixel, 0] - x, points[pixel, 1] - y
+    slope, steepness = points[pixel, 2] - a, points[pixel, 3] - b
+    result: float = across * across + down * down + slope * slope + steepness * steepness
+    return result

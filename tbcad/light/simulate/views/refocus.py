@@ -1,4 +1,4 @@
-"""A large lens made of many pinholes (section 4.3 of the paper): the mean of their pictures."""
+"""A large lens made of many pinholes (section 4.3 of the paper), and ray-traced ground truth."""
 
 import warnings
 from collections.abc import Callable
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError, PlausibilityWarning
+from tbcad.light.simulate.capture.photograph import subpixel_shifts
 from tbcad.light.simulate.parallel import in_batches
-from tbcad.light.simulate.scene.rays import unit_directions
+from tbcad.light.simulate.scene.ray_casting import Scene, colours_along
+from tbcad.light.simulate.scene.rays import unit_directions, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import two_plane_along
 from tbcad.light.simulate.views.synthesis import (
@@ -31,6 +33,7 @@ from tbcad.types import Bools, Colours, Floats, Ints, Progress
 LATTICE_RADIUS2 = 20
 # A lens as wide as it is far away is seen from the object under 53 degrees: wider than F/1.
 WIDE_LENS = 1.0
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,7 @@ class ThinLens:
     def check(self, view: Camera, capture_mm: float) -> None:
         """Refuse what cannot be, and warn of what is unlikely.
 
-        Raises:
-            InputError: no aperture, or the plane that is to be sharp is not near the object.
+        InputError: no aperture, or the plane that is to be sharp is not near the object.
         """
         if not 0 < self.aperture_mm < np.inf:
             raise InputError(f"--aperture {self.aperture_mm:g} is no diameter: give mm above 0")
@@ -65,11 +67,7 @@ class ThinLens:
 
 
 def lens_pinholes(radius2: int = LATTICE_RADIUS2) -> Floats:
-    """Places (n, 2) of pinholes on the unit disc: a square lattice, 69 of them.
-
-    Args:
-        radius2: squared radius of the disc in steps of the lattice.
-    """
+    """Places (n, 2) on the unit disc: a square lattice of this squared radius in its steps."""
     reach = int(np.sqrt(radius2))
     x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
     inside = x**2 + y**2 <= radius2
@@ -81,14 +79,8 @@ def lens_rays(
 ) -> Rays:
     """Rays from a point of the lens to where its middle sees each pixel on the sharp plane.
 
-    Args:
-        view: middle of the lens, and the picture.
-        focus: the lens.
-        place: on the lens, right and down from its middle, mm, (2,).
-        shift: from the pixels' centres, in pixels.
-
-    Returns:
-        Origins and unit directions, (h, w, 3) each.
+    `place` (2,): right and down from the middle, mm; `shift`: from the pixels' centres, pixels.
+    Origins and unit directions, (h, w, 3) each.
     """
     offset = place @ view.axes[:2]
     depth = -float(view.pinhole @ view.forward) - focus.plane_mm
@@ -105,15 +97,9 @@ def refocus(
 ) -> SynthesisedView:
     """The picture of a lens, as the mean of what 69 pinholes all over it see.
 
-    Args:
-        tiles: the light field.
-        view: the middle of the lens, and the picture.
-        focus: the lens.
-        pinholes: their places on the unit disc, (n, 2), if not those 69.
-        proceed: called before every few pinholes; may raise to give up.
-
-    Where some pinholes saw nothing, because they lie outside of the hemisphere that was captured,
-    the mean is of the others.
+    Others have places (n, 2) on the unit disc. `proceed` is called before every few pinholes; it
+    may raise to give up. Where some pinholes saw nothing, because they lie outside of the
+    hemisphere that was captured, the mean is of the others.
     """
     places = (lens_pinholes() if pinholes is None else pinholes) * focus.aperture_mm / 2
     return _mean_of_pinholes(tiles, view, places, partial(lens_rays, view, focus), proceed)
@@ -125,14 +111,8 @@ def refocus_everywhere(
     """The picture of a lens that makes each pixel sharp at its own depth.
 
     Each pixel is the mean of what the 69 pinholes see of its point of the surface: as bright and
-    as free of noise as the picture of a lens, and as sharp everywhere as that of a pinhole.
-
-    Args:
-        tiles: the light field.
-        view: the middle of the lens, and the picture.
-        aperture_mm: diameter of the lens.
-        depth: the surface; pixels whose rays pass it are made sharp on the plane through the
-            origin.
+    as free of noise as the picture of a lens, and as sharp everywhere as that of a pinhole. Pixels
+    whose rays pass the surface are made sharp on the plane through the origin.
     """
     points = _points_on_surface(view, depth)
 
@@ -195,3 +175,51 @@ def refocus_sweep(
         progress(f"picture {k + 1} of {count}")
         pictures.append(refocus(tiles, view, ThinLens(aperture_mm, plane)).image)
     return pictures
+
+
+def pinhole_picture(scene: Scene, view: Camera, samples: int = 4) -> Colours:
+    """The picture (h, w, 3), 0 to 255, of a pinhole camera, samples x samples rays a pixel."""
+    total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
+    for shift in subpixel_shifts(samples):
+        direction = view_directions(view, shift)
+        flat = direction.reshape(-1, 3)
+        origin = np.broadcast_to(view.pinhole, flat.shape)
+        total += colours_along(scene, origin, flat).reshape(total.shape)
+    return total / np.float32(samples**2)
+
+
+def lens_picture(
+    scene: Scene,
+    view: Camera,
+    focus: ThinLens,
+    samples: int = 256,
+    progress: Progress = lambda _: None,
+) -> Colours:
+    """The picture (h, w, 3), 0 to 255, of a camera with a thin lens, of which `view` is the middle.
+
+    Each of a pixel's rays is through another point of the lens and of the pixel.
+    """
+    total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
+    for k, (point, shift) in enumerate(
+        zip(disc_points(samples), pixel_points(samples), strict=True)
+    ):
+        progress(f"ray {k + 1} of {samples}")
+        rays = lens_rays(view, focus, point * focus.aperture_mm / 2, shift)
+        colours = colours_along(scene, *(part.reshape(-1, 3) for part in rays))
+        total += colours.reshape(total.shape)
+    return total / np.float32(samples)
+
+
+def disc_points(count: int) -> Floats:
+    """Points (n, 2) spread evenly over the unit disc, on Vogel's spiral."""
+    k = np.arange(count)
+    radius, angle = np.sqrt((k + 0.5) / count), GOLDEN_ANGLE * k
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def pixel_points(count: int) -> list[tuple[float, float]]:
+    """Points spread evenly over a pixel, from its centre (the R2 sequence of M. Roberts, 2018)."""
+    plastic = 1.324717957244746
+    steps = np.arange(count)[:, None] / np.array([plastic, plastic**2])
+    places = (0.5 + steps) % 1 - 0.5
+    return [(float(x), float(y)) for x, y in places]

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled
-from tbcad.common.picture_bytes import png_bytes
+from tbcad.common.figure_files import png_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.views.blend import blend_cameras
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.simulate.views.nearest import nearest_rays
 from tbcad.light.simulate.views.ray_bundle import (
     RayBundle,
     TwoPlane,
     boxes_around,
     mirrors_near_boxes,
+    nearest_rays,
     ray_bundle,
     two_plane_along,
 )
@@ -59,19 +59,12 @@ class SynthesisedView:
 
 
 def synthesise(
-    tiles: MirrorTiles,
-    view: Camera,
-    method: Method = "nearest",
-    depth: DepthFunction | None = None,
+    tiles: MirrorTiles, view: Camera, method: Method = "nearest", depth: DepthFunction | None = None
 ) -> SynthesisedView:
     """The picture that a pinhole camera would see.
 
-    Args:
-        tiles: the light field.
-        view: the pinhole camera.
-        method: the nearest captured ray (section 4.2), or a blend of several virtual cameras.
-        depth: the surface that a blend takes the object for; without, the plane through the
-            origin that faces the camera.
+    By the nearest captured ray (section 4.2), or a blend of several virtual cameras on the surface
+    `depth`; without one, on the plane through the origin that faces the camera.
     """
     pixels, rays = _rays_of_view(tiles, view)
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
@@ -102,13 +95,7 @@ def _through_sphere(
 ) -> tuple[Ints, Floats]:
     """Those numbers of pixels whose rays meet the sphere round the origin, and unit directions.
 
-    Args:
-        order: numbers of all pixels, (p,).
-        width: columns of the picture.
-        lens: width of a pixel at unit distance; column and row of the middle.
-        axes: of the view, (3, 3).
-        pinhole: mm, (3,).
-        radius: mm.
+    `lens`: width of a pixel at unit distance; column and row of the middle.
     """
     pixels, directions = np.empty(len(order), dtype=np.int64), np.empty((len(order), 3))
     squared = (pinhole**2).sum() - radius**2  # the power of the pinhole

@@ -12,10 +12,10 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.light.simulate.views.ground_truth import GOLDEN_ANGLE, pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.simulate.views.synthesis import DepthFunction, Method, synthesise
+from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE, pinhole_picture
+from tbcad.light.simulate.views.synthesis import Method, synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress
 
 # Blurs that are tried, standard deviations of a Gaussian in pixels, and how finely.
@@ -125,6 +125,10 @@ class Viewpoints:
     azimuth_deg: Floats  # of each viewpoint, (v,)
     distance_mm: float  # of all of them from the origin
 
+    def angles(self) -> dict[str, Floats]:
+        """Both as columns of a table."""
+        return {"elevation_deg": self.elevation_deg, "azimuth_deg": self.azimuth_deg}
+
     def cameras(self, capture_mm: float, size: tuple[int, int] = (640, 480)) -> list[Camera]:
         """The cameras, of these columns and rows, each filled by the capture sphere."""
         azimuth, elevation = np.radians([self.azimuth_deg, self.elevation_deg]).tolist()
@@ -139,8 +143,7 @@ def viewpoints_around(
 ) -> Viewpoints:
     """Viewpoints at some elevations, and at each a number of azimuths evenly around the object.
 
-    Raises:
-        InputError: there are none or too many.
+    InputError: there are none or too many.
     """
     if not 1 <= azimuths <= MAX_AZIMUTHS:
         raise InputError(
@@ -154,8 +157,7 @@ def viewpoints_around(
 def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
     """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral).
 
-    Raises:
-        InputError: there are none or too many.
+    InputError: there are none or too many.
     """
     if not 1 <= count <= MAX_VIEWS:
         raise InputError(f"--views {count}: allowed is 1 to {MAX_VIEWS} viewpoints")
@@ -176,24 +178,17 @@ def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list
 def object_masks(scene: Scene, views: list[Camera]) -> list[Bools]:
     """Which pixels of each viewpoint's picture show the object, (h, w)."""
     depth = depth_along_rays(scene)
-    return [_object_mask(depth, view) for view in views]
-
-
-def _object_mask(depth: DepthFunction, view: Camera) -> Bools:
-    direction = view_directions(view)
-    origin = np.broadcast_to(view.pinhole, direction.shape)
-    distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
-    return np.isfinite(distance).reshape(direction.shape[:2])
+    masks = []
+    for view in views:
+        direction = view_directions(view)
+        origin = np.broadcast_to(view.pinhole, direction.shape)
+        distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
+        masks.append(np.isfinite(distance).reshape(direction.shape[:2]))
+    return masks
 
 
 def views_by(method: StudyMethod, tiles: MirrorTiles, scene: Scene) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera.
-
-    Args:
-        method: how.
-        tiles: the light field.
-        scene: the object, whose depth a blend takes.
-    """
+    """What makes the picture (h, w, 3) of a camera; a blend takes the depth of the scene."""
     if isinstance(method, OwnMethod):
         return method.views(tiles.source)
     depth = depth_along_rays(scene) if method == "blend" else None
@@ -208,16 +203,7 @@ def view_quality(
     method: StudyMethod,
     progress: Progress,
 ) -> dict[str, Floats]:
-    """The light field's views against the truth: QUALITY, each (v,).
-
-    Args:
-        tiles: the light field.
-        scene: the object, whose depth a blend takes.
-        views: the viewpoints, v of them.
-        truths: the ground truth at each.
-        method: how the views are made.
-        progress: called with each step.
-    """
+    """The light field's views against the truth at each viewpoint: QUALITY, each (v,)."""
     picture_of, masks, qualities = views_by(method, tiles, scene), object_masks(scene, views), []
     for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
         progress(f"view {k + 1} of {len(views)}")

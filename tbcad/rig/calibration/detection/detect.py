@@ -17,13 +17,15 @@ from tbcad.rig.calibration.detection.detection import (
     relative_light,
     verdicts,
 )
-from tbcad.rig.calibration.detection.expected import Expected, Room, maybe_hidden
 from tbcad.rig.calibration.detection.matching import (
     CameraMove,
+    Expected,
     NoPairs,
+    Room,
     find_move,
     highlights_of,
     match,
+    maybe_hidden,
     shift_of,
 )
 from tbcad.rig.calibration.detection.spots import (
@@ -38,8 +40,7 @@ from tbcad.rig.calibration.detection.spots import (
 )
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.machine.machine import Machine
-from tbcad.rig.runs.images import Image16
-from tbcad.rig.runs.photographs import Run, read_photograph
+from tbcad.rig.runs import Image16, Run, read_photograph
 from tbcad.types import Bools, Floats, Progress
 
 DOME_MM = 1.5  # radius of a 3 mm LED
@@ -93,15 +94,9 @@ def detect(
 ) -> Detection:
     """Find all highlights of a run, and say of each that is not used why.
 
-    Args:
-        run: that was photographed.
-        prior: of the machine; its frames are those of the run's record.
-        room: that an object may fill; None where nothing stands between LEDs and spheres.
-        dome: radius of the LEDs' domes, mm.
-        progress: called with each step.
-
-    Raises:
-        InputError: no highlights are found, or the run has no phases of single LEDs.
+    The prior's frames are those of the run's record. An object may fill a room, None where nothing
+    stands between LEDs and spheres; LEDs have domes of a radius in mm. InputError: no highlights
+    are found, or the run has no phases of single LEDs.
     """
     frames, machine = run.record.frames, prior.mean
     if not any(phase.startswith("led_") for phase in run.record.phases):

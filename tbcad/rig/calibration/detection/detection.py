@@ -1,7 +1,7 @@
 """What a detection gives: the highlights to calibrate from, and what was not used, and why.
 
 `tbcad.rig.calibration.detection.detect.detect(run, prior)` makes it of a run that
-tbcad.rig.runs.photographs has read, and of the prior of its machine, whose frames are those of the
+tbcad.rig.runs has read, and of the prior of its machine, whose frames are those of the
 run's record in the same order.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
-from tbcad.rig.calibration.detection.expected import Expected
+from tbcad.rig.calibration.detection.matching import Expected
 from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, Unmeasured, stacked
 from tbcad.rig.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints
@@ -78,13 +78,10 @@ def no_highlights(
     photographs: int,
     reasons: Sequence[Rejection | None] = (),
 ) -> InputError:
-    """The error of a run without highlights.
+    """The error of a run without highlights, by its spots and what is bright besides.
 
-    Args:
-        spots: of all photographs.
-        unmeasured: what is bright besides.
-        photographs: number of those by LEDs.
-        reasons: of all expected highlights; none where the spots fit no machine.
+    So many photographs are by LEDs; reasons are of all expected highlights, none where the spots
+    fit no machine.
     """
     saturated = int(np.count_nonzero(spots.full >= FULL))
     if reasons:

@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from tbcad.rig.runs.images import Image16
+from tbcad.rig.runs import Image16
 from tbcad.types import Bools, Floats, Ints
 
 THRESHOLD = 0.02  # of the largest number: less is no spot

@@ -70,11 +70,7 @@ def estimate(
     progress: Progress = lambda _: None,
     start: Floats | None = None,
 ) -> Estimate:
-    """Estimate a machine, from parameters (q,) in prior standard deviations or the prior's mean on.
-
-    Raises:
-        InputError: there are no highlights, or nothing explains them.
-    """
+    """Estimate a machine, from parameters (q,) in prior deviations or the prior's mean on."""
     if not len(highlights):
         raise InputError("no highlights to calibrate from: see the faults of the run")
     every = np.ones(len(highlights), dtype=bool)

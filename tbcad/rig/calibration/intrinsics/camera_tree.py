@@ -48,9 +48,8 @@ FULL = {"0", "1"}  # binning of a picture of all pixels
 def camera_lens(tree: Node, name: str) -> CalibratedLens:
     """The lens of the only camera of a file's tree of mappings, lists and texts.
 
-    Raises:
-        InputError: it has no camera or several, another model of the lens, or a part of the
-            picture's pixels.
+    InputError: it has no camera or several, another model of the lens, or a part of the picture's
+    pixels.
     """
     cameras = list(_cameras(tree, ""))
     if len(cameras) > 1:

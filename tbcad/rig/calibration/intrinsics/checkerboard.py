@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.cad.formats.images.pictures import visible_files
+from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
 from tbcad.rig.calibration.intrinsics.boards import (
     MIN_CORNERS,
@@ -16,7 +16,7 @@ from tbcad.rig.calibration.intrinsics.boards import (
     find_corners,
 )
 from tbcad.rig.calibration.intrinsics.lens import CalibratedLens, cv
-from tbcad.rig.runs.images import read_image
+from tbcad.rig.runs import read_image
 from tbcad.types import Floats, Progress
 
 MIN_BOARDS = 6
@@ -56,11 +56,7 @@ class SolvedLens:
 
 
 def solve_lens(folder: Path, board: Board, progress: Progress) -> SolvedLens:
-    """Solve a lens from a folder of photographs of a board, whole or in part, by one camera.
-
-    Raises:
-        InputError: too few boards are found, sizes differ, or the solution makes no sense.
-    """
+    """Solve a lens from a folder of photographs of a board, whole or in part, by one camera."""
     cv()  # before any photograph is read
     files, seen, size = _photographs(folder), dict[str, BoardCorners](), None
     for file in files:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import yaml
 
-from tbcad.core.spec.files import read_text
+from tbcad.core.spec.csv_rows import read_text
 from tbcad.errors import InputError
 from tbcad.rig.calibration.intrinsics.camera_tree import Tree, camera_lens
 from tbcad.rig.calibration.intrinsics.lens import USABLE, CalibratedLens, lens_of
@@ -34,11 +34,7 @@ MAX_DEPTH = 20  # a list of Kalibr is four deep
 
 
 def read_lens(path: Path) -> CalibratedLens:
-    """The lens in a file.
-
-    Raises:
-        InputError: the file cannot be read, is none of these, or has another model of the lens.
-    """
+    """The lens in a file; InputError: it is none of these, or has another model of the lens."""
     text, name = read_text(path, str(path), "lens", MAX_BYTES), str(path)
     lines = [line for line in map(str.strip, text.split("\n")) if line and line[0] != "#"]
     if MRCAL_FILE.search(text):

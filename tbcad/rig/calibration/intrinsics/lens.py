@@ -80,11 +80,7 @@ class CalibratedLens:
 def lens_of(
     intrinsics: Iterable[object], coefficients: Iterable[object], size: Iterable[object], name: str
 ) -> CalibratedLens:
-    """A lens from a file's 4 intrinsics, OpenCV's coefficients of distortion, columns and rows.
-
-    Raises:
-        InputError: one is no number, or a coefficient after k3 is not zero.
-    """
+    """A lens from 4 intrinsics, OpenCV's coefficients, columns and rows; InputError: it is none."""
     values, given = numbers_of(intrinsics, name), numbers_of(coefficients, name)
     if len(values) != 4:
         raise InputError(f"{name} has {len(values)} numbers, 4 or more are needed: export it again")

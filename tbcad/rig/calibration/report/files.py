@@ -7,15 +7,23 @@ from typing import Any
 import numpy as np
 
 from tbcad.common.figure_files import PlotFormat, figure_file
-from tbcad.common.results.tables import csv_text
+from tbcad.common.results import csv_text
 from tbcad.common.screen import WIDTH
 from tbcad.core.geometry.vectors import norm
 from tbcad.output.manifest import write_manifest
 from tbcad.records.calibration import NAME as RECORD
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.covariance import covariance
+from tbcad.rig.calibration.estimate.parameters import covariance
 from tbcad.rig.calibration.report.plots import INCHES, draw_recovered, plots
-from tbcad.rig.calibration.report.record import calibration_record, covariance_bytes
+from tbcad.rig.calibration.report.record import (
+    angles_table,
+    calibration_record,
+    covariance_bytes,
+    rays_table,
+    residuals_table,
+    sphere_covariances,
+    spheres_table,
+)
 from tbcad.rig.calibration.report.recovered import (
     BESIDES,
     Kind,
@@ -25,17 +33,9 @@ from tbcad.rig.calibration.report.recovered import (
     recovered_table,
     turn_mrad,
 )
-from tbcad.rig.calibration.report.tables import (
-    angles_table,
-    rays_table,
-    residuals_table,
-    sphere_covariances,
-    spheres_table,
-)
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict
-from tbcad.rig.machine.machine import Machine
-from tbcad.rig.machine.record import RECORD as MACHINE
-from tbcad.rig.machine.record import write_machine
+from tbcad.rig.machine.machine import RECORD as MACHINE
+from tbcad.rig.machine.machine import Machine, write_machine
 
 COVARIANCE = "covariance.npz"
 

@@ -1,10 +1,12 @@
-"""calibration.json and covariance.npz: what a calibration is based on, and all that it knows."""
+"""calibration.json, covariance.npz and the tables: all that a calibration is based on and knows."""
 
 from io import BytesIO
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from tbcad.common.results import Table
 from tbcad.records.calibration import (
     CalibrationRecord,
     HalvesRecord,
@@ -14,26 +16,136 @@ from tbcad.records.calibration import (
     PulledParameter,
     RayFigures,
 )
+from tbcad.records.exposure import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.covariance import Covariance
-from tbcad.rig.calibration.report.tables import sphere_covariances
+from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
+from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
-from tbcad.types import Floats
+from tbcad.rig.machine.built import is_cap
+from tbcad.types import Floats, Ints
 
+AXES = ("x", "y", "z")
+SPHERE = ("x_mm", "y_mm", "z_mm", "radius_mm")
 DIGITS = 6
+
+
+def spheres_table(result: MachineCalibration, known: Covariance) -> Table:
+    """Centres at base angle zero and radii: designed, estimated, difference, deviation."""
+    designed, found = result.setup.designed, result.found.machine
+    before = np.column_stack([designed.centre, designed.radius])
+    after = np.column_stack([found.centre, found.radius])
+    sigma = np.sqrt(np.diagonal(sphere_covariances(result, known), axis1=1, axis2=2))
+    h, used = result.found.highlights, result.found.used
+    count = np.bincount(h.sphere[used], minlength=len(before))
+    caps = is_cap(result.setup.plan)
+    columns: dict[str, ArrayLike] = {
+        "ball": np.arange(1, len(before) + 1),
+        "kind": np.where(caps, "cap", "ball"),
+        "highlights": count,
+    }
+    for heading, values in (
+        ("designed", before),
+        ("estimated", after),
+        ("difference", after - before),
+        ("sigma", sigma),
+    ):
+        columns |= {f"{heading}_{name}": values[:, i] for i, name in enumerate(SPHERE)}
+    return Table.of_columns("spheres", columns)
+
+
+def sphere_covariances(result: MachineCalibration, known: Covariance) -> Floats:
+    """Of each sphere's centre at base angle zero and radius, mm^2, (k, 4, 4)."""
+    prior = result.found.prior
+    return known.of(base_slopes(prior, result.found.values).matrix(prior), 4)
+
+
+def angles_table(result: MachineCalibration, known: Covariance) -> Table:
+    """Of each frame: planned and estimated angle, deviation, and where the base is shifted to."""
+    found, planned = result.found, np.degrees(result.setup.designed.angle)
+    machine, frames = found.machine, result.setup.frames
+    angle = np.degrees(machine.angle)
+    h = found.highlights
+    shift = np.zeros((len(frames), 3)) if machine.shift is None else machine.shift
+    columns: dict[str, ArrayLike] = {
+        "object_turn_deg": [frame.object_turn_deg for frame in frames],
+        "stop": [frame.stop for frame in frames],
+        "highlights": np.bincount(h.frame[found.used], minlength=len(frames)),
+        "planned_deg": planned,
+        "estimated_deg": angle,
+        "difference_deg": angle - planned,
+        "sigma_deg": np.degrees(angle_sigmas(found.prior, known)),
+        **{f"shift_{axis}_mm": shift[:, i] for i, axis in enumerate(AXES)},
+        "sigma_shift_mm": _runout_sigmas(found.prior, known),
+    }
+    return Table.of_columns("angles", columns)
+
+
+def rays_table(result: MachineCalibration) -> Table:
+    """How well the middle ray of each mirror is known."""
+    known, frames = result.rays.known, result.setup.frames
+    columns: dict[str, ArrayLike] = {
+        "mirror": result.rays.ids,
+        "object_turn_deg": [frames[i].object_turn_deg for i in known.frame],
+        "stop": [frames[i].stop for i in known.frame],
+        "ball": known.sphere + 1,
+        **{f"direction_{axis}": known.direction[:, i] for i, axis in enumerate(AXES)},
+        "sigma_mrad": known.relative.turn_mrad,
+        "sigma_mm": known.relative.place_mm,
+        "sigma_in_run_mrad": known.in_run.turn_mrad,
+        "sigma_in_run_mm": known.in_run.place_mm,
+        "sigma_in_design_mrad": known.whole.turn_mrad,
+        "sigma_in_design_mm": known.whole.place_mm,
+        "pixel_mm": known.pixel_mm,
+    }
+    return Table.of_columns("rays", columns)
+
+
+def residuals_table(result: MachineCalibration) -> Table:
+    """Every highlight: where it is, how far from where the machine would show it."""
+    found, h = result.found, result.found.highlights
+    frames = result.setup.frames
+    pairs = zip(h.frame.tolist(), h.led.tolist(), strict=True)
+    columns: dict[str, ArrayLike] = {
+        "photograph": [exposure_name(frames[i], f"led_{led + 1}") for i, led in pairs],
+        "ball": h.sphere + 1,
+        "led": h.led + 1,
+        "column_px": h.pixel[:, 0],
+        "row_px": h.pixel[:, 1],
+        "residual_column_px": found.residual[:, 0],
+        "residual_row_px": found.residual[:, 1],
+        "sigma_px": h.sigma,
+        "sigmas_off": found.sigmas_off,
+        "used": found.used.astype(np.int64),
+    }
+    return Table.of_columns("residuals", columns)
+
+
+def angle_sigmas(prior: Prior, known: Covariance) -> Floats:
+    """Of each frame's angle, with the offset of its series, radians, (f,)."""
+    frames = np.arange(len(prior.mean.angle))
+    columns = np.stack(
+        [prior.first[Block.OFFSET] + prior.series, prior.first[Block.ANGLES] + frames], axis=1
+    )
+    return _sigmas(prior, known, columns)
+
+
+def _runout_sigmas(prior: Prior, known: Covariance) -> Floats:
+    """Root mean square of each frame's shift, mm, (f,)."""
+    frames = np.arange(len(prior.mean.angle))
+    ways = [(prior.first[Block.RUNOUT] + 2 * frames + way)[:, None] for way in (0, 1)]
+    return np.asarray(np.hypot(*(_sigmas(prior, known, columns) for columns in ways)))
+
+
+def _sigmas(prior: Prior, known: Covariance, columns: Ints) -> Floats:
+    ones = np.ones((len(columns), 1, columns.shape[1]))
+    slopes = Slopes((columns,), (ones,)).matrix(prior)
+    return np.asarray(np.sqrt(known.of(slopes, 1)[:, 0, 0]))
 
 
 def calibration_record(
     result: MachineCalibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
 ) -> CalibrationRecord:
-    """What calibration.json says.
-
-    Args:
-        result: the calibration.
-        judged: its verdict.
-        known: covariance of its parameters.
-        basis: names of run, export, process and lens.
-    """
+    """What calibration.json says; the basis names run, export, process and lens."""
     found = result.found
     return CalibrationRecord(
         **basis,

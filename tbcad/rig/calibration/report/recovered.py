@@ -1,28 +1,30 @@
 """Recovered errors of a simulated build next to those that were injected."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from tbcad.common.results.tables import Table
+from tbcad.common.results import Table
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.covariance import Covariance
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.parameters import Block, Covariance
 from tbcad.rig.calibration.estimate.solve import Estimate
-from tbcad.rig.calibration.report.tables import angle_sigmas
+from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
 from tbcad.rig.machine.built import is_cap
 from tbcad.rig.machine.machine import Machine
-from tbcad.types import Bools, Floats, Ints
+from tbcad.types import Floats, Ints
 
 MICROMETRES, MILLI = 1000.0, 1000.0
 SIGMAS = 2.0
+LENS = (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION)
 BESIDES = "centres besides a motion and growth of all"
 
 
@@ -51,9 +53,42 @@ def recovered_errors(
     result: MachineCalibration, known: Covariance, truth: Machine
 ) -> tuple[Kind, ...]:
     """Errors by kind, against the true machine with the same frames; none that are fixed."""
-    kinds = (*_of_spheres(result, known, truth), *_of_base(result, known, truth))
+    designed, prior = result.setup.designed, result.found.prior
+    caps, rest = is_cap(result.setup.plan), _besides_motion(designed.centre)
+    spheres, besides = _sphere_sigmas(result, known, rest)
+    width = np.concatenate([prior.sigma[block] for block in LENS])
+    width = np.where(width > 0, width, 1.0)
+    of = partial(_sigma, result, known)
+    rows: tuple[tuple[str, str, float, Callable[[Machine], Floats], Floats], ...] = (
+        ("centres", "um", MICROMETRES, lambda one: one.centre, spheres[:, :3]),
+        (BESIDES, "um", MICROMETRES, lambda one: rest @ one.centre.ravel(), besides),
+        ("radii of balls", "um", MICROMETRES, lambda one: one.radius[~caps], spheres[~caps, 3]),
+        ("radii of caps", "um", MICROMETRES, lambda one: one.radius[caps], spheres[caps, 3]),
+        (
+            *("base angles", "deg", 1.0),
+            lambda one: np.degrees(one.angle),
+            np.degrees(angle_sigmas(prior, known)),
+        ),
+        ("axis", "mrad", MILLI, lambda one: one.axis @ prior.across.T, of(Block.TILT)),
+        (
+            *("base in each frame", "um", MICROMETRES),
+            lambda one: _base_places(one, prior.across),
+            _place_sigmas(result, known),
+        ),
+        ("camera's place", "um", MICROMETRES, lambda one: one.camera.pinhole, of(Block.PINHOLE)),
+        (
+            *("camera's direction", "mrad", MILLI),
+            lambda one: _turn(designed, one),
+            of(Block.CAMERA_TURN),
+        ),
+        ("lens", "deviations of the prior", 1.0, lambda one: _lens(one) / width, of(*LENS) / width),
+        ("LEDs", "um", MICROMETRES, lambda one: one.leds, of(Block.LEDS)),
+    )
+    machines = designed, truth, result.found.machine
     return tuple(
-        _free(kind) for kind in (*kinds, *_of_camera(result, known, truth)) if kind.sigma.any()
+        _kind(name, unit, factor, (*map(figure, machines), sigma))
+        for name, unit, factor, figure, sigma in rows
+        if sigma.any()
     )
 
 
@@ -68,41 +103,23 @@ def recovered_table(kinds: tuple[Kind, ...]) -> Table:
     return Table.of_columns("recovered", columns)
 
 
-def _free(kind: Kind) -> Kind:
-    free = kind.sigma > 0
-    return Kind(kind.name, kind.unit, kind.injected[free], kind.recovered[free], kind.sigma[free])
-
-
-def _kind(name: str, unit: str, factor: float, *values: Floats) -> Kind:
+def _kind(name: str, unit: str, factor: float, values: tuple[Floats, ...]) -> Kind:
     """Of values designed, true, estimated, and their deviations, in a unit by its factor."""
-    designed, true, found, sigma = (factor * np.asarray(one).ravel() for one in values)
+    every = [factor * np.asarray(one).ravel() for one in values]
+    designed, true, found, sigma = (one[every[-1] > 0] for one in every)
     return Kind(name, unit, true - designed, found - designed, sigma)
 
 
-def _of_spheres(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
-    """Centres, also besides a motion and growth of all of them, and radii of balls and of caps."""
-    designed, found = result.setup.designed, result.found.machine
+def _sphere_sigmas(
+    result: MachineCalibration, known: Covariance, rest: Floats
+) -> tuple[Floats, Floats]:
+    """Of centres and radii, mm, (k, 4), and of centres besides a motion and growth of all."""
     slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
     covariance = np.asarray(slopes @ known.times(slopes.T.toarray()))
     sigma = np.sqrt(np.diag(covariance)).reshape(-1, 4)
     of_centres = np.arange(sigma.size).reshape(-1, 4)[:, :3].ravel()
-    rest = _besides_motion(designed.centre)
     besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
-    moved = [rest @ one.centre.ravel() for one in (designed, truth, found)]
-    caps = is_cap(result.setup.plan)
-    centres = [one.centre for one in (designed, truth, found)]
-    return [
-        _kind("centres", "um", MICROMETRES, *centres, sigma[:, :3]),
-        _kind(BESIDES, "um", MICROMETRES, *moved, np.sqrt(np.maximum(np.diag(besides), 0))),
-        *(
-            _radii(name, which, sigma, designed, truth, found)
-            for name, which in (("radii of balls", ~caps), ("radii of caps", caps))
-        ),
-    ]
-
-
-def _radii(name: str, which: Bools, sigma: Floats, *machines: Machine) -> Kind:
-    return _kind(name, "um", MICROMETRES, *(one.radius[which] for one in machines), sigma[which, 3])
+    return sigma, np.sqrt(np.maximum(np.diag(besides), 0))
 
 
 def _besides_motion(centre: Floats) -> Floats:
@@ -112,20 +129,6 @@ def _besides_motion(centre: Floats) -> Floats:
     shifts = [np.broadcast_to(one, place.shape).ravel() for one in np.eye(3)]
     basis, _ = np.linalg.qr(np.stack([*shifts, *turns, place.ravel()], axis=1))
     return np.asarray(np.eye(place.size) - basis @ basis.T)
-
-
-def _of_base(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
-    """Angles, the axis's direction, and where the base is in each frame beside its rotation."""
-    designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
-    machines = designed, truth, found
-    angles = [np.degrees(one.angle) for one in machines]
-    tilts = [one.axis @ prior.across.T for one in machines]
-    places = [_base_places(one, prior.across) for one in machines]
-    return [
-        _kind("base angles", "deg", 1.0, *angles, np.degrees(angle_sigmas(prior, known))),
-        _kind("axis", "mrad", MILLI, *tilts, _sigma(result, known, Block.TILT)),
-        _kind("base in each frame", "um", MICROMETRES, *places, _place_sigmas(result, known)),
-    ]
 
 
 def _base_places(machine: Machine, across: Floats) -> Floats:
@@ -157,33 +160,6 @@ def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
     return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
 
 
-def _of_camera(result: MachineCalibration, known: Covariance, truth: Machine) -> list[Kind]:
-    """The camera's place and direction, its lens in deviations of the process, and LEDs."""
-    designed, found, prior = result.setup.designed, result.found.machine, result.found.prior
-    machines = designed, truth, found
-    turns = [_turn(designed, one) for one in machines]
-    lens = Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION
-    width = np.concatenate([prior.sigma[block] for block in lens])
-    unit = np.where(width > 0, width, 1.0)
-    lenses = [_lens(one) / unit for one in machines]
-    sigma = np.concatenate([_sigma(result, known, block) for block in lens]) / unit
-    places = [one.camera.pinhole for one in machines]
-    return [
-        _kind("camera's place", "um", MICROMETRES, *places, _sigma(result, known, Block.PINHOLE)),
-        _kind(
-            "camera's direction", "mrad", MILLI, *turns, _sigma(result, known, Block.CAMERA_TURN)
-        ),
-        _kind("lens", "deviations of the prior", 1.0, *lenses, sigma),
-        _kind(
-            "LEDs",
-            "um",
-            MICROMETRES,
-            *(m.leds for m in machines),
-            _sigma(result, known, Block.LEDS),
-        ),
-    ]
-
-
 def _turn(designed: Machine, machine: Machine) -> Floats:
     """By which a camera is rotated about its own axes, radians, (3,)."""
     turn = machine.camera.axes @ designed.camera.axes.T
@@ -198,12 +174,12 @@ def _lens(machine: Machine) -> Floats:
     return np.concatenate([focal, camera.principal, camera.distortion])
 
 
-def _sigma(result: MachineCalibration, known: Covariance, block: str) -> Floats:
+def _sigma(result: MachineCalibration, known: Covariance, *blocks: Block) -> Floats:
     prior = result.found.prior
     every = np.zeros(len(prior.flat_sigma))
     every[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
-    first = prior.first[block]
-    return every[first : first + prior.sigma[block].size]
+    ends = [(prior.first[block], prior.sigma[block].size) for block in blocks]
+    return np.concatenate([every[first : first + size] for first, size in ends])
 
 
 @dataclass(frozen=True)

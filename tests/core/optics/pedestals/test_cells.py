@@ -1,18 +1,23 @@
 """Mirrors on pedestals against slow oracles: dense outlines, half-spaces and balls, rays."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.mirrors.array import MirrorArray, design
 from tbcad.core.optics.cells import Cells, cell_areas
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES, NotRegularError
 from tbcad.core.optics.reflection import reflect
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.load import load_spec
 from tests.mirror_arrays import mirror_array
-from tests.pedestal_designs import GROOVE, pedestals
+from tests.pedestal_designs import pedestal_design, pedestals
 
 CAPTURE_RADIUS = 30.3  # with the margin
+EVEN = Path(__file__).parents[4] / "designs" / "turtleback-even.toml"
 
 
 @pytest.fixture(scope="module")
@@ -40,32 +45,6 @@ def test_every_edge_lies_on_both_its_faces_and_the_surface_is_one_piece(n: int, 
         assert np.abs(cells.surfaces.value(face[:, None], points)).max() < 1e-9
     corners = len(np.unique([cells.arcs.start, cells.arcs.end]))
     assert corners - len(cells.arcs) + cells.mirrors + len(cells.walls) == 1
-
-
-def test_rings_of_walls_close_on_their_plane(cells: PedestalCells) -> None:
-    arc, back = cells.wall_rings // 2, cells.wall_rings % 2
-    ends = np.stack([cells.arcs.start, cells.arcs.end], axis=1)
-    start, end = ends[arc, back], ends[arc, 1 - back]
-    np.testing.assert_array_equal(end, np.roll(start, -1, axis=1))
-    face = cells.mirrors + PLANES + np.arange(len(cells.walls))
-    np.testing.assert_array_equal(
-        np.where(back == 0, cells.arcs.left[arc], cells.arcs.right[arc]),
-        np.broadcast_to(face[:, None], arc.shape),
-    )
-    # Walls face the neighbour across the groove.
-    apex = cells.surfaces.apex
-    toward = apex[cells.walls[:, 1]] - apex[cells.walls[:, 0]]
-    assert (dot(toward, cells.surfaces.normal[face]) > 0).all()
-
-
-def test_a_groove_has_about_its_width_at_its_narrowest(cells: PedestalCells) -> None:
-    """Distances of the mirrors' corners from the wall on the other side of the groove."""
-    walls = {tuple(pair): k for k, pair in enumerate(cells.walls.tolist())}
-    across = [walls[j, i] for i, j in cells.walls.tolist()]
-    points = cells.corners[cells.arcs.start[cells.wall_rings[:, [0, 1]] // 2]]
-    face = cells.mirrors + PLANES + np.array(across)
-    width = dot(points - cells.surfaces.apex[face][:, None], cells.surfaces.normal[face][:, None])
-    assert 0.9 * GROOVE < width.min() < 1.1 * GROOVE
 
 
 def test_bottoms_of_grooves_part_the_picture_without_gaps(
@@ -164,12 +143,74 @@ def test_no_pedestal_stands_in_the_light_of_another_mirror(cells: PedestalCells)
     assert (solids_entered(raised, point, passing) * others).max() > 0.1
 
 
-def test_the_mirror_image_is_the_other_camera_s(cells: PedestalCells) -> None:
-    other = cells.mirrored()
-    np.testing.assert_allclose(cell_areas(other), cell_areas(cells), rtol=1e-10)
-    assert other.mirrored().walls.tolist() == cells.walls.tolist()
-
-
 def test_a_groove_wider_than_a_mirror_is_refused(array: MirrorArray) -> None:
     with pytest.raises(NotRegularError, match="groove"):
         pedestals(array, 30.0)
+
+
+def modelled(*settings: str, path: Path | None = None) -> PedestalCells:
+    spec = load_spec(path, ["shell.edges=pedestal", *settings])
+    cells = design(spec).arrays[0].modelled_cells
+    assert isinstance(cells, PedestalCells)
+    return cells
+
+
+def heights(cells: PedestalCells) -> np.ndarray:
+    """Distances (c, 2) of all corners from the seam and the foot plane, inward."""
+    planes = slice(cells.mirrors, cells.mirrors + PLANES)
+    apex, normal = cells.surfaces.apex[planes], cells.surfaces.normal[planes]
+    return np.einsum("cpx,px->cp", cells.corners[:, None] - apex, normal)
+
+
+# Mirrors of n = 3 and 8 have borders of less than 2 mm with the foot; those of the others have
+# ends of grooves near the seam.
+@pytest.mark.parametrize(
+    "settings", [("n=3", "groove_mm=0.05"), ("n=8",), ("n=9", "groove_mm=0.5")]
+)
+def test_nothing_sticks_out_beyond_the_seam_and_the_foot(settings: tuple[str, ...]) -> None:
+    assert heights(modelled(*settings)).min() > -1e-9
+
+
+def test_a_mirror_that_ends_before_the_foot_keeps_its_distance() -> None:
+    """No tip lies between the foot plane and a groove's width above it."""
+    cells = modelled("n=8")
+    above = heights(cells)[:, 1]
+    tips = above[: len(cells.rings[1])]
+    assert not ((tips > 1e-9) & (tips < cells.layout.groove)).any()
+
+
+def test_a_groove_that_crosses_the_seam_is_refused_with_a_width_that_was_tried() -> None:
+    with pytest.raises(SpecError, match=r"groove.*: set shell\.groove_mm to 0\.25,"):
+        modelled("n=20", "groove_mm=0.5")
+
+
+@pytest.mark.slow
+def test_radii_that_are_not_found_may_be_with_another_groove() -> None:
+    """Of some stretched designs a border vanishes with every second set of radii."""
+    stretched = "n=9", "optics.stretch=[2, 2]"
+    with pytest.raises(SpecError, match=r"change shell\.groove_mm, optics\.n"):
+        modelled(*stretched, "groove_mm=0.05")
+    assert heights(modelled(*stretched, "groove_mm=0.1")).min() > -1e-9
+
+
+def test_every_mirror_covers_the_target_whatever_the_groove() -> None:
+    areas = []
+    for groove in (0.02, 0.1, 0.5):
+        array = pedestal_design("n=4", f"shell.groove_mm={groove}").arrays[0]
+        assert array.coverage.min() == pytest.approx(60.6, abs=1e-3)
+        areas.append(array.area.sum())
+    assert areas[0] > areas[1] > areas[2]
+    assert 0.9 * mirror_array("n=4").area.sum() < areas[1] < mirror_array("n=4").area.sum()
+
+
+def test_a_coat_leaves_the_pedestals_where_they_are() -> None:
+    array = pedestal_design("n=4", "coating_um=100").arrays[0]
+    bare, coated = array.modelled_cells, array.cells
+    assert (cell_areas(bare) != cell_areas(coated)).all()
+    walls = slice(bare.mirrors, None)
+    np.testing.assert_array_equal(bare.surfaces.normal[walls], coated.surfaces.normal[walls])
+
+
+def test_a_coat_thicker_than_the_grooves_are_deep_is_refused() -> None:
+    with pytest.raises(SpecError, match=r"mirrors\.coating_um 200 .* shell\.groove_mm larger"):
+        pedestal_design("n=4", "coating_um=200", "shell.groove_mm=0.02")

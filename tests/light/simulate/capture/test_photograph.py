@@ -1,19 +1,15 @@
-"""Photographs: what each pixel sees, whether spheres and meshes agree, what hides what."""
-
-from pathlib import Path
+"""Photographs: what each pixel sees, of one ray or of many, and what hides what."""
 
 import numpy as np
 import pytest
 
-from tbcad.cad.formats.stl import write_stl
 from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.light.simulate.capture.light_field import PIXEL_ARRAYS, LightField, traced_light_field
 from tbcad.light.simulate.capture.photograph import Tracer, photograph, subpixel_shifts
-from tbcad.light.simulate.scene.exported import ExportedDesign
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
-from tbcad.shell.files import camera_a_mesh
+from tbcad.studies.low_pass import defocus_shifts, low_pass_shifts
 
 Cameras = tuple[Reflector, Reflector]
 
@@ -74,45 +70,56 @@ def _shifted(at: Reflector, shift: tuple[float, float]) -> Tracer:
     return lambda rows, _: trace(rows, shift)
 
 
-def test_subpixel_shifts_are_even() -> None:
-    assert subpixel_shifts(1) == [(0.0, 0.0)]
-    assert sorted(subpixel_shifts(2)) == [
-        (-0.25, -0.25),
-        (-0.25, 0.25),
-        (0.25, -0.25),
-        (0.25, 0.25),
-    ]
-    assert np.mean(subpixel_shifts(5), axis=0) == pytest.approx([0, 0])
+def contrast(shifts: tuple[tuple[float, float], ...], frequency: float) -> float:
+    """What is left of a sine along the rows, cycles a pixel."""
+    x = np.array(shifts)[:, 0]
+    return float(np.abs(np.exp(2j * np.pi * frequency * x).mean()))
 
 
-@pytest.fixture(scope="module")
-def with_meshes(
-    low_resolution_design: MirrorDesign,
-    record: Path,
-    exported: ExportedDesign,
-    tmp_path_factory: pytest.TempPathFactory,
-) -> ExportedDesign:
-    """The record with shells beside it, as STL."""
-    folder, mesh = tmp_path_factory.mktemp("meshes"), camera_a_mesh(low_resolution_design)
-    write_stl(folder / "shell_a.stl", mesh)
-    write_stl(folder / "shell_b.stl", mesh.mirrored())
-    return exported.model_copy(update={"folder": folder})
+@pytest.mark.parametrize("separation", [0.75, 1.0, 2.0])
+@pytest.mark.parametrize("frequency", [0.1, 0.25, 0.4])
+def test_low_pass_filter_passes_its_cosine(separation: float, frequency: float) -> None:
+    """|cos(pi s f)|, times the pixel's own response."""
+    pixel = contrast(tuple(subpixel_shifts(3)), frequency)
+    expected = abs(np.cos(np.pi * separation * frequency)) * pixel
+    assert contrast(low_pass_shifts(separation, 3), frequency) == pytest.approx(expected, abs=1e-12)
 
 
-def test_spheres_and_meshes_agree(with_meshes: ExportedDesign, knot: Scene) -> None:
-    shells = read_shell_meshes(with_meshes)
-    for at in with_meshes.reflectors:
-        rows = range(at.camera.height_px)
-        exact, mesh = exact_tracer(at)(rows, (0.0, 0.0)), mesh_tracer(shells, at)(rows, (0.0, 0.0))
-        same = exact.mirror == mesh.mirror
-        assert same.mean() > 0.999  # but for pixel centres on an edge
-        both = same & (exact.mirror > 0)
-        apart = mesh.origin[both] - exact.origin[both]
-        assert np.abs(apart).max() < 1e-4
-        turned = np.cross(exact.direction[both], mesh.direction[both])
-        assert 200 * np.linalg.norm(turned, axis=1).max() < 2e-3  # mm at the object
-        pictures = [
-            np.concatenate([band.colour for band in photograph(at.camera, trace, knot)]).astype(int)
-            for trace in (exact_tracer(at), mesh_tracer(shells, at))
-        ]
-        assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 2)[both].mean() < 1e-3
+def test_defocus_fills_its_circle() -> None:
+    """Radius of gyration: that of the circle and of the pixel, d^2 / 8 + 1 / 6."""
+    places = np.array(defocus_shifts(6.0, 400))
+    assert np.abs(places.mean(axis=0)).max() < 0.02
+    assert (places**2).sum(axis=1).mean() == pytest.approx(36 / 8 + 1 / 6, rel=0.01)
+
+
+def test_photograph_is_the_mean_at_these_places(
+    cameras: tuple[Reflector, Reflector], knot: Scene
+) -> None:
+    at = cameras[0]
+    trace = exact_tracer(at)
+    same = list(photograph(at.camera, trace, knot, tuple(subpixel_shifts(2))))
+    square = list(photograph(at.camera, trace, knot, 2))
+    blurred = list(photograph(at.camera, trace, knot, low_pass_shifts(2.0, 1)))
+    assert all(np.array_equal(a.colour, b.colour) for a, b in zip(same, square, strict=True))
+    assert all(
+        np.array_equal(a.rays.mirror, b.rays.mirror) for a, b in zip(blurred, square, strict=True)
+    )
+    one, four = (
+        np.concatenate([band.colour for band in bands]).astype(float) for bands in (square, blurred)
+    )
+    assert np.diff(four, axis=1).std() < 0.8 * np.diff(one, axis=1).std()
+
+
+def test_every_part_is_that_of_the_photograph(
+    low_resolution_design: MirrorDesign, knot: Scene, light_field: LightField
+) -> None:
+    traced = traced_light_field(low_resolution_design, knot)
+    assert traced.capture_mm == light_field.capture_mm
+    for name, frame in light_field.frames.items():
+        rows, columns = frame.planes["mirror"].shape
+        parts = [np.s_[:rows, :columns], np.s_[rows // 3 : rows // 2, 7 : columns // 2]]
+        for part in parts + [np.s_[box[2] : box[3], box[0] : box[1]] for box in frame.boxes[::40]]:
+            expected, got = frame.read(*part), traced.frames[name].read(*part)
+            for plane in PIXEL_ARRAYS:
+                assert np.array_equal(got[plane], expected[plane]), plane
+                assert got[plane].dtype == expected[plane].dtype

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.exported import ExportedDesign, read_export
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
 from tests.exported_files import Rows, edit_csv, edit_json
 
 Document = dict[str, Any]

@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.files import read_object, write_object
-from tbcad.light.simulate.prototype.lamps import RectangularLamps, irradiance, lit_by, read_lamps
+from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance, lit_by, read_lamps
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tests.exported_files import edit_json

@@ -1,16 +1,32 @@
-"""Pixels' rays off the exact mirrors, against a search over all of them."""
+"""Pixels' rays off the exact mirrors, also on pedestals, against a search over all of them."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.mirrors.array import design
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
+from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_model
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.sharpness import built_reflector
+from tests.pedestal_designs import pedestal_design
+from tests.shell_meshes import export_with_meshes
 
 Cameras = tuple[Reflector, Reflector]
+SETTINGS = ("n=6", "width_px=416", "height_px=310", "shell.groove_mm=0.4")
+CENTRE = (0.0, 0.0)
+SOME = 7  # a pixel of so many is searched
 
 
 def every_row(at: Reflector) -> TracedRays:
@@ -44,11 +60,11 @@ def searched(at: Reflector, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def test_first_mirror_is_the_one_that_a_search_finds(cameras: Cameras, camera: int) -> None:
     at = cameras[camera]
     rays = every_row(at)
-    way = unit(pixel_directions(at.camera, range(at.camera.height_px)))
-    found, reach = searched(at, way.reshape(-1, 3))
-    assert np.array_equal(rays.mirror.ravel(), found)
-    on = found > 0
-    assert norm(rays.origin.reshape(-1, 3)[on] - at.camera.pinhole) == pytest.approx(reach[on])
+    way = unit(pixel_directions(at.camera, range(at.camera.height_px))).reshape(-1, 3)
+    found, reach = searched(at, way[::SOME])
+    assert np.array_equal(rays.mirror.ravel()[::SOME], found)
+    on, origin = found > 0, rays.origin.reshape(-1, 3)[::SOME]
+    assert norm(origin[on] - at.camera.pinhole) == pytest.approx(reach[on])
 
 
 def points_in_cells(at: Reflector) -> tuple[np.ndarray, np.ndarray]:
@@ -85,22 +101,6 @@ def test_reflection_obeys_its_law(cameras: Cameras) -> None:
     )
 
 
-def test_every_mirror_shows_the_whole_capture_sphere_of_its_record(cameras: Cameras) -> None:
-    """Rays of the pixels on a cell's rim pass the sphere by: the design's own coverage."""
-    at = cameras[0]
-    rays = every_row(at)
-    seen = np.bincount(rays.mirror[rays.meeting(30.0)], minlength=len(at) + 1)[1:]
-    assert (seen > 0).all()
-    # Where a neighbour's pixel is next, the ray must already have left the sphere, by a pixel's
-    # width at most; at the seam and the foot no neighbour shows that.
-    right = rays.mirror[:, 1:] != rays.mirror[:, :-1]
-    both = right & (rays.mirror[:, 1:] > 0) & (rays.mirror[:, :-1] > 0)
-    miss = norm(np.cross(rays.origin, rays.direction))
-    step = np.abs(np.diff(miss, axis=1))[~right & (rays.mirror[:, 1:] > 0)].max()
-    assert miss[:, 1:][both].min() > 30.0 - step
-    assert miss[:, :-1][both].min() > 30.0 - step
-
-
 def test_bands_and_shifts_are_parts_of_one_picture(cameras: Cameras) -> None:
     at = cameras[0]
     whole, trace = every_row(at), exact_tracer(at)
@@ -124,9 +124,114 @@ def test_planar_mirrors() -> None:
     assert norm(past).max() < 1e-9
 
 
-def test_pixels_of_points_undo_directions(cameras: Cameras) -> None:
-    view = cameras[0].camera
-    way = pixel_directions(view, range(5, 9))
-    place = view.project(view.pinhole + 7 * way)
-    assert place[..., 0] == pytest.approx(np.broadcast_to(np.arange(view.width_px), (4, 416)))
-    assert place[:, 0, 1] == pytest.approx([5, 6, 7, 8])
+@pytest.fixture(scope="module")
+def made() -> MirrorDesign:
+    return pedestal_design(*SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def on_pedestals(made: MirrorDesign) -> Cameras:
+    return reflectors(made)
+
+
+def searched_solids(at: Reflector, way: np.ndarray) -> np.ndarray:
+    """First mirror, from 1, that rays (k, 3) meet: balls cut by half-spaces, on segments.
+
+    A ray may meet the wall of a pedestal first, which is no mirror.
+    """
+    cells, pinhole = at.cells, at.camera.pinhole
+    assert isinstance(cells, PedestalCells)
+    to_centre = at.mirrors.centre - pinhole
+    along = way @ to_centre.T
+    rest = at.mirrors.radius**2 - dot(to_centre, to_centre) + along**2
+    half = np.sqrt(np.maximum(rest, 0))
+    low, high = along - half, np.where(rest > 0, along + half, -np.inf)
+    on_sphere = low.copy()
+    planes = [(slice(None), -n, p) for n, p in cells_planes(cells)]
+    walls = zip(*wall_planes(cells), strict=True)
+    for mirror, n, p in [*planes, *walls]:  # outside where value > 0
+        value, rate = n @ (pinhole - p), way @ n
+        crossing = -value / rate
+        enters, leaves = np.where(rate < 0, crossing, -np.inf), np.where(rate > 0, crossing, np.inf)
+        if isinstance(mirror, slice):
+            enters, leaves = enters[:, None], leaves[:, None]
+        low[:, mirror] = np.maximum(low[:, mirror], enters)
+        high[:, mirror] = np.minimum(high[:, mirror], leaves)
+    reach = np.where(low < high, low, np.inf)
+    first = reach.argmin(axis=1)
+    row = np.arange(len(way))
+    there = np.isfinite(reach[row, first]) & (reach[row, first] == on_sphere[row, first])
+    return np.where(there, first + 1, 0)
+
+
+def cells_planes(cells: PedestalCells) -> list[tuple[np.ndarray, np.ndarray]]:
+    at, m = cells.surfaces, cells.mirrors
+    return [(at.normal[k], at.apex[k]) for k in range(m, m + PLANES)]
+
+
+def wall_planes(cells: PedestalCells) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    first = cells.mirrors + PLANES
+    return cells.walls[:, 0], cells.surfaces.normal[first:], cells.surfaces.apex[first:]
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_mirrors_on_pedestals_are_those_that_a_search_finds(
+    on_pedestals: Cameras, camera: int
+) -> None:
+    at = on_pedestals[camera]
+    way = unit(pixel_directions(at.camera, range(at.camera.height_px))).reshape(-1, 3)
+    found = searched_solids(at, way[::SOME])
+    assert np.array_equal(every_row(at).mirror.ravel()[::SOME], found)
+    assert (found == 0).mean() > 0.05  # grooves, and what lies beside the mirrors
+
+
+def counted(at: Reflector) -> np.ndarray:
+    """Pixels of each mirror."""
+    return np.bincount(every_row(at).mirror.ravel(), minlength=len(at) + 1)[1:]
+
+
+def within_frame(at: Reflector) -> np.ndarray:
+    """Which mirrors' pictures lie inside the frame."""
+    box = at.boxes()
+    inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < at.camera.width_px)
+    return inside & (box[:, 3] < at.camera.height_px)
+
+
+@pytest.mark.parametrize("pedestals", [False, True])
+def test_the_mesh_of_the_shell_shows_the_same(
+    low_resolution_design: MirrorDesign, made: MirrorDesign, tmp_path: Path, pedestals: bool
+) -> None:
+    """Rays of every pixel off the facets of the STL; grooves are dark in both."""
+    exported = export_with_meshes(tmp_path, made if pedestals else low_resolution_design)
+    shells = read_shell_meshes(exported)
+    for at in exported.reflectors:
+        exact = every_row(at)
+        mesh = mesh_tracer(shells, at)(range(at.camera.height_px), CENTRE)
+        same = exact.mirror == mesh.mirror
+        assert same.mean() > 0.999  # but for pixel centres on an edge
+        both = same & (exact.mirror > 0)
+        assert np.abs(mesh.origin[both] - exact.origin[both]).max() < 1e-4
+        turned = np.cross(exact.direction[both], mesh.direction[both])
+        assert 200 * norm(turned).max() < 2e-3  # mm at the object
+
+
+def test_pixels_of_builds_are_those_of_the_fast_model(on_pedestals: Cameras) -> None:
+    """Shells that are moved, turned and grown take their walls along; each wall is off as well."""
+    errors = Errors(
+        sphere_centre=Error(0.02),
+        scale_isotropic=Error(0.01),
+        shell_shift=Error(0.4),
+        shell_tilt=Error(5e-3),
+        camera_shift=Error(0.2),
+        camera_focal=Error(5e-3),
+    )
+    at = on_pedestals[0]
+    one = draw(errors, 5, range(1), len(at), None, len(at.walls))[0]
+    moved = replace(one, wall=np.random.default_rng(3).normal(0, 0.2, one.wall.shape))
+    pixels = counted(built_reflector(at, moved, 0))
+    area = mirror_coverage(edge_model(at), moved).pixels[0]
+    inside = within_frame(built_reflector(at, moved, 0))
+    assert inside.sum() > 50
+    assert np.abs(area - pixels)[inside] == pytest.approx(0, abs=0.6 * np.sqrt(pixels.max()))
+    # Walls of the design would give other pictures.
+    assert np.abs(area - counted(built_reflector(at, one, 0)))[inside].max() > 30

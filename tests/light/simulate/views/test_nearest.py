@@ -1,4 +1,4 @@
-"""The nearest captured ray, against a four-dimensional k-d tree over all of them."""
+"""The nearest captured ray, and blends of several cameras, against a search among all of them."""
 
 import numpy as np
 import pytest
@@ -8,14 +8,16 @@ from scipy.spatial import cKDTree
 
 from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
+from tbcad.light.simulate.views.blend import CAMERAS, SIGMA_PX, blend_cameras
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles, convergence_point
-from tbcad.light.simulate.views.nearest import nearest_rays
-from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
+from tbcad.light.simulate.views.ray_bundle import RayBundle, TwoPlane, nearest_rays, two_plane_along
 from tbcad.light.simulate.views.synthesis import Rays, nearby_rays, search_radius
+from tbcad.types import Bools, Floats, Ints
 
 CAPTURE_MM = 60.0
 EXACT = 0.9995
+SIZE = (96, 72)
 
 
 def every_ray(source: LightField) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,19 +110,80 @@ def test_convergence_point_of_rays() -> None:
     assert spread == pytest.approx(1)
 
 
-def test_a_captured_ray_is_its_own_nearest(light_field: LightField, tiles: MirrorTiles) -> None:
-    """A view whose rays are captured ones gives their colours back."""
-    frame = light_field.frames["a"]
-    number = 10
-    on = frame.planes["mirror"][:] == number + 1
-    origin, direction, colour = (
-        frame.planes[name][:][on] for name in ("origin", "direction", "colour")
-    )
-    two_plane = two_plane_along(
-        -frame.u[number], np.cross(frame.u[number], [0.0, 1.0, 0.0]), CAPTURE_MM
-    )
-    targets = two_plane.coordinates(origin, direction)
-    bundle = nearby_rays(tiles, two_plane, (origin, direction), search_radius(tiles))
+def bundle_and_targets(
+    tiles: MirrorTiles, azimuth: float, elevation: float
+) -> tuple[RayBundle, Floats]:
+    place = np.radians(azimuth), np.radians(elevation)
+    view = camera_around_object(*place, 640.0, 60.0, SIZE)
+    two_plane, rays = targets_of(view)
+    bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
     assert bundle is not None
-    found = nearest_rays(bundle, targets)
-    assert np.array_equal(bundle.colour[found], colour)
+    return bundle, two_plane.coordinates(*rays)
+
+
+def depths(targets: Floats, kind: str) -> Floats:
+    """Surfaces: a plane, a smooth one, and one with edges from each target to the next."""
+    if kind == "plane":
+        return np.full(len(targets), -0.3)
+    if kind == "bumps":
+        return np.asarray(np.sin(targets[:, 0] / 4) * np.cos(targets[:, 1] / 5))
+    return np.random.default_rng(5).uniform(-1, 1, len(targets))
+
+
+def searched(bundle: RayBundle, target: Floats, depth: float) -> Floats:
+    """Colour and total weight of one target, (4,), by its definition."""
+    point = target[:2] + depth * target[2:]
+    ahead = depth - bundle.pinholes[:, 2]
+    usable = (bundle.tiles[:, 3] >= 0) & (ahead > 0)
+    deviation = np.linalg.norm(
+        (point - bundle.pinholes[:, :2]) / ahead[:, None] - target[2:], axis=1
+    )
+    deviation = np.where(usable, deviation, np.inf)
+    order = np.argsort(deviation, kind="stable")[: CAMERAS + 1]
+    total = np.zeros(4)
+    for k in order[:-1]:
+        weight = 1 - deviation[k] / deviation[order[-1]]
+        total += weight * pixels_of(bundle, bundle.tiles[k], point, depth)
+    return np.append(total[:3] / total[3], total[3])
+
+
+def pixels_of(bundle: RayBundle, tile: Ints, point: Floats, depth: float) -> Floats:
+    """The sum (4,) of the pixel nearest to a point, of all of a mirror's, and of its neighbours."""
+    first, height, width, _ = tile
+    rays = bundle.points[first : first + height * width]
+    places = rays[:, :2] + depth * rays[:, 2:]
+    distance = np.linalg.norm(places - point, axis=1)
+    pixel = int(np.nanargmin(distance))
+    if distance[pixel] > bundle.limit:
+        return np.zeros(4)
+    beside = pixel + np.array([-1, 1, -width, width])
+    pitch2 = np.nanmean(((places[beside] - places[pixel]) ** 2).sum(axis=1))
+    around = pixel + np.add.outer([-width, 0, width], [-1, 0, 1]).ravel()
+    share = np.nan_to_num(np.exp(-(distance[around] ** 2) / (2 * SIGMA_PX**2 * pitch2)))
+    return np.append(share @ bundle.colour[first + around], share.sum())
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "elevation", "kind"),
+    [(20.0, 25.0, "plane"), (90.0, 60.0, "bumps"), (20.0, 25.0, "edges")],
+)
+def test_equals_a_search_among_all_pixels(
+    tiles: MirrorTiles, azimuth: float, elevation: float, kind: str
+) -> None:
+    """But for pixels far from the point, and the width of the bell curve, found a pixel beside."""
+    bundle, targets = bundle_and_targets(tiles, azimuth, elevation)
+    depth = depths(targets, kind)
+    colour, seen = blend_cameras(bundle, targets, depth)
+    some = np.random.default_rng(8).choice(len(targets), 400, replace=False)
+    expected = np.array([searched(bundle, targets[i], depth[i]) for i in some])
+    assert seen[some].tolist() == (expected[:, 3] > 0).tolist()
+    differ = np.abs(colour[some] - expected[:, :3]).max(axis=1)
+    assert differ.mean() < 0.25
+    assert differ.max() < 6
+
+
+def test_a_surface_behind_all_cameras_is_not_seen(tiles: MirrorTiles) -> None:
+    bundle, targets = bundle_and_targets(tiles, 0.0, 45.0)
+    behind = np.full(len(targets), 2 * bundle.pinholes[:, 2].min())
+    seen: Bools = blend_cameras(bundle, targets, behind)[1]
+    assert not seen.any()

@@ -16,16 +16,15 @@ from tbcad.light.depth.depth_map import depth_views
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
-from tbcad.light.simulate.scene.viewpoint import camera_around_object, view_directions
-from tbcad.light.simulate.views.ground_truth import lens_picture, pinhole_picture
+from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import two_plane_along
 from tbcad.light.simulate.views.refocus import (
     ThinLens,
+    lens_picture,
     lens_pinholes,
-    lens_rays,
+    pinhole_picture,
     refocus,
-    refocus_sweep,
 )
 from tbcad.light.simulate.views.synthesis import horizon_search_radius, synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
@@ -147,28 +146,6 @@ def test_the_papers_69_pinholes() -> None:
     assert len(places) == 69
     assert np.linalg.norm(places, axis=1).max() == pytest.approx(1)
     assert {tuple(place) for place in -places} == {tuple(place) for place in places}
-
-
-def test_rays_through_the_lens_meet_on_the_sharp_plane() -> None:
-    view, focus = view_from(70, 25), ThinLens(300, 12.0)
-    middle = lens_rays(view, focus, np.zeros(2))
-    assert middle[1] == pytest.approx(view_directions(view))
-    edge = lens_rays(view, focus, np.array([100.0, -80.0]))
-    toward = -view.forward
-    at = [
-        origin + ((12.0 - origin @ toward) / (way @ toward))[..., None] * way
-        for origin, way in (middle, edge)
-    ]
-    assert at[0] == pytest.approx(at[1], abs=1e-9)
-
-
-def test_a_sweep_goes_through_the_object(tiles: MirrorTiles) -> None:
-    view = view_from(30, 45)
-    messages: list[str] = []
-    frames = refocus_sweep(tiles, view, 250, 3, messages.append)
-    assert len(messages) == len(frames) == 3
-    assert np.array_equal(frames[1], refocus(tiles, view, ThinLens(250, 0)).image)
-    assert not np.array_equal(frames[0], frames[2])
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.rig.calibration.detection.expected import Expected
-from tbcad.rig.calibration.detection.matching import highlights_of
+from tbcad.rig.calibration.detection.matching import Expected, highlights_of
 from tbcad.rig.calibration.detection.spots import find_spots
 
 SLOPE = np.array([-0.02, 0.01])  # of the light for a pixel: larger than lenses have

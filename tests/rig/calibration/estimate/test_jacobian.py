@@ -13,7 +13,7 @@ STEP = 1e-3  # of the prior standard deviations
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=4)
+@settings(max_examples=2)
 def test_slopes_are_those_of_finite_differences(seed: int) -> None:
     values, machine = drawn(PRIOR, seed)
     shape = (len(machine.angle), len(machine.radius), len(machine.leds))

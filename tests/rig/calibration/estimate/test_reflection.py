@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflection_points
-from tbcad.rig.calibration.estimate.reflection import projection, reflections
-from tests.rig.machine.test_record import CAMERA
+from tbcad.rig.calibration.estimate.jacobian import projection, reflections
+from tests.rig.machine.test_machine import CAMERA
 
 STEP = 1e-4
 ACCURACY = 1e-7  # of central differences with this step, of lengths of 100 mm

@@ -27,7 +27,7 @@ SQUARES, SIZE_MM = (9, 6), 5.0
 WIDTH, HEIGHT, SAMPLES = 640, 480, 2
 FOCAL, PRINCIPAL = np.array([620.0, 622.0]), np.array([322.5, 236.0])
 DISTORTION = np.array([-0.08, 0.02, 5e-4, -3e-4, 0.0])
-SIGMAS, BOARDS = 4.0, 8
+SIGMAS, BOARDS = 4.0, 7
 SQUARE_PX, MARKERS = 60, cv2.aruco.DICT_4X4_50
 
 
@@ -72,6 +72,9 @@ def charuco(place: np.ndarray, legacy: bool = False) -> np.ndarray:
         row.clip(0, SQUARES[1] * SQUARE_PX - 1), column.clip(0, SQUARES[0] * SQUARE_PX - 1)
     ]
     return np.where(inside & (light < 128), 30.0, 220.0)
+
+
+old_charuco = partial(charuco, legacy=True)
 
 
 def _rendered(
@@ -123,16 +126,20 @@ def test_the_lens_is_found_with_its_uncertainty(boards: Path, tmp_path: Path) ->
     assert again.focal == pytest.approx(solved.lens.focal, abs=0)
 
 
-@pytest.mark.parametrize("legacy", [False, True])
-def test_charuco_boards_partly_out_of_the_picture(tmp_path: Path, legacy: bool) -> None:
-    folder = photograph_boards(tmp_path, 17.0, partial(charuco, legacy=legacy))
+def test_charuco_boards_partly_out_of_the_picture(tmp_path: Path) -> None:
+    photograph_boards(tmp_path, 17.0, charuco)
     solved = intrinsics(
-        folder, size=SIZE_MM, charuco="4x4_50", marker=3.75, out=tmp_path / "camera.yml"
+        tmp_path, size=SIZE_MM, charuco="4x4_50", marker=3.75, out=tmp_path / "camera.yml"
     )
     inner = (SQUARES[0] - 1) * (SQUARES[1] - 1)
     assert solved.corners < 0.9 * inner * solved.boards  # not whole
     assert solved.reach > EDGE_SHARE
     assert is_near_truth(solved)
+
+
+def test_charuco_board_of_an_older_opencv() -> None:
+    picture = _rendered(_camera((8.0, -6.0, 4.0), (0.0, 0.0, 70.0)), 2.0, 1, old_charuco)
+    assert find_corners(picture, Board(SQUARES, SIZE_MM, "DICT_4X4_50", 3.75)) is not None
 
 
 def test_a_checkerboard_partly_out_of_the_picture() -> None:
@@ -152,7 +159,7 @@ def test_a_checkerboard_partly_out_of_the_picture() -> None:
 def test_what_is_no_checkerboard_is_not_taken_for_a_part_of_one() -> None:
     """OpenCV goes on from what it takes for a part to rows that are none."""
     noise = np.random.default_rng(3).uniform(0, 255, size=(24, 32)).astype(np.uint8)
-    grey = cv2.resize(noise, (WIDTH, HEIGHT), interpolation=cv2.INTER_NEAREST)
+    grey = cv2.resize(noise, (WIDTH // 2, HEIGHT // 2), interpolation=cv2.INTER_NEAREST)
     assert find_corners(grey, Board(SQUARES, SIZE_MM)) is None
 
 
@@ -173,18 +180,14 @@ def simulated_corners(rng: np.random.Generator, noise_px: float, bend: float) ->
     return seen
 
 
-@pytest.mark.parametrize(("noise_px", "bend"), [(0.1, 0.0), (0.05, 0.1)])
-def test_standard_deviations_hold_for_errors_that_a_photograph_shares(
-    noise_px: float, bend: float
-) -> None:
-    """Of 25 solutions; by OpenCV's own figures the second case is off by 3.3 sigma RMS, not 1.1."""
+def test_standard_deviations_hold_for_errors_that_a_photograph_shares() -> None:
+    """By OpenCV's own figures solutions are off by 3.3 sigma RMS, not 1.1."""
     rng, ratio = np.random.default_rng(1), []
-    for _ in range(25):
-        solved = solve_corners(simulated_corners(rng, noise_px, bend), (WIDTH, HEIGHT))
+    for _ in range(12):
+        solved = solve_corners(simulated_corners(rng, 0.05, 0.1), (WIDTH, HEIGHT))
         off = np.concatenate([solved.lens.focal - FOCAL, solved.lens.principal - PRINCIPAL])
         ratio.append(off / solved.sigma[:4])
-    spread = np.sqrt(np.mean(np.square(ratio)))
-    assert 0.6 < spread < 1.6
+    assert 0.6 < np.sqrt(np.mean(np.square(ratio))) < 1.6
 
 
 def test_a_corner_that_is_none_is_left_out() -> None:

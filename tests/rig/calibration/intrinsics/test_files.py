@@ -1,12 +1,13 @@
 """Lenses in the files of other programs, against what these programs say of them."""
 
 import re
+from itertools import product
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tbcad.core.optics.camera import Camera, without_distortion
@@ -46,7 +47,7 @@ def _written(path: Path, extension: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize("extension", ["yml", "xml"])
+@pytest.mark.parametrize("extension", ["yml", "xml", "json"])
 def test_opencv(tmp_path: Path, extension: str) -> None:
     _same(read_lens(_written(tmp_path, extension)), LENS.distortion)
 
@@ -177,16 +178,11 @@ def test_yaml_of_other_programs(tmp_path: Path, text: str) -> None:
     _same(_read(tmp_path, text), np.array([-0.05, 0.01, 1e-3, -5e-4, k3]))
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(("encoding", "end"), [("utf-8-sig", "\r\n"), ("utf-16", "\r")])
 def test_encodings(tmp_path: Path, encoding: str, end: str) -> None:
     file = tmp_path / "camera.yaml"
     file.write_bytes(ROS.replace("\n", end).encode(encoding))
     _same(read_lens(file), LENS.distortion)
-
-
-def test_json_of_opencv(tmp_path: Path) -> None:
-    _same(read_lens(_written(tmp_path, "json")), LENS.distortion)
 
 
 def _read(folder: Path, text: str) -> CalibratedLens:
@@ -199,15 +195,12 @@ MODEL_KEYS = ("distortion_model", "camera_model", "Model", "lensType", "projecti
 MODELS = ("equidistant", "FISHEYE", "omni", "fov", "thin_prism", "kannala_brandt4", "mei", "new")
 
 
-@pytest.mark.parametrize("key", MODEL_KEYS)
-@pytest.mark.parametrize("model", MODELS)
-def test_models_that_are_named_are_refused_whatever_the_key(
-    tmp_path: Path, key: str, model: str
-) -> None:
-    text = ROS.replace("distortion_model: plumb_bob", f"{key}: {model}")
-    with pytest.raises(InputError, match=f"lens model {key}: {model}: use a pinhole"):
-        _read(tmp_path, text)
-    assert _read(tmp_path, text.replace(model, "plumb_bob"))
+def test_models_that_are_named_are_refused_whatever_the_key(tmp_path: Path) -> None:
+    for key, model in product(MODEL_KEYS, MODELS):
+        text = ROS.replace("distortion_model: plumb_bob", f"{key}: {model}")
+        with pytest.raises(InputError, match=f"lens model {key}: {model}: use a pinhole"):
+            _read(tmp_path, text)
+        assert _read(tmp_path, text.replace(model, "plumb_bob"))
 
 
 TAIL = {
@@ -224,12 +217,6 @@ TAIL = {
     "roi: {x_offset: 10}": "roi",
     f"---\n{ROS}": "2 documents",
 }
-
-
-@pytest.mark.parametrize(("tail", "message"), TAIL.items())
-def test_lines_after_a_good_lens(tmp_path: Path, tail: str, message: str) -> None:
-    with pytest.raises(InputError, match=re.escape(message)):
-        _read(tmp_path, f"{ROS}{tail}\n")
 
 
 CHANGED = {
@@ -253,23 +240,10 @@ CHANGED = {
 }
 
 
-@pytest.mark.parametrize(("change", "message"), CHANGED.items())
-def test_numbers_that_cannot_be(tmp_path: Path, change: tuple[str, str], message: str) -> None:
-    assert change[0] in ROS
-    with pytest.raises(InputError, match=re.escape(message)):
-        _read(tmp_path, ROS.replace(*change))
-
-
-def test_kalibr_must_name_its_models_and_one_camera(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="names no camera_model and distortion_model"):
-        _read(tmp_path, KALIBR.replace("  distortion_model: radtan\n", ""))
-    with pytest.raises(InputError, match=re.escape("2 cameras (cam0, cam1): which took")):
-        _read(tmp_path, KALIBR + KALIBR.replace("cam0", "cam1"))
-
-
 PIECES = (*ROS.split("\n"), *KALIBR.split("\n"), *MRCAL.split("\n"), "<a>", "</a>", "\x85", "&a *a")
 
 
+@settings(max_examples=40)
 @given(
     st.one_of(
         st.binary(max_size=60),
@@ -288,12 +262,22 @@ def test_any_file_is_a_lens_or_a_message_of_one_line(
         assert str(error).isprintable()  # noqa: PT017
 
 
-@pytest.mark.parametrize(("text", "message"), REFUSED.values(), ids=REFUSED)
+WRONG = {
+    **REFUSED,
+    **{tail: (f"{ROS}{tail}\n", message) for tail, message in TAIL.items()},
+    **{f"{old} {new:.9}": (ROS.replace(old, new), text) for (old, new), text in CHANGED.items()},
+    "no model": (
+        KALIBR.replace("  distortion_model: radtan\n", ""),
+        "names no camera_model and distortion_model",
+    ),
+    "two of Kalibr": (KALIBR + KALIBR.replace("cam0", "cam1"), "2 cameras (cam0, cam1): which"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
 def test_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
-    file = tmp_path / "lens"
-    file.write_text(text)
     with pytest.raises(InputError, match=re.escape(message)) as error:
-        read_lens(file)
+        _read(tmp_path, text)
     assert "\n" not in str(error.value)
 
 

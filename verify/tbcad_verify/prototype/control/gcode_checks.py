@@ -6,15 +6,15 @@ from the motion that the design asks for.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control.gcode_lines import LAMP
-from tbcad_verify.prototype.control.gcode_machine import Machine, Photograph, run_program
+from tbcad_verify.prototype.control.gcode_machine import LAMP, Machine, Photograph, run_program
 from tbcad_verify.record.spec import MotionSpec
-from tbcad_verify.report.checks import Check, CheckName, at_most, short_list
+from tbcad_verify.report.checks import Check, CheckName, no_faults
 
 PROGRAM_DEG = 1.0001e-4  # the digits of angles in the program
 PROGRAM_DIGITS = 4
@@ -28,11 +28,11 @@ PULL_OFF_DEG = 2.0
 def program_check(name: CheckName, context: PrototypeContext) -> Check:
     """Run the program, and compare what it does with the stops."""
     machine = run_program(context.prototype.program, *homing(context))
-    faults = [*machine.faults, *_deviations(context, machine)]
-    return at_most(name, len(faults), 0, short_list(faults))
+    return no_faults(name, [*machine.faults, *deviations(context, machine)])
 
 
-def _deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
+def deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
+    """What a machine did otherwise than the design asks for."""
     yield from _travel(context, machine)
     motion, stops = context.export.spec.prototype.motion, context.prototype.stops
     lights = expected_lights(context)
@@ -106,8 +106,7 @@ def _unlike_motion(one: Photograph, motion: MotionSpec, switched: bool) -> Itera
 
 
 def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
-    motion = context.export.spec.prototype.motion
-    low, high = context.prototype.swing
+    motion, (low, high) = context.export.spec.prototype.motion, context.prototype.swing
     pauses = PAUSES[motion.controller]
     if machine.axis != motion.axis:
         yield f"drives axis {machine.axis or 'none'}"
@@ -116,12 +115,12 @@ def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     if machine.homes != (motion.controller == "grblhal"):
         yield f"homes {machine.homes} times"
     for angle in machine.bases:
-        if not _is_close(angle, motion.home_deg):
+        if not math.isclose(angle, motion.home_deg, rel_tol=SHARE):
             yield f"starts at {angle:g} deg"
     if not machine.moves or abs(machine.moves[-1] - motion.home_deg) > PROGRAM_DEG:
         yield "does not end at home_deg"
     for speed in machine.feeds:
-        if not _is_close(speed, motion.feed_deg_min):
+        if not math.isclose(speed, motion.feed_deg_min, rel_tol=SHARE):
             yield f"a speed of {speed:g}"
     for angle in machine.moves:
         if not low - PROGRAM_DEG <= angle <= high + PROGRAM_DEG:
@@ -130,7 +129,3 @@ def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
     for name, end, far in (("lower", low, min), ("upper", high, max)):
         if reached and abs(far(reached) - end) > PROGRAM_DEG:
             yield f"{far(reached):.4f} deg is not the swing's {name} end"
-
-
-def _is_close(one: float, two: float) -> bool:
-    return abs(one - two) <= SHARE * max(abs(one), abs(two))

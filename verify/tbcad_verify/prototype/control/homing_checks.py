@@ -16,11 +16,10 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control.gcode_checks import PULL_OFF_DEG, homing
 from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, require, short_list
+from tbcad_verify.report.checks import Check, CheckName, Unknown, no_faults, require
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
 from tbcad_verify.types import Floats
 
-PIN_MM = 4.0  # diameter of the rod
 PIN_HOLE_MM = 4.2
 MIN_PIN_OUT_MM = 40.0  # of the pin from the axis: for 0.3 degrees
 SAME_MM = 1e-6
@@ -49,38 +48,31 @@ def checks(
 ) -> list[Check]:
     """Pin, tab and switch in the solids; settings against gear and program."""
     home = [*_pin(context, solids), *_switch(context, solids)]
-    found = [*_settings(context, gear_of(context, solids).ratio)]
-    return [
-        at_most(name, len(faults), 0, short_list(faults))
-        for name, faults in zip(names, (home, found), strict=True)
-    ]
+    settings = settings_faults(context, gear_of(context, solids).ratio)
+    return [no_faults(*pair) for pair in zip(names, (home, settings), strict=True)]
 
 
 def _pin(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
     """One hole in the disc, one in the head, in line at base angle zero; the rod is long enough."""
-    axis, places = context.frame[0], {}
+    axis, places = context.frame[0], []
     for name in ("zero_disc", "bearing_head"):
         solid = require(solids.get(name), f"the assembly has no {name}")
-        found = [
-            hole
-            for hole in holes(solid.faces, PIN_HOLE_MM / 2, SAME_MM)
-            if abs(hole.axis @ axis) > 1 - SAME_MM
-        ]
+        found = holes(solid.faces, PIN_HOLE_MM / 2, SAME_MM)
+        found = [hole for hole in found if abs(hole.axis @ axis) > 1 - SAME_MM]
         if len(found) != 1:
             yield f"{name} has {len(found)} holes for the zero pin"
             return
-        places[name] = found[0].point
-    disc, head = places["zero_disc"], places["bearing_head"]
+        places.append(found[0].point)
+    disc, head = places
     if distance_to_line(disc, head, axis) > SAME_MM:
         yield "the zero pin's holes are not in line at base angle zero"
     if distance_to_line(disc, np.zeros(3), axis) < MIN_PIN_OUT_MM:
         yield "the zero pin is too near to the axis"
-    along = [solids[name].corners @ axis for name in places]
-    path = max(values.max() for values in along[:1]) - (head @ axis)
-    home = context.prototype.home
-    rod = re.fullmatch(r"ROD-4x(\d+)", home.pin)
+    path = float((solids["zero_disc"].corners @ axis).max() - head @ axis)
+    pin = context.prototype.home.pin
+    rod = re.fullmatch(r"ROD-4x(\d+)", pin)
     if not rod or float(rod[1]) < path:
-        yield f"{home.pin} does not reach through {path:.0f} mm"
+        yield f"{pin} does not reach through {path:.0f} mm"
 
 
 def _polar(context: PrototypeContext, points: Floats) -> Floats:
@@ -128,35 +120,28 @@ def _arc(azimuth: Floats) -> tuple[float, float]:
     return first, 360.0 - float(gaps[last])
 
 
-def _settings(context: PrototypeContext, ratio: float) -> Iterator[str]:
-    values, faults = _parsed(context.prototype.settings)
+def settings_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
+    """Settings that are missing, foreign, or unlike what gear, motion and program need."""
+    values, faults = parsed_settings(context.prototype.settings)
     yield from faults
     motion = context.export.spec.prototype.motion
     axis = AXES.index(motion.axis)
-    expected: dict[int, float] = {
-        0: PULSE_US,
-        1: 255,
-        3: 0,
-        10: PLACES,
-        13: 0,
-        32: 0,
-        100 + axis: FULL_STEPS * motion.microsteps * ratio / 360,
-        110 + axis: motion.feed_deg_min,
-        120 + axis: motion.acceleration_deg_s2,
-    }
-    mask = float(1 << axis)
+    mask, others = float(1 << axis), {130 + axis}
+    expected: dict[int, float] = {0: PULSE_US, 1: 255, 3: 0, 13: 0, 32: 0}
+    expected[100 + axis] = FULL_STEPS * motion.microsteps * ratio / 360
+    expected |= {110 + axis: motion.feed_deg_min, 120 + axis: motion.acceleration_deg_s2}
     if motion.controller == "grbl":
-        expected |= {20: 0, 21: 0, 22: 0}
+        expected |= {10: PLACES, 20: 0, 21: 0, 22: 0}
     else:
         # The motor on in alarms; no sleep; pulled-up inputs; reports while it homes.
         expected |= {37: mask, 62: 0, 18: 0, 10: HAL_DEFAULT | REPORTS_HOMING, 43: 1}
         expected |= {5: XYZ & ~(1 << axis), 20: 1, 21: 1, 22: 1, 23: mask, 27: PULL_OFF_DEG}
         expected |= {26: DEBOUNCE_MS, 44: mask} | dict.fromkeys(range(45, 50), 0.0)
+        others |= {24, 25}
     for number, value in expected.items():
         if not math.isclose(values.get(number, math.nan), value, rel_tol=SHARE):
             yield f"${number} is {values.get(number, 'missing')}, not {value:g}"
-    others = {24, 25} if motion.controller == "grblhal" else set()
-    if foreign := set(values) - set(expected) - {130 + axis} - others:
+    if foreign := values.keys() - expected.keys() - others:
         yield f"${min(foreign)} is not needed"
     steps = values.get(110 + axis, 0.0) / 60 * values.get(100 + axis, 0.0)
     if steps > MAX_STEPS_S:
@@ -164,7 +149,7 @@ def _settings(context: PrototypeContext, ratio: float) -> Iterator[str]:
     yield from _limits(context, values, values.get(130 + axis, math.nan))
 
 
-def _parsed(text: str) -> tuple[dict[int, float], list[str]]:
+def parsed_settings(text: str) -> tuple[dict[int, float], list[str]]:
     """Settings by number; what is wrong with other lines. Soft limits need homing before them."""
     values: dict[int, float] = {}
     faults = []

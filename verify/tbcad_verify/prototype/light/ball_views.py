@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tbcad_verify.mesh.lines import distances_to_segments, rotation_angles
 from tbcad_verify.mesh.surfaces import Surfaces, nearest_on_rays, prepare_for_rays, reflect
-from tbcad_verify.mesh.vectors import dot, norm, unit
+from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
+from tbcad_verify.prototype.bodies import MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.blocked_rays import blocked_rays
 from tbcad_verify.prototype.light.pinhole_cells import (
     INSIDE,
     OUTLINE_DIRECTIONS,
@@ -22,14 +21,14 @@ from tbcad_verify.prototype.light.pinhole_cells import (
     mirror_spheres,
     sampled_pixels,
 )
-from tbcad_verify.prototype.light.ray_transfer import (
+from tbcad_verify.prototype.light.ray_paths import (
     RayTransfer,
     Reflecting,
+    blocked_rays,
     nearest_points,
     ray_transfer,
     rotated,
 )
-from tbcad_verify.prototype.measured_prototype import MeasuredPrototype
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -80,12 +79,7 @@ class PixelRays:
 
 
 def ball_views(measured: MeasuredPrototype, pixel: PixelRays) -> BallViews:
-    """Trace all mirrors of the camera, each on its ball at its stop.
-
-    Args:
-        measured: the prototype.
-        pixel: its rays.
-    """
+    """Trace all mirrors of the camera, each on its ball at its stop."""
     shell, transfer = mirror_spheres(measured.context), ray_transfer(measured)
     cells = cell_outlines(shell)
     outlines, nearest = ended_on_balls(transfer, cells)
@@ -107,35 +101,20 @@ def checks(names: list[CheckName], context: PrototypeContext, views: BallViews) 
     """Every mirror's ball shows the whole object at its stop, and nothing obstructs the light."""
     cells, covers, off_record, light, rays, pixels = names
     ids, target = context.mirror_ids, context.export.target_mm
-    hidden, blocked = views.hidden.astype(float), views.blocked.astype(float)
-    coverage = views.coverage
-    balls, moved = context.prototype.balls, context.prototype.moved
-    minimum = ball_coverage(context, coverage)
-    recorded = balls.coverage_mm if moved else balls.coverage_fixed_mm
+    hidden, blocked, coverage = views.hidden, views.blocked, views.coverage
+    small = worst_offenders(ids, coverage, "mm", coverage < target, badness=-coverage)
+    balls, minimum = context.prototype.balls, ball_coverage(context, coverage)
+    recorded = balls.coverage_mm if context.moved else balls.coverage_fixed_mm
     error = np.where(np.isfinite(minimum), np.abs(minimum - recorded), 0)
-    k = int(error.argmax())
+    k, seen, of = int(error.argmax()), views.pixels.sum(), views.pixels_shell.sum()
+    by, share = short_list(views.blockers), 100 * float(seen / max(of, 1))
     return [
         at_most(cells, hidden.sum(), 0, f"another mirror covers {_ray_counts(ids, hidden)}"),
-        at_least(
-            covers,
-            float(coverage.min()),
-            target,
-            "shows too little: "
-            + worst_offenders(ids, coverage, "mm", coverage < target, badness=-coverage),
-        ),
+        at_least(covers, float(coverage.min()), target, f"shows too little: {small}"),
         informative(off_record, float(error[k]), f"ball {k + 1} shows {minimum[k]:.3f}"),
-        at_most(
-            light,
-            blocked.sum(),
-            0,
-            f"{_ray_counts(ids, blocked)}; blocked by {short_list(views.blockers)}",
-        ),
+        at_most(light, blocked.sum(), 0, f"{_ray_counts(ids, blocked)}; blocked by {by}"),
         informative(rays, float(views.rays.sum()), "traced, before and after the ball"),
-        informative(
-            pixels,
-            100 * float(views.pixels.sum() / max(views.pixels_shell.sum(), 1)),
-            f"{views.pixels.sum():.0f} of {views.pixels_shell.sum():.0f} px, from a sample",
-        ),
+        informative(pixels, share, f"{seen:.0f} of {of:.0f} px, from a sample"),
     ]
 
 
@@ -146,15 +125,14 @@ def ball_coverage(context: PrototypeContext, coverage: Floats) -> Floats:
     return minimum
 
 
-def _ray_counts(ids: list[str], counts: Floats) -> str:
-    return worst_offenders(ids, counts, "rays", counts > 0, ".0f")
+def _ray_counts(ids: list[str], counts: Ints) -> str:
+    return worst_offenders(ids, counts.astype(np.float64), "rays", counts > 0, ".0f")
 
 
 def ended_on_balls(transfer: Reflecting, cells: PinholeOutlines) -> tuple[PinholeOutlines, Floats]:
     """Outlines drawn in to where a ball ends before its mirror's cell does.
 
-    Returns:
-        The outlines, and where their reflected rays are nearest to the origin.
+    And where (3, m, s) their reflected rays are nearest to the origin.
     """
     nearest = nearest_points(transfer, np.arange(cells.is_edge.shape[0]), cells.direction)
     beside = np.isnan(nearest[0])
@@ -172,12 +150,8 @@ def _largest_share(
 ) -> Floats:
     """(s, directions) share of the angle to the outline up to which rays pass within a radius.
 
-    Args:
-        transfer: to the balls.
-        outlines: of all cells.
-        some: (s,) mirrors.
-        search: (s, directions) where it is less than one.
-        radius: about the origin, mm; infinite: as long as rays meet the ball.
+    Of mirrors `some` (s,); it is less than one where `search` (s, directions) is true. The radius
+    is about the origin, mm; infinite: as long as rays meet the ball.
     """
     mine = outlines.take(some)
     low, high = np.where(search, 0.0, 1.0), np.ones(search.shape)

@@ -1,20 +1,24 @@
-"""The lamps' light on the object: integrated over their faces, the base in the way at its stops.
+"""The lamps' light on the object, the base in the way at its stops; and a background in the dark.
 
 Each face is Lambertian and is cut into tiles. The object's room is sampled by points on its wall
 and axis, each with surfaces that face all ways. Compared is what falls on a surface of the object
 before and after the half turn about z, at all of some stops. What is inside the capture sphere (the
 stage) is part of the scene and throws its own shadow.
+
+A lamp below the horizon is seen by the mirrors opposite, past the object, where no object hides it.
+Lamps that light the object alike before and after its half turn cannot be anywhere else.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.prototype.bodies import AssembledBodies, Bodies, some_angles, stage_bodies
+from tbcad_verify.prototype.bodies import OWN, AssembledBodies, Bodies, some_angles, stage_bodies
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.report.checks import (
@@ -23,13 +27,14 @@ from tbcad_verify.report.checks import (
     Unknown,
     at_most,
     informative,
+    no_faults,
     short_list,
 )
 from tbcad_verify.step.solids_text import TextSolid
 from tbcad_verify.types import Bools, Floats
 
-# Of each strip: width, length that is cut off, lumen of a mm.
-STRIPS = {"STRIP-COB-24V": (8.0, 50.0, 0.9), "STRIP-240-24V": (10.0, 25.0, 1.8)}
+# Of each strip: width, mm, and lumen of a mm.
+STRIPS = {"STRIP-COB-24V": (8.0, 0.9), "STRIP-240-24V": (10.0, 1.8)}
 TILES = (2, 5)  # across and along a face
 SIDES, LEVELS, FACINGS = 8, 3, 12  # points round the room, their heights, surfaces round each
 TILTS_DEG = (-60.0, -30.0, 0.0, 30.0, 60.0)  # of the surfaces, upward
@@ -40,8 +45,6 @@ PLACE_MM = 1e-6
 FACET_MM = 0.1  # by which facets of the assembly may be off the faces that they stand for
 PAIR_MM = 1e-3  # between an LED and the image of another
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
-IMAGES = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])
-IMAGES_BY_COUNT = {2: np.stack([np.ones(3), HALF_TURN]), 4: IMAGES}
 CHECKS = {
     "lamps": "faults",
     "light before and after": "%",
@@ -49,6 +52,11 @@ CHECKS = {
     "light of the lamps": "lx",
     "light from above": "% of upright surfaces'",
 }
+DARK = {"dark background": "rays"}
+GRID = 160  # rays across the columns of the picture
+BLACK = "matt black"
+NOTHING = "nothing"
+MIRRORS = ("ball_", "cap_")
 
 
 def checks(
@@ -57,7 +65,7 @@ def checks(
     assembly: AssembledBodies,
     solids: Mapping[str, TextSolid],
 ) -> list[Check]:
-    """The lamps are as listed and drawn, and light the object alike before and after its turn."""
+    """The lamps are as drawn, and light the object alike before and after its turn."""
     listed, same, shadow, light, above = names
     lamps = context.prototype.lamps
     if lamps is None:
@@ -66,28 +74,29 @@ def checks(
         return [missing, *(informative(name, 0, "there are no lamps") for name in names[1:])]
     if lamps.strip not in STRIPS:
         raise Unknown(f"{lamps.strip} is no strip that is known")
-    faults = [*_faults(context, lamps, solids)]
     own = {lamp.name for lamp in lamps.places}
     bodies = assembly.without(stage_bodies(context) | own)
     points, normals = _surfaces(context)
-    fields = np.stack([*_fields(context, lamps, bodies, points, normals)])
+    fields = np.stack(
+        [
+            irradiance(lamps, points * turn, normals * turn, bodies, angle)
+            for angle in some_angles(context).tolist()
+            for turn in (np.ones(3), HALF_TURN)
+        ]
+    )
     greatest, least = fields.max(axis=0), fields.min(axis=0)
     lit = greatest > LEAST_SHARE * greatest.max()
     change = 100 * float(((greatest - least)[lit] / greatest[lit]).max())
     tilt = np.degrees(np.arcsin(normals[:, 2]))
     upright, upward = (float(fields[:, np.abs(tilt - of) < 1].mean()) for of in (0.0, UPWARD_DEG))
+    shadowed = _shadowed(context, lamps, assembly.without(own), points, normals)
+    facing = f"on surfaces that face {UPWARD_DEG:g} deg upward"
     return [
-        at_most(listed, len(faults), 0, short_list(faults)),
+        no_faults(listed, _faults(lamps, solids)),
         at_most(same, change, CHANGE, "the object is lit otherwise after its half turn"),
-        _shadow_check(
-            shadow,
-            context,
-            _shadowed(context, lamps, assembly.without(own), points, normals),
-        ),
+        _shadow_check(shadow, context, shadowed),
         informative(light, upright, "on upright surfaces in the object's room, on average"),
-        informative(
-            above, 100 * upward / upright, f"on surfaces that face {UPWARD_DEG:g} deg upward"
-        ),
+        informative(above, 100 * upward / upright, facing),
     ]
 
 
@@ -107,13 +116,9 @@ def _shadowed(
     """Share of lit surfaces whose light the turn changes by more than the limit, %."""
     angles = some_angles(context)
     angle = float(angles[len(angles) // 2])
+    edges = EdgedBodies(bodies, True), EdgedBodies(bodies, False)
     before, after = (
-        np.stack(
-            [
-                irradiance(lamps, points * turn, normals * turn, edges, angle)
-                for edges in (EdgedBodies(bodies, grazing) for grazing in (True, False))
-            ]
-        )
+        np.stack([irradiance(lamps, points * turn, normals * turn, one, angle) for one in edges])
         for turn in (np.ones(3), HALF_TURN)
     )
     greatest = np.maximum(before[1], after[1])
@@ -138,57 +143,31 @@ class EdgedBodies:
         along = unit((ends - starts).T).T
         across = unit(np.cross(along, [0.0, 0.0, 1.0]).T).T
         upward = np.cross(across, along)
-        sides = (across, -across, upward, -upward)
-        rays = np.stack(
-            [
-                self.bodies.blocked(starts + FACET_MM * to, ends + FACET_MM * to, angle)
-                for to in sides
-            ]
-        )
-        return np.asarray(rays.any(axis=0) if self.grazing else rays.all(axis=0))
+        rays = [
+            self.bodies.blocked(starts + FACET_MM * to, ends + FACET_MM * to, angle)
+            for to in (across, -across, upward, -upward)
+        ]
+        return np.asarray(np.any(rays, axis=0) if self.grazing else np.all(rays, axis=0))
 
 
-def _faults(
-    context: PrototypeContext, lamps: Lamps, solids: Mapping[str, TextSolid]
-) -> Iterator[str]:
-    """What is wrong with the lamps' figures, places and bodies."""
-    spec = context.export.spec.prototype.light
-    if lamps.strips != spec.strips:
-        yield f"{lamps.strips} strips on each, the spec has {spec.strips}"
-    strip_mm, cut_mm, _ = STRIPS[lamps.strip]
-    sides = spec.segments * cut_mm, spec.strips * strip_mm
-    if np.abs(np.subtract((lamps.length, lamps.width), sides)).max() > PLACE_MM:
-        yield f"a lamp is {lamps.length:g} x {lamps.width:g} mm, not {sides[0]:g} x {sides[1]:g}"
-    places = np.array([lamp.position for lamp in lamps.places])
-    images = IMAGES_BY_COUNT.get(len(places), IMAGES)
-    if places.shape != images.shape or np.abs(places - places[0] * images).max() > PLACE_MM:
-        yield "the lamps are no images of one another"
-    if abs(places[0, 2] - float(spec.lamp_z_mm)) > PLACE_MM:
-        yield f"the lamps are at z = {places[0, 2]:g}, the spec has {spec.lamp_z_mm:g}"
+def _faults(lamps: Lamps, solids: Mapping[str, TextSolid]) -> Iterator[str]:
+    """Lamps whose boxes do not have their shining face where the record has it, across x."""
     for lamp in lamps.places:
-        solid = solids.get(lamp.name)
-        if solid is None or not _is_body(solid, lamp.position, lamp.direction, _sides(lamps)):
+        if lamp.name not in solids:
+            yield f"{lamp.name} is not drawn"
+            continue
+        ends = solids[lamp.name].corners.min(axis=0), solids[lamp.name].corners.max(axis=0)
+        middle = np.mean(ends, axis=0)
+        middle[0] = ends[int(lamp.direction[0] > 0)][0]
+        errors = [*(middle - lamp.position), *(np.subtract(*ends)[1:] + _sides(lamps))]
+        errors += [abs(lamp.direction[0]) - 1, *lamp.direction[1:]]
+        if np.abs(errors).max() >= PLACE_MM or lamp.direction[0] * lamp.position[0] >= 0:
             yield f"{lamp.name} is drawn elsewhere"
 
 
 def _sides(lamps: Lamps) -> tuple[float, float]:
     """Of a shining face, along y and along z, mm."""
     return (lamps.length, lamps.width) if lamps.level else (lamps.width, lamps.length)
-
-
-def _is_body(
-    solid: TextSolid, position: Floats, direction: Floats, sides_mm: tuple[float, float]
-) -> bool:
-    """Whether a box has its shining face where the record has it, across x."""
-    low, high = solid.corners.min(axis=0), solid.corners.max(axis=0)
-    face = high[0] if direction[0] > 0 else low[0]
-    middle = np.array([face, *(low + high)[1:] / 2])
-    sides = np.abs((high - low)[1:] - sides_mm).max()
-    facing = abs(abs(direction[0]) - 1) + np.abs(direction[1:]).max()
-    toward = direction[0] * position[0] < 0
-    return bool(np.abs(middle - position).max() < PLACE_MM and sides < PLACE_MM) and bool(
-        facing < PLACE_MM and toward
-    )
 
 
 def _surfaces(context: PrototypeContext) -> tuple[Floats, Floats]:
@@ -212,15 +191,6 @@ def _surfaces(context: PrototypeContext) -> tuple[Floats, Floats]:
     return np.repeat(points, len(normals), axis=0), np.tile(normals, (len(points), 1))
 
 
-def _fields(
-    context: PrototypeContext, lamps: Lamps, bodies: Bodies, points: Floats, normals: Floats
-) -> Iterator[Floats]:
-    """Irradiance (n,) of the object's surfaces before and after the turn, stop by stop, lx."""
-    for angle in some_angles(context).tolist():
-        for turn in (np.ones(3), HALF_TURN):
-            yield irradiance(lamps, points * turn, normals * turn, bodies, angle)
-
-
 def irradiance(
     lamps: Lamps, points: Floats, normals: Floats, bodies: Bodies | EdgedBodies, angle: float
 ) -> Floats:
@@ -231,7 +201,7 @@ def irradiance(
     places, index = np.unique(points, axis=0, return_inverse=True)
     index = index.reshape(-1)
     total = np.zeros(len(points))
-    wide, _, lumen = STRIPS[lamps.strip]
+    wide, lumen = STRIPS[lamps.strip]
     exitance = lumen / wide
     area = lamps.width * lamps.length / (TILES[0] * TILES[1])
     for lamp in lamps.places:
@@ -250,7 +220,46 @@ def _tiles(lamps: Lamps, position: Floats, direction: Floats) -> Iterator[Floats
     """Middles (3,) of a face's tiles."""
     up, (wide, high) = np.array([0.0, 0.0, 1.0]), _sides(lamps)
     across = np.cross(up, direction)
-    for i in range(TILES[0]):
-        for j in range(TILES[1]):
-            x, z = ((i + 0.5) / TILES[0] - 0.5) * wide, ((j + 0.5) / TILES[1] - 0.5) * high
-            yield position + x * across + z * up
+    for i, j in np.ndindex(TILES):
+        x, z = ((i + 0.5) / TILES[0] - 0.5) * wide, ((j + 0.5) / TILES[1] - 0.5) * high
+        yield position + x * across + z * up
+
+
+def dark_checks(
+    names: list[CheckName], context: PrototypeContext, assembly: AssembledBodies
+) -> list[Check]:
+    """Rays of the whole sensor, at some stops: what they meet is a mirror or listed as black."""
+    if context.prototype.shroud is None:
+        return [informative(names[0], 0, "there is no shroud")]
+    black, rays = _black_bodies(context), _sensor_rays(context)
+    origin, bodies = np.broadcast_to(context.pinhole, rays.shape), assembly.without(OWN)
+    seen = Counter[str]()
+    for angle in some_angles(context).tolist():
+        for name, count in bodies.count_first(origin, rays, angle).items():
+            if name not in black and not name.startswith(MIRRORS):
+                seen[name or NOTHING] += count
+    texts = [f"{count} rays end on {name}" for name, count in sorted(seen.items())]
+    return [at_most(names[0], seen.total(), 0, short_list(texts))]
+
+
+def _black_bodies(context: PrototypeContext) -> set[str]:
+    """Names of all bodies that the record lists as matt black."""
+    record = context.prototype
+    listed = {part.name for part in record.parts if part.finish == BLACK}
+    listed |= {one.name for one in record.bought if one.finish == BLACK}
+    listed |= {one.name for one in record.fasteners if one.finish == BLACK}
+    if record.shroud and record.shroud.finish == BLACK:
+        listed |= {panel.name for panel in record.shroud.panels}
+    return listed
+
+
+def _sensor_rays(context: PrototypeContext) -> Floats:
+    """(N, 3) unit directions through evenly spaced places of the sensor, its edges included."""
+    camera = context.camera
+    half = np.tan(camera.hfov / 2)
+    across = np.linspace(-half, half, GRID)
+    ratio = camera.height / camera.width
+    down = np.linspace(-half, half, max(2, round(GRID * ratio))) * ratio
+    x, y = np.meshgrid(across, down)
+    rays = camera.forward + x[..., None] * camera.right + y[..., None] * camera.down
+    return np.ascontiguousarray(unit(rays.reshape(-1, 3).T).T)

@@ -121,12 +121,8 @@ def _outside(shell: MirrorSpheres, near: Ints, chief: Floats, out: Floats) -> Fl
 def first_mirrors(shell: MirrorSpheres, d: Floats, together: int = OUTLINE_DIRECTIONS) -> Ints:
     """(N,) the mirror that the pinhole sees first along d (3, N); -1 for none.
 
-    Beyond the seam and below the foot there is no mirror.
-
-    Args:
-        shell: the mirrors.
-        d: directions.
-        together: how many that follow each other are tried against the spheres near all of them.
+    Beyond the seam and below the foot there is no mirror. As many directions as `together` says
+    that follow each other are tried against the spheres near all of them.
     """
     toward = shell.centre - shell.pinhole[:, None]
     # A sphere about the pinhole is met by all rays.
@@ -139,11 +135,7 @@ def first_mirrors(shell: MirrorSpheres, d: Floats, together: int = OUTLINE_DIREC
 
 
 def sampled_pixels(camera: Camera) -> tuple[Floats, int]:
-    """Every k-th pixel of every k-th row, tile by tile; and k.
-
-    Returns:
-        (3, N) directions with 1 along `forward`.
-    """
+    """Directions (3, N), with 1 along `forward`, of every k-th pixel of every k-th row; and k."""
     step = max(1, int(np.sqrt(camera.width * camera.height / PIXELS)))
     rows = range(step // 2, camera.height, step)
     grid = np.stack([pixel_rows(camera, k, k + 1)[:, step // 2 :: step] for k in rows], axis=1)
@@ -174,12 +166,9 @@ def _first(shell: MirrorSpheres, toward: Floats, half: Floats, d: Floats) -> Int
 
 
 def _near(toward: Floats, half: Floats, d: Floats) -> Ints:
-    """Spheres that any of rays d may meet, at least one: those in the cone about all rays.
+    """Spheres that any of rays d (3, N) may meet, at least one: those in the cone about all rays.
 
-    Args:
-        toward: (3, m) unit directions of the centres.
-        half: (m,) angles between them and the spheres' outlines, rad.
-        d: (3, N) directions.
+    Of unit directions (3, m) of the centres, and angles (m,) from them to the outlines, rad.
     """
     rays = unit(d)
     axis = unit(rays.sum(axis=1, keepdims=True))

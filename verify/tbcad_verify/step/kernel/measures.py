@@ -19,8 +19,7 @@ from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopoDS import TopoDS_Face
 
-from tbcad_verify.step.kernel.arcs import between_arcs
-from tbcad_verify.step.kernel.topology import triple
+from tbcad_verify.step.kernel.shapes import between_arcs, triple
 from tbcad_verify.types import Floats
 
 Row = dict[str, Any]
@@ -41,10 +40,8 @@ class AreaMoments:
 def measure_face(face: TopoDS_Face, origin: Floats, gap: float = 0.0) -> tuple[Row, Floats]:
     """A face's kind, figures, area and centroid; and the moments of what it encloses.
 
-    Args:
-        face: of a solid.
-        origin: (3,) mm; errors of integration are least if it is in the middle of the solid.
-        gap: how far edges may be from where the kernel has their faces end, mm.
+    `origin`: (3,) mm; errors of integration are least if it is in the middle of the solid.
+    `gap`: how far edges may be from where the kernel has their faces end, mm.
 
     Returns:
         The figures as plain numbers, and (4,) the volume between face and origin and its first

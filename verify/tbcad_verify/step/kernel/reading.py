@@ -16,9 +16,8 @@ from OCP.STEPControl import STEPControl_Controller, STEPControl_Reader
 from OCP.TopAbs import TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopoDS import TopoDS_Shape
 
-from tbcad_verify.step.kernel.box import box
 from tbcad_verify.step.kernel.measures import measure_face
-from tbcad_verify.step.kernel.topology import corners_of, count, faces_of, open_edges
+from tbcad_verify.step.kernel.shapes import box, corners_of, count, faces_of, open_edges
 
 Row = dict[str, Any]
 

@@ -1,0 +1,128 @@
+"""Simulate photographs, and export captures for other programs."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tbcad.app.cli.app import command
+from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.common.screen import stages
+from tbcad.errors import InputError
+from tbcad.options.captures import CaptureOptions, ExportOptions, Geometry
+from tbcad.options.shared import JsonResult
+
+CAPTURES, BUILT_IN = Path("captures"), "knot"
+
+
+@command()
+def capture(
+    options: CaptureOptions,
+    mesh: Annotated[
+        bool,
+        typer.Option("--mesh", help="Trace the exported meshes instead of the recorded spheres."),
+    ] = False,
+    prototype: Annotated[
+        bool,
+        typer.Option(
+            "--prototype",
+            help="Trace the balls of the prototype, stop by stop, and merge the photographs into "
+            "those of the shell.",
+        ),
+    ] = False,
+    json: JsonResult = False,
+) -> int:
+    """Simulate the photographs of an object by both cameras through the mirrors of an export.
+
+    Writes both photographs at the full size of the sensors, and the light field: the ray, colour
+    and mirror of every pixel.
+    """
+    if mesh and prototype:
+        raise InputError("--mesh and --prototype exclude each other: leave one out")
+    from tbcad.app.api import photograph, write_photographs
+
+    name = Path(options.object_file).stem if options.object_file else BUILT_IN
+    lights, frames, out = options.lights, options.frames, Path(options.out or CAPTURES / name)
+    geometry: Geometry = "mesh" if mesh else "prototype" if prototype else "spheres"
+    with stages(3 + (lights is not None) + (frames is not None)) as screen:
+        asked = replace(options, out=out, geometry=geometry).on(screen)
+        photographs = photograph(asked)
+        record = write_photographs(photographs, asked)
+    if json:
+        print_json(record)
+        return 0
+    for camera, counts in record["cameras"].items():
+        seen, on = counts["pixels_that_see_the_capture_sphere"], counts["pixels_on_mirrors"]
+        typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
+    if reflectance := record.get("reflectance"):
+        size = (out / "reflectance.h5").stat().st_size / 1e6
+        lamps_and_rays = f"{reflectance['lamps']} lamps, {reflectance['rays']} rays"
+        typer.echo(f"{out / 'reflectance.h5'}: {lamps_and_rays}, {size:.0f} MB")
+    if frames is not None:
+        size = (out / "sequence.h5").stat().st_size / 1e6
+        typer.echo(f"{out / 'sequence.h5'}: {frames} frames, {size:.0f} MB")
+    typer.echo(f"{out}: {photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
+    return 0
+
+
+STAGES = 4
+WRITTEN = {
+    "nerfstudio": "transforms.json, images, masks and points.ply",
+    "colmap": "images, masks and the model in sparse/0, binary and text",
+    "ngp-rays": "transforms.json, and images with rays_*.dat and dynamic_mask_*.png",
+    "rays": "rays.npz and rays.h5 with origin, direction, colour and camera of every ray",
+    "mitsuba": "camera_a.xml, camera_b.xml and blender.py with their meshes",
+}
+
+NOTES = {
+    "rms_distance_from_common_point_mm": " RMS",
+    "central_error_at_capture_radius_mm": " at the ends of the capture sphere",
+}
+
+
+@command()
+def export(options: ExportOptions, json: JsonResult = False) -> int:
+    """Write virtual cameras of a capture for nerfstudio, COLMAP or instant-ngp, rays, or a scene.
+
+    Each mirror's crop is resampled to the picture of a pinhole at the point that its rays come
+    nearest to, right way round, with a mask. Prints how far rays and pinholes are apart.
+    """
+    to = options.check()
+    from tbcad.app.api import export as exported
+
+    with stages(STAGES) as screen:
+        record = exported(options.on(screen))
+    figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
+    files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
+    lines = _scene_lines(record) if to == "mitsuba" else _lines(record)
+    print_result(record, [*lines, files], json)
+    return 0
+
+
+def _scene_lines(record: dict[str, Any]) -> Iterator[str]:
+    for part, count in record["facets"].items():
+        yield f"{part}: {count} facets"
+
+
+def _lines(record: dict[str, Any]) -> Iterator[str]:
+    """What is written first, then how well pinholes fit."""
+    fit, left_out = record["fit"], len(record["left_out"])
+    size = record.get("size_px")
+    content = f"{record['rays']} rays" if size is None else f"{size} x {size} pixels each"
+    missing = f"; {left_out} mirrors give none" if left_out else ""
+    yield f"{record['virtual_cameras']} virtual cameras, {content}{missing}"
+    for text, name in (
+        ("captured rays miss the pinhole by", "rms_distance_from_common_point_mm"),
+        ("rays of the pinhole are off by", "central_error_at_capture_radius_mm"),
+        ("captured pixels are apart by", "pixel_pitch_mm"),
+    ):
+        note = NOTES.get(name, "")
+        yield f"{text} {fit[name]['median']:.2f} mm (median), {fit[name]['max']:.2f} (worst){note}"
+    errors = record.get("reprojection_error_px")
+    if errors:
+        yield (
+            f"points of the object appear {errors['median']:.3f} pixels off (median), "
+            f"{errors['percentile_95']:.3f} (95 %)"
+        )

@@ -1,0 +1,139 @@
+"""How commands end: by an interrupt, or by options that are no options."""
+
+import errno
+import os
+import re
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from tbcad.errors import ProcessLost, one_line
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+
+INTERRUPTED = 130  # exit code of a command that is stopped, from the keyboard or by a signal
+STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
+DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+IMPORTING = "<frozen importlib._bootstrap>"  # the code of imports
+AGAIN_S = 0.05
+USED_UP = (errno.EAGAIN, errno.ENOMEM, errno.ENOSPC)  # processes, memory, room on a disk
+NO_THREAD = "can't start new thread"  # Python's own words: it has no class for it
+
+
+class Stopped(Exception):
+    """A command was stopped and has kept something; its text says what, and how to go on."""
+
+
+def shortage(error: Exception) -> str | None:
+    """What the system has no more of, in a line for the screen; None: the error is another."""
+    if isinstance(error, MemoryError | ProcessLost) or str(error) == NO_THREAD:
+        reason = str(error) or "no memory"
+    elif isinstance(error, OSError) and error.errno in USED_UP:
+        reason = error.strerror or str(error)
+    else:
+        return None
+    return one_line(
+        f"this system has too few resources ({reason}): free memory and disk, allow more processes "
+        "(ulimit -u) or ask for a smaller design, and run again"
+    )
+
+
+@contextmanager
+def signals_as_interrupt() -> Iterator[None]:
+    """Let a kill or a closed terminal raise KeyboardInterrupt during the block.
+
+    A signal that is ignored, as by nohup, stays so; handlers belong to the main thread.
+    """
+    numbers = [getattr(signal, name) for name in STOPPING if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []
+    taken = {number: signal.getsignal(number) for number in numbers}
+    taken = {number: handler for number, handler in taken.items() if handler in DEFAULTS}
+    again: list[threading.Timer] = []
+    for number in taken:
+        signal.signal(number, partial(_interrupt, again))
+    try:
+        yield
+    finally:
+        for timer in again:  # the command has ended: its caller is not to be stopped
+            timer.cancel()
+        for number, handler in taken.items():
+            signal.signal(number, handler)
+
+
+def _interrupt(again: list[threading.Timer], number: int, frame: FrameType | None) -> None:
+    """Stop, but after an import: native modules that are stopped while they load hide the cause."""
+    while frame:
+        if frame.f_code.co_filename == IMPORTING:
+            timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
+            again.append(timer)
+            timer.start()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+# The typer library keeps the classes of its errors to itself: they differ in what they hold.
+_PARAMETER, _OPTION, _LIKELY = "param", "option_name", "possibilities"
+
+_EXTRA = re.compile(r"^Got unexpected extra argument\(s\) \(")
+
+
+def usage_error_text(error: typer.TyperException) -> str:
+    """Return the line for the screen, in place of typer's and pydantic's own sentences.
+
+    Args:
+        error: what typer found wrong with a command line.
+    """
+    from pydantic import ValidationError
+
+    parameter = getattr(error, _PARAMETER, None)
+    if parameter is not None and isinstance(error.__cause__, ValidationError):
+        return _wrong_value(parameter, error.__cause__)
+    if parameter is not None:
+        return f"{_name(parameter)} is missing: name the {_first_lower(parameter.help.rstrip('.'))}"
+    if likely := getattr(error, _LIKELY, None):
+        option = getattr(error, _OPTION, "")
+        return f"there is no option {option}: did you mean {' or '.join(sorted(likely))}?"
+    fault = _EXTRA.sub("too many arguments: ", error.message.rstrip(".)"))
+    fault = _first_lower(fault).replace(". Did", ": did")
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "tbcad"
+    return f"{fault or 'no command is named'}: see {command} --help"
+
+
+def _wrong_value(parameter: Any, error: "ValidationError") -> str:
+    from tbcad.core.spec.errors import short_text
+
+    given = error.errors(include_url=False)[0]["input"]
+    return f"{_name(parameter)} is {short_text(given)}, allowed is {_allowed(parameter)}: change it"
+
+
+def _allowed(parameter: Any) -> str:
+    from annotated_types import Ge, Le
+
+    from tbcad.core.spec.errors import allowed_text
+
+    kind, limits = parameter.type_descriptor, parameter.type_descriptor.parameter_info
+    between = [
+        limit(bound) for limit, bound in ((Ge, limits.min), (Le, limits.max)) if bound is not None
+    ]
+    return " or ".join(kind.choices) if kind.is_choice else allowed_text(kind.annotation, between)
+
+
+def _name(parameter: Any) -> str:
+    """An option as it is written, its long form; an argument as the help calls it."""
+    options = [name for name in parameter.opts if name.startswith("-")]
+    return str(max(options, key=len, default=parameter.display_name_raw))
+
+
+def _first_lower(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,240 @@
+"""Named, coloured solids in groups, as prototype.step (one tree) and prototype.glb (to look at).
+
+Both have the same bytes each time; glTF demands metres and y up.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import trimesh
+from OCP.BRep import BRep_Builder
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
+from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape, TopoDS_Solid
+from OCP.XCAFDoc import XCAFDoc_DocumentTool
+from OCP.XSControl import XSControl_WorkSession
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from tbcad.cad.formats.step import (
+    StepError,
+    finish,
+    kernel_settings,
+    new_document,
+    write_header,
+)
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.meshing import meshed
+from tbcad.cad.kernel.solids import moved, solids
+from tbcad.common.colours import srgb_light
+from tbcad.types import Floats
+
+Colour: TypeAlias = tuple[float, float, float, float]
+"""Red, green, blue (sRGB) and opacity, from 0 to 1."""
+
+
+DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25  # of meshes that are only looked at
+# Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
+UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
+METAL, ROUGH = 0.1, 0.6
+
+
+@dataclass(frozen=True)
+class ColouredSolid:
+    """One solid."""
+
+    name: str  # unique in the assembly
+    shape: TopoDS_Solid  # in its place, the base at angle zero
+    colour: Colour  # red, green, blue (sRGB) and opacity, from 0 to 1
+    mesh: Mesh | None = None  # of the shape; None where none is known
+
+    def copy(self, name: str, axes: Floats, origin: Floats) -> "ColouredSolid":
+        """One like it under another name, moved: axes are what x, y and z become, as rows."""
+        mesh = self.mesh and Mesh(self.mesh.vertices @ axes + origin, self.mesh.triangles)
+        return ColouredSolid(name, solids(moved(self.shape, axes, origin))[0], self.colour, mesh)
+
+
+@dataclass(frozen=True)
+class SolidGroup:
+    """Bodies that belong together."""
+
+    name: str
+    bodies: tuple[ColouredSolid, ...]
+
+
+@dataclass(frozen=True)
+class ColouredMesh:
+    """What is seen of one solid: name and colour as of `ColouredSolid`."""
+
+    name: str
+    mesh: Mesh
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class MeshGroup:
+    """Meshes that belong together."""
+
+    name: str
+    bodies: tuple[ColouredMesh, ...]
+
+
+def mesh_groups(groups: Sequence[SolidGroup]) -> list[MeshGroup]:
+    """What is seen of groups of solids, without shapes of the kernel."""
+    return [MeshGroup(group.name, tuple(map(_drawn, group.bodies))) for group in groups]
+
+
+def _drawn(body: ColouredSolid) -> ColouredMesh:
+    return ColouredMesh(body.name, body.mesh or display_mesh(body.shape), body.colour)
+
+
+def display_mesh(shape: TopoDS_Solid) -> Mesh:
+    """A coarse mesh, to be looked at."""
+    return meshed(shape, DISPLAY_MM, DISPLAY_ANGLE)
+
+
+@kernel_settings()
+def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
+    """Write groups of bodies as one AP214 assembly in millimetres, all solids in their places.
+
+    The kernel writes colours in the order of addresses in memory, so they are written here.
+    StepError if the kernel fails, OSError if the file cannot be written in full.
+    """
+    document = _document(name, groups)
+    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
+    writer.SetColorMode(False)
+    writer.SetNameMode(True)
+    if not writer.Transfer(document, STEPControl_AsIs):
+        raise StepError(f"{path.name}: the kernel cannot translate the assembly")
+    step_writer = writer.ChangeWriter()
+    _number_occurrences(step_writer)
+    write_header(step_writer, name)
+    colours = _colours(step_writer, [body for group in groups for body in group.bodies])
+    finish(path, writer, lambda _: colours)
+
+
+def _document(name: str, groups: Sequence[SolidGroup]) -> TDocStd_Document:
+    """The tree of named solids as cadquery's `Assembly` has it, which takes longer to load."""
+    document = new_document()
+    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    tool.SetAutoNaming_s(False)
+    top = _named(tool.NewShape(), name)
+    for group in groups:
+        branch = _named(tool.NewShape(), group.name)
+        for body in group.bodies:
+            part = _named(tool.NewShape(), body.name)
+            tool.SetShape(part, _compound(body.shape))
+            _named(tool.AddComponent(branch, part, TopLoc_Location()), body.name)
+        tool.AddComponent(top, branch, TopLoc_Location())
+    tool.UpdateAssemblies()
+    return document
+
+
+def _named(label: TDF_Label, name: str) -> TDF_Label:
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+    return label
+
+
+def _compound(shape: TopoDS_Shape) -> TopoDS_Compound:
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    builder.Add(compound, shape)
+    return compound
+
+
+def _number_occurrences(writer: STEPControl_Writer) -> None:
+    """Number and name the occurrences; the kernel counts on from file to file."""
+    model, count = writer.Model(), 0
+    for k in range(1, model.NbEntities() + 1):
+        entity = model.Value(k)
+        if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
+            count += 1
+            entity.SetId(TCollection_HAsciiString(str(count)))
+            entity.SetName(entity.RelatedProductDefinition().Formation().OfProduct().Name())
+
+
+def _colours(writer: STEPControl_Writer, bodies: Sequence[ColouredSolid]) -> str:
+    """Styled items of all bodies (CAx-IF, Recommended Practices for Model Styling, section 4)."""
+    styles, model = STEPConstruct_Styles(writer.WS()), writer.Model()
+    # The binding's model.Number finds nothing; the same entity is the same object here, though.
+    entities = [model.Value(k) for k in range(1, model.NbEntities() + 1)]
+    place = {id(entity): k for k, entity in enumerate(entities, 1)}
+    number = len(entities) + 1
+    lines, items = [], []
+    for body in bodies:
+        entity = STEPConstruct.FindEntity_s(styles.FinderProcess(), body.shape)
+        if id(entity) not in place:
+            raise StepError(f"the kernel lost {body.name}")
+        style = list(_style(number, place[id(entity)], body.colour))
+        items.append(f"#{number}")
+        number += len(style)
+        lines += style
+    context = place[id(styles.FindContext(bodies[0].shape))]
+    drawn, listed = "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION", ",\n".join(items)
+    lines.append(f"#{number}={drawn}('',\n({listed}),#{context});")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _style(first: int, item: int, colour: Colour) -> Iterator[str]:
+    """Entities from number first on that give an item its colour, the first the styled item."""
+    *mixed, opaque = (f"{value:.6f}" for value in colour)
+    yield f"#{first}=STYLED_ITEM('color',(#{first + 1}),#{item});"
+    yield f"#{first + 1}=PRESENTATION_STYLE_ASSIGNMENT((#{first + 2}));"
+    yield f"#{first + 2}=SURFACE_STYLE_USAGE(.BOTH.,#{first + 3});"
+    clear = float(opaque) < 1
+    rendered = f",#{first + 8}" if clear else ""
+    yield f"#{first + 3}=SURFACE_SIDE_STYLE('',(#{first + 4}{rendered}));"
+    yield f"#{first + 4}=SURFACE_STYLE_FILL_AREA(#{first + 5});"
+    yield f"#{first + 5}=FILL_AREA_STYLE('',(#{first + 6}));"
+    yield f"#{first + 6}=FILL_AREA_STYLE_COLOUR('',#{first + 7});"
+    yield f"#{first + 7}=COLOUR_RGB('',{','.join(mixed)});"
+    if clear:
+        properties = f"(#{first + 9})"
+        yield (
+            f"#{first + 8}=SURFACE_STYLE_RENDERING_WITH_PROPERTIES(.NORMAL_SHADING.,"
+            f"#{first + 7},{properties});"
+        )
+        yield f"#{first + 9}=SURFACE_STYLE_TRANSPARENT({1 - float(opaque):.6f});"
+
+
+def write_glb(path: Path, name: str, groups: Sequence[MeshGroup]) -> None:
+    """Write groups of meshes as a binary glTF 2.0 file, a node for each group and each mesh."""
+    scene = trimesh.Scene(base_frame="world")
+    scene.graph.update(name, "world", matrix=UPRIGHT)
+    for group in groups:
+        scene.graph.update(group.name, name, matrix=np.eye(4))
+        for body in group.bodies:
+            scene.add_geometry(
+                _drawn_in_glb(body),
+                node_name=body.name,
+                geom_name=body.name,
+                parent_node_name=group.name,
+            )
+    # Without normals viewers must shade each facet flat (glTF 2.0, 3.7.2.1), as it is.
+    path.write_bytes(export_glb(scene, include_normals=False))
+
+
+def _drawn_in_glb(body: ColouredMesh) -> trimesh.Trimesh:
+    drawn = trimesh.Trimesh(body.mesh.vertices, body.mesh.triangles, process=False)
+    drawn.visual = TextureVisuals(
+        material=PBRMaterial(
+            name=body.name,
+            # light, not its code (glTF 2.0, 3.9.2)
+            baseColorFactor=[*srgb_light(np.array(body.colour[:3])), body.colour[3]],
+            metallicFactor=METAL,
+            roughnessFactor=ROUGH,
+            alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",
+        )
+    )
+    return drawn

@@ -1,1 +1,0 @@
-"""Pictures: raw, TIFF, OpenEXR, Radiance, PNG."""

@@ -1,1 +1,0 @@
-"""Results as tables, plots and the files of a study."""

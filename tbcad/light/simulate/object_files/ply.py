@@ -1,0 +1,249 @@
+"""PLY files (G. Turk, The PLY Polygon File Format, 1994), text and binary, with their colours."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tbcad.errors import InputError
+from tbcad.light.simulate.object_files.contents import (
+    ObjectFile,
+    ObjectPart,
+    shown_shares,
+    texture_beside,
+    triangles,
+    without_facets,
+)
+from tbcad.types import Floats, Ints
+
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+MOST_ENTRIES = 1 << 20  # of a list
+Values: TypeAlias = NDArray[Any]
+COLOURS = (("red", "green", "blue"), ("r", "g", "b"),
+           ("diffuse_red", "diffuse_green", "diffuse_blue"))  # fmt: skip
+COORDINATES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"))
+CORNERS = ("vertex_indices", "vertex_index")
+KNOWN = {*"xyz", "nx", "ny", "nz", "alpha", "a", "diffuse_alpha", "texcoord", "texnumber", "flags",
+         "quality", "confidence", *CORNERS, *sum(COLOURS, ()), *sum(COORDINATES, ())}  # fmt: skip
+
+
+class _Property(NamedTuple):
+    name: str
+    kind: str
+    length: str | None  # type of the length of a list
+
+
+class _Element(NamedTuple):
+    name: str
+    length: int
+    properties: list[_Property]
+
+
+class List(NamedTuple):
+    """Lists: their lengths (n,), and all values one after the other."""
+
+    counts: Ints
+    values: Values
+
+
+Table = dict[str, Any]  # columns by name: Values or List
+
+
+def read_tables(data: bytes) -> tuple[dict[str, Table], list[str]]:
+    """Tables by the name of their element, and the names of textures in comments.
+
+    InputError: it is no PLY file, or cut off.
+    """
+    encoding, elements, textures, at = _header(data)
+    order = ENCODINGS[encoding]
+    if encoding == "ascii":  # as if all of its numbers were stored as real ones
+        data, at = np.array(data[at:].split(), dtype=np.float64).tobytes(), 0
+    tables = dict[str, Table]()
+    for one in elements:
+        tables[one.name], at = _table(one, data, at, order)
+    return tables, textures
+
+
+def _header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
+    """Encoding, elements, names of textures, and where the header ends."""
+    if not data.startswith(b"ply") or (end := data.find(b"end_header")) < 0:
+        raise InputError("it has no header of a PLY file")
+    start = data.find(b"\n", end) + 1 or len(data)
+    if data[end + 10 : end + 11] == b"\r" and data[end + 11 : end + 12] != b"\n":
+        start = end + 11
+    encoding, elements, textures = "", [], list[str]()
+    for line in data[:end].decode("latin-1").splitlines()[1:]:
+        match line.split():
+            case ["format", name, *_]:
+                encoding = name
+            case ["element", name, length]:
+                elements.append(_Element(name, int(length), []))
+            case ["property", "list", count, kind, name]:
+                elements[-1].properties.append(_Property(name.lower(), TYPES[kind], TYPES[count]))
+            case ["property", kind, name]:
+                elements[-1].properties.append(_Property(name.lower(), TYPES[kind], None))
+            case ["comment", word, *_] if word.lower() == "texturefile":
+                textures.append(line.split(None, 2)[2].strip())
+            case ["comment" | "obj_info", *_] | []:
+                pass
+            case _:
+                raise InputError(f"its header has a line that is not understood: {line!r:.60}")
+    if encoding not in ENCODINGS:
+        raise InputError(f"its format is {encoding!r:.40}: allowed is {', '.join(ENCODINGS)}")
+    return encoding, elements, textures, start
+
+
+def _table(one: _Element, data: bytes, at: int, order: str) -> tuple[Table, int]:
+    """Columns of an element at a place in the data, and where it ends.
+
+    At once where all its lists are as long as those of the first row, else row by row.
+    """
+    if one.length == 0:
+        none = List(np.zeros(0, dtype=np.int64), np.zeros(0))
+        return {name: none if length else none.values for name, _, length in one.properties}, at
+    try:
+        found, end = _rows(one, one.length, data, at, order)
+        lists = (column for column in found.values() if isinstance(column, List))
+        if all((column.counts == column.counts[0]).all() for column in lists):
+            return found, end
+    except InputError:
+        pass  # where lists differ in length, the first says nothing of the others
+    parts = []
+    for _ in range(one.length):
+        part, at = _rows(one, 1, data, at, order)
+        parts.append(part)
+    return {name: _joined([part[name] for part in parts]) for name, _, _ in one.properties}, at
+
+
+def _rows(one: _Element, count: int, data: bytes, at: int, order: str) -> tuple[Table, int]:
+    """Columns of rows that are all as the first, and where they end."""
+    fields = list[Any]()
+    for k, (name, kind, length) in enumerate(one.properties):
+        if length is None:
+            fields.append((f"{k}", _stored(kind, order)))
+            continue
+        size = _first(data, at + np.dtype(fields).itemsize, _stored(length, order))
+        if not 0 <= size <= MOST_ENTRIES:
+            raise InputError(f"its list {name} has {size} entries: it is damaged")
+        fields += [(f"{k}n", _stored(length, order)), (f"{k}", _stored(kind, order), (size,))]
+    row = np.dtype(fields)
+    end = at + count * row.itemsize
+    if end > len(data):
+        raise InputError("it is cut off: copy it again")
+    table, columns = np.frombuffer(data, row, count, at), Table()
+    for k, (name, kind, length) in enumerate(one.properties):
+        values = table[f"{k}"].astype(kind)
+        columns[name] = List(table[f"{k}n"].astype(np.int64), values.ravel()) if length else values
+    return columns, end
+
+
+def _stored(kind: str, order: str) -> str:
+    return order + kind if order else "f8"
+
+
+def _first(data: bytes, at: int, kind: str) -> int:
+    """The number at a place."""
+    try:
+        return int(np.frombuffer(data, kind, 1, at)[0])
+    except ValueError:
+        raise InputError("it is cut off: copy it again") from None
+
+
+def _joined(parts: list[Any]) -> Values | List:
+    if not isinstance(parts[0], List):
+        return np.concatenate(parts)
+    return List(*(np.concatenate([part[k] for part in parts]) for k in range(2)))
+
+
+def read_ply(path: Path) -> ObjectFile:
+    """Read a mesh; InputError: it is no PLY file, cut off, or without facets."""
+    tables, textures = read_tables(path.read_bytes())
+    vertex, face = tables.get("vertex", {}), tables.get("face", {})
+    if not {*"xyz"} <= vertex.keys():
+        raise InputError("its vertices have no x, y, z")
+    points = _stack(vertex, tuple("xyz"))
+    corners = next((face[name] for name in CORNERS if isinstance(face.get(name), List)), None)
+    if corners is None or len(corners.counts) == 0:
+        raise without_facets(len(points))
+    index = corners.values.astype(np.int64)
+    if len(index) and not (index.min() >= 0 and index.max() < len(points)):
+        raise InputError("its facets name corners that do not exist: it is damaged")
+    cut, polygon = triangles(corners.counts, points[index])
+    faces = index[cut]
+    notes = list[str]()
+    normals = _stack(vertex, ("nx", "ny", "nz")) if "nz" in vertex else None
+    colours, source = _colours(vertex, face, faces, polygon, notes)
+    uv = _coordinates(vertex, face, corners.counts, cut, faces)
+    whole = ObjectPart(points, faces, normals, colours, source=source)
+    number = face.get("texnumber", np.zeros(len(corners.counts)))[polygon].astype(np.int64)
+    parts = _textured(path, whole, uv, number, textures, notes)
+    if not any(part.source for part in parts) and (unknown := sorted({*vertex, *face} - KNOWN)):
+        notes.append(f"its properties {', '.join(unknown)} are not understood")
+    return ObjectFile(parts, notes)
+
+
+def _stack(table: Mapping[str, Values], names: tuple[str, ...]) -> Floats:
+    return np.column_stack([table[name] for name in names]).astype(np.float64)
+
+
+def _colours(
+    vertex: Mapping[str, Values], face: Mapping[str, Any], faces: Ints, polygon: Ints,
+    notes: list[str],
+) -> tuple[Floats | None, str]:  # fmt: skip
+    """Colours (f, 3, 3), and whose they are."""
+    for where, table in (("vertex", vertex), ("face", face)):
+        names = next((names for names in COLOURS if {*names} <= table.keys()), None)
+        if names is None:
+            continue
+        alpha = [table[n] for n in ("alpha", "a", "diffuse_alpha") if n in table]
+        if alpha and (shown_shares(alpha[0]) < 1).any():
+            notes.append("its transparency is left out")
+        shares = shown_shares(np.column_stack([table[name] for name in names]))
+        if where == "vertex":
+            return shares[faces], "vertex colours"
+        return np.repeat(shares[polygon][:, None], 3, axis=1), "face colours"
+    return None, ""
+
+
+def _coordinates(
+    vertex: Mapping[str, Values], face: Mapping[str, Any], counts: Ints, cut: Ints, faces: Ints
+) -> Floats | None:
+    """Places (f, 3, 2) of the facets' corners on a texture."""
+    lists = face.get("texcoord")
+    if isinstance(lists, List) and np.array_equal(lists.counts, 2 * counts):
+        return lists.values.reshape(-1, 2).astype(np.float64)[cut]
+    names = next((names for names in COORDINATES if {*names} <= vertex.keys()), None)
+    return None if names is None else _stack(vertex, names)[faces]
+
+
+def _textured(
+    path: Path, whole: ObjectPart, uv: Floats | None, number: Ints, textures: list[str],
+    notes: list[str],
+) -> list[ObjectPart]:  # fmt: skip
+    """The mesh by its textures; colours stay where there is none."""
+    if uv is None or not textures:
+        if uv is not None:
+            notes.append("it has texture coordinates, but names no texture (comment TextureFile)")
+        elif textures:
+            notes.append(f"it names the texture {textures[0]}, but has no texture coordinates")
+        return [whole]
+    parts = []
+    for k in np.unique(number).tolist():
+        own = number == k
+        name = textures[k] if 0 <= k < len(textures) else textures[0]
+        picture = texture_beside(path, name, notes)
+        colours = None if whole.colours is None else whole.colours[own]
+        part = replace(whole, faces=whole.faces[own], colours=colours)
+        if picture is not None:
+            part = replace(part, colours=None, uv=uv[own], picture=picture,
+                           source=f"texture {Path(name).name}")  # fmt: skip
+        parts.append(part)
+    return parts

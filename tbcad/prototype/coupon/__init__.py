@@ -1,1 +1,0 @@
-"""A part printed first, to try seats and fits."""

@@ -1,0 +1,314 @@
+"""The electronics: outputs of the controller, resistors of LEDs, and what is wired, line by line.
+
+A light's circuit: supply, resistor, LED, switch module to ground. An LED's two wires go from its
+pocket through the grooves of arm and crown, down the post, and out of the foot's channel, to a
+connector; resistors (IEC 60063) and switch modules are beside the controller.
+
+GRBL 1.1 has two outputs only, for spindle and coolant. grblHAL, FluidNC and LinuxCNC number digital
+outputs from 0 and switch them by M64 P (on) and M65 P (off), at once when the line is read; a dwell
+before makes the line wait until the base is at rest.
+Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.cad.formats.checked_files import Row
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import MotionSpec, PrototypeSpec, StageSpec
+from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
+from tbcad.prototype.stage import crown
+from tbcad.prototype.stage.layout import StageLayout
+from tbcad.records.prototype_drive import Phase
+
+LAMP_OUTPUT, LAMP = 0, "lamp"
+MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most
+DARK, LIT = "dark", "lit"
+# Two digits of each decade.
+E24 = (
+    *(10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30),
+    *(33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91),
+)
+DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
+ROUNDING = 1e-9
+COLUMNS = (
+    *("line", "signal", "part", "output", "on", "off", "connector", "pins", "supply_v"),
+    *("forward_v", "resistor", "resistor_ohm", "current_ma", "dissipation_w", "wire"),
+    *("length_mm", "path"),
+)
+MAX_FILL = 0.5  # of a bore's section by wires as squares, so that they can be pulled through
+LEAD_MM = 1000.0  # from the foot of the stage to the controller
+CHANNEL_MM = 45.0  # from the post's axis out of the foot's channel, with room for the connector
+CUT_MM = 50.0  # wires are cut to multiples of this
+METRE_MM = 1000.0
+MA_PER_A = 1000.0
+WIRES = 2  # of an LED
+SWITCH_MODULE = "MOSFET"
+PATH = "grooves of arm and crown, bore of crown and post, channel of the stage's foot, controller"
+BOARD = "board"  # connector: terminals of the controller
+CABLE, CABLE_MM = "CABLE-2x0.25", 1500.0  # to lamps, camera's release and switch
+BETWEEN_LAMPS_MM = 500.0  # of cable from one lamp to the next
+LAMP_PATH = "from lamp to lamp, all in parallel, then to the controller"
+ON_CABLE: Row = {"wire": CABLE, "length_mm": CABLE_MM, "connector": BOARD}
+RELEASE: Row = ON_CABLE | {
+    **{"signal": "release", "part": "RELAY", "output": "coolant", "on": "M8", "off": "M9"},
+    "path": "relay, camera's release",
+}
+HOME: Row = ON_CABLE | {
+    **{"signal": "home", "part": "SWITCH-SS-5GL2"},
+    "path": "common and normally closed contact of the switch, input and ground",
+}
+MOTOR: Row = {
+    "signal": "motor",
+    "connector": BOARD,
+    "pins": "A+ A- B+ B-",
+    "path": "the motor's own wires; a few ohm are between the two of a coil",
+}
+FUSE, SUPPLY_V = "FUSE-2A", 24.0
+SUPPLY: Row = ON_CABLE | {
+    **{"signal": "supply", "part": "SUPPLY-24V", "output": "supply"},
+    **{"connector": FUSE, "pins": "+ -", "supply_v": SUPPLY_V},
+    "path": "plus by the fuse to controller, lamps and resistors; minus to controller and all "
+    "switch modules: one ground",
+}
+
+
+def lights(leds: int, motion: MotionSpec) -> dict[str, int]:
+    """Digital outputs of lamp and LEDs, rising; none with GRBL 1.1, which cannot switch them.
+
+    Raises:
+        SpecError: when no controller has so many outputs.
+    """
+    if motion.controller == "grbl":
+        return {}
+    if leds >= MAX_OUTPUTS:
+        raise SpecError(
+            f"prototype.stage.leds_mm has {leds} LEDs, but a controller switches {MAX_OUTPUTS} "
+            f"outputs, one of them for the lamp: use at most {MAX_OUTPUTS - 1} LEDs, or set "
+            "prototype.motion.controller to grbl and switch them by hand"
+        )
+    return {LAMP: LAMP_OUTPUT} | {f"led_{i}": LAMP_OUTPUT + i for i in range(1, leds + 1)}
+
+
+def phases(leds: int, motion: MotionSpec) -> tuple[Phase, ...]:
+    """The photographs of a stop in order: dark, every LED alone, the object lit.
+
+    Without outputs there is one, with the lamp on all the time.
+
+    Raises:
+        SpecError: when no controller has so many outputs.
+    """
+    if not (switched := lights(leds, motion)):
+        return (Phase(name=LIT, output=None),)
+    lit = Phase(name=LIT, output=switched.pop(LAMP))
+    alone = (Phase(name=name, output=output) for name, output in switched.items())
+    return (Phase(name=DARK, output=None), *alone, lit)
+
+
+@dataclass(frozen=True)
+class SeriesResistor:
+    """A resistor in series with an LED."""
+
+    part: PurchasedPart  # to buy; its name has value and rating
+    ohm: float  # value
+    current_ma: float  # that the LED gets, mA
+    dissipation_w: float  # of the resistor while the LED is on, W
+
+
+def e24_at_least(ohm: float) -> float:
+    """The smallest value of the series that is no smaller than a resistance (ohm)."""
+    decade = 10.0 ** (math.floor(math.log10(ohm)) - 1)
+    values = (round(digits * step, 9) for step in (decade, 10 * decade) for digits in E24)
+    return next(value for value in values if value >= ohm * (1 - ROUNDING))
+
+
+def series_resistor(
+    led: PurchasedPart, max_ma: float, supply_v: float, parts: Parts
+) -> SeriesResistor:
+    """The resistor with which an LED gets a current (mA), or a little less, from a supply (V).
+
+    Raises:
+        SpecError: when the LED bears less, the supply is too low, or no resistor is large enough.
+    """
+    forward = led["forward_v"]
+    if max_ma > led["max_ma"]:
+        raise SpecError(
+            f"prototype.stage.led_ma {max_ma:g} is more than {led.name} bears: make it "
+            f"{led['max_ma']:g} or less"
+        )
+    if supply_v <= forward:
+        raise SpecError(
+            f"prototype.stage.led_supply_v {supply_v:g} does not light {led.name} of {forward:g} "
+            f"V: make it greater than {forward:g}"
+        )
+    ohm = e24_at_least((supply_v - forward) / max_ma * 1e3)
+    current = (supply_v - forward) / ohm
+    dissipation = current**2 * ohm
+    rated = _rated(DERATING * dissipation, parts)
+    part = replace(
+        rated, name=f"{rated.name}-{ohm:g}", what=f"{rated.what}, {ohm:g} ohm of the series E24"
+    )
+    return SeriesResistor(part, ohm, current * 1e3, dissipation)
+
+
+def _rated(watts: float, parts: Parts) -> PurchasedPart:
+    """The smallest resistor that is rated for a power."""
+    enough = [part for part in of_kind(parts, "resistors") if part["power_w"] >= watts]
+    if not enough:
+        raise SpecError(
+            f"no resistor of {watts:.1f} W is in resistors.csv: make prototype.stage.led_ma or "
+            "prototype.stage.led_supply_v smaller"
+        )
+    return min(enough, key=lambda part: part["power_w"])
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """The electronics of a stage."""
+
+    lights: dict[str, int]  # that the controller switches, and their outputs
+    leds: int  # number of LEDs
+    led: PurchasedPart  # the purchased part
+    supply_v: float  # of lamp and LEDs
+    resistor: SeriesResistor | None  # in series with each LED; None without LEDs
+    connector: PurchasedPart | None  # of the LEDs' cable; None without LEDs
+    wire: PurchasedPart | None  # of the LEDs; None without LEDs
+    lengths: tuple[float, ...]  # of each LED's cable to the controller, mm
+    trigger: bool  # whether a relay releases the camera
+    axis: str  # of the controller
+
+    @property
+    def parts(self) -> Parts:
+        """Parts that no list has by this name: the resistor of a value."""
+        return {self.resistor.part.name: self.resistor.part} if self.resistor else {}
+
+    def purchased(self, lamps: LampLayout | None) -> dict[str, int]:
+        """Quantity of purchased parts by name; without LEDs; of wire, in metres."""
+        counts = Counter({SWITCH_MODULE: len(self.lights)})
+        if self.resistor and self.connector and self.wire:
+            counts[self.resistor.part.name] += self.leds
+            counts[self.connector.name] += 1
+            counts[self.wire.name] += math.ceil(WIRES * sum(self.lengths) / METRE_MM)
+        # Of supply, switch and release.
+        cable = (2 + self.trigger) * CABLE_MM + lamp_cable_mm(lamps)
+        counts[CABLE] += math.ceil(cable / METRE_MM)
+        return dict(+counts)
+
+
+def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiring:
+    """The electronics of a stage.
+
+    Raises:
+        SpecError: when LEDs are too many, or not to be had with this current, supply or bore.
+    """
+    count, section = len(stage.leds), spec.stage
+    resistor = connector = wire = None
+    if count:
+        resistor = series_resistor(stage.led, section.led_ma, section.led_supply_v, parts)
+        hint = "use fewer LEDs in prototype.stage.leds_mm"
+        key, pins = "prototype.stage.leds_mm", WIRES * count
+        connector = choose_part(parts, "connectors", key, hint, "pins", pins=pins)
+        wire = _wire(section, stage, resistor.current_ma, parts)
+    return Wiring(
+        lights=lights(count, spec.motion),
+        leds=count,
+        led=stage.led,
+        supply_v=section.led_supply_v,
+        resistor=resistor,
+        connector=connector,
+        wire=wire,
+        lengths=_lengths(spec, stage),
+        trigger=spec.motion.trigger == "coolant",
+        axis=spec.motion.axis,
+    )
+
+
+def lamp_cable_mm(lamps: LampLayout | None) -> float:
+    """Length of the cable to the lamps, mm."""
+    return CABLE_MM + (BETWEEN_LAMPS_MM * (len(lamps.places) - 1) if lamps else 0.0)
+
+
+def wiring_rows(wiring: Wiring, lamps: LampLayout | None, drive: Drive) -> list[Row]:
+    """One row for each line of the controller: lights by output, release, switch, motor, supply."""
+    rows = [_row(_lamp_cells(wiring, lamps), wiring.lights)]
+    rows += [_row(_led_cells(wiring, i), wiring.lights) for i in range(wiring.leds)]
+    if wiring.trigger:
+        rows.append(RELEASE)
+    motor = {"part": drive.motor.name, "output": f"driver {wiring.axis}"}
+    rows.append(HOME | {"output": f"limit {wiring.axis}"})
+    # A rotary stage's current is its maker's.
+    rows += [MOTOR | motor | {"current_ma": drive.rated_current * MA_PER_A or None}, SUPPLY]
+    empty: Row = dict.fromkeys(COLUMNS)
+    return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
+
+
+def _row(cells: Row, outputs: dict[str, int]) -> Row:
+    """A light's row, with what switches it; without an output it is switched by hand."""
+    output = outputs.get(str(cells["signal"]))
+    if output is None:
+        return {"connector": BOARD, "output": "by hand", **cells}
+    on, off = f"M64 P{output}", f"M65 P{output}"
+    return {"connector": BOARD, "output": f"digital {output}", "on": on, "off": off, **cells}
+
+
+def _lamp_cells(wiring: Wiring, lamps: LampLayout | None) -> Row:
+    """The lamps' line; without lamps it is that of a lamp of the user's own."""
+    cable: Row = {"signal": LAMP, "wire": CABLE, "length_mm": lamp_cable_mm(lamps)}
+    if lamps is None:
+        return {**cable, "part": "lamp", "supply_v": wiring.supply_v}
+    strip: Row = {"part": lamps.strip.name, "supply_v": lamps.strip["supply_v"]}
+    return {**cable, **strip, "current_ma": lamps.current_ma, "path": LAMP_PATH}
+
+
+def _led_cells(wiring: Wiring, index: int) -> Row:
+    resistor, connector, wire = wiring.resistor, wiring.connector, wiring.wire
+    assert resistor
+    assert connector
+    assert wire
+    first = WIRES * index + 1
+    return {
+        "signal": f"led_{index + 1}",
+        "part": wiring.led.name,
+        "connector": connector.name,
+        "pins": f"{first} {first + 1}",  # anode, cathode
+        "supply_v": wiring.supply_v,
+        "forward_v": wiring.led["forward_v"],
+        "resistor": resistor.part.name,
+        "resistor_ohm": resistor.ohm,
+        "current_ma": resistor.current_ma,
+        "dissipation_w": resistor.dissipation_w,
+        "wire": wire.name,
+        "length_mm": wiring.lengths[index],
+        "path": PATH,
+    }
+
+
+def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Parts) -> PurchasedPart:
+    """The thickest wire of which an LED's two go through a groove, and all through the bore."""
+    wires, bore = WIRES * len(stage.leds), 2 * stage.sizes.wire
+    groove = min(crown.ARM_GROOVE_MM, crown.GROOVE_MM, section.wire_mm / WIRES)
+    thickest = min(groove, bore * math.sqrt(MAX_FILL / wires))
+    fitting = [
+        wire
+        for wire in of_kind(parts, "wires")
+        if wire["outer_mm"] <= thickest and wire["max_ma"] >= current_ma
+    ]
+    if not fitting:
+        raise SpecError(
+            f"{wires} wires of LEDs do not fit through the crown's bore of {bore:.1f} mm: use "
+            "fewer LEDs in prototype.stage.leds_mm, or set it to []"
+        )
+    return max(fitting, key=lambda wire: wire["outer_mm"])
+
+
+def _lengths(spec: PrototypeSpec, stage: StageLayout) -> tuple[float, ...]:
+    """Length of each LED's cable: down to its groove, inward, down the post, to the controller."""
+    way = norm(stage.leds[:, :2]) + stage.leds[:, 2] - spec.frame.floor_mm
+    total = way + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
+    return tuple((CUT_MM * np.ceil(total / CUT_MM)).tolist())

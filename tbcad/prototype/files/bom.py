@@ -1,0 +1,270 @@
+"""bom.csv: everything to buy and to print."""
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tbcad.cad.formats.checked_files import Row
+from tbcad.core.spec.csv_rows import read_rows
+from tbcad.core.spec.errors import SpecError, short_text
+from tbcad.errors import InputError
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.purchased.parts import Parts, Price, Prices
+
+# A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
+STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
+NAME = "bom.csv"
+PRICE_COLUMNS = ("unit_price", "total_price", "currency", "price_date", "price_source")
+COLUMNS = (
+    *("item", "quantity", "part", "what", "standard", "material", "mass_g", "total_mass_g"),
+    *("print_volume_mm3", "filament_g", "print_hours"),
+    *PRICE_COLUMNS,
+    "from",
+)
+WHOLE = ("item", "quantity", "print_volume_mm3")
+NUMBERS = (*WHOLE, "mass_g", "total_mass_g", "filament_g", "print_hours", *PRICE_COLUMNS[:2])
+ALWAYS = {"FUSE-2A": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
+PRINT_MATERIAL, CAP_MATERIAL = "PETG", "resin"
+GRAM_DECIMALS, CENTS = 2, 2
+ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 g
+LIGHT_G = 0.1
+KINDS = BOUGHT, PRINTED = "bought", "printed"
+MM3_PER_CM3 = 1000.0
+SHOWN = 6  # rows without --full
+WHAT, PART = 34, 17  # columns, of the 80 of a terminal
+DAY_H, KG_G = 24.0, 1000.0
+
+
+def standard_in(what: str) -> str:
+    """The first standard that a description names; empty without any."""
+    found = STANDARD.search(what)
+    return found[0] if found else ""
+
+
+@dataclass(frozen=True)
+class PrintedItem:
+    """A part to be printed."""
+
+    name: str  # of the part and of its files
+    what: str  # it is for
+    volume: float  # mm^3
+    estimate: tuple[float, float]  # of its print: filament in mm^3, hours
+    material: str = PRINT_MATERIAL  # of it
+
+
+def bom_rows(
+    prototype: PrototypeLayout,
+    drive: Drive,
+    purchased: Mapping[str, int],
+    printed: Iterable[PrintedItem],
+    density: float,
+    parts: Parts,
+    prices: Prices,
+) -> list[Row]:
+    """One record for each kind of part, in the order of COLUMNS, items numbered from 1.
+
+    Balls come first, by size, then the drive, other purchased parts by their quantity, and last
+    what is printed of a material of a density (g/cm^3).
+
+    Raises:
+        SpecError: when a part is in no list.
+    """
+    counts = Counter(ALWAYS) + Counter(purchased)
+    if unknown := [name for name in counts if name not in parts]:
+        raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
+    bought = [(part, 1) for part in drive.parts]
+    bought += [(part, counts[name]) for name, part in parts.items() if counts[name]]
+    rows = [
+        *ball_rows(prototype, prices),
+        *(
+            _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
+            for part, quantity in bought
+        ),
+        *(_printed(item, density, prices) for item in printed),
+    ]
+    return [{"item": item, **row} for item, row in enumerate(rows, 1)]
+
+
+def cap_item(
+    prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
+) -> PrintedItem:
+    """A cap of a volume (mm^3), by the number of its ball from 0: no two are alike."""
+    balls = prototype.balls
+    front, body = balls.radius[j], 2 * balls.body_radius[j]
+    what = (
+        f"front of radius {front:.1f} mm on a ball of {body:.3f} mm, polished and coated as drawn"
+    )
+    return PrintedItem(f"cap {j + 1}", what, volume, estimate, CAP_MATERIAL)
+
+
+def totals(rows: Iterable[Row]) -> dict[str, Any]:
+    """Sums of a list, for prototype.json; prices by currency, of parts that have one."""
+    rows = list(rows)
+    bought, printed = ([row for row in rows if row["from"] == kind] for kind in KINDS)
+    return {
+        "mass_g": _sum(rows, "total_mass_g"),
+        "bought_price": by_currency(bought),
+        "without_price": sum(row["unit_price"] is None for row in bought),
+        "filament_g": _sum(printed, "filament_g"),
+        "filament_price": by_currency(printed),
+        "print_hours": _sum(printed, "print_hours"),
+    }
+
+
+def _row(part: str, what: str, quantity: int, material: str, mass: float) -> Row:
+    """What all rows have; mass is that of one, grams."""
+    rounded = round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
+    return {
+        "quantity": quantity,
+        "part": part,
+        "what": what,
+        "standard": standard_in(what),
+        "material": material,
+        "mass_g": rounded,
+        "total_mass_g": round(quantity * rounded, GRAM_DECIMALS + ESTIMATE_DIGITS),
+    }
+
+
+def price_columns(quantity: int, price: Price | None) -> Row:
+    """The columns of a price; empty without one."""
+    if price is None:
+        return dict.fromkeys(PRICE_COLUMNS)
+    total = round(quantity * price.amount, CENTS)
+    values = (price.amount, total, price.currency, price.date, price.source)
+    return dict(zip(PRICE_COLUMNS, values, strict=True))
+
+
+def _bought(part: str, what: str, quantity: int, material: str, mass: float, prices: Prices) -> Row:
+    row = _row(part, what, quantity, material, mass)
+    return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
+
+
+def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
+    """Its mass is that of a solid print, and its price that of its filament."""
+    filament_mm3, hours = item.estimate
+    filament = filament_mm3 / MM3_PER_CM3 * density
+    mass = item.volume / MM3_PER_CM3 * density
+    return {
+        **_row(item.name, item.what, 1, item.material, mass),
+        "print_volume_mm3": round(item.volume),
+        "filament_g": _estimate(filament),
+        "print_hours": _estimate(hours),
+        **price_columns(1, prices.of(item.material, filament)),
+        "from": PRINTED,
+    }
+
+
+def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:
+    """Purchased balls by rising diameter."""
+    balls, grade = prototype.balls, prototype.grade.grade
+    for k, count in sorted(Counter(balls.stock[~balls.cap].tolist()).items()):
+        ball = balls.catalogue.balls[k]
+        what = f"steel ball {ball.size} {ball.standard} {grade}"
+        yield _bought(f"ball {ball.size}", what, count, "steel", ball.mass_g, prices)
+
+
+def _estimate(value: float) -> float:
+    """A figure to as many digits as can be known."""
+    return float(f"{value:.{ESTIMATE_DIGITS}g}")
+
+
+def _sum(rows: Iterable[Row], column: str) -> float:
+    return round(sum(float(row[column] or 0) for row in rows), GRAM_DECIMALS)
+
+
+def by_currency(rows: Iterable[Row]) -> dict[str, float]:
+    """Sums of the prices that there are, by currency."""
+    sums = defaultdict[str, float](float)
+    for row in rows:
+        if row["currency"]:
+            sums[str(row["currency"])] += float(row["total_price"] or 0)
+    return {currency: round(amount, CENTS) for currency, amount in sorted(sums.items())}
+
+
+@dataclass(frozen=True)
+class PartsList:
+    """Rows of bom.csv, and their sums."""
+
+    rows: tuple[Row, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For other programs: the sums, then all rows by the columns of bom.csv."""
+        return {"totals": totals(self.rows), "rows": [*self.rows]}
+
+    def lines(self, *, full: bool) -> list[str]:
+        """At most 80 columns: the sums, and all rows or the dearest."""
+        dearest = sorted(self.rows, key=lambda row: -float(row["total_price"] or 0))
+        return [*_sums(self.rows), *_table(self.rows if full else dearest[:SHOWN])]
+
+
+def read_parts_list(folder: Path, prices: Prices | None = None) -> PartsList:
+    """The parts list of a build, with other prices where these have one.
+
+    Raises:
+        InputError: no such list, or a broken one; it names the line.
+    """
+    path = folder / NAME
+    if not path.is_file():
+        raise InputError(f"{path} is not there: name a folder with a prototype by tbcad build")
+    rows = [_read_row(where, cells) for where, cells in read_rows(path, NAME, COLUMNS, NUMBERS)]
+    return PartsList(tuple(_priced(row, prices) for row in rows) if prices else tuple(rows))
+
+
+def _read_row(where: str, cells: Mapping[str, str]) -> Row:
+    row: Row = {**cells}
+    for column in NUMBERS:
+        try:
+            number = float(cells[column]) if cells[column] else None
+        except ValueError:
+            raise SpecError(f"{where}, column {column}: no number: build again") from None
+        row[column] = int(number) if number is not None and column in WHOLE else number
+    if cells["from"] not in (BOUGHT, PRINTED):
+        raise SpecError(f"{where}, column from: allowed is bought or printed: build again")
+    return row
+
+
+def _priced(row: Row, prices: Prices) -> Row:
+    printed = row["from"] == PRINTED
+    part = PRINT_MATERIAL if printed else str(row["part"])
+    mass = float(row["filament_g" if printed else "mass_g"] or 0)
+    found = prices.of(part, mass)
+    return {**row, **price_columns(int(row["quantity"] or 0), found)} if found else row
+
+
+def _sums(rows: Sequence[Row]) -> Iterator[str]:
+    sums = totals(rows)
+    bought = [row for row in rows if row["from"] == BOUGHT]
+    without = sums["without_price"]
+    unknown = f", {without} of them without a price" if without else ""
+    yield f"{len(bought)} kinds of parts to buy: {_money(sums['bought_price'])}{unknown}"
+    kg, hours = sums["filament_g"] / KG_G, sums["print_hours"]
+    yield (
+        f"{len(rows) - len(bought)} parts to print: {kg:.1f} kg of filament, "
+        f"{_money(sums['filament_price'])}, {hours:.0f} h ({hours / DAY_H:.1f} days)"
+    )
+    yield f"{sums['mass_g'] / KG_G:.1f} kg in all, printed parts as solids; prices are estimates"
+    yield "not in the list: camera, lens, computer, tools, paint"
+
+
+def _money(prices: Mapping[str, float]) -> str:
+    return " + ".join(f"{amount:.0f} {name}" for name, amount in prices.items()) or "no prices"
+
+
+def _table(rows: Sequence[Row]) -> Iterator[str]:
+    yield f"{'item':>4} {'qty':>3} {'part':<{PART}} {'what':<{WHAT}} {'price':>8}"
+    for row in rows:
+        columns = ("part", PART), ("what", WHAT)
+        part, what = (_cut(str(row[column]), width) for column, width in columns)
+        price = "-" if row["total_price"] is None else f"{float(row['total_price']):.2f}"
+        yield (
+            f"{row['item']:>4} {row['quantity']:>3} {part:<{PART}} {what:<{WHAT}} {price:>8}  "
+            f"{row['currency'] or ''}"
+        ).rstrip()
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 3]}..."

@@ -1,0 +1,193 @@
+"""Files of the controllers: settings of GRBL and grblHAL; program and configuration of Klipper.
+
+grbl_settings.txt: the controller's settings, worked out from the drive, to be sent line by line.
+
+A comment in round brackets is on a line of its own before each setting. A board that had another
+life is set whole: reports of the machine's place in degrees, no laser, no sleep, motor always on.
+An alarm in mid-motion lets the motor go in spite of $1, in grblHAL but for the axes of $37. Left to
+the board are $2, $4 and $14 to $16, which follow from its circuit. After homing GRBL sets the
+machine's coordinate to minus the travel plus the pull-off, and soft limits keep it between minus
+the travel and zero; grblHAL keeps the pull-off from both ends.
+
+rotation_plan_klipper.gcode and klipper.cfg: Klipper drives the base as a manual stepper whose
+millimetres are degrees, without any kinematics. Its G4 takes milliseconds, SPEED is a second's, and
+SET_PIN waits for the motion as moves do. Two things would let the motor go. Without [idle_timeout]
+Klipper sends M84 after 600 s without motion, as in a pause. And a shutdown takes a stepper's
+enable_pin back, but leaves a static output as it is: so the driver is enabled by one.
+Sources: klippy/extras/manual_stepper.py, output_pin.py, idle_timeout.py, stepper_enable.py and
+static_digital_output.py; Config_Reference.md, G-Codes.md; doc/markdown/settings.md, grbl/limits.c
+and stepper.c of GRBL 1.1h; settings.h, config.h, machine_limits.c and stepper.c of grblHAL core.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+
+from tbcad.core.spec.prototype import MotionSpec
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.drive.travel import PULL_OFF_DEG, HomeAngles, home_angles
+from tbcad.prototype.electronics import LAMP, LAMP_OUTPUT, lights
+from tbcad.prototype.files.gcode import gcode_program
+
+NAME = "grbl_settings.txt"
+AXES = "XYZA"  # a bit of a mask each, and the last digit of $100, $110, $120, $130
+SEEK_DEG_MIN, LOCATE_DEG_MIN = 360.0, 60.0
+DEBOUNCE_MS = 25
+# A pulled-up input is high, which means pressed, with an open switch and with none (grblHAL core,
+# config.h: the default 0 is for normally closed switches to ground): empty ones are inverted.
+OTHER_AXES = 0b111
+OTHER_CYCLES = range(45, 50)  # of homing; boards have those of their axes, three at least
+PULSE_US = 10  # of a step: optocouplers of drivers need 5 to 10
+# Places of the machine, and in grblHAL its other defaults (bits 0 to 8) and reports while it homes.
+GRBL_REPORTS, HAL_REPORTS = 0b1, 0b1_1111_1111 | 1 << 12
+PLAN, PROGRAM, CONFIG = "rotation_plan.nc", "rotation_plan_klipper.gcode", "klipper.cfg"
+STEPPER = "MANUAL_STEPPER STEPPER=base"
+SEARCH = 1.5  # travel of the search for the switch, over the travel, as GRBL has it
+MINUTE_S, MILLISECONDS = 60, 1000
+IDLE_S = 86_400  # of a day, after which Klipper tells that it is idle, and does no more
+MESSAGE = re.compile(r"M0 \(MSG, (.*?)[,.?]? [Tt]hen resume\)")
+PIN = "FILL_IN"  # what the user's board has
+TRAVEL_STEP_DEG = 0.001  # that the travel is rounded up to
+Setting = tuple[int, float, str]
+
+
+def controller_files(
+    layout: PrototypeLayout, drive: Drive, motion: MotionSpec, leds: int, design: str
+) -> dict[str, str]:
+    """Texts of program, settings and, with grblHAL, what Klipper takes instead, by name."""
+    program, angles = gcode_program(layout, drive, motion, leds), home_angles(layout, motion)
+    values = settings(drive, motion, angles)
+    title = f"settings of {design} for {motion.controller}"
+    files: dict[str, Iterable[str]] = {PLAN: program, NAME: settings_lines(title, values)}
+    if motion.controller == "grblhal":
+        files[PROGRAM] = klipper_program(program, motion, angles)
+        files[CONFIG] = klipper_config(drive, motion, lights(leds, motion))
+    return {name: "\n".join(lines) + "\n" for name, lines in files.items()}
+
+
+def settings(drive: Drive, motion: MotionSpec, angles: HomeAngles) -> list[Setting]:
+    """Number, value and meaning of each setting, in an order in which GRBL takes them."""
+    axis = AXES.index(motion.axis)
+    travel = math.ceil(angles.travel / TRAVEL_STEP_DEG - TRAVEL_STEP_DEG) * TRAVEL_STEP_DEG
+    hal = motion.controller == "grblhal"
+    common: list[Setting] = [
+        (0, PULSE_US, "microseconds of a step's pulse"),
+        (1, 255, "motor always on, for the base falls without it"),
+        (3, 0, f"{1 << axis} if the base turns against its arrow"),
+        (10, HAL_REPORTS if hal else GRBL_REPORTS, "what status reports tell"),
+        (13, 0, "reports in degrees, not divided by 25.4"),
+        (32, 0, "no laser, no lathe"),
+        (100 + axis, drive.steps_per_deg(motion.microsteps), "steps a degree"),
+        (110 + axis, motion.feed_deg_min, "degrees a minute, at most"),
+        (120 + axis, motion.acceleration_deg_s2, "degrees/s^2"),
+        (130 + axis, travel, "degrees of travel"),
+    ]
+    return common + (_homing(1 << axis, motion) if hal else UNHOMED)
+
+
+UNHOMED: list[Setting] = [
+    (20, 0, "no soft limits: the base is not homed"),
+    (21, 0, "no hard limits"),
+    (22, 0, "no homing"),
+]
+
+
+def _homing(mask: int, motion: MotionSpec) -> list[Setting]:
+    seek = min(SEEK_DEG_MIN, motion.feed_deg_min)
+    return [
+        (37, mask, "motor on in alarms too"),
+        (62, 0, "no sleep: it lets the motor go"),
+        (5, OTHER_AXES & ~mask, "the switch opens when it is pressed; other inputs are empty"),
+        (18, 0, "inputs of switches are pulled up"),
+        (22, 1, "homing"),
+        (43, 1, "homing: passes"),
+        (44, mask, "homing: this axis"),
+        *((cycle, 0, "homing: no other axis") for cycle in OTHER_CYCLES),
+        (23, mask, "homing: toward negative angles"),
+        (24, min(LOCATE_DEG_MIN, seek), "homing: degrees a minute, to find the switch again"),
+        (25, seek, "homing: degrees a minute, to find the switch"),
+        (26, DEBOUNCE_MS, "homing: ms until the switch has settled"),
+        (27, PULL_OFF_DEG, "homing: degrees of pull-off"),
+        (20, 1, "soft limits"),
+        (21, 1, "hard limit: the switch stops the base"),
+    ]
+
+
+def settings_lines(title: str, values: list[Setting]) -> Iterator[str]:
+    """Lines of the file: a title, and for each setting its meaning and its value."""
+    yield f"({title})"
+    for number, value, meaning in values:
+        yield f"({meaning})"
+        yield f"${number}={value:.7g}"
+
+
+def klipper_program(lines: list[str], motion: MotionSpec, angles: HomeAngles) -> Iterator[str]:
+    """The lines of a program for grblHAL, translated."""
+    for line in lines:
+        yield from _translated(line, motion, angles)
+
+
+def _translated(line: str, motion: MotionSpec, angles: HomeAngles) -> Iterator[str]:
+    code, _, rest = line.partition(" ")
+    if message := MESSAGE.fullmatch(line):
+        yield f'RESPOND MSG="{message[1]}"'
+        yield "PAUSE"
+    elif code == "$H":
+        yield from _klipper_homing(motion, angles)
+    elif code == "G1":
+        words = rest.split()
+        yield f"{STEPPER} MOVE={words[0][1:]} SPEED={motion.feed_deg_min / MINUTE_S:g}"
+    elif code == "G4":
+        yield f"G4 P{float(rest[1:]) * MILLISECONDS:.0f}"
+    elif code in ("M8", "M9"):
+        yield f"SET_PIN PIN=release VALUE={int(code == 'M8')}"
+    elif code in ("M64", "M65"):
+        yield f"SET_PIN PIN={_light(int(rest[1:]))} VALUE={int(code == 'M64')}"
+    elif line.startswith("(stop"):
+        yield f"; {line.strip('()')}"
+
+
+def _light(output: int) -> str:
+    return LAMP if output == LAMP_OUTPUT else f"led_{output}"
+
+
+def _klipper_homing(motion: MotionSpec, angles: HomeAngles) -> Iterator[str]:
+    """Down to the switch, which is at a known angle, and off it."""
+    speed = min(SEEK_DEG_MIN, motion.feed_deg_min) / MINUTE_S
+    trim = motion.home_trim_deg
+    yield f"{STEPPER} ENABLE=1 SET_POSITION=0"
+    yield f"{STEPPER} MOVE={-SEARCH * angles.travel:.4f} SPEED={speed:g} STOP_ON_ENDSTOP=1"
+    yield f"{STEPPER} SET_POSITION={angles.switch + trim:.4f}"
+    yield f"{STEPPER} MOVE={angles.homed + trim:.4f} SPEED={speed:g}"
+
+
+def klipper_config(drive: Drive, motion: MotionSpec, outputs: Iterable[str]) -> Iterator[str]:
+    """A configuration to include; pins of the board are left to fill in."""
+    yield "# base of the prototype: degrees for millimetres; fill in the pins of the board"
+    yield "# zero pin in before RESTART, FIRMWARE_RESTART or the supply's switch: they let it fall"
+    yield "[printer]"
+    yield "kinematics: none"
+    yield "max_velocity: 1000"
+    yield "max_accel: 1000"
+    yield "[pause_resume]"
+    yield "[respond]"
+    yield "[idle_timeout]"
+    yield f"timeout: {IDLE_S}"
+    yield "gcode:"
+    yield '    RESPOND MSG="idle, the motor stays on"'
+    yield "[static_digital_output base_enable]"
+    yield f"pins: {PIN}"  # not enable_pin of the stepper, which a shutdown takes back
+    yield "[manual_stepper base]"
+    yield from (f"{name}_pin: {PIN}" for name in ("step", "dir"))
+    yield f"endstop_pin: ^{PIN}"  # normally closed to ground: high when pressed
+    yield "rotation_distance: 360"
+    yield f"gear_ratio: {drive.ratio:.7g}:1"
+    yield f"full_steps_per_rotation: {drive.motor['full_steps']:.0f}"
+    yield f"microsteps: {motion.microsteps}"
+    yield f"velocity: {motion.feed_deg_min / MINUTE_S:g}"
+    yield f"accel: {motion.acceleration_deg_s2:g}"
+    for name in ("release", *outputs):
+        yield f"[output_pin {name}]"
+        yield f"pin: {PIN}"
+        yield "value: 0"

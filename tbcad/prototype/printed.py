@@ -1,0 +1,290 @@
+"""Printed parts, and their place on the bed: what fits and needs the least support."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull
+
+from tbcad.cad.kernel.checks import SolidProperties, check_volume, closed_mesh, properties, volume
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.meshing import primitive_mesh, volume_by_meshes, without_degenerate
+from tbcad.cad.kernel.solids import (
+    cut,
+    cylinder,
+    from_bytes,
+    fused,
+    moved,
+    one_solid,
+    polygon,
+    prism,
+    revolved_polygon,
+    slot_face,
+    solids,
+    to_bytes,
+)
+from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.spec.design import PrinterSpec
+from tbcad.core.spec.errors import SpecError
+from tbcad.prototype.print_bed import fitting_orientation, min_bed, size_text
+from tbcad.types import Bools, Floats
+
+LEVEL = 1e-6  # of a normal's downward part
+STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
+EXACT = 1e3  # weight of the sum of shares, which is one
+NO_PADS = np.zeros((0, 3))
+MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
+# Base and caps turn, stage and frame are static; a tool is not in the assembly.
+Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
+VOLUME_ERROR = 1e-4
+LAYER_MM, INFILL = 0.2, 0.25
+SIDE_MM, FLAT_MM = 1.65, 1.0  # what is solid behind a wall, and below or above a flat face
+SUPPORT = 0.29  # share of the space below an overhang
+# mm^3 in a second, of walls, solid layers, infill and support; seconds more for each layer.
+FLOWS = (5.5, 1.5, 3.1, 2.2)
+LAYER_S = 6.2
+OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal, from which on
+FLAT = 0.5  # of the vertical part of a normal, from which on a facet counts as flat
+TOUCHING_MM = 0.05  # a facet no higher lies on the bed
+BELOW_MM = 0.02  # where rays begin, off the facet they are for
+HOUR_S = 3600.0
+
+
+def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
+    """Pads that face down by more than 45 degrees, and all that do, by unit normals (n, 3).
+
+    Rows of the orientation (3, 3) are what the axes become; the third is up on the bed.
+    """
+    height = normals @ orientation[:, 2]
+    return int((height < -STEEP).sum()), int((height < -LEVEL).sum())
+
+
+def opening_up(normals: Floats) -> Floats | None:
+    """Unit direction that is down when the pad nearest to facing down is as far up as possible.
+
+    The point of the convex hull of the unit normals (n, 3) that is nearest to the origin is up.
+    None where some pad faces down in every direction.
+    """
+    if not len(normals):
+        return None
+    weighed = np.vstack([normals.T, np.full(len(normals), EXACT)])
+    shares, _ = nnls(weighed, np.array([0.0, 0.0, 0.0, EXACT]))
+    up = normals.T @ shares
+    length = float(np.linalg.norm(up))
+    if length < LEVEL or float((normals @ up).min()) < LEVEL * length:
+        return None
+    return np.asarray(-up / length)
+
+
+@dataclass(frozen=True)
+class PlacedSolid:
+    """A solid in its place, and its pose on the printer's bed."""
+
+    name: str  # of the part
+    shape: TopoDS_Solid  # one closed solid in the frame of the shell, the base at angle zero
+    mesh: Mesh  # of the shape, as it is exported
+    properties: SolidProperties  # volume, area and centroid of the shape
+    axes: Floats  # what x, y and z become on the printer's bed, as rows, (3, 3)
+    origin: Floats  # place of the origin on the bed, mm, (3,)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The kernel's shapes are no data to Python until they are written as bytes."""
+        data = self.__dict__.get("_shape_bytes") or to_bytes(self.shape)
+        return {**self.__dict__, "_shape_bytes": data, "shape": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Read the shape again, and keep its bytes: a shape read and written again has others."""
+        self.__dict__.update(state, shape=from_bytes(state["_shape_bytes"]))
+
+    @property
+    def on_bed(self) -> TopoDS_Solid:
+        """The part as it is printed: above z = 0, about the middle of the bed."""
+        return solids(moved(self.shape, self.axes, self.origin))[0]
+
+    @property
+    def mesh_on_bed(self) -> Mesh:
+        """Its mesh in the pose in which it is printed."""
+        return Mesh(self.mesh.vertices @ self.axes + self.origin, self.mesh.triangles)
+
+    @property
+    def volume(self) -> float:
+        """Volume, mm^3."""
+        return self.properties.volume
+
+    def mass_g(self, density: float) -> float:
+        """Mass when printed solid, grams, for a density in g/cm^3."""
+        return self.volume / 1000 * density
+
+
+def placed_on_bed(
+    name: str,
+    shape: TopoDS_Solid,
+    mesh: Mesh,
+    properties: SolidProperties,
+    downs: Sequence[Floats],
+    axes: Floats,
+    printer: PrinterSpec,
+    pads: Floats = NO_PADS,
+) -> PlacedSolid:
+    """A part on the bed: of the orientations that fit, one with the fewest pads that face down.
+
+    Among these, the one that needs the least support. The shape is one valid solid in a frame of
+    its own, whose axes in the frame of the shell are rows; a move keeps it valid. Directions that
+    may point down are unit vectors (3,) of that frame, as are the normals of pads, (n, 3).
+
+    Raises:
+        SpecError: when it fits in no orientation.
+    """
+    corners = mesh.vertices[ConvexHull(mesh.vertices).vertices]
+    opening = opening_up(pads)
+    directions = [*downs, *([] if opening is None else [opening])]
+    orientations = [fitting_orientation(corners, down, printer) for down in directions]
+    fitting = [orientation for orientation in orientations if orientation is not None]
+    if not fitting:
+        bed = size_text(min_bed(corners, downs, printer))
+        raise SpecError(
+            f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
+            "prototype.largest_ball_mm or prototype.k smaller"
+        )
+    best = min(fitting, key=lambda way: (*downward_pads(pads, way), round(_overhang(mesh, way), 3)))
+    placed = corners @ best
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    origin = -np.array([*(low + high)[:2] / 2, low[2]])
+    solid = solids(moved(shape, axes, np.zeros(3)))[0]
+    in_place = Mesh(mesh.vertices @ axes, mesh.triangles)
+    return PlacedSolid(name, solid, in_place, properties.rotated(axes), axes.T @ best, origin)
+
+
+def _overhang(mesh: Mesh, orientation: Floats) -> float:
+    """Area that hangs over by more than 45 degrees and does not lie on the bed, mm^2."""
+    corner = (mesh.vertices @ orientation)[mesh.triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = norm(normal) / 2
+    height = corner[..., 2].max(axis=1) - corner[..., 2].min()
+    overhangs = (-normal[:, 2] > MAX_OVERHANG * 2 * area) & (height > TOUCHING_MM)
+    return float(area[overhangs].sum())
+
+
+@dataclass(frozen=True)
+class PrintedPart:
+    """One printed part."""
+
+    solid: PlacedSolid  # in its place, and how it is laid on the bed
+    role: Role  # what it belongs to
+    what: str  # it is for
+    ball: int = -1  # of a cap, the number of its seat, from 0; -1 for all others
+
+    @property
+    def name(self) -> str:
+        """Name of the part and of its files."""
+        return self.solid.name
+
+
+def part_mesh(part: PrintedPart) -> Mesh:
+    """The part's mesh on the printer's bed, its coordinates rounded to 32 bits as in an STL.
+
+    Vertices that become equal are merged.
+    """
+    mesh = part.solid.mesh_on_bed
+    single = mesh.vertices.astype(np.float32).astype(np.float64) + 0.0
+    corners, group = np.unique(single, axis=0, return_inverse=True)
+    return without_degenerate(corners, group.reshape(-1)[mesh.triangles])
+
+
+def primitive_solid(body: Primitive) -> TopoDS_Shape:
+    """The solid of a primitive."""
+    if isinstance(body, Cylinder):
+        return cylinder(body.start, body.axis, body.radius, body.length)
+    if isinstance(body, Revolved):
+        return moved(revolved_polygon(body.profile, 0.0, 2 * np.pi), body.axes, body.start)
+    if isinstance(body, Slot):
+        return prism(slot_face(body.middle, body.step, body.radius, body.along), body.along)
+    return prism(polygon(_outward(body)), body.along)
+
+
+def component_solid(component: Component) -> TopoDS_Solid:
+    """The one solid of a component, in the frame of the shell.
+
+    Raises:
+        InvalidSolidError: when the kernel fails, or its volume is not what meshes give.
+    """
+    if len(component.added) == 1 and not component.removed:  # no boolean that could go wrong
+        return one_solid(component.name, primitive_solid(component.added[0]))
+    added = [primitive_solid(body) for body in component.added]
+    removed = [primitive_solid(body) for body in component.removed]
+    solid = one_solid(component.name, cut(fused(added), removed))
+    bodies = (component.added, component.removed)
+    expected = volume_by_meshes(*([primitive_mesh(one) for one in some] for some in bodies))
+    check_volume(component.name, volume(solid), expected, VOLUME_ERROR)
+    return solid
+
+
+def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float) -> PlacedSolid:
+    """A component placed on the printer's bed, its mesh within a distance of the surface.
+
+    Raises:
+        SpecError: when it does not fit.
+        InvalidSolidError: when the kernel fails.
+    """
+    solid, name = component_solid(component), component.name
+    mesh, downs = closed_mesh(name, solid, mesh_mm), component.downs
+    return placed_on_bed(name, solid, mesh, properties(solid), downs, np.eye(3), printer)
+
+
+def placed_components(
+    components: Sequence[Component], printer: PrinterSpec, mesh_mm: float
+) -> list[PlacedSolid]:
+    """Several components, each as `placed_component` places it."""
+    return [placed_component(component, printer, mesh_mm) for component in components]
+
+
+def _outward(body: Prism) -> Floats:
+    """The corners in the order that turns the prism's faces outward."""
+    a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
+    return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]
+
+
+def print_estimate(mesh: Mesh) -> tuple[float, float]:
+    """Filament (mm^3), supports included, and hours, to print a mesh that stands on the bed.
+
+    The print is by a 0.4 mm nozzle in layers of 0.2 mm: four perimeters, five layers at top and
+    bottom, 25 % of infill, support below 40 degrees. Thicknesses, shares and flows were fitted on
+    what PrusaSlicer 2.5 says of 29 printed parts of two designs, with its default speeds;
+    docs/prototype.md has the errors.
+    """
+    corners = mesh.vertices[mesh.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    area = np.maximum(norm(across), np.finfo(float).tiny)
+    up = across[:, 2] / area
+    sides = (area * np.sqrt(np.maximum(1 - up**2, 0))).sum()
+    flats = (area * np.abs(up))[np.abs(up) > FLAT].sum()
+    solid = np.array([SIDE_MM * sides, FLAT_MM * flats])
+    solid *= min(1.0, mesh.volume / solid.sum())
+    infill = INFILL * (mesh.volume - solid.sum())
+    heights = corners[..., 2]
+    bottom = heights.min()
+    over = (up < -OVERHANG) & (heights.max(axis=1) > bottom + TOUCHING_MM)
+    columns = _room_below(corners, over, bottom)
+    volumes = np.array([*solid, infill, SUPPORT * float((-across[over, 2]) @ columns)])
+    layers = (heights.max() - bottom) / LAYER_MM
+    seconds = (volumes / FLOWS).sum() + layers * LAYER_S
+    return float(volumes.sum()), float(seconds / HOUR_S)
+
+
+def _room_below(corners: Floats, which: Bools, bottom: float) -> Floats:
+    """Heights of what is free below the middles of some facets, down to the part or the bed, mm."""
+    middles = corners[which].mean(axis=1) - [0.0, 0.0, BELOW_MM]
+    if not len(middles):
+        return np.zeros(0)
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene, corners.astype(np.float32))
+    down = np.zeros_like(middles, dtype=np.float32)
+    down[:, 2] = -1
+    hit = scene.run(middles.astype(np.float32), down, query="DISTANCE")
+    return np.asarray(np.minimum(hit.astype(float), middles[:, 2] - bottom))

@@ -1,1 +1,0 @@
-"""Printed parts: the printer's bed, how a part lies on it, its mesh."""

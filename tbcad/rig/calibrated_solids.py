@@ -1,0 +1,306 @@
+"""A machine as it was built: what its calibration changes in coverage, models and tolerances."""
+
+import json
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from scipy.spatial.transform import Rotation
+
+from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
+from tbcad.cad.formats.checked_files import Row, write_table
+from tbcad.cad.kernel.solids import common, one_solid, sphere
+from tbcad.common.results import Table
+from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.windows import cell_windows
+from tbcad.errors import InputError
+from tbcad.light.simulate.image_files import write_images
+from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, read_plan
+from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.records.tables import RayRow
+from tbcad.rig.machine.designed import machine_runs, stops_known
+from tbcad.rig.machine.machine import RECORD, Machine, read_machine
+from tbcad.types import Bools, Bytes, Floats
+
+SAME_MM = 1e-6  # centres and radii of a ball's front and body; a cap's are apart
+UM_PER_MM = 1000.0
+LEAST_BALLS = 3  # whose places tell a motion of the whole base from errors of balls
+STEPS = (1.0, 2.0, 5.0)  # of the scale's ends, times powers of ten
+# From none to the largest deviation: blue, green, yellow, red; red, green, blue from 0 to 1.
+COLOURS = np.array([[0.16, 0.38, 0.75], [0.20, 0.66, 0.36], [0.98, 0.83, 0.20], [0.83, 0.15, 0.16]])
+SCHEMA = "tbcad-as-built/1"
+STEP, TABLE, LEGEND, AS_BUILT = "as_built.step", "deviations.csv", "legend.png", "as_built.json"
+COLUMNS = (
+    *("ball", "x_mm", "y_mm", "z_mm", "radius_mm"),
+    *("dx_um", "dy_um", "dz_um", "distance_um", "radius_error_um", "colour"),
+)
+# Of the legend, pixels.
+WIDTH, HEIGHT, EDGE, BAR, TICK, FONT = 640, 96, 40, 28, 6, 16
+TICKS = 5
+CALIBRATE = "calibrate again with tbcad calibrate"
+AXES = 2  # of the plane at the object in which a ray may be off
+PERCENT = 95.0
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Deviations of k balls from the designed base, moved as a whole to fit best."""
+
+    offset: Floats  # of the centres, in the frame of the design, mm, (k, 3)
+    radius: Floats  # measured less designed, mm, (k,)
+    shift: Floats  # of the whole base, mm, (3,)
+    turn: Floats  # rotation vector of the whole base about the origin, radians, (3,)
+
+    @property
+    def distance_um(self) -> Floats:
+        """Of the centres from where the base should have them, micrometres, (k,)."""
+        return UM_PER_MM * norm(self.offset)
+
+    @property
+    def scale_um(self) -> float:
+        """End of a scale from 0 that holds all distances, micrometres."""
+        return round_up(float(self.distance_um.max()))
+
+
+def deviations(machine: Machine, plan: Plan) -> Deviations:
+    """Compare a calibrated machine with its plan, which has as many balls."""
+    designed, found = plan.centre, machine.centre
+    turn, shift = Rotation.identity(), np.zeros(3)
+    if len(designed) >= LEAST_BALLS:
+        middles = designed.mean(axis=0), found.mean(axis=0)
+        turn, _ = Rotation.align_vectors(found - middles[1], designed - middles[0])
+        shift = middles[1] - turn.apply(middles[0])
+    offset = found - turn.apply(designed) - shift
+    return Deviations(offset, machine.radius - plan.radius, shift, turn.as_rotvec())
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20 ... from a value on; 1 for less."""
+    power = 10.0 ** int(np.floor(np.log10(max(value, 1.0))))
+    return next(step * power for step in (*STEPS, 10.0) if step * power >= value)
+
+
+def colours(share: Floats) -> Floats:
+    """Colours (n, 3), 0 to 1, of shares (n,) of the scale."""
+    places = np.linspace(0, 1, len(COLOURS))
+    return np.stack([np.interp(share, places, column) for column in COLOURS.T], axis=-1)
+
+
+def ball_group(machine: Machine, plan: Plan, found: Deviations) -> SolidGroup:
+    """All balls at base angle zero; a cap is what its reflecting sphere and its body share."""
+    shades = colours(found.distance_um / found.scale_um).tolist()
+    bodies = []
+    for number, (red, green, blue) in enumerate(shades, 1):
+        k = number - 1
+        shape = sphere(machine.centre[k], float(machine.radius[k]))
+        apart = abs(plan.centre[k] - plan.body_centre[k]).max()
+        if max(apart, abs(plan.radius[k] - plan.body_radius[k])) > SAME_MM:
+            body = machine.centre[k] + plan.body_centre[k] - plan.centre[k]
+            cap = common(shape, sphere(body, float(plan.body_radius[k])))
+            shape = one_solid(f"ball_{number}", cap)
+        bodies.append(ColouredSolid(f"ball_{number}", shape, (red, green, blue, 1.0)))
+    return SolidGroup("balls", tuple(bodies))
+
+
+def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
+    """Write the files of a machine as built and return their record, or an InputError."""
+    machine, _ = read_machine(calibration / RECORD)
+    plan = read_plan(read_export(exports))
+    if len(machine.radius) != len(plan):
+        raise InputError(
+            f"{calibration} has {len(machine.radius)} balls, {exports} has {len(plan)}: name the "
+            "export that was calibrated with --exports"
+        )
+    found = deviations(machine, plan)
+    write_assembly(folder / STEP, "prototype_as_built", [ball_group(machine, plan, found)])
+    write_table(folder / TABLE, COLUMNS, _rows(machine, found))
+    write_images({folder / LEGEND: legend(found.scale_um)})
+    record = {
+        "schema": SCHEMA,
+        "calibration": str(calibration),
+        "exports": str(exports),
+        "balls": len(plan),
+        "scale_um": [0.0, found.scale_um],
+        "base": {
+            "shift_mm": found.shift.tolist(),
+            "turn_deg": np.degrees(found.turn).tolist(),
+        },
+        "largest_um": float(found.distance_um.max()),
+        "median_um": float(np.median(found.distance_um)),
+        "files": {"solids": STEP, "table": TABLE, "legend": LEGEND},
+    }
+    (folder / AS_BUILT).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    return record
+
+
+def legend(scale_um: float) -> Bytes:
+    """A picture of the colours from 0 to the end of the scale, (h, w, 3)."""
+    picture = np.full((HEIGHT, WIDTH, 3), 255, dtype=np.uint8)
+    share = np.linspace(0, 1, WIDTH - 2 * EDGE)
+    picture[EDGE // 2 : EDGE // 2 + BAR, EDGE:-EDGE] = np.rint(255 * colours(share))
+    image = Image.fromarray(picture)
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(FONT)
+    under = EDGE // 2 + BAR
+    for part in np.linspace(0, 1, TICKS + 1).tolist():
+        x = EDGE + part * (WIDTH - 2 * EDGE - 1)
+        draw.line([(x, under), (x, under + TICK)], fill="black")
+        draw.text((x, under + TICK), f"{part * scale_um:g}", fill="black", font=font, anchor="ma")
+    name = "centre off the designed base, micrometres"
+    draw.text((WIDTH / 2, HEIGHT - FONT), name, fill="black", font=font, anchor="ma")
+    return np.asarray(image)
+
+
+def _rows(machine: Machine, found: Deviations) -> list[Row]:
+    """Measured centre at base angle zero, radius, and what they are off by."""
+    shades = np.rint(255 * colours(found.distance_um / found.scale_um)).astype(int)
+    table = np.column_stack(
+        [
+            machine.centre,
+            machine.radius,
+            UM_PER_MM * found.offset,
+            found.distance_um,
+            UM_PER_MM * found.radius,
+        ]
+    )
+    return [
+        {
+            "ball": number,
+            **dict(zip(COLUMNS[1:-1], values, strict=True)),
+            "colour": "#{:02x}{:02x}{:02x}".format(*shade),
+        }
+        for number, (values, shade) in enumerate(zip(table.tolist(), shades, strict=True), 1)
+    ]
+
+
+@dataclass(frozen=True)
+class AsBuiltTolerance:
+    """Coverage and pointing of a calibrated machine, over m mirrors of both cameras."""
+
+    target: float  # coverage that is wanted, mm
+    ids: tuple[str, ...]  # of the mirrors whose stops are calibrated, (m,)
+    absent: tuple[str, ...]  # of the others
+    coverage: Floats  # with windows where the balls are, mm, (m,)
+    place: Floats  # root mean square distance at the object of a ray from the true one, mm, (m,)
+    turn: Floats  # likewise its direction, mrad, (m,)
+    pixel: Floats  # width of a pixel at the object, mm, (m,)
+    worst: Floats  # minimum coverage of each simulated truth, mm, (s,)
+
+    @property
+    def share(self) -> float:
+        """Share of the simulated truths in which all mirrors reach the target."""
+        return float((self.worst >= self.target).mean())
+
+
+def as_built_tolerance(
+    calibration: Path, exports: Path, builds: int, seed: int
+) -> AsBuiltTolerance:
+    """Study one machine with what its calibration leaves unknown, by so many simulated truths.
+
+    A ray that is off by d at the object moves the edge of what its mirror shows by at most d, and
+    costs at most 2 d of coverage. The errors d of the mirrors are drawn independently, each with
+    its own standard deviation of rays.csv.
+
+    InputError: one cannot be read, or they do not belong together.
+    """
+    export = read_export(exports)
+    plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)
+    runs, known = machine_runs(export, plan, machine, frames), stops_known(plan, frames)
+    names = [_names(run) for run in runs]
+    rays = {ray.mirror: ray for ray in RayRow.read(calibration)}
+    covered = np.concatenate([*map(_coverage, runs)])
+    coverage = dict(zip(chain(*names), covered.tolist(), strict=True))
+    ids = [name for half in range(len(runs)) for name in _known(plan, known, half, names[half])]
+    ids = [name for name in ids if name in rays]
+    if not ids:
+        raise InputError(f"{calibration / RayRow.FILE} names no mirror of {exports}: {CALIBRATE}")
+    shown = np.array([coverage[name] for name in ids])
+    place = np.array([rays[name].sigma_mm for name in ids])
+    random = np.random.default_rng(seed)
+    worst = np.array([(shown - 2 * _drawn(random, place)).min() for _ in range(builds)])
+    return AsBuiltTolerance(
+        target=export.capture_mm,
+        ids=tuple(ids),
+        absent=tuple(sorted({*coverage} - {*ids})),
+        coverage=shown,
+        place=place,
+        turn=np.array([rays[name].sigma_mrad for name in ids]),
+        pixel=np.array([rays[name].pixel_mm for name in ids]),
+        worst=worst,
+    )
+
+
+def tolerance_table(found: AsBuiltTolerance) -> Table:
+    """Every mirror."""
+    return Table.of_columns(
+        "as-built",
+        {
+            "mirror": found.ids,
+            "coverage_mm": found.coverage,
+            "sigma_mm": found.place,
+            "sigma_mrad": found.turn,
+            "pixel_mm": found.pixel,
+        },
+    )
+
+
+def tolerance_record(found: AsBuiltTolerance, builds: int, seed: int) -> dict[str, Any]:
+    """The object of as-built.json."""
+    return {
+        "schema": "tbcad-as-built-tolerance/1",
+        "target_mm": found.target,
+        "builds": builds,
+        "seed": seed,
+        "share_good": found.share,
+        "coverage_mm_minimum": float(found.coverage.min()),
+        "coverage_mm_worst_median": float(np.median(found.worst)),
+        "place_mm_median": float(np.median(found.place)),
+        "place_mm_95": float(np.percentile(found.place, PERCENT)),
+        "turn_mrad_median": float(np.median(found.turn)),
+        "turn_mrad_95": float(np.percentile(found.turn, PERCENT)),
+        "pixel_mm_median": float(np.median(found.pixel)),
+        "mirrors": len(found.ids),
+        "mirrors_not_calibrated": list(found.absent),
+    }
+
+
+def summary(found: AsBuiltTolerance) -> str:
+    """The result in words."""
+    least, truth = float(found.coverage.min()), float(np.median(found.worst))
+    lost = f" {len(found.absent)} mirrors are not calibrated." if found.absent else ""
+    return (
+        f"As calibrated, {found.share:.0%} of {len(found.worst)} simulated truths show "
+        f"{found.target:g} mm by all {len(found.ids)} mirrors: minimum coverage {least:.2f} mm as "
+        f"calibrated, {truth:.2f} mm in the median truth. Rays are known to "
+        f"{np.median(found.place):.3f} mm at the object ({np.percentile(found.place, PERCENT):.3f} "
+        f"at {PERCENT:.0f} %) and {np.median(found.turn):.2f} mrad; a pixel is "
+        f"{np.median(found.pixel):.3f} mm wide there.{lost}"
+    )
+
+
+def _names(run: PrototypeRun) -> list[str]:
+    count = len(run.reflector)
+    return [f"{run.reflector.camera_id}{number:04d}" for number in range(1, count + 1)]
+
+
+def _known(plan: Plan, known: Bools, half: int, names: list[str]) -> list[str]:
+    """Mirrors of one run whose stops are calibrated."""
+    seen = known[half, plan.stop[half]].tolist()
+    return [name for name, one in zip(names, seen, strict=True) if one]
+
+
+def _coverage(run: PrototypeRun) -> Floats:
+    """Coverage of the mirrors of a run, with windows where the balls are, mm, (m,)."""
+    turn = Rotation.from_matrix(np.swapaxes(run.window_rotation, 1, 2)).as_rotvec()
+    angle = norm(turn)
+    axis = np.where(angle[:, None] > 0, turn / np.maximum(angle, 1e-300)[:, None], [1.0, 0, 0])
+    surfaces = run.ball_surfaces
+    windows = cell_windows(run.reflector.cells, run.reflector.camera.pinhole)
+    return windows.coverage(surfaces.centre, surfaces.radius, axis, angle, run.camera.pinhole)
+
+
+def _drawn(random: np.random.Generator, place: Floats) -> Floats:
+    """Lengths (m,) of errors in a plane with root mean squares (m,)."""
+    return np.asarray(norm(random.standard_normal((len(place), AXES))) * place / np.sqrt(AXES))

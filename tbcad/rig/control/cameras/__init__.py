@@ -1,1 +1,0 @@
-"""Cameras that a run photographs with, one module for each kind."""

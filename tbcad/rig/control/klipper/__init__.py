@@ -1,1 +1,0 @@
-"""Klipper behind Moonraker, as the controller of a run."""

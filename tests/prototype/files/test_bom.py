@@ -1,0 +1,73 @@
+"""The list of parts as a file: figures, kinds of rows, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tbcad.core.spec.errors import SpecError
+from tbcad.core.spec.prototype import MotionSpec
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.drive.balance import ball_masses, sum_masses
+from tbcad.prototype.drive.drive import load_drives
+from tbcad.prototype.drive.loads import base_torques, choose_drive
+from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item, standard_in
+from tbcad.prototype.files.record import drive_record
+from tbcad.prototype.purchased.parts import load_parts, load_prices
+
+PARTS = load_parts()
+DRIVES = load_drives(PARTS)
+PRICES = load_prices(["estimates"])
+PRINTED = (
+    PrintedItem("base", "carrier", 5e5, (4.2e5, 41.26)),
+    PrintedItem("foot", "below the plate", 1e3, (800.0, 0.0834)),
+)
+
+
+@pytest.mark.parametrize(
+    ("what", "standard"),
+    [
+        ("steel ball 1 3/8 in ISO 3290-1 G40", "ISO 3290-1"),
+        ("shaft collar DIN 705 A 8 with set screw", "DIN 705 A"),
+        ("screw ASME B18.3 1/4-20 UNC for the camera's thread (ISO 1222)", "ASME B18.3"),
+        ("disc magnet 6 x 3 mm N42 nickel plated", ""),
+    ],
+)
+def test_the_first_standard_named(what: str, standard: str) -> None:
+    assert standard_in(what) == standard
+
+
+def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout) -> None:
+    """Masses to 0.01 g, or two digits below 0.1 g; estimates to two digits."""
+    alike = replace(layout.balls, stock=np.full_like(layout.balls.stock, 10))
+    caps = [cap_item(layout, j, 2e3, (1e3, 0.2)) for j in np.flatnonzero(layout.balls.cap).tolist()]
+    printed = [*PRINTED, *caps]
+    same = replace(layout, balls=alike)
+    first, *others, base, foot = bom_rows(same, DRIVES[0], {}, PRINTED, 1.27, PARTS, PRICES)
+    assert first["quantity"] == len(layout)
+    assert not any(str(row["part"]).startswith("ball ") for row in others)
+    told = tuple(base[key] for key in ("print_volume_mm3", "filament_g", "print_hours"))
+    assert told == (500000, 530.0, 41.0)
+    assert foot["print_hours"] == 0.083
+    rows = bom_rows(layout, DRIVES[0], {"MAGNET-4x3": 2}, printed, 1.27, PARTS, PRICES)
+    assert [row["material"] for row in rows[-len(caps) :]] == ["resin"] * len(caps)
+    for row in rows:
+        assert round(row["mass_g"], 2) == row["mass_g"] or row["mass_g"] < 0.1
+
+
+def test_unknown_part(layout: PrototypeLayout) -> None:
+    with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
+        bom_rows(layout, DRIVES[0], {"M3x11": 1}, (), 1.27, PARTS, PRICES)
+
+
+def test_record_of_the_drive(layout: PrototypeLayout) -> None:
+    summed = sum_masses(layout.array.ellipsoid.frame(), ball_masses(layout, 1.27))
+    swing, motion = (float(layout.stops.angle[0]), float(layout.stops.angle[-1])), MotionSpec()
+    drive = choose_drive("nema17-belt", base_torques(summed, swing, motion), DRIVES)
+    record = drive_record(summed, drive, motion, swing)
+    assert record.required_torque_nmm <= record.holding_torque_nmm
+    assert record.required_torque_nmm == pytest.approx(2 * record.peak_torque_nmm)
+    assert record.peak_torque_nmm > record.worst_torque_nmm
+    assert record.mass_g == summed.mass_g
+    assert record.belt_pull_n <= record.belt_rating_n
+    assert record.motor == drive.motor.name

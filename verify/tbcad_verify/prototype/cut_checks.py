@@ -1,0 +1,274 @@
+"""What is cut, drilled or folded: DXF files and drill table against bodies of the assembly.
+
+Flat drawings are read by group codes in plain Python. Another unit, or a layer that tbcad does not
+draw on, is refused: who cuts may take it for a cut. The shroud is a closed box of card round
+everything, and its patterns fold to its panels.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from tbcad_verify.prototype.assembly import VIEWS, Shape
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.files import MAX_TEXT_BYTES, read
+from tbcad_verify.record.prototype import PLATE_HOLES
+from tbcad_verify.record.prototype_sections import Panel, Shroud
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, no_faults, require
+from tbcad_verify.step.solids_text import TextSolid, holes
+from tbcad_verify.types import Floats
+
+CHECKS, SHROUD = {"drawings": "faults", "plate holes": "faults"}, {"shroud": "faults"}
+DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
+TAPPED_M5_MM = 4.2
+CORNERS = 4  # of a strip
+SAME_MM = 1e-6
+SINGLE_MM = 2e-3  # of the GLB's single precision
+CUT, FOLD = "cut", "fold"  # the layer of outlines and holes, and that of folds
+LAYERS = frozenset({CUT, FOLD, "centre", "dimensions", "frame"})
+# Group codes; X and Y of a line's end too.
+X, Y, END_X, END_Y, RADIUS, LAYER, VARIABLE, VALUE, NAME = 10, 20, 11, 21, 40, 8, 9, 70, 2
+MILLIMETRES = "4"
+MOST_CIRCLES = 1000
+FLAP_MM = 15.0  # width of a flap
+FLAPS = {"shroud_front": 3, "shroud_back": 3, "shroud_right": 1}  # folds of panels that have any
+PREFIX = "shroud_"
+SHEET = re.compile(r"CARD-(\d+)x(\d+)x(\d+)")
+
+Entity = dict[int, list[str]]
+
+
+class FlatDrawing(NamedTuple):
+    """What a DXF says is to be cut."""
+
+    circles: Floats  # (N, 3) x, y and radius, mm
+    corners: Floats  # (M, 2) of the outlines
+
+
+def read_dxf(text: str) -> FlatDrawing:
+    """Circles and outlines on the layer to be cut.
+
+    Raises:
+        Unknown: it is no DXF, or has too many circles.
+    """
+    entities = dxf_entities(text)
+    circles = [[one[code][0] for code in (X, Y, RADIUS)] for one in _on(CUT, "CIRCLE", entities)]
+    if len(circles) > MOST_CIRCLES:
+        raise Unknown(f"a drawing has {len(circles)} circles")
+    outlines = [np.array([one[X], one[Y]]).T for one in _on(CUT, "LWPOLYLINE", entities)]
+    corners = np.concatenate([np.zeros((0, 2)), *outlines])
+    return FlatDrawing(np.array(circles, dtype=float).reshape(-1, 3), corners.astype(float))
+
+
+def _on(layer: str, kind: str, entities: list[Entity]) -> list[Entity]:
+    return [one for one in entities if (one[0], one.get(LAYER)) == ([kind], [layer])]
+
+
+def dxf_entities(text: str) -> list[Entity]:
+    """Entities of a DXF, the values of each by group code.
+
+    Raises:
+        Unknown: it is no DXF, in another unit than millimetres, or on a layer of another name.
+    """
+    lines = [line.strip() for line in text.splitlines()]
+    try:
+        codes = [int(line) for line in lines[::2]]
+        pairs = list(zip(codes, lines[1::2], strict=True))
+        begin = pairs.index((NAME, "ENTITIES"))
+        end = pairs.index((0, "ENDSEC"), begin)
+    except ValueError:
+        raise Unknown("a drawing is no DXF") from None
+    unit = [k for k, pair in enumerate(pairs) if pair == (VARIABLE, "$INSUNITS")]
+    if [pairs[k + 1] for k in unit] != [(VALUE, MILLIMETRES)]:
+        raise Unknown("a drawing is not in millimetres")
+    found: list[Entity] = []
+    for code, value in pairs[begin + 1 : end]:
+        if code == 0:
+            found.append({})
+        if found:
+            found[-1].setdefault(code, []).append(value)
+    if others := {layer for one in found for layer in one.get(LAYER, ())} - LAYERS:
+        raise Unknown(f"a drawing has a layer {min(others)}")
+    return found
+
+
+def checks(
+    names: list[CheckName], context: PrototypeContext, assembly: Mapping[str, TextSolid]
+) -> list[Check]:
+    """All drawings, and the drill table of the plate."""
+    faults = _drawing_faults(context, assembly), _table_faults(context, assembly)
+    return [no_faults(*pair) for pair in zip(names, faults, strict=True)]
+
+
+def _drawing_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Iterator[str]:
+    bought = {one.name: one.part for one in context.prototype.bought}
+    drawings = {one.part: one.dxf for one in context.prototype.drawings}
+    needed = {name: str(bought[name]) for name in DRAWN if bought.get(name)}
+    for part in drawings.keys() ^ set(needed.values()):
+        yield f"{part}: drawn without need" if part in drawings else f"{part}: no drawing"
+    for name, part in needed.items():
+        if part in drawings and name in assembly:
+            flat = read_dxf(_text(context, drawings[part]))
+            if name == "lamp_1":
+                yield from _strip_faults(context, assembly[name], flat)
+            else:
+                yield from _board_faults(context, name, assembly[name], flat)
+
+
+def _text(context: PrototypeContext, file: str) -> str:
+    return read(context.export.folder, file, MAX_TEXT_BYTES).text()
+
+
+def _strip_faults(context: PrototypeContext, solid: TextSolid, flat: FlatDrawing) -> Iterator[str]:
+    """The strips of a lamp side by side, their length across the paper, and no holes."""
+    lamps = context.prototype.lamps
+    size = np.sort(np.ptp(solid.corners, axis=0)[1:])[::-1]
+    if lamps is None or len(flat.corners) != CORNERS * lamps.strips:
+        yield "lamp_1: its drawing does not have each strip's outline"
+        return
+    if lamps.length < lamps.width:
+        size = size[::-1]
+    own = flat.corners.reshape(lamps.strips, CORNERS, 2)
+    low, high = own.min(axis=1), own.max(axis=1)
+    wide = size[1] / lamps.strips
+    ends = np.column_stack([np.zeros(lamps.strips), wide * np.arange(lamps.strips)])
+    off = max(np.abs(low - ends).max(), np.abs(high - ends - [size[0], wide]).max())
+    if off > SAME_MM or len(flat.circles):
+        yield f"lamp_1: its outlines are not {lamps.strips} of {size[0]:g} x {wide:g} mm"
+
+
+def _board_faults(
+    context: PrototypeContext, name: str, solid: TextSolid, flat: FlatDrawing
+) -> Iterator[str]:
+    """A plate from above, an upright that lies, or a wheel about its axis, which is round too.
+
+    Every hole of the solid has its circle, and every circle its hole.
+    """
+    level = context.level_axes
+    axes = {"plate": level[:2], "wheel": context.frame[1:]}.get(name, level[[2, 1]])
+    corners, low = solid.corners @ axes.T, np.zeros(2)
+    if name != "wheel":
+        low, size = corners.min(axis=0), np.ptp(corners, axis=0)
+        outline = flat.corners if len(flat.corners) else np.zeros((1, 2))
+        ends = np.stack([outline.min(axis=0), outline.max(axis=0) - size])
+        if np.abs(ends).max() > SAME_MM:
+            yield f"{name}: its outline is not {size[0]:g} x {size[1]:g} mm"
+    radii: list[float] = []
+    for face in solid.faces:
+        if face.hollow and all(abs(face.radius - radius) > SAME_MM for radius in radii):
+            radii.append(face.radius)
+    wanted = [
+        (*(axes @ hole.point - low), radius)
+        for radius in radii
+        for hole in holes(solid.faces, radius, SAME_MM)
+    ]
+    if name == "wheel":
+        wanted.append((0.0, 0.0, max(face.radius for face in solid.faces if not face.hollow)))
+    if len(flat.circles) != len(wanted):
+        yield f"{name}: {len(flat.circles)} circles for {len(wanted)} holes"
+    for x, y, radius in wanted:
+        away = np.abs(flat.circles - [x, y, radius]).max(axis=1, initial=0.0)
+        if not (away <= SAME_MM).any():
+            yield f"{name}: no circle of {radius:g} mm radius at {x:.2f}, {y:.2f}"
+
+
+def _table_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Iterator[str]:
+    """The drill table against the tapped holes of the plate, from its corner."""
+    table = require(context.prototype.plate_holes, f"there is no {PLATE_HOLES}")
+    plate, axes = require(assembly.get("plate"), "the assembly has no plate"), context.level_axes
+    low, high = (end(plate.corners @ axes.T, axis=0) for end in (np.min, np.max))
+    drilled = holes(plate.faces, TAPPED_M5_MM / 2, SAME_MM)
+    places = np.array([hole.point @ axes.T for hole in drilled]).reshape(-1, 3)[:, :2] - low[:2]
+    if len(table) != len(places):
+        yield f"{len(table)} holes, the plate has {len(places)}"
+    if any(abs(hole.depth - (high - low)[2]) > SAME_MM for hole in drilled):
+        yield "a hole is not through the plate"
+    for k, place in enumerate(np.column_stack([table.x_mm, table.y_mm]), 1):
+        if (np.abs(places - place).max(axis=1) <= SAME_MM).sum() != 1:
+            yield f"hole {k} is elsewhere in the plate"
+
+
+def shroud_checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    drawn: Mapping[str, Shape],
+    solids: Mapping[str, TextSolid],
+) -> list[Check]:
+    """Panels against the assembly, patterns against panels, and all bodies inside."""
+    shroud = context.prototype.shroud
+    if shroud is None:
+        asked = context.export.spec.prototype.light.shroud is True
+        return [at_most(names[0], float(asked), 0, "the spec has a shroud, the record has none")]
+    return [no_faults(names[0], _shroud_faults(context, shroud, drawn, solids))]
+
+
+def _shroud_faults(
+    context: PrototypeContext,
+    shroud: Shroud,
+    drawn: Mapping[str, Shape],
+    solids: Mapping[str, TextSolid],
+) -> Iterator[str]:
+    sheet = SHEET.fullmatch(shroud.sheet)
+    if not sheet:
+        yield f"{shroud.sheet} is no sheet of card"
+        return
+    length, width, thick = (float(size) for size in sheet.groups())
+    boxes: dict[str, Floats] = {}
+    for panel in shroud.panels:
+        corners = require(solids.get(panel.name), f"the assembly has no {panel.name}").corners
+        boxes[panel.name] = np.stack([corners.min(axis=0), corners.max(axis=0)])
+        yield from _panel_faults(context, panel, boxes[panel.name], thick, (length, width))
+    yield from _box_faults(context, boxes, drawn, thick)
+
+
+def _panel_faults(
+    context: PrototypeContext, panel: Panel, box: Floats, thick: float, sheet: tuple[float, float]
+) -> Iterator[str]:
+    """One panel's size, and its pattern: outline less flaps, and folds on the panel's edges."""
+    sides, size = np.sort(box[1] - box[0]), np.array(panel.size)
+    if np.abs(sides - np.sort([thick, *size])).max() > SAME_MM:
+        yield f"{panel.name} is drawn {sides[1]:g} x {sides[2]:g} mm and {sides[0]:g} mm thick"
+    entities = dxf_entities(_text(context, panel.dxf))
+    outlines, folds = _on(CUT, "LWPOLYLINE", entities), _on(FOLD, "LINE", entities)
+    if len(outlines) != 1:
+        yield f"{panel.dxf}: {len(outlines)} outlines"
+        return
+    corners = np.array([outlines[0][X], outlines[0][Y]], dtype=float).T
+    flaps = np.zeros(4)  # below, left, above, right
+    for one in folds:
+        line = np.array([[one[X][0], one[Y][0]], [one[END_X][0], one[END_Y][0]]], dtype=float)
+        edges = [line[:, 1], line[:, 0], size[1] - line[:, 1], size[0] - line[:, 0]]
+        flaps += FLAP_MM * np.array([np.abs(edge).max() < SAME_MM for edge in edges])
+    if len(folds) != FLAPS.get(panel.name, 0) or (flaps > 0).sum() != len(folds):
+        yield f"{panel.dxf}: {len(folds)} folds"
+    low, high = -flaps[[1, 0]], size + flaps[[3, 2]]
+    if np.abs(np.stack([corners.min(axis=0) - low, corners.max(axis=0) - high])).max() > SAME_MM:
+        yield f"{panel.dxf}: its outline is not that of the panel with its flaps"
+    if (np.sort(high - low) > np.sort(sheet) + SAME_MM).any():
+        yield f"{panel.name} is larger than its sheet"
+
+
+def _box_faults(
+    context: PrototypeContext, boxes: Mapping[str, Floats], drawn: Mapping[str, Shape], thick: float
+) -> Iterator[str]:
+    """The panels close a box, and every body is inside, not nearer to the walls than asked."""
+    walls = (("back", "right", "floor"), 1), (("front", "left", "lid"), 0)
+    inner = np.array(
+        [[boxes[PREFIX + name][end, k] for k, name in enumerate(some)] for some, end in walls]
+    )
+    whole = np.stack(list(boxes.values()))
+    outer = np.stack([whole[:, 0].min(axis=0), whole[:, 1].max(axis=0)])
+    if np.abs(outer - inner - [[-thick], [thick]]).max() > SAME_MM:
+        yield "the panels do not close a box"
+    gap = context.export.spec.prototype.light.shroud_gap_mm - SINGLE_MM
+    for name, (points, _) in drawn.items():
+        if name in VIEWS or name.startswith(PREFIX):
+            continue
+        near = np.minimum(points.min(axis=0) - inner[0], inner[1] - points.max(axis=0))
+        near[2] = inner[1, 2] - points[:, 2].max()
+        if near.min() < gap or points[:, 2].min() < inner[0, 2] - SINGLE_MM:
+            yield f"{name} is {near.min():.2f} mm from the shroud"

@@ -1,1 +1,0 @@
-"""Balls, caps, magnets and fasteners in their seats and holes."""
