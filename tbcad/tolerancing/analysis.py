@@ -62,7 +62,7 @@ class ProcessOption:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Result of an analysis."""
+    """What simulated builds say of a design: yield, causes, margins, sharpness of pictures."""
 
     process: Process
     options: ToleranceOptions

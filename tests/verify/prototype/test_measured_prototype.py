@@ -32,7 +32,7 @@ from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
 from tests.exported_files import edit_json
-from tests.verify.prototype.conftest import synthetic_prototype
+from tests.verify.prototype import synthetic_prototype
 from tests.verify.prototype.synthetic_prototype import (
     SyntheticPrototype,
     export,

@@ -21,8 +21,6 @@ def _or_auto(value: object, check: ValidatorFunctionWrapHandler) -> object:
 
 
 OR_AUTO = WrapValidator(_or_auto)
-Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
-Place = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
 
 class OpticsSpec(Strict):
@@ -142,7 +140,6 @@ class StageSpec(Strict):
     top_mm: Annotated[float, Field(ge=-1000, le=1000), OR_AUTO]
     object_diameter_mm: Annotated[float, Field(ge=1, le=1000), OR_AUTO]
     led: Literal["LED-3", "LED-5"]
-    leds_mm: Annotated[list[Place], Field(max_length=12), OR_AUTO]
 
 
 class LightSpec(Strict):
