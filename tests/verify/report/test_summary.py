@@ -83,7 +83,8 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
-    assert "diamond 98% 60, cnc 0% 58.9, sla 0% 51.4, fdm 0% 42" in lines[-7]
+    assert lines[-7] == "  by: diamond 98% 60"
+    assert lines[-6] == "  not by: cnc 0% 58.9, sla 0% 51.4; more: --for-process"
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 COMMAND = "tbcad tolerance FOLDER"
 NOT_MODELLED = "sag 1.8 mm, lens 2 mm, shadows, caps"
 """Figures of the paper's design: docs/tolerance.md has them all."""
-NEAREST = 4  # processes that cannot, of which the verdict tells
+MOST, NEAREST = 3, 2  # processes that can, and that cannot, of which the verdict tells
 GOOD = 0.95  # share of few builds that stands for a process that can make a design
 NOT_SIMULATED = f"Can be made: {COMMAND} simulates builds with manufacturing errors"
 
@@ -44,8 +44,7 @@ def as_made_lines(as_made: AsMade | None) -> list[str]:
         (good if one.share >= GOOD else others).append(words)
     return [
         f"Can be made ({as_made.builds} simulated builds: yield, median minimum coverage in mm)",
-        f"  by: {', '.join(good) or 'none of the built-in processes'}",
-        *([f"  not by: {', '.join(others[:NEAREST])}"] if others else []),
-        f"  margins: tbcad build --for-process NAME; causes: {COMMAND}",
+        f"  by: {', '.join(good[:MOST]) or 'none of the built-in processes'}",
+        *([f"  not by: {', '.join(others[:NEAREST])}; more: --for-process"] if others else []),
         f"  left out: {NOT_MODELLED}",
     ]
