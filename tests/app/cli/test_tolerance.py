@@ -92,7 +92,7 @@ class TestWritten:
         """Closed forms, and what must be in order."""
         read = json.loads((written / "tolerance.json").read_text())
         alone = {one["kind"]: one for one in read["single_errors"]}
-        assert len(alone) == 13
+        assert len(alone) == 14
         assert not {"seat_um", "ball_radius_um", "rotation_angle_deg"} & set(alone)
         assert alone["facets_mm"]["loss_mm"] == pytest.approx(0.36, abs=1e-9)
         assert alone["facets_mm"]["tolerable_factor"] == pytest.approx(0.6 / 0.36, rel=0.02)
