@@ -24,7 +24,6 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
 )
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
-from tbcad.prototype.files.tables import picture_rows
 from tests.helpers import segment_distances
 
 SPEC = load_spec(None)
@@ -169,19 +168,6 @@ class TestStops:
         azimuth = min_swing_placement(prototype.problem).azimuth
         other = plan_stops(groups, array.polar, requests, azimuth)
         assert len(prototype.stops) < len(other)
-
-    def test_other_half_with_the_object_turned(
-        self, prototype: PrototypeLayout, paper_design: MirrorDesign
-    ) -> None:
-        """Camera a's mirror sees of the turned object what camera b's would of the straight one."""
-        b = paper_design.arrays[1]
-        assert b.u[prototype.twin] == pytest.approx(prototype.array.u * [-1, -1, 1], abs=1e-9)
-        rows = picture_rows(prototype)
-        assert len(rows) == 2 * 847
-        assert {row["mirror"] for row in rows} == {*prototype.array.ids, *b.ids}
-        assert [row["object_turn_deg"] for row in rows] == [0] * 847 + [180] * 847
-        first = [int(str(row["stop"])) for row in rows[:847]]
-        assert first == sorted(first)
 
 
 class TestAsked:

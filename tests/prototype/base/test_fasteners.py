@@ -11,7 +11,6 @@ from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.caps import cap_magnets, cap_pocket, cap_spigot
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.split import UNCUT, BaseSplit, split_base
@@ -66,19 +65,6 @@ def test_a_whole_base(base: BaseLayout) -> None:
         )
         outer, inner = (norm(np.cross(one.place, w)) for one in (screw, insert))
         assert min(outer, inner) - (inner - insert.part["length_mm"]) >= 3.0
-
-
-def test_the_magnet_of_a_cap_fills_its_pocket(
-    base: BaseLayout, small_prototype: PrototypeLayout
-) -> None:
-    magnets = cap_magnets(base, small_prototype, PARTS)
-    assert magnets
-    for one in magnets:
-        k = int(one.through[0].removeprefix("cap_")) - 1
-        from_centre = (one.place - base.seats.centre[k]) @ base.seats.axis[k]
-        assert from_centre == pytest.approx(cap_spigot(base, k)[1])
-        depth = float(small_prototype.balls.body_depth[k])
-        assert one.part["height_mm"] == cap_pocket(base, k, depth)[1]
 
 
 def test_joints_need_more(base: BaseLayout) -> None:

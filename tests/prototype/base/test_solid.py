@@ -80,12 +80,6 @@ def in_plane(mesh: trimesh.Trimesh, point: np.ndarray, normal: np.ndarray) -> np
     return (distance < 1e-6) & (mesh.face_normals @ normal > 1 - 1e-9)
 
 
-def quartered(corners: np.ndarray) -> np.ndarray:
-    half = (corners + np.roll(corners, -1, axis=1)) / 2
-    tips = np.stack([corners, half, np.roll(half, 1, axis=1)], axis=2).reshape(-1, 3, 3)
-    return np.concatenate([tips, half])
-
-
 class TestCarrier:
     def test_solid_and_mesh_are_watertight_exact_and_on_the_bed(
         self, part: PlacedSolid, mesh: trimesh.Trimesh
@@ -111,25 +105,6 @@ class TestCarrier:
         assert part.properties.area == pytest.approx(expected.area, rel=1e-9)
         assert part.properties.centroid == pytest.approx(expected.centroid, abs=1e-6)
 
-    def test_ball_centres_are_recovered_from_whole_pads(
-        self, base: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
-    ) -> None:
-        centre, seats = prototype.body_centres(), base.seats
-        for k in range(len(seats)):
-            planes = []
-            for contact, normal in zip(seats.contacts[k], seats.pad_normals[k], strict=True):
-                near = norm(mesh.triangles_center - contact) < seats.pad[k]
-                pad = in_plane(mesh, contact, normal) & near
-                area = mesh.area_faces[pad].sum()
-                assert area == pytest.approx(np.pi * seats.pad[k] ** 2, rel=0.02)
-                points = mesh.triangles[pad].reshape(-1, 3)
-                middle = points.mean(axis=0)
-                found = np.linalg.svd(points - middle)[2][2]
-                found *= np.sign(found @ normal)
-                planes.append((found, found @ middle + seats.radius[k]))
-            recovered = np.linalg.solve([n for n, _ in planes], [d for _, d in planes])
-            assert norm(recovered - centre[k]) < 1e-3
-
     def test_balls_touch_nothing_but_their_pads_and_can_be_put_in(
         self, base: BaseLayout, mesh: trimesh.Trimesh
     ) -> None:
@@ -146,14 +121,6 @@ class TestCarrier:
             along = offset @ path / length
             beside = norm(offset - along[:, None] * path / length)
             assert not ((along > 0) & (along < length) & (beside < seats.radius[k] - 1e-6)).any()
-
-    def test_no_facet_reaches_into_the_light(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
-        corners = mesh.triangles @ base.frame.T
-        for _ in range(4):
-            # The bound is below all of a facet; where it is too low, of its quarters.
-            corners = quartered(corners[base.light.min_excess(corners) < 0])
-        assert not len(corners)
-        assert base.light.excess(mesh.vertices @ base.frame.T).min() > 0
 
     def test_numbers_stand_on_the_bosses(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
         seats = base.seats
@@ -262,11 +229,6 @@ def rows_of(base: BaseLayout, spec: BaseSpec = SPEC) -> list[CouponRow]:
 
 
 class TestCoupon:
-    def test_they_fit_and_are_watertight(self, plates: list[PlacedSolid]) -> None:
-        for plate in plates:
-            assert as_trimesh(plate.shape).is_watertight
-            assert (np.ptp(bounds(plate.shape), axis=0) < 256).all()
-
     def test_a_seat_lies_on_the_bed_whole_round_its_pads_and_empty_between_them(
         self, base: BaseLayout
     ) -> None:

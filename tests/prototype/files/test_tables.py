@@ -13,7 +13,6 @@ from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.drive.loads import DriveLoads, base_torques
 from tbcad.prototype.files.tables import (
     BALL_COLUMNS,
-    PICTURE_COLUMNS,
     STOP_COLUMNS,
     ball_rows,
     picture_rows,
@@ -34,26 +33,6 @@ def plan(layout: PrototypeLayout) -> list[Row]:
 
 def numbers(rows: list[Row], *names: str) -> NDArray[np.float64]:
     return np.array([[float(row[name] or 0) for name in names] for row in rows]).squeeze()
-
-
-def test_every_mirror_of_both_cameras_once_and_each_run_upward(
-    layout: PrototypeLayout, plan: list[Row]
-) -> None:
-    """Ball's azimuth on the base and the base's angle, less the error: the mirror's azimuth."""
-    array = layout.array
-    assert tuple(plan[0]) == PICTURE_COLUMNS
-    assert [row["order"] for row in plan] == list(range(1, 2 * len(array) + 1))
-    for turn, camera in ((0, "a"), (180, "b")):
-        own = [row for row in plan if row["object_turn_deg"] == turn]
-        assert sorted(str(row["mirror"]) for row in own) == [
-            f"{camera}{i + 1:04d}" for i in range(len(array))
-        ]
-        assert (np.diff(numbers(own, "base_angle_deg")) >= 0).all()
-    own = [row for row in plan if row["object_turn_deg"] == 0]
-    stands = np.degrees(layout.placement.azimuth)[numbers(own, "ball").astype(int) - 1]
-    found = stands + numbers(own, "base_angle_deg") - numbers(own, "azimuth_error_deg")
-    mirrors = [array.ids.index(str(row["mirror"])) for row in own]
-    assert found == pytest.approx(np.degrees(array.azimuth[mirrors]), abs=1e-9)
 
 
 def test_stops_sum_up_the_plan_and_tell_what_gravity_does(
