@@ -24,7 +24,6 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
 )
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
-from tests.helpers import segment_distances
 
 SPEC = load_spec(None)
 LIMITS = SPEC.prototype
@@ -121,16 +120,6 @@ class TestPlaces:
         gap = norm(centre[:, None] - centre) - radius[:, None] - radius
         np.fill_diagonal(gap, np.inf)
         assert 0 < gap.min() - LIMITS.ball_wall_mm < 0.05  # and are no farther than they must
-
-    def test_post_and_camera_stay_clear_over_the_swing(self, prototype: PrototypeLayout) -> None:
-        view = prototype.array.camera
-        back = view.pinhole - LIMITS.camera_length_mm * view.forward
-        for angle in np.linspace(-1, 1, 41) * prototype.placement.swing / 2:
-            centre = prototype.body_centres(angle)
-            post = segment_distances(np.zeros((1, 3)), np.array([[0, 0, -400.0]]), centre)[0]
-            body = segment_distances(view.pinhole[None], back[None], centre)[0]
-            assert (post - prototype.balls.body_radius - 10).min() > LIMITS.ball_wall_mm - 1e-3
-            assert (body - prototype.balls.body_radius - 30).min() > LIMITS.ball_wall_mm - 1e-3
 
     def test_swing_is_the_minimum_less_than_greedy_and_outermost_that_of_the_edges(
         self, prototype: PrototypeLayout
