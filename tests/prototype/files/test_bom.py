@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item, standard_in
+from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item
 from tbcad.prototype.purchased.parts import load_parts, load_prices
 
 PARTS = load_parts()
@@ -18,19 +18,6 @@ PRINTED = (
     PrintedItem("base", "carrier", 5e5, (4.2e5, 41.26)),
     PrintedItem("foot", "below the plate", 1e3, (800.0, 0.0834)),
 )
-
-
-@pytest.mark.parametrize(
-    ("what", "standard"),
-    [
-        ("steel ball 1 3/8 in ISO 3290-1 G40", "ISO 3290-1"),
-        ("shaft collar DIN 705 A 8 with set screw", "DIN 705 A"),
-        ("screw ASME B18.3 1/4-20 UNC for the camera's thread (ISO 1222)", "ASME B18.3"),
-        ("disc magnet 6 x 3 mm N42 nickel plated", ""),
-    ],
-)
-def test_the_first_standard_named(what: str, standard: str) -> None:
-    assert standard_in(what) == standard
 
 
 def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout) -> None:
