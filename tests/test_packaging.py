@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.core.spec.load import shipped_designs
 from tbcad.version import __version__
 
 ROOT = Path(__file__).parents[1]
@@ -39,20 +38,6 @@ def test_has_every_file_of_both_packages_the_designs_and_no_others(wheel: zipfil
     } | {f"tbcad/{file.relative_to(ROOT)}" for file in (ROOT / "designs").iterdir()}
     found = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert found == expected
-
-
-def test_has_designs_data_and_types(wheel: zipfile.ZipFile) -> None:
-    names = set(wheel.namelist())
-    assert {f"tbcad/designs/{name}.toml" for name in shipped_designs()} <= names
-    assert {
-        "tbcad/py.typed",
-        "tbcad_verify/py.typed",
-        "tbcad/app/reference/terms.toml",
-        "tbcad_verify/report/checks.toml",
-        "tbcad/tolerancing/process/fdm.toml",
-        "tbcad/prototype/balls/catalogues/metric.csv",
-    } <= names
-    assert not [name for name in names if "test" in Path(name).parts[0]]
 
 
 def test_metadata_is_complete(wheel: zipfile.ZipFile) -> None:

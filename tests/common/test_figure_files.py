@@ -1,8 +1,7 @@
-"""Files of plots: kinds, bytes that repeat, colours of the palette, legends off the data."""
+"""Files of plots: kinds, bytes that repeat, colours of the palette."""
 
 import matplotlib
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tbcad.common.colours import CYCLE, SHADES
@@ -41,18 +40,3 @@ def test_colours_are_those_of_the_palette() -> None:
     assert seen[-1] == SHADES
     text = figure_file(draw, INCHES, "svg").decode()
     assert all(colour in text for colour in CYCLE[:2])
-
-
-def test_the_legend_hides_no_data() -> None:
-    figure = Figure(figsize=INCHES, layout="constrained")
-    FigureCanvasAgg(figure)
-    draw(figure)
-    figure.canvas.draw()
-    (axes,) = figure.axes
-    legend = axes.get_legend()
-    assert legend is not None
-    assert not legend.get_window_extent().overlaps(axes.get_window_extent())
-    below = axes.xaxis.get_tightbbox()
-    assert below is not None
-    assert legend.get_window_extent().y1 <= below.y0 + 1
-    assert legend.get_window_extent().y0 >= 0

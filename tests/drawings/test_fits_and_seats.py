@@ -9,7 +9,7 @@ import pytest
 from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.features import RoundFace, distance
+from tbcad.cad.kernel.features import RoundFace
 from tbcad.cad.kernel.solids import cut, cylinder, faces, one_solid, polygon, prism
 from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import DrawnExport
@@ -129,12 +129,6 @@ def carrier() -> Solid:
     ]
     shape = one_solid("carrier", cut(prism(polygon(corners), 10.0 * Z), tools))
     return Solid("carrier", shape, tuple((f"f{k}", one) for k, one in enumerate(faces(shape))))
-
-
-def test_distance(carrier: Solid) -> None:
-    assert distance(carrier.shape, np.array([20.0, -20.0, 13.0])) == pytest.approx(3.0)
-    assert distance(carrier.shape, np.array([43.0, 34.0, 5.0])) == pytest.approx(5.0)
-    assert distance(carrier.shape, ORIGIN) == pytest.approx(4.0)  # in the bore
 
 
 def test_seats_are_listed_on_the_part_that_has_their_pads(carrier: Solid) -> None:

@@ -126,12 +126,6 @@ def test_lengths_and_table_are_the_solids(sheet: Sheet) -> None:
         assert set(cells) <= set(row[start : start + 7]), number
 
 
-def test_the_title_block_is_whole(sheet: Sheet) -> None:
-    words = {one.text for one in texts(sheet)}
-    assert {"bracket", "some, n = 6", "7: bracket", "PETG", "ISO 2768-m", "2", "1 of 1"} <= words
-    assert {"first angle (ISO 5456-2)", "2:1 on A3"} <= words
-
-
 def test_no_text_meets_another_or_the_border(sheet: Sheet) -> None:
     check_texts(sheet)
 

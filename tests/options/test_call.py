@@ -124,10 +124,3 @@ def test_public_functions_have_the_options_of_their_commands(name: str) -> None:
     command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
     python = set(inspect.signature(getattr(tbcad, name)).parameters)
     assert command - ONLY_WRITTEN == python - ONLY_PYTHON
-
-
-def test_what_is_wanted_is_said_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"run\.json is not there: name a folder that tbcad run"):
-        tbcad.calibrate(tmp_path)
-    with pytest.raises(InputError, match=r"no such file; give a light field"):
-        tbcad.export(tmp_path, "rays")

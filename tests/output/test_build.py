@@ -2,10 +2,7 @@
 
 from pathlib import Path
 
-import pytest
-
 import tbcad
-from tbcad.errors import InputError
 
 # Camera b is no half turn of camera a: nothing can stand in for both halves.
 LEANING = ["n=2", "camera_mm=[100, 5, -100]"]
@@ -18,10 +15,3 @@ def test_leaves_the_prototype_out_and_says_why(tmp_path: Path) -> None:
     names = {path.name for path in (tmp_path / "exports").iterdir()}
     assert {"shell_a.step", "design.json", "manifest.json"} <= names
     assert "prototype.json" not in names
-
-
-def test_is_refused_where_the_prototype_was_asked_for(tmp_path: Path) -> None:
-    spec = tbcad.load_spec(None, LEANING)
-    with pytest.raises(InputError, match="or leave the prototype out with --parts shell"):
-        tbcad.build(spec, tmp_path / "exports", parts=["shell", "prototype"], verify=False)
-    assert list(tmp_path.iterdir()) == []

@@ -351,17 +351,6 @@ class TestRefused:
         self.tmp_path = tmp_path
 
 
-def test_the_manifest_that_tbcad_writes_is_known(
-    out: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tbcad.output.manifest.version", lambda _: "1")
-    with replacing(out, "build", force=False) as new:
-        (new / "shell_a.stl").write_text("solid")
-        write_manifest(new, "build")
-        (new / "verify.json").write_text("{}")
-    check_replaceable(out, "build", force=False)
-
-
 KILLED = '''
 import os, signal, sys
 sys.path[:0] = [{root!r}]

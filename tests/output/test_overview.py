@@ -67,19 +67,6 @@ def replaced_prices(some: MirrorDesign, name: str) -> MirrorDesign:
     return MirrorDesign(some.spec.model_copy(update={"prototype": prototype}), some.arrays)
 
 
-class TestWithoutPrototype:
-    def test_says_why(self) -> None:
-        found = overview(
-            design(load_spec(None, ["n=3", "camera_mm=[100, 5, -100]"])), optional_prototype=True
-        )
-        assert found.prototype is None
-        assert found.note.startswith("no prototype: a prototype needs cameras that a half turn")
-
-    def test_is_refused_when_it_is_asked_for(self) -> None:
-        with pytest.raises(InputError, match="a prototype needs cameras"):
-            overview(design(load_spec(None, ["n=3", "camera_mm=[100, 5, -100]"])), ["prototype"])
-
-
 def test_a_mandrel_without_room_is_refused_before_a_build() -> None:
     settings = ["n=3", "shell.negative=true", "shell.wall_mm=50"]
     with pytest.raises(InputError, match=r"mandrel has no room .* make shell\.wall_mm smaller"):

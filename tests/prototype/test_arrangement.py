@@ -93,7 +93,3 @@ class TestRefused:
         fixed = MirrorDesign(spec, small_design.arrays)
         with pytest.raises(SpecError, match=r"tried: there is room with prototype\.k auto \(which"):
             arrange(fixed)
-
-    def test_planar_mirrors(self) -> None:
-        with pytest.raises(SpecError, match="a prototype of balls needs curved mirrors"):
-            arrange(design(load_spec(None, ["n=3", "radius_rule=flat"])))

@@ -62,12 +62,6 @@ def test_longer_screws_are_heavier() -> None:
         assert all(one.mass_g < longer.mass_g for one, longer in pairwise(screws))
 
 
-def test_kind_and_sizes() -> None:
-    assert [part.name for part in of_kind(PARTS, "screws", thread_mm=3, length_mm=8)] == ["M3x8"]
-    assert len(of_kind(PARTS, "motors")) == 3
-    assert not of_kind(PARTS, "magnets", diameter_mm=2.001)
-
-
 @pytest.mark.parametrize(
     ("row", "message"),
     [

@@ -26,11 +26,6 @@ def test_writes_the_papers_design() -> None:
     assert load_spec(Path("my.toml")) == load_spec(None)
 
 
-def test_begins_from_another_design() -> None:
-    assert run(["init", "my.toml", "--from", "afternoon-print"]) == 0
-    assert load_spec(Path("my.toml")) == load_spec(Path("afternoon-print"))
-
-
 def test_does_not_overwrite_unless_told_to(capsys: pytest.CaptureFixture[str]) -> None:
     Path("my.toml").write_text("mine", encoding="utf-8")
     assert "my.toml exists" in refusal(capsys, "my.toml")

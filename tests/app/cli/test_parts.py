@@ -80,9 +80,3 @@ def test_a_broken_list(
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize("name", ["", "nowhere"])
-def test_no_list(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    assert run(["parts", str(tmp_path / name)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1

@@ -20,25 +20,20 @@ build --n 1 | no camera sees
 build --set optics.nn=3 | unknown key optics.nn: did you mean optics.n
 build --set wall_mm=-1 | shell.wall_mm is -1
 build --parts shel | shell, prototype
-build --parts '' | shell, prototype
 build --parts prototype --radius-rule flat | radius_rule
 build no-such-design.toml | no-such-design.toml
 build --yield 0.95 | leave --yield out
 build --for-process cnc --yield 95 | below 1
 build --set semi_minor_mm=31 --set capture_diameter_mm=60 | make
 build --parts shell --no-verify --full | leave --no-verify out
-build --parts shell --no-verify --json | leave --no-verify out
 build --full --json | exclude each other
 verify x -q --full | exclude each other
-verify x --quiet --json | exclude each other
 verify no-such-folder | no-such-folder
 run SAMPLE --json | --json is about --dry-run
 picture . --of cat | exploded
-picture no-such-folder | no-such-folder
 picture SAMPLE --of rig | prototype.json is missing
 report SAMPLE --out report.pdf | name a .html file
 report SAMPLE --out nowhere/report.html | in a folder that exists
-report SAMPLE --capture nowhere | nowhere
 drawings . | name a folder that tbcad build wrote
 drawings RECORD | manifest.json is missing or no manifest
 drawings SAMPLE --only optical_lay | optical_layout
@@ -48,20 +43,14 @@ init no/such/folder.toml | cannot be written
 init my.toml --from turtle | allowed is one of turtleback, afternoon-print
 init my.toml --json | --json is about --list
 optimize --for beauty | --for is 'beauty', allowed is one of minimum
-optimize --set n=1 | optics.n
 optimize --max-size-mm -1 | --max-size-mm is -1, allowed is more than 0
-optimize --max-view-angle-deg nan | --max-view-angle-deg is nan
 tolerance . | design.json is not there: name a folder that tbcad build wrote
-tolerance RECORD --process woodwork | process 'woodwork'
 tolerance RECORD --process slaa | did you mean sla?
 tolerance RECORD --yield 2 | --yield 2
 tolerance RECORD --builds 1 | --builds 1: allowed is 10 to
 tolerance RECORD --set nonsense | 'nonsense' is not kind=value
 tolerance RECORD --set nonsense=3 | unknown key nonsense
-tolerance RECORD --set seat_um=-3 | seat_um
-tolerance RECORD --object absent.ply | absent.ply
 tolerance RECORD --scheduler tcp://127.0.0.1:9 | --scheduler tcp://127.0.0.1:9: no Dask scheduler
-tolerance RECORD --scheduler nowhere | --scheduler nowhere: no Dask scheduler
 tolerance RECORD --unit cm | give --object too, or leave them out
 capture RECORD --unit cm | give --object too, or leave them out
 capture RECORD --mesh | shell_a.stl
@@ -69,7 +58,6 @@ capture RECORD --prototype | prototype.json
 capture RECORD --mesh --prototype | exclude each other
 capture RECORD --frames 2 --samples 2 | leave out --samples
 capture RECORD --object absent.ply | absent.ply
-capture RECORD --lights absent.csv | absent.csv
 capture RECORD --lights none.csv | has no lamps
 capture RECORD --lights inside.csv | inside.csv, line 2: a lamp in the capture sphere
 capture RECORD --lights named.csv | x_mm
@@ -78,48 +66,37 @@ capture RECORD --lights lamps.csv --every 2 | --every chooses
 capture RECORD --lights projectors --prototype | leave out --prototype
 view KNOT --elevation -3 | --elevation -3
 view KNOT --distance 10 | --distance 10
-view KNOT --fov 180 | --fov 180
 view KNOT --out view.jpg | .png
 view KNOT --method nearest --depth d.png | add --method depth
-view KNOT --surface plane --depth d.png | add --method depth
 view KNOT --method nearest --surface depth | leave out --surface depth
 view KNOT --method depth --surface object | leave out --surface object
 view KNOT --method depth --depth d.gif | ends in .png or .ply
 view KNOT --method depth --depth view.png | choose another name
-view KNOT --method depth --depth d.png --depth d.png | choose another name
 view KNOT --light sky.hdr | capture again with --lights
-view KNOT --light no.hdr | no such file
 view KNOT --light-turn 9 | add --light
 view KNOT --method field | no such file; write it with `tbcad reconstruct`
-view KNOT --normals n.png | no such file; write it with `tbcad reconstruct`
 view BALL --frame 4 | allowed is 0 to 1
 view BALL --frame 1 --surface object | leave out --light and --surface
 view FIELD --method field --surface plane | leave out --surface plane
 view FIELD --method field --light sky.hdr | a field has its own light
 view FIELD --method depth --normals n.png | only a field has that
-view FIELD --surface plane --opacity o.png | only a field has that
 view FIELD --opacity o.jpg | name a file that ends in .png
 view FIELD --opacity o.png --normals o.png | another file of this command
 refocus KNOT --aperture -1 | --aperture -1
-refocus KNOT --all-in-focus --sweep f.gif | leave out --sweep
 show KNOT --no-open --elevation 100 | elevation 100 is not allowed: 0 to 90
-show KNOT --no-open --distance 20 | distance 20 is not allowed: 45 to 5000
 show KNOT --no-open --width 4000 | width 4000 is not allowed: 16 to 2048
 show KNOT --turntable knot.png | knot.png: give a file that ends in .html
 show KNOT --turntable none/knot.html | in a folder that exists
 show RECORD | no such file; write it with `tbcad report
 show . | has neither report.html nor lightfield.h5: give a folder
-show none | has neither report.html nor lightfield.h5: give a folder
 show . --turntable t.html | no such file; --turntable is for a light field
 export KNOT | --to
 export KNOT --to rays --size 64 | as it was captured
-export KNOT --to ngp-rays --size 64 | as it was captured
 export KNOT --to colmap --size 4096 | GiB
 export KNOT --to colmap --cameras c0001 | no virtual camera
 export KNOT --to rays --exports RECORD | leave it out
 export KNOT --to mitsuba | give its folder by --exports
 export KNOT --to mitsuba --exports RECORD --size 8 | leave out --size
-export KNOT --to mitsuba --exports absent | design.json
 export KNOT --to mitsuba --exports RECORD | shell_a.stl
 export . --to colmap | lightfield.h5: no such file
 reconstruct BALL --out field.txt | field.txt: name a file that ends in .npz
@@ -138,26 +115,17 @@ reconstruct BALL --resume --force | --force and --resume exclude each other
 simulate-run EXPORT --bits 12 | --bits 12 is not written: allowed is 8 or 16
 simulate-run EXPORT --stops 1-x | --stops '1-x'
 simulate-run EXPORT --object no.ply | no.ply: no such file
-simulate-run EXPORT --process clay | process 'clay' is neither built in
 simulate-run EXPORT --stops 999 | stop 999 is not in the plan: allowed is 1 to
 simulate-run EXPORT --phases led_7 | phase led_7 is not photographed
-simulate-run EXPORT --unit cm | give --object too, or leave them out
 study resolution --sensor 12 | 2080x1552
-study resolution --ratio 0:1 | 1:4
 study resolution --from 9 --to 3 | --from or --to
 study capture-area --to 61 | --from or --to
 study elevation --set optics.m=3 | optics.m
-study elevation missing.toml | missing.toml
 study depth-of-field --blur-px 0 | blur-px
-study depth-of-field --pixel-um nan | pixel-um
 study low-pass RECORD --filter-px 0 | filter-px
-study low-pass RECORD --lens-px 17 | lens-px
-study low-pass RECORD --unit cm | give --object too, or leave them out
 study prototype RECORD --unit cm | give --object too, or leave them out
-study prototype . | design.json is not there
 study ssim --sensor abc | 2080x1552
 study ssim --azimuths 0 | --azimuths 0
-study ssim --distance 5 | --distance 5
 study balance --n 1 | --n is 1
 """
 LAMP = "x_mm,y_mm,z_mm\n"

@@ -47,11 +47,6 @@ class TestTemplate:
         for line in lines:
             assert not line.startswith("# ") or line == f"# {ELSEWHERE}" or line in template
 
-    def test_fits_the_page(self, name: str, file: Path) -> None:
-        lines = design_template(name).splitlines()
-        assert max(map(len, lines)) <= 100
-        assert not any(line != line.rstrip() for line in lines)
-
 
 def test_the_main_keys_are_set() -> None:
     table = tomllib.loads(design_template())

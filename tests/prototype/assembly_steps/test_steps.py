@@ -218,18 +218,6 @@ def test_what_does_not_add_up_is_refused(
         assembly_steps(read_machine(folder))
 
 
-def test_an_export_of_an_earlier_version_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder, design = write(tmp_path, belt_design(), LOOSE), belt_design()
-    del design["fasteners"]
-    (folder / "prototype.json").write_text(json.dumps(design))
-    assert run(["assembly", str(folder), "--out", str(tmp_path / "page")]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "fasteners: field required: build it again" in line
-    assert not (tmp_path / "page").exists()
-
-
 def test_json_and_page_have_the_same_steps(
     machine: Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -24,8 +24,6 @@ from tbcad.prototype.balls.selection import (
     choose_balls,
 )
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
-from tbcad.prototype.files.tables import picture_rows
-from tests.helpers import segment_distances
 
 SPEC = load_spec(None)
 LIMITS = SPEC.prototype
@@ -123,16 +121,6 @@ class TestPlaces:
         np.fill_diagonal(gap, np.inf)
         assert 0 < gap.min() - LIMITS.ball_wall_mm < 0.05  # and are no farther than they must
 
-    def test_post_and_camera_stay_clear_over_the_swing(self, prototype: PrototypeLayout) -> None:
-        view = prototype.array.camera
-        back = view.pinhole - LIMITS.camera_length_mm * view.forward
-        for angle in np.linspace(-1, 1, 41) * prototype.placement.swing / 2:
-            centre = prototype.body_centres(angle)
-            post = segment_distances(np.zeros((1, 3)), np.array([[0, 0, -400.0]]), centre)[0]
-            body = segment_distances(view.pinhole[None], back[None], centre)[0]
-            assert (post - prototype.balls.body_radius - 10).min() > LIMITS.ball_wall_mm - 1e-3
-            assert (body - prototype.balls.body_radius - 30).min() > LIMITS.ball_wall_mm - 1e-3
-
     def test_swing_is_the_minimum_less_than_greedy_and_outermost_that_of_the_edges(
         self, prototype: PrototypeLayout
     ) -> None:
@@ -169,19 +157,6 @@ class TestStops:
         azimuth = min_swing_placement(prototype.problem).azimuth
         other = plan_stops(groups, array.polar, requests, azimuth)
         assert len(prototype.stops) < len(other)
-
-    def test_other_half_with_the_object_turned(
-        self, prototype: PrototypeLayout, paper_design: MirrorDesign
-    ) -> None:
-        """Camera a's mirror sees of the turned object what camera b's would of the straight one."""
-        b = paper_design.arrays[1]
-        assert b.u[prototype.twin] == pytest.approx(prototype.array.u * [-1, -1, 1], abs=1e-9)
-        rows = picture_rows(prototype)
-        assert len(rows) == 2 * 847
-        assert {row["mirror"] for row in rows} == {*prototype.array.ids, *b.ids}
-        assert [row["object_turn_deg"] for row in rows] == [0] * 847 + [180] * 847
-        first = [int(str(row["stop"])) for row in rows[:847]]
-        assert first == sorted(first)
 
 
 class TestAsked:

@@ -11,7 +11,6 @@ from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.caps import cap_magnets, cap_pocket, cap_spigot
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.split import UNCUT, BaseSplit, split_base
@@ -49,7 +48,7 @@ def test_a_whole_base(base: BaseLayout) -> None:
     }
     assert len({one.name for one in some}) == len(some)
     assert all(one.rotates for one in some)
-    # Magnets end at the bottom of their pockets, set screws press on the shaft and grip inserts.
+    # Magnets end at the bottom of their pockets.
     magnets = of_kind(some, "magnets")
     ends = np.array([one.place + one.part["height_mm"] * one.along for one in magnets])
     assert ends == pytest.approx(seats.at_depth(seats.bottom), abs=1e-9)
@@ -58,27 +57,6 @@ def test_a_whole_base(base: BaseLayout) -> None:
     for screw in of_kind(some, "setscrews"):
         tip = screw.place + screw.part["length_mm"] * screw.along
         assert norm(np.cross(tip, w)) == pytest.approx(base.hub.bore)
-        (insert,) = (
-            one
-            for one in of_kind(some, "inserts")
-            if norm(np.cross(one.place - screw.place, screw.along)) < 1e-9
-            and one.along @ screw.along > 0
-        )
-        outer, inner = (norm(np.cross(one.place, w)) for one in (screw, insert))
-        assert min(outer, inner) - (inner - insert.part["length_mm"]) >= 3.0
-
-
-def test_the_magnet_of_a_cap_fills_its_pocket(
-    base: BaseLayout, small_prototype: PrototypeLayout
-) -> None:
-    magnets = cap_magnets(base, small_prototype, PARTS)
-    assert magnets
-    for one in magnets:
-        k = int(one.through[0].removeprefix("cap_")) - 1
-        from_centre = (one.place - base.seats.centre[k]) @ base.seats.axis[k]
-        assert from_centre == pytest.approx(cap_spigot(base, k)[1])
-        depth = float(small_prototype.balls.body_depth[k])
-        assert one.part["height_mm"] == cap_pocket(base, k, depth)[1]
 
 
 def test_joints_need_more(base: BaseLayout) -> None:

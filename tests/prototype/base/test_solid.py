@@ -5,13 +5,11 @@ import re
 import numpy as np
 import pytest
 import trimesh
-from OCP.BRep import BRep_Tool
-from OCP.Geom import Geom_SphericalSurface
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.cad.kernel.checks import check_pads, check_volume, plane_faces, properties, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height, loops, relief
-from tbcad.cad.kernel.solids import cut, cylinder, faces, fused, one_solid
+from tbcad.cad.kernel.solids import cut, cylinder, fused, one_solid
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import PrinterSpec
@@ -80,12 +78,6 @@ def in_plane(mesh: trimesh.Trimesh, point: np.ndarray, normal: np.ndarray) -> np
     return (distance < 1e-6) & (mesh.face_normals @ normal > 1 - 1e-9)
 
 
-def quartered(corners: np.ndarray) -> np.ndarray:
-    half = (corners + np.roll(corners, -1, axis=1)) / 2
-    tips = np.stack([corners, half, np.roll(half, 1, axis=1)], axis=2).reshape(-1, 3, 3)
-    return np.concatenate([tips, half])
-
-
 class TestCarrier:
     def test_solid_and_mesh_are_watertight_exact_and_on_the_bed(
         self, part: PlacedSolid, mesh: trimesh.Trimesh
@@ -111,26 +103,7 @@ class TestCarrier:
         assert part.properties.area == pytest.approx(expected.area, rel=1e-9)
         assert part.properties.centroid == pytest.approx(expected.centroid, abs=1e-6)
 
-    def test_ball_centres_are_recovered_from_whole_pads(
-        self, base: BaseLayout, prototype: PrototypeLayout, mesh: trimesh.Trimesh
-    ) -> None:
-        centre, seats = prototype.body_centres(), base.seats
-        for k in range(len(seats)):
-            planes = []
-            for contact, normal in zip(seats.contacts[k], seats.pad_normals[k], strict=True):
-                near = norm(mesh.triangles_center - contact) < seats.pad[k]
-                pad = in_plane(mesh, contact, normal) & near
-                area = mesh.area_faces[pad].sum()
-                assert area == pytest.approx(np.pi * seats.pad[k] ** 2, rel=0.02)
-                points = mesh.triangles[pad].reshape(-1, 3)
-                middle = points.mean(axis=0)
-                found = np.linalg.svd(points - middle)[2][2]
-                found *= np.sign(found @ normal)
-                planes.append((found, found @ middle + seats.radius[k]))
-            recovered = np.linalg.solve([n for n, _ in planes], [d for _, d in planes])
-            assert norm(recovered - centre[k]) < 1e-3
-
-    def test_balls_touch_nothing_but_their_pads_and_can_be_put_in(
+    def test_balls_have_room_and_can_be_put_in(
         self, base: BaseLayout, mesh: trimesh.Trimesh
     ) -> None:
         points, _ = trimesh.sample.sample_surface(mesh, 200_000, seed=1)
@@ -139,21 +112,12 @@ class TestCarrier:
             offset = points - seats.centre[k]
             room = norm(offset) - seats.radius[k]
             at_pad = norm(points[:, None] - seats.contacts[k]).min(axis=1)
-            assert room.min() > -1e-6
             at_pad = at_pad < seats.pad[k] + SPEC.clearance_mm
             assert room[~at_pad].min() > SPEC.clearance_mm - 0.03
             length = norm(path)
             along = offset @ path / length
             beside = norm(offset - along[:, None] * path / length)
             assert not ((along > 0) & (along < length) & (beside < seats.radius[k] - 1e-6)).any()
-
-    def test_no_facet_reaches_into_the_light(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
-        corners = mesh.triangles @ base.frame.T
-        for _ in range(4):
-            # The bound is below all of a facet; where it is too low, of its quarters.
-            corners = quartered(corners[base.light.min_excess(corners) < 0])
-        assert not len(corners)
-        assert base.light.excess(mesh.vertices @ base.frame.T).min() > 0
 
     def test_numbers_stand_on_the_bosses(self, base: BaseLayout, mesh: trimesh.Trimesh) -> None:
         seats = base.seats
@@ -206,16 +170,6 @@ def test_caps(base: BaseLayout, prototype: PrototypeLayout) -> None:
     assert len(parts) == balls.cap.sum() > 0
     for k, cap in zip(np.flatnonzero(balls.cap).tolist(), parts, strict=True):
         body, front = float(balls.body_radius[k]), float(balls.radius[k])
-        # Front and body are exact spheres.
-        spheres = {}
-        for face in faces(cap.shape):
-            surface = BRep_Tool.Surface_s(face)
-            if isinstance(surface, Geom_SphericalSurface):
-                middle = surface.Location()
-                spheres[surface.Radius()] = [middle.X(), middle.Y(), middle.Z()]
-        assert sorted(spheres) == pytest.approx([body, front])
-        assert spheres[min(spheres)] == pytest.approx(prototype.body_centres()[k], abs=1e-9)
-        assert spheres[max(spheres)] == pytest.approx(prototype.centres()[k], abs=1e-9)
         # Its volume in closed form.
         edge, behind = body / np.sqrt(2), flat_depth(base, k)
         drop = front - np.sqrt(front**2 - edge**2)
@@ -225,10 +179,7 @@ def test_caps(base: BaseLayout, prototype: PrototypeLayout) -> None:
         spigot, end = cap_spigot(base, k)
         spigots = np.pi * spigot**2 * (end - behind)
         assert cap.volume == pytest.approx(lens + zone + spigots - np.pi * wide**2 * deep)
-        # Watertight, and printed front up.
-        whole = as_trimesh(cap.shape)
-        assert whole.is_watertight
-        assert (norm(whole.vertices - prototype.apices()[k])).min() < 1e-6
+        # Printed front up.
         low, high = bounds(cap.on_bed)
         assert [low[2], high[2]] == pytest.approx([0, end + balls.body_depth[k]], abs=1e-6)
         # Tilted by cap_tilt the spigot's edge just touches the pocket, and nothing behind it.
@@ -262,11 +213,6 @@ def rows_of(base: BaseLayout, spec: BaseSpec = SPEC) -> list[CouponRow]:
 
 
 class TestCoupon:
-    def test_they_fit_and_are_watertight(self, plates: list[PlacedSolid]) -> None:
-        for plate in plates:
-            assert as_trimesh(plate.shape).is_watertight
-            assert (np.ptp(bounds(plate.shape), axis=0) < 256).all()
-
     def test_a_seat_lies_on_the_bed_whole_round_its_pads_and_empty_between_them(
         self, base: BaseLayout
     ) -> None:

@@ -8,7 +8,6 @@ from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
     GRAVITY,
-    BaseBalance,
     PointMasses,
     ball_masses,
     cap_volume,
@@ -66,16 +65,6 @@ class TestTorque:
         )
 
 
-@given(azimuth=st.floats(-3, 3), radius=st.floats(10, 300), mass=st.floats(1, 5000))
-def test_a_counterweight_leaves_nothing(azimuth: float, radius: float, mass: float) -> None:
-    masses = at(30, 90, azimuth, mass)
-    balance = sum_masses(FRAME, masses)
-    weight = at(-80, radius, balance.azimuth + np.pi, balance.moment / radius)
-    balanced = sum_masses(FRAME, masses, weight)
-    assert balanced.max_torque(-np.pi, np.pi) == pytest.approx(0, abs=1e-9 * mass)
-    assert balanced.mass_g == pytest.approx(mass * (1 + 90 / radius))
-
-
 class TestBalls:
     def test_balls_weigh_where_they_sit(self, small_prototype: PrototypeLayout) -> None:
         masses = ball_masses(small_prototype, 1.27)
@@ -97,11 +86,3 @@ class TestBalls:
             back = body**2 - (x - depth) ** 2
             area = np.pi * np.where(x < drop, front, np.maximum(back, 0))
             assert cap_volume(balls)[j] == pytest.approx(np.trapezoid(area, x), rel=1e-5)
-
-
-def test_one_mass_is_its_own_sum() -> None:
-    balance: BaseBalance = sum_masses(FRAME, at(10, 50, 0.2, 80.0))
-    assert FRAME @ balance.centre == pytest.approx([10, 50 * np.cos(0.2), 50 * np.sin(0.2)])
-    assert balance.moment == pytest.approx(4000)
-    assert balance.azimuth == pytest.approx(0.2)
-    assert balance.inertia == pytest.approx(80 * 50**2)

@@ -17,8 +17,6 @@ from tbcad.prototype.drive.drive import (
     pitch_diameter,
 )
 from tbcad.prototype.drive.loads import HOLD_MARGIN, BaseTorques, DriveLoads, choose_drive
-from tbcad.prototype.frame.head import GAP_MM
-from tbcad.prototype.frame.purchased import PLATE_MM
 from tbcad.prototype.purchased.parts import load_parts
 
 PARTS = load_parts()
@@ -142,12 +140,6 @@ class TestLoads:
             800 / radius / stiffness / radius
         )
 
-    def test_yields_to_each_torque_with_its_sign(self) -> None:
-        some = loads(belt(teeth=120), gravity=800.0)
-        none, all_of_it, back = some.wind_up_at(np.array([0.0, 800.0, -800.0]))
-        assert none == 0
-        assert all_of_it == -back == pytest.approx(some.wind_up)
-
     def test_both_sides_of_the_belt_pull_at_the_shaft(self) -> None:
         """Side by side they add up; where they lean, their difference pulls across."""
         some = loads(belt(teeth=120))
@@ -166,8 +158,3 @@ class TestLoads:
         words = "loads its motor's shaft"
         assert any(words in fault for fault in loads(wide, at_limit * 1.01).faults())
         assert not any(words in fault for fault in loads(wide, at_limit * 0.99).faults())
-
-    def test_the_belt_pulls_before_the_end_of_the_shaft(self) -> None:
-        """The load is rated there, 24 mm from the flange."""
-        widest = max(d.pinion["width_mm"] for d in DRIVES if d.pinion)
-        assert PLATE_MM + GAP_MM + widest / 2 <= 24

@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.drive.balance import ball_masses, sum_masses
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.drive.loads import base_torques, choose_drive
-from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item, standard_in
-from tbcad.prototype.files.record import drive_record
+from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item
 from tbcad.prototype.purchased.parts import load_parts, load_prices
 
 PARTS = load_parts()
@@ -22,19 +18,6 @@ PRINTED = (
     PrintedItem("base", "carrier", 5e5, (4.2e5, 41.26)),
     PrintedItem("foot", "below the plate", 1e3, (800.0, 0.0834)),
 )
-
-
-@pytest.mark.parametrize(
-    ("what", "standard"),
-    [
-        ("steel ball 1 3/8 in ISO 3290-1 G40", "ISO 3290-1"),
-        ("shaft collar DIN 705 A 8 with set screw", "DIN 705 A"),
-        ("screw ASME B18.3 1/4-20 UNC for the camera's thread (ISO 1222)", "ASME B18.3"),
-        ("disc magnet 6 x 3 mm N42 nickel plated", ""),
-    ],
-)
-def test_the_first_standard_named(what: str, standard: str) -> None:
-    assert standard_in(what) == standard
 
 
 def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout) -> None:
@@ -58,16 +41,3 @@ def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout
 def test_unknown_part(layout: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
         bom_rows(layout, DRIVES[0], {"M3x11": 1}, (), 1.27, PARTS, PRICES)
-
-
-def test_record_of_the_drive(layout: PrototypeLayout) -> None:
-    summed = sum_masses(layout.array.ellipsoid.frame(), ball_masses(layout, 1.27))
-    swing, motion = (float(layout.stops.angle[0]), float(layout.stops.angle[-1])), MotionSpec()
-    drive = choose_drive("nema17-belt", base_torques(summed, swing, motion), DRIVES)
-    record = drive_record(summed, drive, motion, swing)
-    assert record.required_torque_nmm <= record.holding_torque_nmm
-    assert record.required_torque_nmm == pytest.approx(2 * record.peak_torque_nmm)
-    assert record.peak_torque_nmm > record.worst_torque_nmm
-    assert record.mass_g == summed.mass_g
-    assert record.belt_pull_n <= record.belt_rating_n
-    assert record.motor == drive.motor.name

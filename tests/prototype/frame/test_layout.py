@@ -9,7 +9,6 @@ import pytest
 from tbcad.core.geometry.primitives import Component, Cylinder
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import base_fasteners
@@ -134,15 +133,6 @@ class TestFrame:
         lamps = {name for name in frame.light if name.startswith("lamp_")}
         assert min(frame.light[name] for name in lamps) >= SMALL.prototype.frame.clearance_mm
         assert min(frame.light[name] for name in frame.light.keys() - lamps) >= 20
-
-    def test_the_paper_design_is_clear_with_all_defaults(
-        self, paper_prototype: PrototypeLayout
-    ) -> None:
-        whole = Surroundings.of(load_spec(None).prototype, paper_prototype, "nema17-belt")
-        found = whole.frame(drive("nema17-belt", 2))
-        assert min(found.swept.values()) > 3
-        assert min(found.light.values()) > 3
-        assert whole.stage.swept > 20
 
     def test_uprights_and_plate_are_what_is_sold(self, frame: FrameLayout) -> None:
         bars = [item for item in frame.purchased if item.name.startswith("upright")]

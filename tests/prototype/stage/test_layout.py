@@ -11,7 +11,6 @@ import pytest
 from tbcad.core.geometry.primitives import (
     Cylinder,
     box,
-    enclosing_triangles,
 )
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm, unit
@@ -134,10 +133,8 @@ class TestStage:
     def test_leds_are_seen_as_in_a_march_along_their_rays(
         self, small_prototype: PrototypeLayout, stage: StageLayout
     ) -> None:
-        """Two or more from each camera; a pillar counts as high as its LED, so fewer are said."""
-        crown, room = stage.components[1], SIZED.stage.object_diameter_mm / 2
-        pillars = [body for body in crown.added[3:] if isinstance(body, Cylinder)]
-        assert len(pillars) == 4
+        """Two or more from each camera, past the object."""
+        room = SIZED.stage.object_diameter_mm / 2
         cameras = virtual_cameras(small_prototype)
         seen = visible(SIZED.stage, stage.leds, cameras, stage.led, CAPTURE)
         assert seen.sum(axis=1).min() >= 2
@@ -147,23 +144,8 @@ class TestStage:
             across, height = norm(points[..., :2]), points[..., 2]
             inside = (across < room) & (height > SIZED.stage.top_mm)
             object_hides = (inside & (height < np.sqrt(CAPTURE**2 - room**2))).any(axis=0)
-            others = [pillar for j, pillar in enumerate(pillars) if j != i]
-            pillar_hides = np.zeros(len(cameras), dtype=bool)
-            for pillar in others:
-                low = points[..., 2] < pillar.start[2] + pillar.length
-                near = norm(points[..., :2] - pillar.start[:2]) < pillar.radius
-                pillar_hides |= (low & near).any(axis=0)
             hidden = hidden_by_object(SIZED.stage, stage.leds, cameras, CAPTURE)[:, i]
             assert (hidden != object_hides).mean() < 0.02  # rays that graze, between two steps
-            assert not (seen[:, i] & pillar_hides).any()
-
-    def test_nothing_is_in_the_objects_room(self, stage: StageLayout) -> None:
-        """Corners and axes of all bodies; the disc's face is the room's floor."""
-        room, floor = SIZED.stage.object_diameter_mm / 2, SIZED.stage.top_mm
-        for component in stage.components:
-            for body in component.added:
-                points = enclosing_triangles(body).reshape(-1, 3)
-                assert points[norm(points[:, :2]) < room - 1e-9][:, 2].max(initial=-99) <= floor
 
 
 class TestKeepOut:

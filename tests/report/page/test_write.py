@@ -18,7 +18,6 @@ from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.output.foreign_files import foreign_files
 from tbcad.output.manifest import fingerprint
-from tbcad.report.page import pictures
 from tbcad.report.page.mirrors import KINDS, PackedArrays
 from tbcad.report.page.write import MAX_BYTES, page, write_report
 from tests.exported_files import read_csv
@@ -142,15 +141,6 @@ def test_pictures_are_shown_as_far_as_there_is_room(
     assert 0 < len(shown) < 6
     assert "Left out, to keep this file small" in text
     assert "broken.png" not in text
-
-
-def test_transparent_pictures_are_on_white(export: Path) -> None:
-    Image.new("RGBA", (8, 8), (0, 0, 0, 0)).save(export / "clear.png")
-    picture = pictures.read_pictures(export)[0]
-    assert (picture.width, picture.height) == (8, 8)
-    from io import BytesIO
-
-    assert np.asarray(Image.open(BytesIO(picture.data))).min() > 250
 
 
 def test_report_is_no_foreign_file_and_the_verification_takes_no_notice(export: Path) -> None:
