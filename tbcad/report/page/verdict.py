@@ -75,7 +75,7 @@ def read_verdict(folder: Path) -> Verdict | None:
 def verdict_html(
     verdict: Verdict | None, as_made: AsMade | None, views: int, balls: int, target_mm: float
 ) -> Iterator[str]:
-    """The top of the page: as designed, and as made by each process."""
+    """The top of the page: as designed, and by what it can be made."""
     yield "<div class=verdicts>"
     yield from _as_designed(verdict, views, balls, target_mm)
     yield from _as_made(as_made, target_mm)
@@ -128,7 +128,7 @@ def _key_figures(verdict: Verdict) -> Iterator[str]:
 
 
 def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
-    yield "<div class=card><h2>As made</h2>"
+    yield "<div class=card><h2>Can be made</h2>"
     if as_made is None or not as_made.processes:
         reason = as_made.reason if as_made else "no shell was built, or it was not verified"
         yield f"<p>Not simulated: {escape(reason)}.</p></div>"
