@@ -134,50 +134,6 @@ def _minimum_coverage(setup: OpticalSetup) -> np.ndarray:
     return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
 
 
-def bisected_coverage(
-    array: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000
-) -> float:
-    """Coverage of a mirror of build k by bisection of where each way from its apex ends, mm.
-
-    Every sphere and plane is looked at, scaled as it is, without any circle or corner.
-    """
-    every, m = array.cells.surfaces, len(array)
-    scale = draws.scale[k]
-    centre = array.mirrors.centre + draws.centre[k]
-    radius = array.mirrors.radius + draws.radius[k]
-    apart = np.linalg.norm(array.mirrors.apex - array.mirrors.apex[mirror], axis=1)
-    others = np.argsort(apart)[1:26]
-    axis = np.eye(3) - np.outer(every.normal[mirror], every.normal[mirror])
-    first = axis[np.argmax(np.linalg.norm(axis, axis=1))]
-    first = first / np.linalg.norm(first)
-    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
-    way = np.cos(turn) * first + np.sin(turn) * np.cross(every.normal[mirror], first)
-
-    def at(angle: np.ndarray) -> np.ndarray:
-        out = np.cos(angle)[:, None] * every.normal[mirror] + np.sin(angle)[:, None] * way
-        return scale * (centre[mirror] + radius[mirror] * out)
-
-    def inside(x: np.ndarray) -> np.ndarray:
-        away = x[:, None] / scale - centre[others]
-        clear = (np.linalg.norm(away, axis=2) >= radius[others]).all(axis=1)
-        for wall in (m, m + 1):
-            clear &= (x / scale - every.apex[wall]) @ every.normal[wall] >= 0
-        return clear
-
-    low, high = np.zeros(ways), np.full(ways, np.pi / 2)
-    high[:] = np.minimum(high, 60 / radius[mirror])
-    assert inside(at(low)).all()
-    assert not inside(at(high)).any()
-    for _ in range(40):
-        middle = (low + high) / 2
-        kept = inside(at(middle))
-        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
-    point = at(low)
-    normal = (point / scale - centre[mirror]) / scale
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return float(2 * miss_distances(array.camera.pinhole, point, normal).min())
-
-
 def surrounded(array: MirrorArray, shift: np.ndarray) -> np.ndarray:
     """Whether each whole mirror's rays go round the object's middle, the camera moved, (m,).
 
@@ -257,58 +213,67 @@ def _displaced_misses(
     return miss_distances(array.camera.pinhole, displaced(point), turned)
 
 
-def wavy_coverage(
+def last_inside(
+    normal: np.ndarray, widest: float, inside: Callable[[np.ndarray], np.ndarray], ways: int
+) -> np.ndarray:
+    """Directions (w, 3) all around a normal, as far from it as they are inside, by bisection."""
+    first = np.linalg.svd(normal[None])[2][1]
+    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
+    way = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
+
+    def outward(angle: np.ndarray) -> np.ndarray:
+        return np.asarray(np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * way)
+
+    low, high = np.zeros(ways), np.full(ways, min(widest, np.pi / 2))
+    assert inside(outward(low)).all()
+    assert not inside(outward(high)).any()
+    for _ in range(40):
+        middle = (low + high) / 2
+        kept = inside(outward(middle))
+        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
+    return outward(low)
+
+
+def bisected_coverage(
     array: MirrorArray,
     draws: ShellDraws,
     k: int,
     mirror: int,
-    heights: Heights,
-    ways: int = 720,
+    heights: Heights = lambda _, x: np.zeros(len(x)),
+    ways: int = 4_000,
 ) -> float:
-    """Coverage of a wavy mirror of build k by bisection of where each way from its apex ends, mm.
+    """Coverage of a mirror of build k by bisection of where each way from its apex ends, mm.
 
-    Every surface is the place where the value of its sphere equals the height of its waviness;
-    neither circles nor corners are used, and nothing is linear.
+    Every surface is the place where the value of its sphere equals the height of its waviness,
+    scaled as it is; neither circles nor corners are used, and nothing is linear.
     """
-    every, m = array.cells.surfaces, len(array)
+    every, m, scale = array.cells.surfaces, len(array), draws.scale[k]
     apart = np.linalg.norm(array.mirrors.apex - array.mirrors.apex[mirror], axis=1)
-    others = np.argsort(apart)[1:16]
-    normal = every.normal[mirror]
+    others = np.argsort(apart)[1:26]
     radius = array.mirrors.radius + draws.radius[k]
     centre = array.mirrors.centre + draws.centre[k]
-    first = np.linalg.svd(normal[None])[2][1]
-    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
-    way = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
 
     def value(which: int, x: np.ndarray) -> np.ndarray:
         away = x - centre[which]
         sphere = (np.sum(away * away, axis=1) - radius[which] ** 2) / (2 * radius[which])
         return np.asarray(sphere - heights(which, x))
 
-    def surface(angle: np.ndarray) -> np.ndarray:
-        out = np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * way
+    def surface(out: np.ndarray) -> np.ndarray:
         x = centre[mirror] + radius[mirror] * out
         for _ in range(4):
             x = x - value(mirror, x)[:, None] * out
-        return x
+        return np.asarray(x)
 
-    def inside(x: np.ndarray) -> np.ndarray:
+    def inside(out: np.ndarray) -> np.ndarray:
+        x = surface(out)
         clear = np.all([value(other, x) >= 0 for other in others], axis=0)
         for wall in (m, m + 1):
             clear &= (x - every.apex[wall]) @ every.normal[wall] >= 0
         return np.asarray(clear)
 
-    low, high = np.zeros(ways), np.full(ways, 30 / radius[mirror])
-    np.minimum(high, np.pi / 2, out=high)
-    assert inside(surface(low)).all()
-    for _ in range(34):
-        middle = (low + high) / 2
-        kept = inside(surface(middle))
-        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
-    point = surface(low)
-    gradient = np.stack(
-        [value(mirror, point + STEP * e) - value(mirror, point - STEP * e) for e in np.eye(3)],
-        axis=1,
-    )
+    x = surface(last_inside(every.normal[mirror], 60 / radius[mirror], inside, ways))
+    steps = STEP * np.eye(3)
+    gradient = np.stack([value(mirror, x + e) - value(mirror, x - e) for e in steps], axis=1)
+    gradient /= scale
     gradient /= np.linalg.norm(gradient, axis=1)[:, None]
-    return float(2 * miss_distances(array.camera.pinhole, point, gradient).min())
+    return float(2 * miss_distances(array.camera.pinhole, scale * x, gradient).min())

@@ -24,11 +24,11 @@ from tbcad.tolerancing.montecarlo.warp import pivots, smooth_field
 from tests.pedestal_designs import pedestal_design
 from tests.tolerancing.exact_builds import (
     displaced_coverage,
+    last_inside,
     traced_coverage,
     verified_coverage,
     write_meshes,
 )
-from tests.tolerancing.montecarlo.every_edge import every_edge
 
 COARSE = Errors(
     sphere_centre=Error(0.03),
@@ -116,22 +116,14 @@ def bisected_coverage(half: EdgeModel, draws: ShellDraws, mirror: int, ways: int
         *zip(point, half.walls.normal[own], strict=True),
         *half.table[-2:, :6].reshape(2, 2, 3),
     ]
-    first = np.linalg.svd(normal[None])[2][1]
-    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
-    way = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
 
-    def outward(angle: np.ndarray) -> np.ndarray:
-        return np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * way
+    def inside(out: np.ndarray) -> np.ndarray:
+        return np.all([(centre + radius * out - p) @ n >= 0 for p, n in planes], axis=0)
 
-    low, high = np.zeros(ways), np.full(ways, min(np.pi / 2, 60 / radius))
-    for _ in range(40):
-        middle = (low + high) / 2
-        x = centre + radius * outward(middle)
-        kept = np.all([(x - p) @ n >= 0 for p, n in planes], axis=0)
-        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
-    built = outward(low) / scale
+    out = last_inside(normal, 60 / radius, inside, ways)
+    built = out / scale
     built /= np.linalg.norm(built, axis=1, keepdims=True)
-    x = scale * (centre + radius * outward(low))
+    x = scale * (centre + radius * out)
     return float(2 * miss_distances(half.view.pinhole, x, built).min())
 
 
@@ -144,21 +136,6 @@ def test_moved_walls_and_uneven_scale_against_brute_force(halves: EdgeModels) ->
     slow = bisected_coverage(halves[1], replace(one, wall=moved), mirror)
     assert found == pytest.approx(slow, abs=1e-4)
     assert abs(found - mirror_coverage(halves[1], one).diameter[0, mirror]) > 0.02
-
-
-@pytest.mark.parametrize("size", [1e-3, 0.1])
-def test_same_bits_as_with_every_edge(halves: EdgeModels, size: float) -> None:
-    """Faces and parts of edges that are passed over change nothing."""
-    errors = Errors(
-        sphere_centre=Error(size), sphere_radius=Error(size), scale_axis=Error(size / 9)
-    )
-    draws = drawn(halves, errors, range(4))
-    for half, one in zip(halves, draws, strict=True):
-        slow, fast = every_edge(half, one), mirror_coverage(half, one)
-        assert np.array_equal(fast.diameter, 2 * np.sqrt(slow[..., 0]))
-        assert np.array_equal(fast.crossings, slow[..., 1])
-    whole, worst = (coverage(halves, draws, only)[0] for only in (False, True))
-    assert np.array_equal(worst.min(axis=1), whole.min(axis=1))
 
 
 def test_warped_builds_against_displaced_material(halves: EdgeModels, small: MirrorDesign) -> None:
