@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import read_export as read_record
 from tbcad_verify.record.files import read
 from tbcad_verify.shell.optics import OpticalSetup, set_up
 from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
@@ -21,12 +22,14 @@ from tbcad_verify.shell.recover import recover
 from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics import windows
 from tbcad.core.optics.cells import Cells, cells_of
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances, reflected_rays
 from tbcad.core.optics.surfaces import Surfaces
+from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
@@ -101,6 +104,13 @@ def write_meshes(
         turn = Rotation.from_rotvec(drawn.shell_tilt[k])
         points = turn.apply(facets.vertices * drawn.scale[k]) + drawn.shell_shift[k]
         write_stl(folder / f"shell_{array.camera_id}.stl", Mesh(points, facets.triangles))
+
+
+def read_record_of(made: MirrorDesign, folder: Path) -> Export:
+    """The record of a design as the verification reads it; its meshes may then be replaced."""
+    write_record(folder, made, shells=True)
+    write_manifest(folder, "build")
+    return read_record(folder)
 
 
 def verified_coverage(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:

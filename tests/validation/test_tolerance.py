@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.export import read_export as read_record
 
 from tbcad.core.mirrors.array import MirrorDesign, design
-from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.output.manifest import write_manifest
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
@@ -23,6 +20,7 @@ from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sensitivity import scaled
 from tests.tolerancing.exact_builds import (
     bisected_coverage,
+    read_record_of,
     traced_coverage,
     verified_coverage,
     write_meshes,
@@ -266,11 +264,7 @@ def test_uneven_scale_against_brute_force(halves: EdgeModels, small_design: Mirr
 
 @pytest.fixture(scope="module")
 def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Export:
-    """The record as the verification reads it; its meshes are then replaced."""
-    folder = tmp_path_factory.mktemp("made")
-    write_record(folder, small_design, shells=True)
-    write_manifest(folder, "build")
-    return read_record(folder)
+    return read_record_of(small_design, tmp_path_factory.mktemp("made"))
 
 
 @pytest.mark.parametrize(

@@ -35,12 +35,6 @@ def test_traced_mirrors_all_see_the_target(n: int) -> None:
     assert np.isfinite(array.mirrors.radius).all()
 
 
-def test_paper_rule_never_gives_a_negative_or_infinite_radius() -> None:
-    array = mirror_array("n=4", "radius_rule=paper")
-    assert (array.mirrors.radius > 0).all()
-    assert array.mirrors.radius.max() == pytest.approx((30 * array.half_width).max(), rel=0.5)
-
-
 def test_stretched_directions_are_those_of_the_mirrors() -> None:
     array = mirror_array("n=9", "stretch=[1.3, 1.1]")
     expected, _ = numbered_directions(9, (1.3, 1.1))

@@ -46,24 +46,17 @@ def refused(file: Path, text: str | bytes) -> str:
     return message.removeprefix(f"{file}: ")
 
 
-class TestDefaults:
-    def test_are_the_papers_design(self) -> None:
-        optics = load_spec(None).optics
-        assert (optics.n, optics.capture_diameter_mm, optics.semi_minor_mm) == (18, 60, 100)
-        assert optics.camera_mm == (100, 0, -100)
-
-    def test_stay_where_a_section_is_given_in_part(self, file: Path) -> None:
-        file.write_text("[shell.foot_flange]\nwidth_mm = 20\n", encoding="utf-8")
-        assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
-        assert load_spec(file).shell.foot_flange.bolts == 5
-        assert load_spec(file).shell.seam_flange.bolts == 6
+def test_defaults_stay_where_a_section_is_given_in_part(file: Path) -> None:
+    file.write_text("[shell.foot_flange]\nwidth_mm = 20\n", encoding="utf-8")
+    assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
+    assert load_spec(file).shell.foot_flange.bolts == 5
+    assert load_spec(file).shell.seam_flange.bolts == 6
 
 
-class TestPlainDict:
-    def test_is_json_and_leads_back(self) -> None:
-        spec = load_spec(None, ["n=7", "camera_mm=[90, 5, -80]", "radius_rule=paper"])
-        table = json.loads(json.dumps(spec_dict(spec)))
-        assert Spec.model_validate(table) == spec
+def test_plain_dict_is_json_and_leads_back() -> None:
+    spec = load_spec(None, ["n=7", "camera_mm=[90, 5, -80]", "radius_rule=paper"])
+    table = json.loads(json.dumps(spec_dict(spec)))
+    assert Spec.model_validate(table) == spec
 
 
 class TestFile:
