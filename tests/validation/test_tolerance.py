@@ -58,10 +58,7 @@ def row(*vector: float) -> np.ndarray:
 # Without errors
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [("n=5",), ("n=4", "radius_rule=flat")],
-)
+@pytest.mark.parametrize("settings", [("n=5",), ("n=4", "radius_rule=flat")])
 def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
     """To the accuracy of the design's own samples, 1e-5 mm; the next test goes farther."""
     made = design(load_spec(None, settings))
@@ -267,23 +264,19 @@ def record(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory)
     return read_record_of(small_design, tmp_path_factory.mktemp("made"))
 
 
-@pytest.mark.parametrize(
-    ("errors", "builds"),
-    [(COARSE, range(1)), (POSED, range(20, 21))],
-)
+@pytest.mark.parametrize(("errors", "build"), [(COARSE, 0), (POSED, 20)])
 def test_random_builds_against_the_verification_of_their_meshes(
-    halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, builds: range
+    halves: EdgeModels, small_design: MirrorDesign, record: Export, errors: Errors, build: int
 ) -> None:
     """Both shells meshed, written, read, mirrors found and measured: within 0.05 mm.
 
     The verification takes x = 0 for the seam, so mirrors halved by a moved seam are left out.
     """
-    draws = draw(errors, 5, builds, len(halves[0]))
+    draws = draw(errors, 5, range(build, build + 1), len(halves[0]))
     fast, _ = coverage(halves, draws)
     kept = np.ones(fast.shape[1], dtype=bool)
     kept[: len(halves[0])] = (errors is COARSE) | ~halves[0].halved
-    for k in range(len(builds)):
-        write_meshes(small_design, draws, k, record.folder)
-        shifts = {name: drawn.camera_shift[k] for name, drawn in zip("ab", draws, strict=True)}
-        assert np.abs(fast[k] - verified_coverage(record, shifts))[kept].max() < 0.05
-    assert fast.min(axis=1).max() < TARGET - 1  # the meshes are not the design's
+    write_meshes(small_design, draws, 0, record.folder)
+    shifts = {name: drawn.camera_shift[0] for name, drawn in zip("ab", draws, strict=True)}
+    assert np.abs(fast[0] - verified_coverage(record, shifts))[kept].max() < 0.05
+    assert fast.min() < TARGET - 1  # the meshes are not the design's

@@ -57,9 +57,8 @@ def test_the_same_bytes_after_a_file_with_tolerances(tmp_path: Path) -> None:
 
 
 def test_a_mirror_image_without_a_rule_is_refused(tmp_path: Path) -> None:
-    write_step(
-        tmp_path / "rod.step", Solid("rod", cylinder(np.zeros(3), np.eye(3)[2], 1.0, 2.0), [])
-    )
+    rod = Solid("rod", cylinder(np.zeros(3), np.eye(3)[2], 1.0, 2.0), ())
+    write_step(tmp_path / "rod.step", rod)
     text = (tmp_path / "rod.step").read_text()
     assert mirrored_step(text, {}) != text
     with pytest.raises(NoMirrorImageError, match="no rule for the mirror image of OFFSET_SURFACE"):

@@ -169,16 +169,13 @@ def test_the_foot_goes_along_with_the_mirrors_near_it(halves: EdgeModels) -> Non
     assert moved == pytest.approx(wanted[:, None] * foot[3:6], abs=1e-12)
 
 
-def values(field: SmoothField, places: np.ndarray, draws: int = DRAWS) -> np.ndarray:
-    numbers = np.random.default_rng(3).standard_normal((len(field), draws))
-    return np.asarray(field.basis(places) @ numbers)
-
-
 @pytest.mark.parametrize("length", [30.0, 50.0, 80.0])
 def test_covariance_is_recovered_from_draws(halves: EdgeModels, length: float) -> None:
     """Within five standard errors, sqrt((1 + c^2) / draws), of the closed form c."""
     places = halves[0].apex
-    found = np.cov(values(smooth_field(places, length), places), bias=True)
+    field = smooth_field(places, length)
+    numbers = np.random.default_rng(3).standard_normal((len(field), DRAWS))
+    found = np.cov(field.basis(places) @ numbers, bias=True)
     wanted = np.exp(
         -(np.linalg.norm(places[:, None] - places[None], axis=2) ** 2) / (2 * length**2)
     )
