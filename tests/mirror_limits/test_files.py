@@ -94,21 +94,18 @@ def test_tolerances_as_a_parser_of_the_grammar_reads_them(written: Path) -> None
     assert "Rq 4.4 nm" in notes["surface finish"]
 
 
-class TestRefused:
-    def test_no_shells(self, record: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        assert run(["inspection", str(record)]) == 2
-        assert "shell_a.step is not there: build the shell too" in capsys.readouterr().err
-
-    def test_planar_mirrors(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        sample = Path(__file__).parents[2] / "docs" / "sample"
-        out = tmp_path / "out"
-        assert run(["inspection", str(sample), "--out", str(out)]) == 2
-        assert "its mirrors are planar" in capsys.readouterr().err
-        assert not out.exists()
-
-    def test_a_share_that_is_none(self, exports: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        assert run(["inspection", str(exports), "--yield", "1.5"]) == 2
-        assert "--yield 1.5: allowed is" in capsys.readouterr().err
+def test_what_is_refused(
+    record: Path, exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sample, out = Path(__file__).parents[2] / "docs" / "sample", str(tmp_path / "out")
+    for words, wrong in (
+        ([str(record)], "shell_a.step is not there: build the shell too"),
+        ([str(sample), "--out", out], "its mirrors are planar"),
+        ([str(exports), "--yield", "1.5"], "--yield 1.5: allowed is"),
+    ):
+        assert run(["inspection", *words]) == 2
+        assert wrong in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:

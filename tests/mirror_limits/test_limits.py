@@ -54,12 +54,17 @@ def moved(small_design: MirrorDesign, **deviation: Floats) -> tuple[Floats, Floa
     return model.table[: len(model)], table
 
 
-def test_an_offset_moves_the_apex_along_the_normal(small_design: MirrorDesign) -> None:
+def test_an_offset_moves_the_apex_along_the_normal_a_radius_does_not(
+    small_design: MirrorDesign,
+) -> None:
     m = len(small_design.arrays[0])
     designed, built = moved(small_design, offset=np.full((1, m), 7.0))
     expected = designed[:, APEX] + 7 * UM * designed[:, 3:6]
     assert built[:, APEX] == pytest.approx(expected, abs=1e-12)
     assert built[:, CURVATURE] == pytest.approx(designed[:, CURVATURE], rel=1e-12)
+    _, built = moved(small_design, radius=np.full((1, m), 0.2))
+    assert built[:, APEX] == pytest.approx(designed[:, APEX], abs=1e-12)
+    assert 1 / built[:, CURVATURE] == pytest.approx(1 / designed[:, CURVATURE] + 0.2, rel=1e-12)
 
 
 def test_a_tilt_turns_the_normal_at_the_apex(small_design: MirrorDesign) -> None:
@@ -106,11 +111,8 @@ def test_losses_are_those_of_mirrors_that_deviate_one_by_one(
 
 
 def test_all_mirrors_at_their_limits_are_good(export: ExportedDesign, limits: MirrorLimits) -> None:
+    """At a few times the limits, shells are bad: they are not far too small."""
     assert minimum_at_limits(export, limits, builds=200) >= TARGET
-
-
-def test_limits_are_not_far_too_small(export: ExportedDesign, limits: MirrorLimits) -> None:
-    """At a few times the limits, shells are bad."""
     assert minimum_at_limits(export, replace(limits, each=4 * limits.each)) < TARGET
 
 
@@ -150,10 +152,3 @@ def test_margins_are_never_overdrawn(seed: int) -> None:
 def test_a_design_without_margin_is_refused(found: Sensitivities) -> None:
     with pytest.raises(InputError, match=r"sees 60.* as designed, of 61 mm .*margin_mm"):
         mirror_limits(found, 61.0, 0.99)
-
-
-def test_a_radius_leaves_the_apex_in_its_place(small_design: MirrorDesign) -> None:
-    m = len(small_design.arrays[0])
-    designed, built = moved(small_design, radius=np.full((1, m), 0.2))
-    assert built[:, APEX] == pytest.approx(designed[:, APEX], abs=1e-12)
-    assert 1 / built[:, CURVATURE] == pytest.approx(1 / designed[:, CURVATURE] + 0.2, rel=1e-12)

@@ -16,12 +16,7 @@ from tbcad.errors import InputError
 from tbcad.optimizing import search as search_module
 from tbcad.optimizing.candidate import STEP_MM, DesignCandidate, Figures, MachineLimits, Place
 from tbcad.optimizing.files import comparison, design_text, search_files
-from tbcad.optimizing.search import (
-    SearchResult,
-    _front,
-    search,
-    weightings,
-)
+from tbcad.optimizing.search import _front, search, weightings
 from tbcad.options.designs import OptimizeOptions
 
 SPEC = load_spec(None, ["n=4", "shell.wall_mm=4"])
@@ -35,10 +30,8 @@ def closed_form(
     if place[2] < 60:
         return DesignCandidate(place, None, "the ellipsoid is too small: enlarge it")
     off = float(np.linalg.norm(np.subtract(place, BEST) * [1, 1, 1, 50, 50]))
-    size = 3 * place[0]
-    return DesignCandidate(
-        place, Figures(1000 - off, 2000 - off, 7 - off / 100, 1 + off, size, 89.0)
-    )
+    figures = Figures(1000 - off, 2000 - off, 7 - off / 100, 1 + off, 3 * place[0], 89.0)
+    return DesignCandidate(place, figures)
 
 
 @pytest.fixture(autouse=True)
@@ -116,7 +109,7 @@ def test_front_against_brute_force(losses: np.ndarray) -> None:
 
 
 def test_the_design_that_is_written_is_the_best_one(tmp_path: Path) -> None:
-    result: SearchResult = search(SPEC, asked(120))
+    result = search(SPEC, asked(120))
     file = tmp_path / "better.toml"
     file.write_text(design_text(result, SPEC), encoding="utf-8")
     spec = load_spec(file)

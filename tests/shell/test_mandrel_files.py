@@ -8,7 +8,7 @@ import pytest
 
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
-from tbcad.output.build import Export, write_export
+from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
 from tbcad.shell.files import design_mandrel
 from tests.exported_files import contents
@@ -57,22 +57,16 @@ def test_without_them_an_export_is_as_it_was(exported: Path, tmp_path: Path) -> 
 
 
 def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
-    """Of shells, too."""
-    write_export(with_mandrels(), tmp_path, [SHELL])
+    """Of shells, too; of a mandrel that can be drawn nothing is told."""
+    assert write_export(with_mandrels(), tmp_path, [SHELL]).note == ""
     assert contents(tmp_path) == contents(exported)
 
 
-def exported_note(tmp_path: Path, *options: str) -> Export:
-    return write_export(with_mandrels(*options), tmp_path, [SHELL])
-
-
-def test_a_mandrel_that_cannot_be_drawn_is_told(tmp_path: Path) -> None:
-    note = exported_note(tmp_path, "shell.edges=pedestal").note
+def test_a_mandrel_that_cannot_be_drawn_is_told_and_the_remedy_draws(
+    exported: Path, tmp_path: Path
+) -> None:
+    note = write_export(with_mandrels("shell.edges=pedestal"), tmp_path, [SHELL]).note
     assert "undercut by up to 30 degrees" in note
     assert "shell.edges to valley" in note
-
-
-def test_the_remedy_draws(exported: Path, tmp_path: Path) -> None:
-    assert exported_note(tmp_path, "shell.edges=valley").note == ""
-    record = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
+    record = json.loads((exported / "design.json").read_text(encoding="utf-8"))
     assert all(one["draft_deg"] > 15 for one in record["mandrels"])

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from tbcad_verify.mesh.mesh import mesh_from_facets
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.record.export import Export
+from tbcad_verify.record.export import read_export as read_record
 from tbcad_verify.record.files import read
 from tbcad_verify.shell.optics import OpticalSetup, set_up
 from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
@@ -21,12 +22,14 @@ from tbcad_verify.shell.recover import recover
 from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics import windows
 from tbcad.core.optics.cells import Cells, cells_of
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances, reflected_rays
 from tbcad.core.optics.surfaces import Surfaces
+from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
@@ -103,6 +106,13 @@ def write_meshes(
         write_stl(folder / f"shell_{array.camera_id}.stl", Mesh(points, facets.triangles))
 
 
+def read_record_of(made: MirrorDesign, folder: Path) -> Export:
+    """The record of a design as the verification reads it; its meshes may then be replaced."""
+    write_record(folder, made, shells=True)
+    write_manifest(folder, "build")
+    return read_record(folder)
+
+
 def verified_coverage(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
     """Coverage of every virtual camera by the verification's own reading of STL files, mm, (v,)."""
     cameras = {
@@ -132,50 +142,6 @@ def _minimum_coverage(setup: OpticalSetup) -> np.ndarray:
     assert (setup.match.segment >= 0).all()
     pairs = zip(outlines, lines, strict=True)
     return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
-
-
-def bisected_coverage(
-    array: MirrorArray, draws: ShellDraws, k: int, mirror: int, ways: int = 4_000
-) -> float:
-    """Coverage of a mirror of build k by bisection of where each way from its apex ends, mm.
-
-    Every sphere and plane is looked at, scaled as it is, without any circle or corner.
-    """
-    every, m = array.cells.surfaces, len(array)
-    scale = draws.scale[k]
-    centre = array.mirrors.centre + draws.centre[k]
-    radius = array.mirrors.radius + draws.radius[k]
-    apart = np.linalg.norm(array.mirrors.apex - array.mirrors.apex[mirror], axis=1)
-    others = np.argsort(apart)[1:26]
-    axis = np.eye(3) - np.outer(every.normal[mirror], every.normal[mirror])
-    first = axis[np.argmax(np.linalg.norm(axis, axis=1))]
-    first = first / np.linalg.norm(first)
-    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
-    way = np.cos(turn) * first + np.sin(turn) * np.cross(every.normal[mirror], first)
-
-    def at(angle: np.ndarray) -> np.ndarray:
-        out = np.cos(angle)[:, None] * every.normal[mirror] + np.sin(angle)[:, None] * way
-        return scale * (centre[mirror] + radius[mirror] * out)
-
-    def inside(x: np.ndarray) -> np.ndarray:
-        away = x[:, None] / scale - centre[others]
-        clear = (np.linalg.norm(away, axis=2) >= radius[others]).all(axis=1)
-        for wall in (m, m + 1):
-            clear &= (x / scale - every.apex[wall]) @ every.normal[wall] >= 0
-        return clear
-
-    low, high = np.zeros(ways), np.full(ways, np.pi / 2)
-    high[:] = np.minimum(high, 60 / radius[mirror])
-    assert inside(at(low)).all()
-    assert not inside(at(high)).any()
-    for _ in range(40):
-        middle = (low + high) / 2
-        kept = inside(at(middle))
-        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
-    point = at(low)
-    normal = (point / scale - centre[mirror]) / scale
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return float(2 * miss_distances(array.camera.pinhole, point, normal).min())
 
 
 def surrounded(array: MirrorArray, shift: np.ndarray) -> np.ndarray:
@@ -257,58 +223,67 @@ def _displaced_misses(
     return miss_distances(array.camera.pinhole, displaced(point), turned)
 
 
-def wavy_coverage(
+def last_inside(
+    normal: np.ndarray, widest: float, inside: Callable[[np.ndarray], np.ndarray], ways: int
+) -> np.ndarray:
+    """Directions (w, 3) all around a normal, as far from it as they are inside, by bisection."""
+    first = np.linalg.svd(normal[None])[2][1]
+    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
+    way = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
+
+    def outward(angle: np.ndarray) -> np.ndarray:
+        return np.asarray(np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * way)
+
+    low, high = np.zeros(ways), np.full(ways, min(widest, np.pi / 2))
+    assert inside(outward(low)).all()
+    assert not inside(outward(high)).any()
+    for _ in range(40):
+        middle = (low + high) / 2
+        kept = inside(outward(middle))
+        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
+    return outward(low)
+
+
+def bisected_coverage(
     array: MirrorArray,
     draws: ShellDraws,
     k: int,
     mirror: int,
-    heights: Heights,
-    ways: int = 720,
+    heights: Heights = lambda _, x: np.zeros(len(x)),
+    ways: int = 4_000,
 ) -> float:
-    """Coverage of a wavy mirror of build k by bisection of where each way from its apex ends, mm.
+    """Coverage of a mirror of build k by bisection of where each way from its apex ends, mm.
 
-    Every surface is the place where the value of its sphere equals the height of its waviness;
-    neither circles nor corners are used, and nothing is linear.
+    Every surface is the place where the value of its sphere equals the height of its waviness,
+    scaled as it is; neither circles nor corners are used, and nothing is linear.
     """
-    every, m = array.cells.surfaces, len(array)
+    every, m, scale = array.cells.surfaces, len(array), draws.scale[k]
     apart = np.linalg.norm(array.mirrors.apex - array.mirrors.apex[mirror], axis=1)
-    others = np.argsort(apart)[1:16]
-    normal = every.normal[mirror]
+    others = np.argsort(apart)[1:26]
     radius = array.mirrors.radius + draws.radius[k]
     centre = array.mirrors.centre + draws.centre[k]
-    first = np.linalg.svd(normal[None])[2][1]
-    turn = np.linspace(0, 2 * np.pi, ways, endpoint=False)[:, None]
-    way = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
 
     def value(which: int, x: np.ndarray) -> np.ndarray:
         away = x - centre[which]
         sphere = (np.sum(away * away, axis=1) - radius[which] ** 2) / (2 * radius[which])
         return np.asarray(sphere - heights(which, x))
 
-    def surface(angle: np.ndarray) -> np.ndarray:
-        out = np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * way
+    def surface(out: np.ndarray) -> np.ndarray:
         x = centre[mirror] + radius[mirror] * out
         for _ in range(4):
             x = x - value(mirror, x)[:, None] * out
-        return x
+        return np.asarray(x)
 
-    def inside(x: np.ndarray) -> np.ndarray:
+    def inside(out: np.ndarray) -> np.ndarray:
+        x = surface(out)
         clear = np.all([value(other, x) >= 0 for other in others], axis=0)
         for wall in (m, m + 1):
             clear &= (x - every.apex[wall]) @ every.normal[wall] >= 0
         return np.asarray(clear)
 
-    low, high = np.zeros(ways), np.full(ways, 30 / radius[mirror])
-    np.minimum(high, np.pi / 2, out=high)
-    assert inside(surface(low)).all()
-    for _ in range(34):
-        middle = (low + high) / 2
-        kept = inside(surface(middle))
-        low, high = np.where(kept, middle, low), np.where(kept, high, middle)
-    point = surface(low)
-    gradient = np.stack(
-        [value(mirror, point + STEP * e) - value(mirror, point - STEP * e) for e in np.eye(3)],
-        axis=1,
-    )
+    x = surface(last_inside(every.normal[mirror], 60 / radius[mirror], inside, ways))
+    steps = STEP * np.eye(3)
+    gradient = np.stack([value(mirror, x + e) - value(mirror, x - e) for e in steps], axis=1)
+    gradient /= scale
     gradient /= np.linalg.norm(gradient, axis=1)[:, None]
-    return float(2 * miss_distances(array.camera.pinhole, point, gradient).min())
+    return float(2 * miss_distances(array.camera.pinhole, scale * x, gradient).min())

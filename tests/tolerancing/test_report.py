@@ -87,10 +87,6 @@ def rows_of(analysis: Analysis, name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
-def percent(pattern: str, text: str) -> float:
-    return float(re.findall(pattern + r"([\d.]+)%", text)[0])
-
-
 class TestWords:
     def test_builds(self, analysis: Analysis) -> None:
         said, worst = summary_text(analysis), analysis.result.worst
@@ -99,11 +95,8 @@ class TestWords:
         assert (
             repr(analysis) == f"<Analysis of sla: yield {share.share:.1%} of {len(worst)} builds>"
         )
-        assert percent(r"^Built by sla \(.*?\), ", said) == pytest.approx(
-            100 * share.share, abs=0.05
-        )
-        low, high = 100 * share.low, 100 * share.high
-        assert f"({low:.1f}% to {high:.1f}%) of the builds cover 60 mm" in said
+        good, low, high = (100 * x for x in (share.share, share.low, share.high))
+        assert f"{good:.1f}% ({low:.1f}% to {high:.1f}%) of the builds cover 60 mm" in said
         assert f"covers {np.median(worst):.2f} mm (median" in said
         assert f"1 % cover less than {np.quantile(worst, 0.01):.2f})" in said
 
@@ -116,11 +109,20 @@ class TestWords:
         assert report_dict(smooth)["ray_spread_mm"]["largest"] == 0
         assert "Waviness" not in summary_text(smooth)
 
-    def test_margin(self, analysis: Analysis) -> None:
+    def test_margins_worst_kind_of_error_and_processes(self, analysis: Analysis) -> None:
+        """The largest loss in the unit of the process: 0.375 times the 5 micrometres of sla."""
         said = summary_text(analysis)
-        command = "tbcad build --radius-rule traced --set mirrors.margin_mm=3.71"
-        assert f"A margin of 3.71 mm ({command}) makes 99.0%" in said
-        assert "No margin" not in said
+        for words in (
+            "A margin of 3.71 mm (tbcad build --radius-rule traced --set mirrors.margin_mm=3.71)",
+            "Largest loss by sphere centre: 1.25 mm by itself",
+            "above 1.88 micrometres (sla has 5)",
+            "of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%.",
+            "sla with 3.71 mm, diamond with 0.56 mm; none was found for fdm.",
+        ):
+            assert words in said
+        assert "none" not in summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
+        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
+        assert "Margins needed for 99%: none found; none was found for fdm." in none
 
     def test_margins_that_were_not_searched_for(self, analysis: Analysis) -> None:
         options = tuple(replace(option, margin=None) for option in PROCESS_OPTIONS)
@@ -134,25 +136,6 @@ class TestWords:
         assert all(row["reason"] == read["margin_reason"] for row in rows_of(plain, "processes"))
         names = {str(row[0]) for row in tolerance_study(plain).summary.rows}
         assert "margin needed" not in names
-
-    def test_worst_kind_of_error(self, analysis: Analysis) -> None:
-        """In the unit of the process: 0.375 times the 5 micrometres of sla."""
-        assert (
-            "Largest loss by sphere centre: 1.25 mm by itself; with no other error, fewer than 99% "
-            "of the builds are good above 1.88 micrometres (sla has 5)."
-        ) in summary_text(analysis)
-
-    def test_processes(self, analysis: Analysis) -> None:
-        assert (
-            "Good builds, of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%. "
-            "Margins needed for 99%: sla with 3.71 mm, diamond with 0.56 mm; "
-            "none was found for fdm."
-        ) in summary_text(analysis)
-        every = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[1:]))
-        assert "diamond with 0.56 mm." in every
-        assert "none" not in every
-        none = summary_text(replace(analysis, process_options=PROCESS_OPTIONS[:1] * 2))
-        assert "Margins needed for 99%: none found; none was found for fdm." in none
 
 
 class TestJson:
@@ -179,13 +162,10 @@ class TestJson:
         assert told == {"sphere_centre_um": 0.375, "facets_mm": 1.5, "camera_tilt_mrad": None}
 
     def test_prototype(self, analysis: Analysis) -> None:
-        read = json.loads(json_text(replace(analysis, prototype=prototype_yield(0.1, 0.7))))[
-            "prototype"
-        ]
-        assert read["uncalibrated"]["yield"]["share"] == 0.1
-        assert read["calibrated"]["yield"]["share"] == 0.7
-        assert read["calibrated"]["pointing_mm"]["rms"] == 2
-        assert read["calibrated"]["worst_camera_mm"]["0.5"] == 61
+        both = report_dict(replace(analysis, prototype=prototype_yield(0.1, 0.7)))["prototype"]
+        assert [both[key]["yield"]["share"] for key in ("uncalibrated", "calibrated")] == [0.1, 0.7]
+        assert both["calibrated"]["pointing_mm"]["rms"] == 2
+        assert both["calibrated"]["worst_camera_mm"]["0.5"] == 61
 
 
 class TestTables:
@@ -199,7 +179,6 @@ class TestTables:
         assert median == np.median(coverage, axis=0).tolist()
         assert all(float(row["five_percent_mm"]) < float(row["median_mm"]) for row in rows)
         u = np.array([[float(row[name]) for name in ("ux", "uy", "uz")] for row in rows])
-        assert np.linalg.norm(u, axis=1) == pytest.approx(1, abs=1e-12)
         assert np.array_equal(u[: len(little.arrays[0])], analysis.cameras[0].u)
         # One for each direction of both halves.
         every = np.concatenate([at.u for at in analysis.cameras])

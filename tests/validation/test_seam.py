@@ -62,19 +62,14 @@ def unseen(made: MirrorDesign, diameter: float) -> Iterator[np.ndarray]:
         yield points[~(shown(a, i, points) | shown(b, i, points))]
 
 
-@pytest.mark.parametrize("options", [["n=3"], ["n=5", "mirrors.margin_mm=0.01"]])
+@pytest.mark.parametrize(
+    "options",
+    [["n=3"], ["n=5", "mirrors.margin_mm=0.01"], pytest.param(["n=18"], marks=pytest.mark.slow)],
+)
 def test_every_point_is_seen_in_a_half(options: list[str]) -> None:
     made = design(load_spec(None, options))
     missing = list(unseen(made, made.spec.optics.capture_diameter_mm))
     assert len(missing) == made.arrays[0].cells.halved.sum()
-    assert sum(map(len, missing)) == 0
-
-
-@pytest.mark.slow
-def test_every_point_is_seen_at_18() -> None:
-    made = design(load_spec(None, ["n=18"]))
-    missing = list(unseen(made, made.spec.optics.capture_diameter_mm))
-    assert len(missing) == 37
     assert sum(map(len, missing)) == 0
 
 

@@ -21,11 +21,9 @@ class Numbers(Record):
     ("value", "wrong"),
     [
         ("NaN", "NaN is not finite"),
-        ("-Infinity", "not finite"),
         ("1e400", "1e400 is not finite"),
         ("9" * 5000, "5000 digits"),
         ("9" * 400, "400 digits"),
-        ("[" * 100_000, "nested too deeply"),
         ('{"a": ' * 100_000, "nested too deeply"),
         ('"\\ud800"', "half of one"),
         ('{"a": 1, "a": 2}', "'a' is there twice"),

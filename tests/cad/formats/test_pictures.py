@@ -22,6 +22,7 @@ RANDOM = np.random.default_rng(5)
 RGB = RANDOM.integers(0, 256, (12, 20, 3), dtype=np.uint8)
 DEEP = RANDOM.integers(0, 65_536, (12, 20, 4), dtype=np.uint16)
 GREY = np.ascontiguousarray(RGB[..., 0])
+IMAGE = Image.fromarray(RGB)
 BLACK, WHITE = 512, 16_383
 RED, GREEN, BLUE = 1_000, 3_000, 14_000  # beyond the share of white from which LibRaw moves it
 
@@ -93,12 +94,9 @@ def test_opaque_pixels_lose_what_says_so(mode: str) -> None:
     "data",
     [
         saved(Image.fromarray(np.dstack([RGB, GREY])), "PNG"),
-        saved(Image.fromarray(np.dstack([GREY, GREY]), "LA"), "PNG"),
         saved(Image.fromarray(RGB).quantize(8), "PNG", transparency=0),
         saved(Image.fromarray(GREY), "PNG", transparency=int(GREY[3, 3])),
-        deep_png(DEEP, 6),
         deep_png(DEEP[..., :2], 4),
-        deep_png(DEEP[..., :1], 0, chunk(b"tRNS", struct.pack(">H", DEEP[3, 3, 0]))),
         deep_png(DEEP[..., :3], 2, chunk(b"tRNS", struct.pack(">3H", *DEEP[3, 3, :3]))),
         tiff(DEEP, photometric="rgb", extrasamples=["unassalpha"]),
     ],
@@ -124,15 +122,10 @@ def test_modes_that_are_no_grey_and_no_rgb_are_named(mode: str) -> None:
 @pytest.mark.parametrize("gamma", [b"", chunk(b"gAMA", struct.pack(">I", 100_000))])
 def test_png_keeps_all_16_bits_whatever_its_gamma(colour: int, channels: int, gamma: bytes) -> None:
     pixels = DEEP[..., :channels]
-    check(deep_png(pixels, colour, gamma), pixels if channels == 3 else pixels[..., 0])
-
-
-def test_opaque_png_of_16_bits_and_alpha() -> None:
-    opaque = np.dstack([DEEP[..., :3], np.full(GREY.shape, 65_535, np.uint16)])
-    check(deep_png(opaque, 6), DEEP[..., :3])
-    check(deep_png(opaque[..., 2:], 4), DEEP[..., 2])
-    with Image.open(BytesIO(deep_png(opaque, 6))) as image:
-        assert np.array_equal(decoded(image, "picture"), DEEP[..., :3])
+    expected = pixels if channels == 3 else pixels[..., 0]
+    check(deep_png(pixels, colour, gamma), expected)
+    opaque = np.dstack([pixels, np.full(GREY.shape, 65_535, np.uint16)])
+    check(deep_png(opaque, colour + 4, gamma), expected)
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float16, np.float32, np.float64])
@@ -175,24 +168,18 @@ def test_palettes_of_tiff_have_16_bits(spread: int, kind: Any) -> None:
     [
         (tiff(GREY.astype(np.uint32)), "numbers of 32 bits"),
         (tiff(GREY.astype(np.int16)), "signed numbers of 16 bits"),
-        (tiff(DEEP, photometric="separated"), r"inks \(CMYK\)"),
         (tiff(RGB, photometric="cielab"), "CIE L"),
         (tiff(GREY, compression="jpeg"), "compressed as JPEG"),
         (tiff(GREY, photometric="cfa"), "mosaic"),
         (tiff(RGB, photometric="rgb", compression="jpeg"), "YCbCr"),
-        (tiff(np.stack([RGB, RGB]), photometric="rgb"), "has 2 pictures in it"),
         (tiff(np.stack([GREY] * 3), imagej=True), "has 3 pictures in it"),
         (tiff(GREY / np.float32(2) - 9), "values that are no light"),
         (tiff(np.where(GREY > 99, np.nan, 1).astype(np.float32)), "values that are no light"),
-        (saved(Image.fromarray(RGB), "PNG", save_all=True, append_images=[
-            Image.fromarray(RGB[::-1])]), "has 2 pictures in it"),
-        (saved(Image.fromarray(RGB), "GIF", save_all=True, append_images=[
-            Image.fromarray(RGB[::-1])]), "has 2 pictures in it"),
-        (saved(Image.fromarray(RGB), "JPEG2000"), "is no TIFF, PNG, JPEG"),
+        (saved(IMAGE, "PNG", save_all=True, append_images=[IMAGE.rotate(180)]), "has 2 pictures"),
+        (saved(IMAGE, "JPEG2000"), "is no TIFF, PNG, JPEG"),
         (b"", "is no TIFF, PNG, JPEG"),
-        (b"<html>not found</html>", "is no TIFF, PNG, JPEG"),
     ],
-)  # fmt: skip
+)
 def test_what_is_refused_says_why(data: bytes, wrong: str) -> None:
     with pytest.raises(InputError, match=rf"picture .*{wrong}"):
         picture_of(data, "picture")
@@ -201,14 +188,10 @@ def test_what_is_refused_says_why(data: bytes, wrong: str) -> None:
 @pytest.mark.parametrize(
     "data",
     [
-        saved(Image.fromarray(RGB), "JPEG"),
-        saved(Image.fromarray(RGB), "JPEG", progressive=True),
-        saved(Image.fromarray(RGB), "PNG"),
-        saved(Image.fromarray(RGB), "BMP"),
-        saved(Image.fromarray(RGB), "WEBP", lossless=True),
+        *(saved(IMAGE, kind) for kind in ("JPEG", "PNG", "BMP", "WEBP")),
+        saved(IMAGE, "JPEG", progressive=True),
         deep_png(DEEP[..., :3], 2),
         tiff(DEEP[..., :3], photometric="rgb"),
-        tiff(DEEP[..., 0], photometric="minisblack", compression="lzw"),
         tiff(DEEP[..., :3], photometric="rgb", compression="zlib"),
     ],
 )
@@ -260,8 +243,9 @@ def test_levels_without_white_balance_or_turn(orientation: int) -> None:
     data = dng(mosaic(), BLACK, WHITE, orientation, as_shot=(0.5, 1, 0.7))
     found = picture_of(data, "IMG_1.DNG")
     assert (found.shape, found.dtype) == ((64, 96, 3), np.uint16)
-    expected = [share(value) for value in (RED, GREEN, BLUE)]
-    assert np.abs(found - np.array(expected)).max() <= 1
+    assert np.abs(found - [share(value) for value in (RED, GREEN, BLUE)]).max() <= 1
+    facts = image_facts(data, ".dng")
+    assert (facts.width_px, facts.height_px, facts.model) == (96, 64, "Maker Model")
 
 
 def test_no_brightness_follows_what_is_photographed() -> None:
@@ -279,11 +263,6 @@ def test_a_ramp_stays_in_its_place() -> None:
     found = picture_of(dng(ramp.astype(np.uint16), BLACK, WHITE), "ramp.dng")
     expected = (ramp - BLACK) * 65_535 / (WHITE - BLACK)
     assert np.abs(found - expected[..., None])[2:-2, 2:-2].max() < 2
-
-
-def test_a_run_takes_raw_files() -> None:
-    facts = image_facts(dng(mosaic(), BLACK, WHITE), ".dng")
-    assert (facts.width_px, facts.height_px, facts.model) == (96, 64, "Maker Model")
 
 
 @pytest.mark.parametrize("end", [0, 500, 2_000, -100])

@@ -85,7 +85,6 @@ def test_primaries_of_rec_709_pass() -> None:
     ("data", "wrong"),
     [
         (b"#?RADIANCE\n", "no header"),
-        (file(b"", b"-Y 0 +X 0"), "allowed are"),
         (file(b"", b"-Y 99999 +X 99999"), "allowed are"),
         (file(ONE, b"-Y 1 +Y 1"), "no header"),
         (file(ONE, b"-Y 1 +X 1", b"EXPOSURE=0\n"), "EXPOSURE=0"),
@@ -93,10 +92,8 @@ def test_primaries_of_rec_709_pass() -> None:
         (file(ONE, b"-Y 1 +X 1", b"PRIMARIES=.7347 .2653 0 1 0 -.077 .32 .34\n"), "Rec. 709"),
         (file(ONE, b"-Y 1 +X 1").replace(b"32-bit", b"99-bit"), "format 99-bit_rle_rgbe"),
         (file(bytes([1, 1, 1, 4]), b"-Y 1 +X 4"), "a run does not fit"),
-        (file(ONE + bytes([1, 1, 1, 4]), b"-Y 1 +X 4"), "a run does not fit"),
         (file(bytes([2, 2, 0, 9]), b"-Y 1 +X 8"), "another width"),
         (file(bytes([2, 2, 0, 8, 200, 0]), b"-Y 1 +X 8"), "a run does not fit"),
-        (file(bytes([2, 2, 0, 8, 0, 0]), b"-Y 1 +X 8"), "a run does not fit"),
     ],
 )
 def test_what_is_damaged_or_means_something_else(data: bytes, wrong: str) -> None:

@@ -1,6 +1,5 @@
 """prototype.step has the tree of solids that cadquery makes of them."""
 
-import re
 from pathlib import Path
 
 import cadquery
@@ -15,14 +14,9 @@ from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.formats.step_mirror import NoMirrorImageError, mirrored_step
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.checks import properties
-from tbcad.cad.kernel.solids import sphere
-from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.shell.files import camera_solid
-from tests.helpers import read_step
+from tbcad.cad.kernel.solids import cylinder, sphere
 
 GREY, CLEAR = (0.5, 0.5, 0.5, 1.0), (0.1, 0.2, 0.3, 0.4)
-NUMBER = re.compile(r"-?\d+\.\d*(?:E[-+]\d+)?")
 
 
 def balls() -> tuple[ColouredSolid, ...]:
@@ -62,28 +56,10 @@ def test_the_same_bytes_after_a_file_with_tolerances(tmp_path: Path) -> None:
     assert (tmp_path / "first.step").read_bytes() == (tmp_path / "second.step").read_bytes()
 
 
-@pytest.fixture(scope="module")
-def solid(small_design: MirrorDesign) -> Solid:
-    return camera_solid(small_design, small_design.arrays[0])
-
-
-@pytest.fixture(scope="module")
-def text(solid: Solid, tmp_path_factory: pytest.TempPathFactory) -> str:
-    path = tmp_path_factory.mktemp("original") / "solid.step"
-    write_step(path, solid)
-    return path.read_text()
-
-
-def test_the_solid_is_reflected(text: str, solid: Solid, tmp_path: Path) -> None:
-    (tmp_path / "image.step").write_text(mirrored_step(text, {"a0001": "b0001"}))
-    found, original = read_step(tmp_path / "image.step"), properties(solid.shape)
-    image = properties(found.shape)
-    assert image.volume == pytest.approx(original.volume, rel=1e-7)
-    assert image.area == pytest.approx(original.area, rel=1e-7)
-    x, y, z = original.centroid
-    assert image.centroid == pytest.approx((-x, y, z), abs=1e-5)
-
-
-def test_geometry_without_a_rule_is_refused(text: str) -> None:
+def test_a_mirror_image_without_a_rule_is_refused(tmp_path: Path) -> None:
+    rod = Solid("rod", cylinder(np.zeros(3), np.eye(3)[2], 1.0, 2.0), ())
+    write_step(tmp_path / "rod.step", rod)
+    text = (tmp_path / "rod.step").read_text()
+    assert mirrored_step(text, {}) != text
     with pytest.raises(NoMirrorImageError, match="no rule for the mirror image of OFFSET_SURFACE"):
         mirrored_step(text.replace("PLANE(", "OFFSET_SURFACE("), {})

@@ -34,9 +34,3 @@ def test_volume_of_convex_bodies(body: Primitive, rounding: float) -> None:
     hull = ConvexHull(enclosing_triangles(body).reshape(-1, 3)).volume
     assert volume(body) <= hull * (1 + 1e-12)
     assert volume(body) == pytest.approx(hull, rel=rounding or 1e-12)
-
-
-def test_volume_of_a_ring() -> None:
-    """A torus of square section: 2 pi R times the area (Pappus)."""
-    square = np.array([[0.0, 4.0], [0.0, 6.0], [2.0, 6.0], [2.0, 4.0]])
-    assert volume(Revolved(square)) == pytest.approx(2 * np.pi * 5 * 4)

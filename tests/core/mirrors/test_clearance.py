@@ -53,21 +53,12 @@ def test_both_remedies_work_and_no_less_does(options: tuple[str, ...]) -> None:
 
 
 def test_no_ellipsoid_is_wide_enough_for_a_camera_so_close() -> None:
-    message = refusal(
-        "n=3", "camera_mm=[30.3, 0, -82.9]", "semi_minor_mm=82.1", "capture_diameter_mm=59.1"
-    )
+    close = "n=3", "camera_mm=[30.3, 0, -82.9]", "semi_minor_mm=82.1"
+    message = refusal(*close, "capture_diameter_mm=59.1")
     assert "semi_minor_mm" not in message
     size = re.search(r"make optics\.capture_diameter_mm ([\d.]+) or less \(tried\)$", message)
     assert size
-    assert (
-        clearance(
-            "n=3",
-            "camera_mm=[30.3, 0, -82.9]",
-            "semi_minor_mm=82.1",
-            f"capture_diameter_mm={size[1]}",
-        )
-        >= 0
-    )
+    assert clearance(*close, f"capture_diameter_mm={size[1]}") >= 0
 
 
 def brute_force(array: MirrorArray, i: int, capture: float, reach: float) -> float:
@@ -99,7 +90,7 @@ def brute_force(array: MirrorArray, i: int, capture: float, reach: float) -> flo
 )
 def test_against_brute_force(options: tuple[str, ...]) -> None:
     array = mirror_array("n=3", *options)
-    capture = half_capture(*options)
+    capture = load_spec(None, [*options]).optics.capture_diameter_mm / 2
     distance, mirror = closest_passage(array.cells, array.ellipsoid.pinhole, capture)
     nearest = passing_distances(array.ellipsoid.pinhole, array.mirrors.apex).argsort()[:3]
     reach = 2.5 * array.half_width
@@ -107,10 +98,6 @@ def test_against_brute_force(options: tuple[str, ...]) -> None:
     # The grid's step is a hundredth of a mirror, and what it finds is never nearer than the truth.
     assert distance == pytest.approx(min(found), abs=0.02 * array.half_width[mirror])
     assert distance < min(found) + 1e-3
-
-
-def half_capture(*options: str) -> float:
-    return load_spec(None, [*options]).optics.capture_diameter_mm / 2
 
 
 def test_the_paper_s_limit() -> None:

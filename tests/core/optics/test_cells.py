@@ -8,15 +8,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.optics.cells import Cells, cell_areas, cell_moments, cells_of
+from tbcad.core.optics.cells import Cells, cell_areas, cells_of
 from tbcad.core.optics.power_diagram import bounded_triangulation, lowest_value
 from tbcad.core.optics.surfaces import Surfaces, planes
 from tbcad.core.spec.errors import SpecError
 from tests.mirror_arrays import mirror_array
 
 RULES = ["traced", "paper", "flat"]
-STEPS = 60  # points along each side of a cell
 
 
 def first_hit(surfaces: Surfaces, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,14 +73,8 @@ def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
     for face in cells.arcs.faces.T:
         assert np.abs(cells.surfaces.value(face[:, None], points)).max() < 1e-9
     assert lowest_value(cells.surfaces, points.reshape(-1, 3)) > -1e-9
-
-
-@pytest.mark.parametrize("n", [2, 7, 25])
-def test_euler_characteristic(n: int) -> None:
-    """V - E + F = 1 for a disc of cells (DESIGN.md section 4)."""
-    cells = mirror_array(f"n={n}").cells
-    corners = np.unique(np.concatenate([cells.arcs.start, cells.arcs.end]))
-    assert len(corners) - len(cells.arcs) + cells.mirrors == 1
+    corners = len(np.unique([cells.arcs.start, cells.arcs.end]))
+    assert corners - len(cells.arcs) + cells.mirrors == 1  # of a disc of cells
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -139,37 +131,3 @@ def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str
     assert (cell_areas(cells) > 0).all()
     arc, t = np.broadcast_arrays(np.arange(len(cells.arcs))[:, None], np.linspace(0, 1, 5))
     assert lowest_value(cells.surfaces, cells.arcs.at(arc, t).reshape(-1, 3)) > -1e-7
-
-
-def test_they_are_sums_over_facets(small_half: MirrorArray) -> None:
-    cells, origin = small_half.modelled_cells, np.array([10.0, -20.0, 30.0])
-    found = cell_moments(cells, origin)
-    offsets, sides = cells.rings
-    for k in range(0, cells.mirrors, 7):
-        n, weight = facets(small_half, k, sides[offsets[k] : offsets[k + 1]])
-        area = weight.sum()
-        assert found.area[k] == pytest.approx(area, rel=5e-3)
-        np.testing.assert_allclose(found.first[k], weight @ n, atol=2e-3 * area)
-        second = np.einsum("f,fi,fj->ij", weight, n, n)
-        np.testing.assert_allclose(found.second[k], second, atol=2e-3 * area)
-
-
-def facets(array: MirrorArray, k: int, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normals and areas of thin triangles from the apex to the outline, cut up on the sphere."""
-    cells = array.modelled_cells
-    surfaces = cells.mirror_surfaces
-    centre = surfaces.apex[k] - surfaces.radius[k] * surfaces.normal[k]
-    t = np.linspace(0, 1, STEPS)
-    share = np.linspace(0, 1, STEPS)[:, None, None]
-    normals, areas = [], []
-    for side in sides.tolist():
-        edge = cells.arcs.at(np.full(STEPS, side // 2), t[::-1] if side % 2 else t)
-        grid = surfaces.apex[k] + share * (edge - surfaces.apex[k]) - centre
-        grid *= surfaces.radius[k] / norm(grid)[..., None]
-        along, across = grid[:-1, 1:] - grid[:-1, :-1], grid[1:, :-1] - grid[:-1, :-1]
-        middle = (grid[:-1, :-1] + grid[1:, 1:]) / 2
-        areas.append(norm(np.cross(along, across)).ravel())
-        last = grid[1:, 1:] - grid[1:, :-1], grid[1:, 1:] - grid[:-1, 1:]
-        areas[-1] = (areas[-1] + norm(np.cross(*last)).ravel()) / 2
-        normals.append((middle / norm(middle)[..., None]).reshape(-1, 3))
-    return np.concatenate(normals), np.concatenate(areas)

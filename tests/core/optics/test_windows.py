@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.vectors import norm, unit
-from tbcad.core.mirrors.array import MirrorArray, design
+from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.reflection import miss_distances, reflected_rays
 from tbcad.core.optics.windows import (
@@ -12,11 +12,8 @@ from tbcad.core.optics.windows import (
     cell_windows,
     coverage_diameters,
     cut_positions,
-    parabola_minima,
-    samples_about_minima,
     seam_gaps,
 )
-from tbcad.core.spec.load import load_spec
 from tests.mirror_arrays import mirror_array
 from tests.sphere_misses import sphere_miss_distances
 
@@ -66,19 +63,6 @@ def test_windows_hold_their_own_apex_and_not_the_next(
     assert not seen.contains(np.roll(direction, 60, axis=0), direction, no_rotation).any()
 
 
-def test_minimum_of_a_parabola_is_exact_between_samples() -> None:
-    vertex = np.array([[0.43], [0.07], [0.99]])
-    values = 3.0 + 7.0 * (np.linspace(0, 1, 9) - vertex) ** 2
-    assert parabola_minima(values[:2]) == pytest.approx(3.0, rel=1e-14)
-    assert parabola_minima(values[2:])[0] == values[2, -1]  # the smallest sample is the last
-
-
-def test_rounds_of_samples_close_in_on_the_minimum() -> None:
-    centre = np.array([[0.317], [0.0], [1.0]])
-    samples = samples_about_minima(lambda t: np.abs(t - centre), 3, rounds=4)
-    assert samples.min(axis=1) == pytest.approx(0.0, abs=1 / 512)
-
-
 def brute_force_coverage(cells: Cells, pinhole: np.ndarray, i: int, reach: float) -> float:
     """Twice the smallest miss distance of rays over points of sphere i that another one covers.
 
@@ -111,26 +95,14 @@ def test_coverage_against_brute_force() -> None:
         assert brute_force == pytest.approx(array.coverage[i], rel=4e-3)
 
 
-def array_of(*options: str) -> MirrorArray:
-    return design(load_spec(None, list(options))).arrays[0]
-
-
 @pytest.fixture(scope="module")
 def traced() -> MirrorArray:
-    return array_of("n=6")
+    return mirror_array("n=6")
 
 
 @pytest.fixture(scope="module")
 def paper() -> MirrorArray:
-    return array_of("n=6", "mirrors.radius_rule=paper")
-
-
-def aims(array: MirrorArray) -> np.ndarray:
-    """Where the rays over the apices pierce the planes through the origin across u, (m, 3)."""
-    apex, pinhole = array.mirrors.apex, array.ellipsoid.pinhole
-    ray = reflected_rays(pinhole, apex, array.mirrors.normal)
-    length = (apex * array.u).sum(axis=1) / (ray * array.u).sum(axis=1)
-    return np.asarray(apex - length[:, None] * ray)
+    return mirror_array("n=6", "radius_rule=paper")
 
 
 def test_a_mirror_is_aimed_at_a_point_of_the_x_axis(paper: MirrorArray) -> None:

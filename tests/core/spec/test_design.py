@@ -46,24 +46,17 @@ def refused(file: Path, text: str | bytes) -> str:
     return message.removeprefix(f"{file}: ")
 
 
-class TestDefaults:
-    def test_are_the_papers_design(self) -> None:
-        optics = load_spec(None).optics
-        assert (optics.n, optics.capture_diameter_mm, optics.semi_minor_mm) == (18, 60, 100)
-        assert optics.camera_mm == (100, 0, -100)
-
-    def test_stay_where_a_section_is_given_in_part(self, file: Path) -> None:
-        file.write_text("[shell.foot_flange]\nwidth_mm = 20\n", encoding="utf-8")
-        assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
-        assert load_spec(file).shell.foot_flange.bolts == 5
-        assert load_spec(file).shell.seam_flange.bolts == 6
+def test_defaults_stay_where_a_section_is_given_in_part(file: Path) -> None:
+    file.write_text("[shell.foot_flange]\nwidth_mm = 20\n", encoding="utf-8")
+    assert load_spec(file).shell.foot_flange == FootFlangeSpec(width_mm=20)
+    assert load_spec(file).shell.foot_flange.bolts == 5
+    assert load_spec(file).shell.seam_flange.bolts == 6
 
 
-class TestPlainDict:
-    def test_is_json_and_leads_back(self) -> None:
-        spec = load_spec(None, ["n=7", "camera_mm=[90, 5, -80]", "radius_rule=paper"])
-        table = json.loads(json.dumps(spec_dict(spec)))
-        assert Spec.model_validate(table) == spec
+def test_plain_dict_is_json_and_leads_back() -> None:
+    spec = load_spec(None, ["n=7", "camera_mm=[90, 5, -80]", "radius_rule=paper"])
+    table = json.loads(json.dumps(spec_dict(spec)))
+    assert Spec.model_validate(table) == spec
 
 
 class TestFile:
@@ -76,22 +69,23 @@ class TestFile:
         os.mkfifo(file)
         assert "not a file" in refusal(file)
 
-    @pytest.mark.parametrize("text", ["[optics\n", "\n\nn = \n", "n = 1\nn = 2\n", "a = 1 b = 2"])
-    def test_not_toml(self, file: Path, text: str) -> None:
-        message = refused(file, text)
-        assert message.startswith("not valid TOML")
-        assert " line " in message
-
-    def test_nested_too_deeply(self, file: Path) -> None:
-        assert refused(file, "a = " + "[" * 50_000).startswith("tables nested too deeply")
-        assert refused(file, "\na" + ".a" * 400_000 + " = 1").startswith("line 2: tables nested")
+    @pytest.mark.parametrize(
+        ("text", "wrong"),
+        [
+            ("[optics\n", "not valid TOML.* line "),
+            ("n = 1\nn = 2\n", "not valid TOML.* line "),
+            ("a = " + "[" * 50_000, "tables nested too deeply"),
+            ("\na" + ".a" * 400_000 + " = 1", "line 2: tables nested"),
+        ],
+        ids=["cut", "twice", "lists", "keys"],
+    )
+    def test_not_toml(self, file: Path, text: str, wrong: str) -> None:
+        assert re.match(wrong, refused(file, text))
 
     @given(text=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
     @example(text=b'"" = 1')
     @example(text=b'"a\\nb" = 1')
-    @example(text=b"optics = [1, [2]]")
     @example(text=b"[optics]\nn = 2026-11-21")
-    @example(text=b"[optics]\nn = 0x" + b"f" * 9000)
     @example(text=b"[optics]\nsemi_minor_mm = 0x" + b"f" * 9000)
     @example(text=b"[optics]\nn = " + b"9" * 9000)
     @example(text=b"[[optics]]\nn = 1")
@@ -112,22 +106,22 @@ class TestFile:
 
 class TestUnknownKey:
     @pytest.mark.parametrize(
-        ("text", "key", "meant"),
+        ("text", "said"),
         [
-            ("[optics]\ncapture_diamter_mm = 1", "optics.capture_diamter_mm", "optics.capture_dia"),
-            ("[optic]\nn = 1", "optic", "optics"),
-            ("wall_mm = 1", "wall_mm", "shell.wall_mm"),
-            ("[mesh]\nwall = 1", "mesh.wall", "shell.wall_mm"),
-            ("[shell.seam_flange]\nbolt = 1", "shell.seam_flange.bolt", "shell.seam_flange.bolts"),
-            ("schema_version = 1", "schema_version", "schema"),
+            ("[optic]\nn = 1", "optic: did you mean optics"),
+            ("wall_mm = 1", "wall_mm: did you mean shell.wall_mm"),
+            ("[mesh]\nwall = 1", "mesh.wall: did you mean shell.wall_mm"),
+            ("schema_version = 1", "schema_version: did you mean schema"),
             *(
-                (f"[prototype.base]\n{key} = 1", f"prototype.base.{key}", f"printer.{key}?")
+                (f"[prototype.base]\n{key} = 1", f"{key}: did you mean printer.{key}?")
                 for key in PrinterSpec.model_fields
             ),
         ],
     )
-    def test_names_the_nearest(self, file: Path, text: str, key: str, meant: str) -> None:
-        assert refused(file, text).startswith(f"unknown key {key}: did you mean {meant}")
+    def test_names_the_nearest(self, file: Path, text: str, said: str) -> None:
+        message = refused(file, text)
+        assert message.startswith("unknown key ")
+        assert said in message
 
     @given(st.sampled_from(sorted(KEYS)), st.data())
     def test_one_wrong_letter_is_understood(self, key: str, data: st.DataObject) -> None:
@@ -181,15 +175,15 @@ class TestValue:
             ("stretch=[3, 1]", "stretch[0] is 3, allowed is two numbers in brackets, each"),
             ("stretch=[1]", "stretch[1] is missing, allowed is two numbers in brackets, each"),
             ("stretch=1.2,1.3", "stretch is '1.2,1.3', allowed is two numbers in brackets, each"),
-            ("bed_mm=[9, 200, 200]", "bed_mm[0] is 9, allowed is three numbers in brackets, each"),
-            (
-                "camera_mm=[0, 0, -1]",
-                "three numbers in brackets: above 0 to 10000, from -10000 to 10000, from -10000 ",
-            ),
+            ("camera_mm=[0, 0, -1]", "three numbers in brackets: above 0 to 10000, from -10000 "),
             ("own_margins_mm=[21]", "allowed is numbers in brackets, each from 0 to 20: change"),
+            ("prototype.k=0", "give a whole number from 1 to 1000, or auto"),
+            ("prototype.k=1.0", "give a whole number from 1 to 1000, or auto"),
+            ("prototype.prices=estimates", 'give a list such as ["my_prices.csv", "estimates"]'),
+            ("prototype.prices=[1]", 'give a list such as ["my_prices.csv", "estimates"]'),
         ],
     )
-    def test_lists_in_words(self, given: str, said: str) -> None:
+    def test_what_a_key_takes_in_words(self, given: str, said: str) -> None:
         assert said in refusal(None, given)
 
     @pytest.mark.parametrize("value", ["''", "'a\\nb'", "'../x'", "7", "'" + "a" * 81 + "'"])
@@ -217,9 +211,6 @@ class TestTogether:
         assert least == pytest.approx(math.sqrt(30**2 + 30 * math.sqrt(2) * 100), rel=1e-3)
         load_spec(None, [f"semi_minor_mm={least * 1.001}"])
         refusal(None, f"semi_minor_mm={least * 0.999}")
-
-    def test_pinhole_is_outside_the_capture_sphere(self) -> None:
-        assert "inside the capture sphere" in refusal(None, "camera_mm=[20, 0, -20]")
 
     def test_facets_are_finer_than_the_wall(self) -> None:
         assert "structure_error_mm" in refusal(None, "structure_error_mm=1", "wall_mm=1")
@@ -292,16 +283,6 @@ class TestOptions:
 
 
 class TestPrototype:
-    @pytest.mark.parametrize("value", ["0", "1001", "true", "1.0", "many", "[]", "-1"])
-    def test_number_of_balls(self, value: str) -> None:
-        message = refusal(None, f"prototype.k={value}")
-        assert "give a whole number from 1 to 1000, or auto" in message
-
-    @pytest.mark.parametrize("value", ["[]", "estimates", "[1]"])
-    def test_prices_are_a_list_of_names(self, value: str) -> None:
-        wanted = 'give a list such as ["my_prices.csv", "estimates"]'
-        assert wanted in refusal(None, f"prototype.prices={value}")
-
     def test_grades_are_those_of_the_table(self) -> None:
         assert "allowed is G3 or G5" in refusal(None, "grade=G11")
         assert list(load_grades()) == list(get_args(GradeName))
@@ -331,13 +312,9 @@ def test_half_the_size() -> None:
     assert (prototype.post_diameter_mm, prototype.camera_diameter_mm) == (10, 40)
     assert (prototype.stage.disc_mm, prototype.stage.leds_mm) == (12, ())
     assert prototype.frame.floor_mm == -180
-
-
-def test_what_the_user_sets_stays() -> None:
-    options = ["post_diameter_mm=12", "leds_mm=[]", "frame.floor_mm=-300", "top_mm=-5"]
-    prototype = load_spec(None, options).prototype
-    assert (prototype.post_diameter_mm, prototype.stage.leds_mm) == (12, ())
-    assert (prototype.frame.floor_mm, prototype.stage.top_mm) == (-300, -5)
+    set_by_hand = load_spec(None, [*options, "post_diameter_mm=12", "frame.floor_mm=-300"])
+    assert set_by_hand.prototype.post_diameter_mm == 12
+    assert set_by_hand.prototype.frame.floor_mm == -300
 
 
 @given(

@@ -105,11 +105,6 @@ def test_without_length_it_is_each_mirrors_own_error(halves: EdgeModels) -> None
     assert not warped.form.any()
 
 
-def test_maps_are_needed(halves: EdgeModels) -> None:
-    with pytest.raises(ValueError, match="needs its maps"):
-        draw(SLA, 1, range(1), len(halves[0]))
-
-
 def test_a_build_is_the_same_alone_or_among_others(halves: EdgeModels) -> None:
     case = MonteCarloCase(halves, replace(CNC, waviness=Error(5e-4)), 5)
     together, alone = case(range(4)), case(range(2, 3))
@@ -161,16 +156,6 @@ def test_builds_against_displaced_material(
             assert off.max() < limit_of_any
 
 
-@pytest.mark.slow
-def test_undisplaced_material_shows_what_is_designed(
-    halves: EdgeModels, small_design: MirrorDesign
-) -> None:
-    """The slow way itself: its samples of the edges cost nothing."""
-    field = smooth_field(halves[0].apex, 50.0)
-    found = displaced_coverage(small_design.arrays[0], field, np.zeros((len(field), 3)))
-    assert found == pytest.approx(small_design.arrays[0].coverage, abs=2e-5)
-
-
 def test_the_foot_goes_along_with_the_mirrors_near_it(halves: EdgeModels) -> None:
     """By the field at the place of the foot below each."""
     half, m = halves[0], len(halves[0])
@@ -184,16 +169,13 @@ def test_the_foot_goes_along_with_the_mirrors_near_it(halves: EdgeModels) -> Non
     assert moved == pytest.approx(wanted[:, None] * foot[3:6], abs=1e-12)
 
 
-def values(field: SmoothField, places: np.ndarray, draws: int = DRAWS) -> np.ndarray:
-    numbers = np.random.default_rng(3).standard_normal((len(field), draws))
-    return np.asarray(field.basis(places) @ numbers)
-
-
 @pytest.mark.parametrize("length", [30.0, 50.0, 80.0])
 def test_covariance_is_recovered_from_draws(halves: EdgeModels, length: float) -> None:
     """Within five standard errors, sqrt((1 + c^2) / draws), of the closed form c."""
     places = halves[0].apex
-    found = np.cov(values(smooth_field(places, length), places), bias=True)
+    field = smooth_field(places, length)
+    numbers = np.random.default_rng(3).standard_normal((len(field), DRAWS))
+    found = np.cov(field.basis(places) @ numbers, bias=True)
     wanted = np.exp(
         -(np.linalg.norm(places[:, None] - places[None], axis=2) ** 2) / (2 * length**2)
     )
@@ -211,13 +193,6 @@ def test_variance_misses_no_more_than_the_limit(length: float, seed: int) -> Non
     missing = 1 - np.sum(basis**2, axis=1)
     assert missing.min() > -1e-7
     assert missing.max() < 1.1 * MISSING_VARIANCE
-
-
-def test_of_endless_length_all_places_have_one(halves: EdgeModels) -> None:
-    places = halves[0].apex
-    field = smooth_field(places, 1e7)
-    assert len(field) == 1
-    assert np.ptp(values(field, places, 100), axis=0).max() < 1e-6
 
 
 def test_slope_is_that_of_the_closed_form(halves: EdgeModels) -> None:

@@ -1,23 +1,19 @@
 """Mirrors on pedestals against slow oracles: dense outlines, half-spaces and balls, rays."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.mirrors.array import MirrorArray, design
+from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics.cells import Cells, cell_areas
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES, NotRegularError
 from tbcad.core.optics.reflection import reflect
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.load import load_spec
 from tests.mirror_arrays import mirror_array
 from tests.pedestal_designs import pedestal_design, pedestals
 
 CAPTURE_RADIUS = 30.3  # with the margin
-EVEN = Path(__file__).parents[4] / "designs" / "turtleback-even.toml"
 
 
 @pytest.fixture(scope="module")
@@ -148,9 +144,8 @@ def test_a_groove_wider_than_a_mirror_is_refused(array: MirrorArray) -> None:
         pedestals(array, 30.0)
 
 
-def modelled(*settings: str, path: Path | None = None) -> PedestalCells:
-    spec = load_spec(path, ["shell.edges=pedestal", *settings])
-    cells = design(spec).arrays[0].modelled_cells
+def modelled(*settings: str) -> PedestalCells:
+    cells = pedestal_design(*settings).arrays[0].modelled_cells
     assert isinstance(cells, PedestalCells)
     return cells
 
@@ -167,21 +162,24 @@ def heights(cells: PedestalCells) -> np.ndarray:
 @pytest.mark.parametrize(
     "settings", [("n=3", "groove_mm=0.05"), ("n=8",), ("n=9", "groove_mm=0.5")]
 )
-def test_nothing_sticks_out_beyond_the_seam_and_the_foot(settings: tuple[str, ...]) -> None:
-    assert heights(modelled(*settings)).min() > -1e-9
-
-
-def test_a_mirror_that_ends_before_the_foot_keeps_its_distance() -> None:
-    """No tip lies between the foot plane and a groove's width above it."""
-    cells = modelled("n=8")
-    above = heights(cells)[:, 1]
-    tips = above[: len(cells.rings[1])]
+def test_nothing_sticks_out_and_no_tip_is_close_above_the_foot(settings: tuple[str, ...]) -> None:
+    cells = modelled(*settings)
+    assert heights(cells).min() > -1e-9
+    tips = heights(cells)[: len(cells.rings[1]), 1]
     assert not ((tips > 1e-9) & (tips < cells.layout.groove)).any()
 
 
-def test_a_groove_that_crosses_the_seam_is_refused_with_a_width_that_was_tried() -> None:
-    with pytest.raises(SpecError, match=r"groove.*: set shell\.groove_mm to 0\.25,"):
-        modelled("n=20", "groove_mm=0.5")
+@pytest.mark.parametrize(
+    ("settings", "wrong"),
+    [
+        (("n=20", "groove_mm=0.5"), r"groove.*: set shell\.groove_mm to 0\.25,"),
+        (("n=4", "coating_um=200", "groove_mm=0.02"), r"coating_um 200 .* shell\.groove_mm larger"),
+    ],
+    ids=["crosses the seam", "coat too thick"],
+)
+def test_grooves_that_cannot_be(settings: tuple[str, ...], wrong: str) -> None:
+    with pytest.raises(SpecError, match=wrong):
+        modelled(*settings)
 
 
 @pytest.mark.slow
@@ -209,8 +207,3 @@ def test_a_coat_leaves_the_pedestals_where_they_are() -> None:
     assert (cell_areas(bare) != cell_areas(coated)).all()
     walls = slice(bare.mirrors, None)
     np.testing.assert_array_equal(bare.surfaces.normal[walls], coated.surfaces.normal[walls])
-
-
-def test_a_coat_thicker_than_the_grooves_are_deep_is_refused() -> None:
-    with pytest.raises(SpecError, match=r"mirrors\.coating_um 200 .* shell\.groove_mm larger"):
-        pedestal_design("n=4", "coating_um=200", "shell.groove_mm=0.02")
