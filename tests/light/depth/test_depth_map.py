@@ -31,7 +31,6 @@ from tbcad.light.simulate.views.refocus import (
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.types import Floats
-from tests.light.simulate.conftest import knot  # noqa: F401
 
 CAPTURE_MM = 60.0
 VIEW = camera_around_object(0.4, 0.5, 640.0, CAPTURE_MM, (40, 30))
@@ -40,7 +39,7 @@ WIDE = camera_around_object(0.4, 0.5, 640.0, CAPTURE_MM, (160, 120))
 
 
 @pytest.fixture(scope="module")
-def tiles(knot: Scene) -> MirrorTiles:  # noqa: F811
+def tiles(knot: Scene) -> MirrorTiles:
     options = ["n=8", "camera.width_px=832", "camera.height_px=620"]
     cameras = reflectors(design(load_spec(None, options)))
     photographs = [(at, photograph(at.camera, exact_tracer(at), knot)) for at in cameras]
@@ -89,8 +88,7 @@ def test_a_view_that_looks_elsewhere_is_refused(tiles: MirrorTiles) -> None:
 
 
 def test_views_are_as_good_as_with_the_true_surface_also_quick_ones(
-    tiles: MirrorTiles,
-    knot: Scene,  # noqa: F811
+    tiles: MirrorTiles, knot: Scene
 ) -> None:
     """Within 0.005 of the blend on the true depth, and better than nearest rays."""
     rows, fine, quick = [], depth_views(tiles), depth_views(tiles, QUICK)
@@ -113,8 +111,7 @@ def test_views_are_as_good_as_with_the_true_surface_also_quick_ones(
 
 @pytest.mark.parametrize("plane", [-20.0, 12.0])
 def test_a_surface_across_the_view_is_the_lens_of_that_focus(
-    tiles: MirrorTiles,
-    plane: float,
+    tiles: MirrorTiles, plane: float
 ) -> None:
     def depth(origin: Floats, direction: Floats) -> Floats:
         away = -float(WIDE.pinhole @ WIDE.forward) - plane
@@ -136,7 +133,7 @@ def test_rays_beside_the_surface_are_sharp_on_the_plane_through_the_origin(
     assert (np.abs(lens.colour - nothing.colour).max(axis=2) > 1e-3).mean() < 1e-3
 
 
-def test_it_is_sharper_than_any_lens(tiles: MirrorTiles, knot: Scene) -> None:  # noqa: F811
+def test_it_is_sharper_than_any_lens(tiles: MirrorTiles, knot: Scene) -> None:
     truth = to_bytes(pinhole_picture(knot, WIDE))
     depth = depth_map(pinhole_pictures(tiles.source), WIDE)
     found = refocus_everywhere(tiles, WIDE, APERTURE_MM, depth.along_rays).image
@@ -147,8 +144,7 @@ def test_it_is_sharper_than_any_lens(tiles: MirrorTiles, knot: Scene) -> None:  
 
 @pytest.mark.parametrize("method", ["nearest", "depth"])
 def test_views_from_python_are_those_of_one_at_a_time(
-    tiles: MirrorTiles,
-    method: Literal["nearest", "depth"],
+    tiles: MirrorTiles, method: Literal["nearest", "depth"]
 ) -> None:
     views = tbcad.Views(tiles.source)
     for azimuth in (0.0, 120.0):

@@ -54,11 +54,6 @@ def test_two_balls_are_two_hulls() -> None:
         assert inside[np.linalg.norm(places - [5 * side, 0, 0], axis=-1) < 2].all()
 
 
-def test_photographs_of_nothing_are_refused() -> None:
-    with pytest.raises(InputError, match="nothing brighter than"):
-        hull_of(rays_of([], 5_000))
-
-
 def test_photographs_without_background_are_refused() -> None:
     everywhere = np.random.default_rng(0).uniform(0.3, 1, (5_000, 3)).astype(np.float32)
     level = noise_level(everywhere.max(axis=1))

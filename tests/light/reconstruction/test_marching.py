@@ -89,13 +89,6 @@ def test_a_uniform_slab_lets_through_the_exponential_of_its_thickness(number: fl
         assert np.isnan(found[:, 4]).all()
 
 
-def test_an_opaque_plane_is_where_its_density_begins() -> None:
-    entry, direction, length = parallel(8)
-    found = composited(entry, direction, length, slab(60.0, 0.05))
-    assert found[:, 3] == pytest.approx(1, abs=float(LEAST_LIGHT))
-    assert found[:, 4] == pytest.approx(-3 - entry[:, 2], abs=0.05)
-
-
 def test_a_ball_becomes_half_opaque_at_its_surface() -> None:
     # A number a u at the depth u has the opacity 1 - exp(-a u^2 / 2): half at sqrt(2 log 2 / a).
     steep, radius = 20.0, 6.0
@@ -163,23 +156,9 @@ def test_spans_hold_all_that_a_ray_meets(n: int, seed: int) -> None:
 def pixels_of(entry: Floats, direction: Floats, colour: Floats, **changes: Singles) -> Pixels:
     count = len(entry)
     length = -2 * (entry * direction).sum(axis=1)
-    plain = dict(
-        zip(
-            ["entry", "direction", "first", "last", "colour", "weight", "footprint", "places"],
-            single(
-                entry,
-                direction,
-                np.zeros(count),
-                length,
-                colour,
-                np.ones(count),
-                np.zeros((1, 4, 3)),
-                np.zeros((1, 1, 2)),
-            ),
-            strict=True,
-        )
-    )
-    return Pixels(**{**plain, **changes})
+    rays = single(entry, direction, np.zeros(count), length, colour, np.ones(count))
+    rays += single(np.zeros((1, 4, 3)), np.zeros((1, 1, 2)))
+    return Pixels(*rays)._replace(**changes)
 
 
 def jitters(pixel: int, seed: int, kinds: int, count: int) -> tuple[int, list[float]]:

@@ -28,19 +28,14 @@ def closed(mesh: trimesh.Trimesh) -> bool:
     return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def test_a_ball_has_the_surface_of_a_ball() -> None:
-    mesh = field_mesh(ball(), 1.0)
-    away = np.linalg.norm(mesh.vertices, axis=1) - RADIUS
+@pytest.mark.parametrize("level", [1.0, 2.0])
+def test_a_ball_has_the_surface_of_a_ball_and_a_denser_level_lies_deeper(level: float) -> None:
+    mesh = field_mesh(ball(), level)
+    deeper = (level - 0.01 / (4 * level) - BELOW) / STEEP
+    away = np.linalg.norm(mesh.vertices, axis=1) - (RADIUS - deeper)
     assert np.abs(away).max() < PITCH / 10
     assert closed(mesh)
     assert mesh.body_count == 1
-
-
-def test_a_denser_level_lies_deeper() -> None:
-    mesh = field_mesh(ball(), 2.0)
-    deeper = (2.0 - 0.01 / 8 - BELOW) / STEEP
-    away = np.linalg.norm(mesh.vertices, axis=1) - (RADIUS - deeper)
-    assert np.abs(away).max() < PITCH / 10
 
 
 def test_random_numbers_have_closed_surfaces() -> None:

@@ -15,7 +15,6 @@ from tbcad.light.simulate.views.synthesis import horizon_search_radius, search_r
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.light.viewer.moving import moving_view
 from tbcad.types import Floats
-from tests.light.simulate.conftest import cameras, knot, light_field  # noqa: F401
 
 CAPTURE_MM = 60.0
 FAR = (1e3,)
@@ -43,7 +42,7 @@ def numbered(count: int, seed: int) -> PinholePictures:
 
 
 @pytest.fixture(scope="module")
-def pictures(light_field: LightField) -> PinholePictures:  # noqa: F811
+def pictures(light_field: LightField) -> PinholePictures:
     return pinhole_pictures(light_field)
 
 
@@ -105,10 +104,7 @@ def test_places_in_pictures_are_the_cameras_own(pictures: PinholePictures) -> No
 
 @pytest.mark.parametrize("place", PLACES_DEG)
 def test_about_as_good_as_nearest_rays(
-    light_field: LightField,  # noqa: F811
-    pictures: PinholePictures,
-    knot: Scene,  # noqa: F811
-    place: tuple[float, float],
+    light_field: LightField, pictures: PinholePictures, knot: Scene, place: tuple[float, float]
 ) -> None:
     tiles, view = MirrorTiles(light_field), seen_at(*place, 640, (160, 120))
     limits = search_radius(tiles), horizon_search_radius(tiles)
