@@ -160,7 +160,7 @@ def changed(source: LightField, camera: str, plane: str) -> LightField:
     """With one value of one pixel a little larger."""
     frame = source.frames[camera]
     values = frame.planes[plane].copy()
-    values[70, 90, 1] += 1
+    values[128, 90, 1] += 1
     other = replace(frame, planes={**frame.planes, plane: values})
     return replace(source, frames={**source.frames, camera: other})
 

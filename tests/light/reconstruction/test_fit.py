@@ -9,7 +9,7 @@ import pytest
 from tbcad.light.reconstruction import fit as fitting
 from tbcad.light.reconstruction import start as starting
 from tbcad.light.reconstruction.field import Field, field_bytes
-from tbcad.light.reconstruction.fit import fit, medium_of, squared_error
+from tbcad.light.reconstruction.fit import fit, medium_of
 from tbcad.light.reconstruction.marching import composited
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import Level, Settings
@@ -57,15 +57,6 @@ def test_two_balls_are_found_with_nothing_between() -> None:
         assert np.abs(found[:, :3] - ball.colour).mean() < 0.03
     between = [np.float32([a]) for a in ([0.3, -9, 0], [0, 1, 0], 18)]
     assert composited(*between, medium_of(made, 0.2))[0, 3] < 0.02
-
-
-def test_rays_that_are_left_out_are_predicted() -> None:
-    rays = rays_of([BALL], 30_000)
-    used = np.arange(30_000) % 10 > 0
-    *_, last = fit(rays, SMALL, used)
-    error = squared_error(rays, ~used, last.field(), SMALL)
-    assert error < 0.005
-    assert np.isnan(squared_error(rays, np.zeros(30_000, bool), last.field(), SMALL))
 
 
 def backward(work: Callable[..., object], items: Iterable[object]) -> list[object]:

@@ -284,13 +284,3 @@ def test_nodes_without_any_gradient_stay() -> None:
     values = random_values()
     changed, _ = step(values, np.zeros((1, V, 4), np.float32), columns(smooth=1.0), 0.1)
     assert np.array_equal(changed, values)
-
-
-def test_a_step_reads_no_node_that_it_has_changed() -> None:
-    values = random_values()
-    whole, _ = step(values, random_values(1)[None], columns(smooth=1.0))
-    moments = Moments(np.zeros_like(values), np.zeros_like(values))
-    parts, changed = random_values(1)[None], np.empty_like(values)
-    for nodes in ((20, V), (0, 7), (7, 20)):
-        adam(nodes, values, changed, parts, moments, GRID.neighbours, columns(smooth=1.0), 0.0)
-    assert np.array_equal(changed, whole)

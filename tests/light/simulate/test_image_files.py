@@ -13,7 +13,6 @@ from tbcad.light.simulate.image_files import (
     ANIMATED_SUFFIXES,
     check_image_path,
     difference,
-    side_by_side,
     write_animation,
     write_images,
 )
@@ -43,13 +42,6 @@ def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
     with Image.open(file) as film:
         levels = [np.asarray(f.convert("RGB"))[0, 0, 0] for f in ImageSequence.Iterator(film)]
     assert levels == [0, 80, 160, 240, 160, 80]
-
-
-def test_images_side_by_side() -> None:
-    sheet = side_by_side({"red": RED, "blue": BLUE})
-    assert (sheet[-1, 0] == [255, 0, 0]).all()
-    assert (sheet[-1, -1] == [0, 0, 255]).all()
-    assert sheet.shape[1] > 64
 
 
 def test_difference_has_no_sign() -> None:

@@ -6,13 +6,8 @@ import pytest
 from tbcad.core.optics.camera import Camera
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
-from tbcad.light.simulate.views.refocus import pinhole_picture
-from tbcad.light.simulate.views.synthesis import horizon_search_radius, search_radius, synthesise
-from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.light.viewer.moving import moving_view
 from tbcad.types import Floats
 
@@ -100,14 +95,3 @@ def test_places_in_pictures_are_the_cameras_own(pictures: PinholePictures) -> No
     assert known.sum() > 100
     difference = image[known].astype(int) - pictures.picture[number][known]
     assert np.abs(difference).max() <= 1
-
-
-@pytest.mark.parametrize("place", PLACES_DEG)
-def test_about_as_good_as_nearest_rays(
-    light_field: LightField, pictures: PinholePictures, knot: Scene, place: tuple[float, float]
-) -> None:
-    tiles, view = MirrorTiles(light_field), seen_at(*place, 640, (160, 120))
-    limits = search_radius(tiles), horizon_search_radius(tiles)
-    truth = np.rint(pinhole_picture(knot, view)).astype(np.uint8)
-    moving = image_quality(truth, moving_view(pictures, view, limits))
-    assert moving.ssim > image_quality(truth, synthesise(tiles, view).image).ssim - 0.01
