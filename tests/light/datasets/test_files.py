@@ -12,7 +12,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.virtual_cameras import MirrorId, read_crop
+from tbcad.light.datasets.virtual_cameras import Crop, MirrorId, read_crop
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays
 from tbcad.light.simulate.scene.rays import view_directions
@@ -170,6 +170,19 @@ class TestColmap:
             assert np.array(pixels) == pytest.approx(opengl_pixels(transforms, frame, points))
 
 
+def crop_of(field: LightField, name: str) -> Crop:
+    crop = read_crop(field, MirrorId(name[0], int(name[1:]) - 1))
+    assert crop is not None
+    return crop
+
+
+def rays_in(folder: Path, frame: Document) -> tuple[np.ndarray, np.ndarray]:
+    """The rays (h, w, 6) of a frame for instant-ngp, and whether its pixels are used."""
+    path, shape = folder / frame["file_path"], (frame["h"], frame["w"], 6)
+    table = np.fromfile(path.parent / f"rays_{path.stem}.dat", "<f4").reshape(shape)
+    return table, picture_of(path.parent / f"dynamic_mask_{path.stem}.png") == 0
+
+
 class TestRays:
     def test_instant_ngp_gets_every_ray_as_captured(
         self, exported: dict[str, Path], field: LightField
@@ -180,14 +193,10 @@ class TestRays:
         rays = 0
         for frame in document["frames"]:
             path = folder / frame["file_path"]
-            crop = read_crop(field, MirrorId(path.stem[0], int(path.stem[1:]) - 1))
-            assert crop is not None
+            crop = crop_of(field, path.stem)
             picture = picture_of(path)
             assert picture.shape == (frame["h"], frame["w"], 3)
-            data = (path.parent / f"rays_{path.stem}.dat").read_bytes()
-            assert len(data) == 24 * frame["h"] * frame["w"]
-            table = np.frombuffer(data, "<f4").reshape(frame["h"], frame["w"], 6)
-            used = picture_of(path.parent / f"dynamic_mask_{path.stem}.png") == 0
+            table, used = rays_in(folder, frame)
             assert np.array_equal(used[:, ::-1], crop.meets)
             expected = np.concatenate([crop.origin, crop.direction], axis=2)[crop.meets]
             assert np.array_equal(table[:, ::-1][crop.meets], expected.astype(np.float32))
@@ -203,12 +212,9 @@ class TestRays:
         document = json.loads((folder / "transforms.json").read_text())
         errors, flipped = [], []
         for frame in document["frames"]:
-            path = folder / frame["file_path"]
-            table = np.fromfile(path.parent / f"rays_{path.stem}.dat", "<f4")
-            table = table.reshape(frame["h"], frame["w"], 6).astype(float)
-            used = picture_of(path.parent / f"dynamic_mask_{path.stem}.png") == 0
+            table, used = rays_in(folder, frame)
             rows, columns = np.nonzero(used)
-            origin, way = np.split(table[used], 2, axis=1)
+            origin, way = np.split(table[used].astype(float), 2, axis=1)
             points = origin - (origin * way).sum(axis=1, keepdims=True) * way
             pixels = opengl_pixels(document, frame, points)
             for found, column in ((errors, columns), (flipped, frame["w"] - 1 - columns)):
@@ -229,9 +235,7 @@ class TestRays:
         assert set(arrays) == {"origin", "direction", "colour", "camera", "name", "centre"}
         assert len(arrays["origin"]) == sum(_meeting(field, frame) for frame in field.frames)
         for k in (0, 17, len(arrays["name"]) - 1):
-            name = str(arrays["name"][k])
-            crop = read_crop(field, MirrorId(name[0], int(name[1:]) - 1))
-            assert crop is not None
+            crop = crop_of(field, str(arrays["name"][k]))
             mine = arrays["camera"] == k
             assert np.array_equal(arrays["colour"][mine], crop.colour[crop.meets])
             for key, expected in zip(("origin", "direction"), crop.rays, strict=True):

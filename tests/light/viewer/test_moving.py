@@ -13,13 +13,10 @@ from tbcad.types import Floats
 
 CAPTURE_MM = 60.0
 FAR = (1e3,)
-PLACES_DEG = ((0.0, 5.0), (200.0, 45.0), (45.0, 88.0))
 
 
-def seen_at(azimuth: float, elevation: float, distance: float, size: tuple[int, int]) -> Camera:
-    return camera_around_object(
-        np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, size
-    )
+def seen_from(distance: float) -> Camera:
+    return camera_around_object(*np.radians([70, 35]), distance, CAPTURE_MM, (150, 100))
 
 
 def numbered(count: int, seed: int) -> PinholePictures:
@@ -55,7 +52,7 @@ def distance(two_plane: TwoPlane, target: Floats, centre: Floats) -> float:
 
 @pytest.mark.parametrize("reach", [150.0, 640.0])
 def test_a_pixel_is_of_the_nearest_virtual_camera(reach: float) -> None:
-    pictures, view = numbered(120, 5), seen_at(70, 35, reach, (150, 100))
+    pictures, view = numbered(120, 5), seen_from(reach)
     image = moving_view(pictures, view, FAR)
     two_plane = two_plane_along(view.forward, view.right, CAPTURE_MM)
     direction = view_directions(view)
@@ -70,7 +67,7 @@ def test_a_pixel_is_of_the_nearest_virtual_camera(reach: float) -> None:
 
 
 def test_nothing_near_is_black_and_the_second_limit_fills_it() -> None:
-    pictures, view = numbered(40, 2), seen_at(70, 35, 640, (150, 100))
+    pictures, view = numbered(40, 2), seen_from(640.0)
     near, wide = (moving_view(pictures, view, limits) for limits in ((1.0,), (1.0, 1e3)))
     assert (near == 0).mean() > 0.5
     kept = near > 0
@@ -79,7 +76,7 @@ def test_nothing_near_is_black_and_the_second_limit_fills_it() -> None:
 
 
 def test_masked_pictures_are_not_taken() -> None:
-    pictures, view = numbered(40, 3), seen_at(70, 35, 640, (150, 100))
+    pictures, view = numbered(40, 3), seen_from(640.0)
     used = np.unique(moving_view(pictures, view, FAR))
     pictures.mask[used[-1] - 1] = False
     assert used[-1] not in moving_view(pictures, view, FAR)
