@@ -53,14 +53,13 @@ def weights(source: LightField, *sigmas: float | None) -> list[float]:
     return [float(rays.weight[rays.mirror == k].mean()) for k in range(3)]
 
 
-def test_a_pixel_at_the_object(parallel: LightField) -> None:
+def test_the_formula(parallel: LightField) -> None:
     rays = captured_rays(parallel, footprint=True)
     assert pixel_areas(rays) == pytest.approx(np.full(len(rays), PIXEL_MM**2), rel=1e-3)
-
-
-def test_the_formula(parallel: LightField) -> None:
     found = weights(parallel, 0.0, PIXEL_MM / 12, PIXEL_MM / 2)
     assert found == pytest.approx([1, 1 / (1 + 6 / 144), 0.4], rel=1e-3)
+    found = weights(parallel, 0.1, None, 0.3)  # what is unknown counts as the worst
+    assert found[1] == pytest.approx(found[2], rel=1e-4)
 
 
 def test_a_pixel_without_neighbours_counts_as_the_others(parallel: LightField) -> None:
@@ -68,11 +67,6 @@ def test_a_pixel_without_neighbours_counts_as_the_others(parallel: LightField) -
     parallel.frames["a"].planes["mirror"][0, 5:8] = 0
     found = weights(parallel, PIXEL_MM / 2, PIXEL_MM / 2, PIXEL_MM / 2)
     assert found == pytest.approx([0.4, 0.4, 0.4], rel=1e-3)
-
-
-def test_an_unknown_mirror_counts_as_the_worst(parallel: LightField) -> None:
-    found = weights(parallel, 0.1, None, 0.3)
-    assert found[1] == pytest.approx(found[2], rel=1e-4)
 
 
 def test_nothing_known_changes_nothing(parallel: LightField) -> None:

@@ -43,16 +43,10 @@ def test_an_even_sky_gives_the_irradiance_of_a_hemisphere() -> None:
     assert up == pytest.approx([np.pi] * 3, rel=1e-3)
 
 
-def test_lamps_share_all_of_the_light() -> None:
+def test_lamps_share_all_of_the_light_and_one_bright_pixel_gives_one_each() -> None:
     found = environment(sky())
-    place = 245 * even_directions(40)
-    lamps = found.on_lamps(place)
-    assert lamps.colour.sum(axis=0) == pytest.approx(found.light.sum(axis=0))
-    far = found.far_lights(100)
-    assert far.colour.sum(axis=0) == pytest.approx(found.light.sum(axis=0))
-
-
-def test_one_bright_pixel_gives_one_lamp_each_and_the_far_one_is_there() -> None:
+    for lights in (found.on_lamps(245 * even_directions(40)), found.far_lights(100)):
+        assert lights.colour.sum(axis=0) == pytest.approx(found.light.sum(axis=0))
     picture = np.zeros((64, 128, 3))
     picture[20, 50] = (3, 2, 1)
     found = environment(picture)

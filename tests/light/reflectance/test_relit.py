@@ -109,8 +109,7 @@ def test_damaged_files_are_refused(captured: Path, tmp_path: Path, name: str) ->
 def test_a_field_of_another_capture_is_refused(
     captured: Path, hdr: Path, light_field: LightField
 ) -> None:
-    small = light_field.frames["a"]
-    one = LightField({"c": small}, light_field.capture_mm, {})
+    one = LightField({"c": light_field.frames["a"]}, light_field.capture_mm, {})
     with (
         open_reflectance(captured) as reflectance,
         pytest.raises(InputError, match="not of this light field"),

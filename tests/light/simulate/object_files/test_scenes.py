@@ -106,6 +106,7 @@ def test_factors_are_light_also_of_pictures(tmp_path: Path) -> None:
         found = part.colours if part.picture is None else part.picture / 255
         assert found is not None
         assert found[0, 0] == pytest.approx([1, HALF, FIFTH], abs=0.003)
+        assert "baseColorFactor" in part.source or part.picture is not None
 
 
 def test_what_is_left_out_is_noted(tmp_path: Path) -> None:

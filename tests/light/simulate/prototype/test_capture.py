@@ -39,6 +39,7 @@ from tests.exported_files import Rows, edit_csv, edit_json
 from tests.light.conftest import CAPTURE_MM
 from tests.photographed_runs import stop_photograph
 from tests.prototype_exports import plan_of
+from tests.prototype_records import FRAME
 
 PLAN, RECORD, BALLS = "rotation_plan.csv", "prototype.json", "balls.csv"
 Runs = tuple[PrototypeRun, PrototypeRun]
@@ -302,7 +303,7 @@ class TestReading:
             (RECORD, lambda t: t.update(picture="bent"), "picture: "),
             (RECORD, lambda t: t["frame"].update(zero=[1, 0, 0]), "not square"),
             (RECORD, lambda t: t["frame"].update(third=[0, 1, 0]), "right-handed"),
-            (RECORD, lambda t: t["frame"].update(turned_frame(t)), "does not point"),
+            (RECORD, lambda t: t.update(frame=FRAME), "does not point"),
             (BALLS, lambda t: t.clear(), "balls.csv: no balls"),
             (BALLS, lambda t: t.reverse(), "ball 1 is out of order"),
             (BALLS, lambda t: t[2].update(nx="2.0"), "ball 3 has a normal"),
@@ -335,8 +336,3 @@ def raised(table: Rows, name: str, by: float, times: int = 1) -> None:
     for row in table:
         value = times * float(row[name]) + by
         row[name] = str(int(value)) if name == "stop" else repr(value)
-
-
-def turned_frame(record: dict) -> dict:
-    frame = record["frame"]
-    return {"axis": frame["zero"], "zero": frame["third"], "third": frame["axis"]}
