@@ -24,6 +24,8 @@ from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.simulate import parallel
 from tbcad.light.simulate.capture.photograph import Sensor
+from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.views.viewpoints import viewpoints_around
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import (
@@ -32,11 +34,13 @@ from tbcad.studies.paper import (
     with_lens_of_table_i,
 )
 from tbcad.studies.resolution import COUNTED, Ratio, resolution
+from tbcad.studies.ssim import ssim
 from tests.mirror_arrays import mirror_array
 
 SMALL = ("n=4", "width_px=208", "height_px=155")
 # No radius gives some of these mirrors their coverage.
-HOPELESS = ("camera_mm=[174, 24, -243]", "semi_minor_mm=78", "capture_diameter_mm=36")
+HOPELESS = (*SMALL, "n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78",
+            "capture_diameter_mm=36")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +101,7 @@ def test_capture_area_has_the_paper_beside_it() -> None:
 
 def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(radii, "MAX_ITERATIONS", 2)  # else the search takes ten seconds
-    spec = load_spec(None, HOPELESS)
+    spec, around = load_spec(None, HOPELESS), viewpoints_around((30.0,), 1, 640.0)
     (at,) = capture_area(spec, range(9, 10)).tables[0].records()
     assert at["traced_minimum_mm"] is None
     assert "no radius gives" in str(at["traced_reason"])
@@ -106,6 +110,9 @@ def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPat
     assert [at[name] for name in COUNTED] == [None] * 7
     assert "no radius gives" in str(at["reason"])
     assert len(study_files(study)) == 7
+    found = ssim(spec, built_in_object(36.0), (Sensor(208, 155),), around, "nearest", print)
+    assert "no radius gives" in str(found.tables[0].column("reason"))
+    assert found.figures == ()
 
 
 def test_elevation_of_the_paper_design() -> None:
@@ -164,12 +171,8 @@ def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
     assert write_study(study, out) == files
     assert {path.name for path in out.iterdir()} == {"mine.txt", *(path.name for path in files)}
     assert (out / "elevation.csv").read_bytes() == study_files(study)["elevation.csv"]
-
-
-def test_study_folders_refused(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="is a file"):
-        check_study_folder(tmp_path / "file" / "studies")
+        check_study_folder(out / "mine.txt" / "studies")
     check_study_folder(tmp_path / "not" / "yet")
     assert not (tmp_path / "not").exists()
 

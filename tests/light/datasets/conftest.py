@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from tbcad.app.cli import run
-from tests.captures import field, scene  # noqa: F401
 
 TARGETS = ("nerfstudio", "colmap", "ngp-rays", "rays")
 

@@ -1,5 +1,7 @@
 """Rays with known answers: a real pinhole, and a sphere by another formula."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -33,14 +35,6 @@ def on_sphere(angles: tuple[float, float]) -> np.ndarray:
     return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
 
 
-def crop_of_points(origin: np.ndarray, points: np.ndarray, colour: np.ndarray) -> Crop:
-    """Rays from origins through points in the plane through the middle, (h, w, 3) each."""
-    direction = unit(points - origin)
-    miss = np.linalg.norm(np.cross(origin, direction), axis=2)
-    every = np.ones(points.shape[:2], dtype=bool)
-    return Crop(colour, origin, direction, every, miss < RADIUS)
-
-
 def pinhole_crop(centre: np.ndarray, size: int = 40) -> Crop:
     """What a mirror that had one common point would show: columns from right to left."""
     forward = -unit(centre)
@@ -50,7 +44,10 @@ def pinhole_crop(centre: np.ndarray, size: int = 40) -> Crop:
     points = -steps[None, :, None] * right + steps[:, None, None] * down
     origin = centre + 5.0 * unit(points - centre)
     colour = np.clip(128 + 3 * np.stack([points @ axis for axis in np.eye(3)], axis=2), 0, 255)
-    return crop_of_points(origin, points, np.rint(colour).astype(np.uint8))
+    direction = unit(points - origin)
+    miss = np.linalg.norm(np.cross(origin, direction), axis=2)
+    every = np.ones(points.shape[:2], dtype=bool)
+    return Crop(np.rint(colour).astype(np.uint8), origin, direction, every, miss < RADIUS)
 
 
 @settings(max_examples=25)
@@ -149,7 +146,7 @@ def test_pixels_outside_the_cell_are_masked() -> None:
     valid[:18, :18] = False
     colour = whole.colour.copy()
     colour[~valid] = 255
-    crop = Crop(colour, whole.origin, whole.direction, valid, whole.meets & valid)
+    crop = replace(whole, colour=colour, valid=valid, meets=whole.meets & valid)
     camera = camera_at(centre, 2 * RADIUS, 60)
     picture, mask = resampled(crop, camera, RADIUS)
     full, known = resampled(whole, camera, RADIUS)
@@ -193,14 +190,10 @@ def test_seed_points_are_carved_by_dark_background() -> None:
 
 def test_too_little_to_be_a_camera(field: LightField) -> None:
     whole = pinhole_crop(120 * on_sphere((0.4, 0.7)))
-    few = np.zeros_like(whole.meets)
-    few[20, 20:24] = True
-    crop = Crop(whole.colour, whole.origin, whole.direction, whole.valid, few)
-    assert "fewer than" in str(_measured(crop, RADIUS))
-    row = np.zeros_like(whole.meets)
-    row[20] = whole.meets[20]
-    crop = Crop(whole.colour, whole.origin, whole.direction, whole.valid, row)
-    assert "side by side" in str(_measured(crop, RADIUS))
+    for columns, reason in ((slice(20, 24), "fewer than"), (slice(None), "side by side")):
+        meets = np.zeros_like(whole.meets)
+        meets[20, columns] = whole.meets[20, columns]
+        assert reason in str(_measured(replace(whole, meets=meets), RADIUS))
     inside = pinhole_crop(20 * on_sphere((0.4, 0.7)))
     assert "outside the capture sphere" in str(_measured(inside, RADIUS))
     mirror = MirrorId("a", 3)

@@ -70,10 +70,7 @@ def test_a_sphere() -> None:
     radius = 25.0
     found, _ = swept_depth(pictures_of(-radius, 1 / radius), VIEW)
     x, y = np.meshgrid(np.arange(80) - 39.5, np.arange(60) - 29.5)
-    ray = unit_directions(VIEW, range(60))
-    half = ray @ VIEW.pinhole
-    distance = -half - np.sqrt(np.maximum(half**2 - VIEW.pinhole @ VIEW.pinhole + radius**2, 0))
-    expected = (VIEW.pinhole + distance[..., None] * ray) @ VIEW.forward
+    expected = met(VIEW, -radius, 1 / radius) @ VIEW.forward
     middle = np.hypot(x, y) < 15
     assert np.median(np.abs(found - expected)[middle]) < 0.6
     assert np.abs(found - expected)[middle].max() < 3

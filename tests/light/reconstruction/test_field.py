@@ -26,7 +26,6 @@ from tbcad.light.reconstruction.field import (
 from tbcad.light.reconstruction.grid import Grid
 from tbcad.light.reconstruction.marching import GLOSSY, MATT
 from tbcad.light.simulate.capture.light_field import LightField
-from tests.light.simulate.conftest import cameras, knot, light_field  # noqa: F401
 from tests.light.viewer.fields import ball, write_ball
 
 
@@ -50,12 +49,9 @@ def test_what_is_written_is_read(tmp_path: Path, columns: int) -> None:
     assert np.array_equal(found.values, given_field.values)
     assert found.order == (columns == GLOSSY)
     assert field_bytes(found) == path.read_bytes()
-
-
-def test_a_field_of_nothing_is_written_and_read(tmp_path: Path) -> None:
-    empty = Field(Grid.about(np.zeros((4,) * 3, bool), 9.0), np.zeros((0, MATT), np.float32))
-    write_field(tmp_path / "field.npz", empty)
-    assert len(read_field(tmp_path / "field.npz").grid) == 0
+    empty = Field(Grid.about(np.zeros((4,) * 3, bool), 9.0), np.zeros((0, columns), np.float32))
+    write_field(path, empty)
+    assert len(read_field(path).grid) == 0
 
 
 def test_density_is_positive_and_tends_to_its_number() -> None:
@@ -93,12 +89,6 @@ def huge_header() -> bytes:
         return buffer.getvalue()
 
 
-def single_array() -> bytes:
-    with io.BytesIO() as buffer:
-        np.save(buffer, np.zeros(3))
-        return buffer.getvalue()
-
-
 def bomb() -> bytes:
     """A member that says it unpacks to 5 GB."""
     content = bytearray(WHOLE)
@@ -111,32 +101,19 @@ PLACE = made().grid.place
 V = len(PLACE)
 DAMAGED = {
     "empty": b"",
-    "text": b"no archive at all",
-    "a single array": single_array(),
     "cut off": WHOLE[: len(WHOLE) // 2],
-    "without its last byte": WHOLE[:-1],
     "another schema": archive(schema=np.array("tbcad-field/9")),
     "no schema": archive(schema=None),
-    "no density": archive(density=None),
     "NaN": archive(density=np.full(V, np.nan, np.float32)),
-    "infinite": archive(colour=np.full((V, 3), np.inf, np.float32)),
     "beyond all densities": archive(density=np.full(V, -1e30, np.float32)),
     "doubles": archive(colour=np.zeros((V, 3))),
     "one density too few": archive(density=np.zeros(V - 1, np.float32)),
     "nodes out of order": archive(node=PLACE[::-1]),
-    "a node twice": archive(node=np.repeat(PLACE[:1], V, axis=0)),
     "a node outside": archive(node=PLACE + np.uint16(4)),
-    "signed nodes": archive(node=PLACE.astype(np.int64)),
     "nodes without a number": archive(node=np.array(3, np.uint16)),
-    "nodes of two coordinates": archive(node=PLACE[:, :2]),
-    "one node along an edge": archive(nodes=np.array(1)),
     "too many nodes": archive(nodes=np.array(10**6)),
-    "two numbers of nodes": archive(nodes=np.array([5, 5])),
-    "endless nodes": archive(nodes=np.array(np.inf)),
     "a fraction of a node": archive(nodes=np.array(5.9)),
-    "no width": archive(capture_mm=np.array(0.0)),
     "negative width": archive(capture_mm=np.array(-1.0)),
-    "endless width": archive(capture_mm=np.array(np.inf)),
     "facts that are no JSON": archive(facts=np.array("{")),
     "facts that are a list": archive(facts=np.array(json.dumps([1]))),
     "slopes of too few": archive(slope=np.zeros((V, 3), np.float32)),
@@ -179,34 +156,26 @@ def test_a_changed_byte_is_refused_or_does_not_matter(tmp_path: Path, at: int, b
     assert field_bytes(found) == WHOLE
 
 
-def brighter(source: LightField) -> LightField:
-    """With one pixel of one camera a little brighter."""
-    frame = source.frames["b"]
-    colour = frame.image().copy()
-    colour[70, 90, 1] += 1
-    planes = {**frame.planes, "colour": colour}
-    return replace(source, frames={**source.frames, "b": replace(frame, planes=planes)})
+def changed(source: LightField, camera: str, plane: str) -> LightField:
+    """With one value of one pixel a little larger."""
+    frame = source.frames[camera]
+    values = frame.planes[plane].copy()
+    values[128, 90, 1] += 1
+    other = replace(frame, planes={**frame.planes, plane: values})
+    return replace(source, frames={**source.frames, camera: other})
 
 
-def turned(source: LightField) -> LightField:
-    """With other rays of the same colours."""
-    frame = source.frames["a"]
-    planes = {**frame.planes, "direction": -frame.planes["direction"]}
-    return replace(source, frames={**source.frames, "a": replace(frame, planes=planes)})
-
-
-def shrunk(source: LightField) -> LightField:
-    return replace(source, capture_mm=59.0)
-
-
-def half(source: LightField) -> LightField:
-    return replace(source, frames={"a": source.frames["a"]})
-
-
-@pytest.mark.parametrize("change", [brighter, turned, shrunk, half])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda source: changed(source, "b", "colour"),
+        lambda source: changed(source, "a", "direction"),
+        lambda source: replace(source, capture_mm=59.0),
+        lambda source: replace(source, frames={"a": source.frames["a"]}),
+    ],
+)
 def test_each_light_field_has_its_own_fingerprint(
-    light_field: LightField,  # noqa: F811
-    change: Callable[[LightField], LightField],
+    light_field: LightField, change: Callable[[LightField], LightField]
 ) -> None:
     assert light_field_fingerprint(change(light_field)) != light_field_fingerprint(light_field)
 
@@ -217,21 +186,18 @@ def test_a_file_has_the_fingerprint_of_what_is_in_it(captured: Path) -> None:
         assert light_field_fingerprint(stored) == light_field_fingerprint(inside)
 
 
-def test_a_field_is_read_with_its_light_field_only(
-    light_field: LightField,  # noqa: F811
-    tmp_path: Path,
-) -> None:
+def test_a_field_is_read_with_its_light_field_only(light_field: LightField, tmp_path: Path) -> None:
     file = write_ball(light_field, tmp_path)
     assert np.array_equal(field_of(file, light_field).values, ball().values)
     with pytest.raises(InputError, match=r"is of another capture, or of an older one: write it"):
-        field_of(file, brighter(light_field))
+        field_of(file, changed(light_field, "b", "colour"))
     write_field(file, ball())
     with pytest.raises(InputError, match="does not say of which light field"):
         field_of(file, light_field)
 
 
 @pytest.mark.filterwarnings("error")
-def test_what_is_used_by_default(light_field: LightField, tmp_path: Path) -> None:  # noqa: F811
+def test_what_is_used_by_default(light_field: LightField, tmp_path: Path) -> None:
     assert wanted_field(None, tmp_path, light_field) is None
     write_ball(light_field, tmp_path)
     for place in (tmp_path, tmp_path / "lightfield.h5"):
@@ -243,17 +209,9 @@ def test_what_is_used_by_default(light_field: LightField, tmp_path: Path) -> Non
     assert wanted_field(None, tmp_path, light_field, frame=1) is not None
 
 
-@pytest.mark.parametrize("damaged", [False, True])
-def test_what_is_of_no_use_is_told_or_refused(
-    light_field: LightField,  # noqa: F811
-    tmp_path: Path,
-    damaged: bool,
-) -> None:
+def test_what_is_of_no_use_is_told_or_refused(light_field: LightField, tmp_path: Path) -> None:
     file = field_file(tmp_path)
-    if damaged:
-        file.write_bytes(b"PK")
-    else:
-        write_ball(brighter(light_field), tmp_path)
+    file.write_bytes(b"PK")
     with pytest.warns(PlausibilityWarning, match="it is not used here"):
         assert wanted_field(None, tmp_path, light_field) is None
     with pytest.raises(InputError, match=str(file)):

@@ -1,20 +1,18 @@
 """Fits to rays of balls in closed form; threads and pauses change no bit of them."""
 
 from collections.abc import Callable, Iterable
-from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tbcad.errors import InputError
 from tbcad.light.reconstruction import fit as fitting
 from tbcad.light.reconstruction import start as starting
 from tbcad.light.reconstruction.field import Field, field_bytes
-from tbcad.light.reconstruction.fit import fit, medium_of, squared_error
+from tbcad.light.reconstruction.fit import fit, medium_of
 from tbcad.light.reconstruction.marching import composited
 from tbcad.light.reconstruction.rays import CapturedRays
-from tbcad.light.reconstruction.start import Level, Settings, State
+from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate import parallel
 from tests.ray_fields import RADIUS, Ball, rays_of
 
@@ -61,20 +59,6 @@ def test_two_balls_are_found_with_nothing_between() -> None:
     assert composited(*between, medium_of(made, 0.2))[0, 3] < 0.02
 
 
-def test_rays_that_are_left_out_are_predicted() -> None:
-    rays = rays_of([BALL], 30_000)
-    used = np.arange(30_000) % 10 > 0
-    *_, last = fit(rays, SMALL, used)
-    error = squared_error(rays, ~used, last.field(), SMALL)
-    assert error < 0.005
-    assert np.isnan(squared_error(rays, np.zeros(30_000, bool), last.field(), SMALL))
-
-
-def test_photographs_of_nothing_are_refused() -> None:
-    with pytest.raises(InputError, match="nothing"):
-        fitted(rays_of([], 3_000), TINY)
-
-
 def backward(work: Callable[..., object], items: Iterable[object]) -> list[object]:
     """As `in_threads`, in one thread that does the last item first."""
     return [work(item) for item in reversed(list(items))][::-1]
@@ -97,12 +81,3 @@ def test_another_seed_is_another_field() -> None:
     rays = rays_of([BALL], 3_000)
     seeds = [replace(TINY, seed=seed) for seed in (0, 1)]
     assert len({field_bytes(fitted(rays, settings)) for settings in seeds}) == 2
-
-
-@pytest.mark.parametrize("epochs", [1, 3])
-def test_a_fit_goes_on_where_it_was_stopped(epochs: int) -> None:
-    rays = rays_of(TWO, 6_000)
-    kept: list[State] = [deepcopy(state) for state in fit(rays, TINY)]
-    *_, last = fit(rays, TINY, state=deepcopy(kept[epochs - 1]))
-    assert field_bytes(last.field()) == field_bytes(kept[-1].field())
-    assert last.loss == kept[-1].loss

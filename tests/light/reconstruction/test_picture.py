@@ -75,21 +75,15 @@ def test_normals_are_radial_and_toward_the_view(away: np.ndarray) -> None:
     assert (shown[0, 0] == 0).all()
 
 
-def test_of_nothing_there_is_a_black_picture_without_depth() -> None:
-    picture = field_picture(nothing(), VIEW)
-    assert not picture.image.any()
-    assert np.isnan(picture.depth(VIEW)).all()
-    assert np.isnan(field_normals(nothing(), VIEW, picture)).all()
-
-
-def test_cameras_that_look_away_or_past_it_see_nothing() -> None:
+def test_nothing_is_black_without_depth_also_where_cameras_look_away_or_past_it() -> None:
     backward = replace(VIEW, forward=-VIEW.forward)
     aside = replace(VIEW, pinhole=VIEW.pinhole + 3 * WIDTH_MM * VIEW.right)
-    for view in (backward, aside):
-        picture = field_picture(ball(), view)
+    for view, made in ((backward, ball()), (aside, ball()), (VIEW, nothing())):
+        picture = field_picture(made, view)
         assert not picture.image.any()
         assert not picture.opacity.any()
         assert np.isnan(picture.distance).all()
+        assert np.isnan(field_normals(made, view, picture)).all()
 
 
 def test_a_ball_beside_the_middle_is_where_the_camera_projects_it() -> None:

@@ -28,19 +28,14 @@ def closed(mesh: trimesh.Trimesh) -> bool:
     return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def test_a_ball_has_the_surface_of_a_ball() -> None:
-    mesh = field_mesh(ball(), 1.0)
-    away = np.linalg.norm(mesh.vertices, axis=1) - RADIUS
+@pytest.mark.parametrize("level", [1.0, 2.0])
+def test_a_ball_has_the_surface_of_a_ball_and_a_denser_level_lies_deeper(level: float) -> None:
+    mesh = field_mesh(ball(), level)
+    deeper = (level - 0.01 / (4 * level) - BELOW) / STEEP
+    away = np.linalg.norm(mesh.vertices, axis=1) - (RADIUS - deeper)
     assert np.abs(away).max() < PITCH / 10
     assert closed(mesh)
     assert mesh.body_count == 1
-
-
-def test_a_denser_level_lies_deeper() -> None:
-    mesh = field_mesh(ball(), 2.0)
-    deeper = (2.0 - 0.01 / 8 - BELOW) / STEEP
-    away = np.linalg.norm(mesh.vertices, axis=1) - (RADIUS - deeper)
-    assert np.abs(away).max() < PITCH / 10
 
 
 def test_random_numbers_have_closed_surfaces() -> None:
@@ -137,21 +132,14 @@ def test_a_mirrors_pixel_is_its_share_of_the_capture_sphere() -> None:
     assert resolved_mm(rays) == pytest.approx(WIDTH_MM / 40, rel=0.03)
 
 
-def test_a_field_of_nothing_is_refused() -> None:
+def test_fields_of_nothing_no_rays_and_levels_that_cannot_be_are_refused() -> None:
     rays = parallel_rays(lambda away: away < 0)
     with pytest.raises(InputError, match="no surface at level 1 1/mm: nothing in it is denser"):
         field_mesh(nothing(), 1.0)
     with pytest.raises(InputError, match="no surface"):
         best_level(nothing(), rays, rays.mirror >= 0)
-
-
-@pytest.mark.parametrize("level", [0.0, -1.0, 8.0, float("nan")])
-def test_a_level_that_cannot_be_is_refused(level: float) -> None:
-    with pytest.raises(InputError, match=r"allowed is 0\.01 to 6"):
-        field_mesh(ball(), level)
-
-
-def test_without_held_rays_there_is_no_level() -> None:
-    rays = parallel_rays(lambda away: away < 5)
     with pytest.raises(InputError, match="no ray is held out"):
         best_level(ball(), rays, rays.mirror < 0)
+    for level in (0.0, 8.0, float("nan")):
+        with pytest.raises(InputError, match=r"allowed is 0\.01 to 6"):
+            field_mesh(ball(), level)

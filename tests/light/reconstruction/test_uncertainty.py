@@ -19,16 +19,13 @@ PIXEL_MM = 0.5
 @pytest.mark.parametrize("count", [3, 12, 40])
 def test_mean_and_variance(count: int, blur_px: float, area: bool) -> None:
     places = pixel_places(count, blur_px, area=area).astype(np.float64)
+    assert np.mean(pixel_places(count).astype(np.float64) ** 2) == pytest.approx(1 / 12)
     assert places.shape[1:] == (count, 2)
     assert np.abs(places.mean(axis=1)).max() < 1e-6
     both = (places**2).sum(axis=2).mean(axis=1)
     assert both == pytest.approx(np.full(len(both), 2 * (area / 12 + blur_px**2)), rel=1e-5)
     of_both_ways = (places**2).mean(axis=(0, 1))
     assert of_both_ways[0] == pytest.approx(of_both_ways[1], rel=1e-5)
-
-
-def test_a_pixel_without_blur_is_its_square() -> None:
-    assert np.mean(pixel_places(12).astype(np.float64) ** 2) == pytest.approx(1 / 12)
 
 
 @pytest.fixture
@@ -56,14 +53,13 @@ def weights(source: LightField, *sigmas: float | None) -> list[float]:
     return [float(rays.weight[rays.mirror == k].mean()) for k in range(3)]
 
 
-def test_a_pixel_at_the_object(parallel: LightField) -> None:
+def test_the_formula(parallel: LightField) -> None:
     rays = captured_rays(parallel, footprint=True)
     assert pixel_areas(rays) == pytest.approx(np.full(len(rays), PIXEL_MM**2), rel=1e-3)
-
-
-def test_the_formula(parallel: LightField) -> None:
     found = weights(parallel, 0.0, PIXEL_MM / 12, PIXEL_MM / 2)
     assert found == pytest.approx([1, 1 / (1 + 6 / 144), 0.4], rel=1e-3)
+    found = weights(parallel, 0.1, None, 0.3)  # what is unknown counts as the worst
+    assert found[1] == pytest.approx(found[2], rel=1e-4)
 
 
 def test_a_pixel_without_neighbours_counts_as_the_others(parallel: LightField) -> None:
@@ -71,11 +67,6 @@ def test_a_pixel_without_neighbours_counts_as_the_others(parallel: LightField) -
     parallel.frames["a"].planes["mirror"][0, 5:8] = 0
     found = weights(parallel, PIXEL_MM / 2, PIXEL_MM / 2, PIXEL_MM / 2)
     assert found == pytest.approx([0.4, 0.4, 0.4], rel=1e-3)
-
-
-def test_an_unknown_mirror_counts_as_the_worst(parallel: LightField) -> None:
-    found = weights(parallel, 0.1, None, 0.3)
-    assert found[1] == pytest.approx(found[2], rel=1e-4)
 
 
 def test_nothing_known_changes_nothing(parallel: LightField) -> None:

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from tbcad.app.cli import run
-from tests.captures import field, scene  # noqa: F401
-from tests.light.simulate.conftest import cameras, knot, light_field  # noqa: F401
 
 LAMPS = "x_mm,y_mm,z_mm\n200,0,120\n-150,120,90\n20,-40,240\n"
 

@@ -37,17 +37,17 @@ def mirrors(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_lamps_are_where_the_virtual_cameras_are(mirrors: Path) -> None:
     with LightField.open(mirrors) as source:
         every = lamps_of_mirrors(source, 1)
-        by_name = {
-            f"{name}{k + 1:04d}": (u, apex)
+        place_of = {
+            f"{name}{k + 1:04d}": place
             for name, frame in source.frames.items()
-            for k, (u, apex) in enumerate(zip(frame.u, frame.mirrors.apex, strict=True))
+            for k, place in enumerate(zip(frame.u, frame.mirrors.apex, strict=True))
         }
     with open_reflectance(mirrors) as reflectance:
         half = reflectance.lamps
     assert len(half.name) == -(-len(every.name) // 2)
-    assert len({tuple(np.round(by_name[one][0], 6)) for one in every.name}) == len(every.name)
+    assert len({tuple(np.round(place_of[one][0], 6)) for one in every.name}) == len(every.name)
     for name, place in zip(half.name, half.place, strict=True):
-        u, apex = by_name[name]
+        u, apex = place_of[name]
         assert np.linalg.norm(place) > np.linalg.norm(apex)  # behind the mirror
         assert np.linalg.norm(np.cross(u, place)) < 0.15 * np.linalg.norm(place)
 
@@ -71,7 +71,7 @@ def test_views_are_like_ray_traced_ones(mirrors: Path, hdr: Path, scene: Scene) 
     assert itself.psnr_db > image_quality(truths[0], before).psnr_db + 3
 
 
-def test_the_command(
+def test_the_command_and_python(
     mirrors: Path, hdr: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "v.png"
@@ -84,11 +84,7 @@ def test_the_command(
     turned = np.asarray(Image.open(out))
     assert run([*words, "--force"]) == 0
     assert np.abs(np.asarray(Image.open(out)).astype(int) - turned).mean() > 1
-
-
-def test_from_python(mirrors: Path, hdr: Path) -> None:
-    field = tbcad.relight(mirrors, hdr)
-    view = tbcad.view(field, 20, 30, size=(64, 48), method="nearest")
+    view = tbcad.view(tbcad.relight(mirrors, hdr), 20, 30, size=(64, 48), method="nearest")
     assert view.image.max() > 100
 
 
@@ -113,8 +109,7 @@ def test_damaged_files_are_refused(captured: Path, tmp_path: Path, name: str) ->
 def test_a_field_of_another_capture_is_refused(
     captured: Path, hdr: Path, light_field: LightField
 ) -> None:
-    small = light_field.frames["a"]
-    one = LightField({"c": small}, light_field.capture_mm, {})
+    one = LightField({"c": light_field.frames["a"]}, light_field.capture_mm, {})
     with (
         open_reflectance(captured) as reflectance,
         pytest.raises(InputError, match="not of this light field"),

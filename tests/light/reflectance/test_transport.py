@@ -1,5 +1,6 @@
 """Light adds up: of lamps and of projectors, against captures, closed forms and bundles of rays."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,7 @@ def test_the_sum_of_the_lamps_is_one_capture_with_all(
         lights = PointLights(reflectance.lamps.place, colour)
         for camera in cameras:
             name = camera.camera_id
-            bands = photograph(camera.camera, exact_tracer(camera), lit(scene, lights))
+            bands = photograph(camera.camera, exact_tracer(camera), replace(scene, lamps=lights))
             whole = np.concatenate([band.colour for band in bands]).reshape(-1, 3)
             summed = np.zeros_like(whole, dtype=np.float32)
             summed[reflectance.pixel[name]] = 255 * reflectance.lit(name, colour)
@@ -70,10 +71,6 @@ def test_the_sum_of_the_lamps_is_one_capture_with_all(
             assert whole[rays].max() > 100
             # Rounded to whole numbers; float32 rays at an edge or a shadow's edge fall beside it.
             assert np.mean(apart > 0.6) < 2e-3
-
-
-def lit(scene: Scene, lights: PointLights) -> Scene:
-    return Scene(scene.subject, scene.embree, scene.shade, scene.radius, lamps=lights)
 
 
 def test_rays_that_meet_nothing_are_left_out(
@@ -91,11 +88,8 @@ def test_rays_that_meet_nothing_are_left_out(
                 frame.planes[key].reshape(-1, 3)[pixel].astype(float)
                 for key in ("origin", "direction")
             )
-            assert off_ray(seen.spots.place, origin, direction).max() < 1e-3
-
-
-def off_ray(point: Floats, origin: Floats, direction: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(np.cross(point - origin, direction), axis=1))
+            off = np.cross(seen.spots.place - origin, direction)
+            assert np.linalg.norm(off, axis=1).max() < 1e-3
 
 
 def traced(direction: Floats, to: Floats, along: Floats) -> Floats:
@@ -155,11 +149,8 @@ def test_a_flat_mirror_gives_the_light_of_a_lamp_at_the_pinholes_image() -> None
     assert expected.min() > 0
     assert found == pytest.approx(expected, rel=1e-4)
     assert flat_mirror(2).light(scene.embree, spots).tolist() == [0, 0, 0]
-
-
-def test_shadows_are_cast() -> None:
-    under = Spots(np.array([[0.0, 0, -5]]), np.array([[0.0, 0, 1]]), np.array([[0.0, 0, 1]]))
-    assert flat_mirror(1).light(plate_scene(-3.0, 8.0).embree, under) == pytest.approx([0])
+    under = spots_at((0, 0, -5))
+    assert flat_mirror(1).light(scene.embree, under) == pytest.approx([0])  # in shadow
     assert flat_mirror(1).light(plate_scene(-9.0, 8.0).embree, under)[0] > 0
 
 

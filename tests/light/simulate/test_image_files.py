@@ -13,7 +13,6 @@ from tbcad.light.simulate.image_files import (
     ANIMATED_SUFFIXES,
     check_image_path,
     difference,
-    side_by_side,
     write_animation,
     write_images,
 )
@@ -43,13 +42,6 @@ def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
     with Image.open(file) as film:
         levels = [np.asarray(f.convert("RGB"))[0, 0, 0] for f in ImageSequence.Iterator(film)]
     assert levels == [0, 80, 160, 240, 160, 80]
-
-
-def test_images_side_by_side() -> None:
-    sheet = side_by_side({"red": RED, "blue": BLUE})
-    assert (sheet[-1, 0] == [255, 0, 0]).all()
-    assert (sheet[-1, -1] == [0, 0, 255]).all()
-    assert sheet.shape[1] > 64
 
 
 def test_difference_has_no_sign() -> None:
@@ -89,6 +81,8 @@ def test_psnr_in_closed_form() -> None:
     grey = np.full((24, 32, 3), 100, dtype=np.uint8)
     assert image_quality(grey, grey + np.uint8(10)).psnr_db == pytest.approx(28.1308, abs=1e-4)
     assert image_quality(grey, grey + np.uint8(10)).ssim < 1
+    small = np.zeros((4, 4, 3), np.uint8)  # than the window: compared whole
+    assert 0 < image_quality(small, small + np.uint8(9)).ssim < 1
 
 
 @pytest.mark.parametrize("shape", [(11, 14, 3), (60, 90, 3)])
@@ -108,11 +102,6 @@ def test_ssim_is_that_of_scikit_image(shape: tuple[int, int, int]) -> None:
     quality, ours = image_quality_map(one, other)
     assert quality.ssim == pytest.approx(ssim, abs=1e-12)
     assert ours == pytest.approx(about.mean(axis=2), abs=1e-12)
-
-
-def test_pictures_smaller_than_the_window_are_compared_whole() -> None:
-    small = np.zeros((4, 4, 3), np.uint8)
-    assert 0 < image_quality(small, small + np.uint8(9)).ssim < 1
 
 
 @pytest.mark.parametrize("sigma", [0.7, 6.0])

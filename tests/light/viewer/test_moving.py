@@ -6,26 +6,17 @@ import pytest
 from tbcad.core.optics.camera import Camera
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
-from tbcad.light.simulate.views.refocus import pinhole_picture
-from tbcad.light.simulate.views.synthesis import horizon_search_radius, search_radius, synthesise
-from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.light.viewer.moving import moving_view
 from tbcad.types import Floats
-from tests.light.simulate.conftest import cameras, knot, light_field  # noqa: F401
 
 CAPTURE_MM = 60.0
 FAR = (1e3,)
-PLACES_DEG = ((0.0, 5.0), (200.0, 45.0), (45.0, 88.0))
 
 
-def seen_at(azimuth: float, elevation: float, distance: float, size: tuple[int, int]) -> Camera:
-    return camera_around_object(
-        np.radians(azimuth), np.radians(elevation), distance, CAPTURE_MM, size
-    )
+def seen_from(distance: float) -> Camera:
+    return camera_around_object(*np.radians([70, 35]), distance, CAPTURE_MM, (150, 100))
 
 
 def numbered(count: int, seed: int) -> PinholePictures:
@@ -43,7 +34,7 @@ def numbered(count: int, seed: int) -> PinholePictures:
 
 
 @pytest.fixture(scope="module")
-def pictures(light_field: LightField) -> PinholePictures:  # noqa: F811
+def pictures(light_field: LightField) -> PinholePictures:
     return pinhole_pictures(light_field)
 
 
@@ -61,7 +52,7 @@ def distance(two_plane: TwoPlane, target: Floats, centre: Floats) -> float:
 
 @pytest.mark.parametrize("reach", [150.0, 640.0])
 def test_a_pixel_is_of_the_nearest_virtual_camera(reach: float) -> None:
-    pictures, view = numbered(120, 5), seen_at(70, 35, reach, (150, 100))
+    pictures, view = numbered(120, 5), seen_from(reach)
     image = moving_view(pictures, view, FAR)
     two_plane = two_plane_along(view.forward, view.right, CAPTURE_MM)
     direction = view_directions(view)
@@ -76,7 +67,7 @@ def test_a_pixel_is_of_the_nearest_virtual_camera(reach: float) -> None:
 
 
 def test_nothing_near_is_black_and_the_second_limit_fills_it() -> None:
-    pictures, view = numbered(40, 2), seen_at(70, 35, 640, (150, 100))
+    pictures, view = numbered(40, 2), seen_from(640.0)
     near, wide = (moving_view(pictures, view, limits) for limits in ((1.0,), (1.0, 1e3)))
     assert (near == 0).mean() > 0.5
     kept = near > 0
@@ -85,7 +76,7 @@ def test_nothing_near_is_black_and_the_second_limit_fills_it() -> None:
 
 
 def test_masked_pictures_are_not_taken() -> None:
-    pictures, view = numbered(40, 3), seen_at(70, 35, 640, (150, 100))
+    pictures, view = numbered(40, 3), seen_from(640.0)
     used = np.unique(moving_view(pictures, view, FAR))
     pictures.mask[used[-1] - 1] = False
     assert used[-1] not in moving_view(pictures, view, FAR)
@@ -101,17 +92,3 @@ def test_places_in_pictures_are_the_cameras_own(pictures: PinholePictures) -> No
     assert known.sum() > 100
     difference = image[known].astype(int) - pictures.picture[number][known]
     assert np.abs(difference).max() <= 1
-
-
-@pytest.mark.parametrize("place", PLACES_DEG)
-def test_about_as_good_as_nearest_rays(
-    light_field: LightField,  # noqa: F811
-    pictures: PinholePictures,
-    knot: Scene,  # noqa: F811
-    place: tuple[float, float],
-) -> None:
-    tiles, view = MirrorTiles(light_field), seen_at(*place, 640, (160, 120))
-    limits = search_radius(tiles), horizon_search_radius(tiles)
-    truth = np.rint(pinhole_picture(knot, view)).astype(np.uint8)
-    moving = image_quality(truth, moving_view(pictures, view, limits))
-    assert moving.ssim > image_quality(truth, synthesise(tiles, view).image).ssim - 0.01

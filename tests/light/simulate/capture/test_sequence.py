@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tbcad.app.cli import run
 from tbcad.errors import InputError
@@ -36,15 +37,10 @@ def test_a_frame_is_a_capture_of_the_turned_object(
     captured: Path, cameras: tuple[Reflector, Reflector], number: int
 ) -> None:
     """In light that stands still: its normals turn, the lamps do not."""
-    angle = np.radians(TURN_DEG) * number / FRAMES
-    about_z = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
+    turn = Rotation.from_rotvec([0, 0, np.radians(TURN_DEG) * number / FRAMES])
     subject = read_object(captured)
-    turned = replace(
-        subject, points=subject.points @ about_z.T, normals=subject.normals @ about_z.T
-    )
-    scene = prepared_scene(turned)
+    points, normals = turn.apply(subject.points), turn.apply(subject.normals)
+    scene = prepared_scene(replace(subject, points=points, normals=normals))
     with LightField.open(captured) as source:
         found = sequence_frame(source, captured, number)
         for camera in cameras:

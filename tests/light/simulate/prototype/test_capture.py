@@ -21,9 +21,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
     trace_balls,
     trace_own_ball,
 )
-from tbcad.light.simulate.prototype.merge import (
-    merge_run,
-)
+from tbcad.light.simulate.prototype.merge import merge_run
 from tbcad.light.simulate.prototype.run import (
     HALF_TURN,
     Plan,
@@ -38,9 +36,10 @@ from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector, read_export
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tests.exported_files import Rows, edit_csv, edit_json
-from tests.light.simulate.conftest import CAPTURE_MM
+from tests.light.conftest import CAPTURE_MM
 from tests.photographed_runs import stop_photograph
 from tests.prototype_exports import plan_of
+from tests.prototype_records import FRAME
 
 PLAN, RECORD, BALLS = "rotation_plan.csv", "prototype.json", "balls.csv"
 Runs = tuple[PrototypeRun, PrototypeRun]
@@ -100,16 +99,6 @@ class TestGeometry:
             alone = trace_own_ball(run, turned, run.stop, run.ball + 1)
             for mine, found in zip(vars(alone).values(), vars(seen).values(), strict=True):
                 assert mine == pytest.approx(found)
-
-    def test_direction_errors_of_balls_are_those_of_the_plan(
-        self, runs: Runs, layout: PrototypeLayout
-    ) -> None:
-        a, b = (
-            2 * np.arcsin(norm(unit(run.ball_surfaces.apex) - run.reflector.u) / 2) for run in runs
-        )
-        assert a == pytest.approx(layout.stops.error, abs=1e-9)
-        assert b[layout.twin] == pytest.approx(layout.stops.error, abs=1e-9)
-        assert a.max() > np.radians(1)
 
     def test_rays_at_the_windows_edge_pass_by_half_the_recorded_coverage(
         self, runs: Runs, layout: PrototypeLayout
@@ -300,7 +289,6 @@ class TestReading:
         ("name", "change", "message"),
         [
             (PLAN, lambda t: t.pop(5), "does not show mirror a"),
-            (PLAN, lambda t: t.pop(-1), "does not show mirror b"),
             (PLAN, lambda t: t.append(t[7]), "a second time"),
             (PLAN, lambda t: t[3].update(mirror="b0001"), "row 4 shows b0001"),
             (PLAN, lambda t: t[3].update(mirror="a9999"), "allowed .* is a0001 to a0103"),
@@ -309,22 +297,17 @@ class TestReading:
             (PLAN, lambda t: t[3].update(base_angle_deg="nan"), "4 base_angle_deg: "),
             (PLAN, lambda t: t[0].update(base_angle_deg="3"), "stop 1 has two base angles"),
             (PLAN, lambda t: raised(t, "stop", 1), "not numbered from 1"),
-            (PLAN, lambda t: exchanged(t, "1", "2"), "do not rise from stop to stop"),
-            (PLAN, lambda t: t[3].update(ball=other(t[3]["ball"])), "but its ball is"),
+            (PLAN, lambda t: raised(t, "base_angle_deg", 1.0, -1), "do not rise from stop to stop"),
             (PLAN, lambda t: raised(t, "base_angle_deg", 0.5), "but its ball is"),
-            (PLAN, lambda t: t.clear(), "not numbered from 1|does not show"),
             (RECORD, lambda t: t.update(schema="tbcad-prototype/1"), "reads 'tbcad-prototype/2'"),
             (RECORD, lambda t: t.update(picture="bent"), "picture: "),
-            (RECORD, lambda t: t.update(balls=[]), "balls: input should be 'balls.csv'"),
             (RECORD, lambda t: t["frame"].update(zero=[1, 0, 0]), "not square"),
             (RECORD, lambda t: t["frame"].update(third=[0, 1, 0]), "right-handed"),
-            (RECORD, lambda t: t["frame"].update(turned_frame(t)), "does not point"),
+            (RECORD, lambda t: t.update(frame=FRAME), "does not point"),
             (BALLS, lambda t: t.clear(), "balls.csv: no balls"),
-            (BALLS, lambda t: t.pop(), "names ball 5, allowed is 1 to 4"),
             (BALLS, lambda t: t.reverse(), "ball 1 is out of order"),
             (BALLS, lambda t: t[2].update(nx="2.0"), "ball 3 has a normal"),
             (BALLS, lambda t: t[1].update(cx="1.0"), "ball 2 has a centre"),
-            (BALLS, lambda t: t[1].update(bz="nan"), "row 2 bz: "),
         ],
     )
     def test_refused(
@@ -349,21 +332,7 @@ class TestReading:
             read_plan(exported.model_copy(update={"reflectors": (a, askew)}))
 
 
-def raised(table: Rows, name: str, by: float) -> None:
+def raised(table: Rows, name: str, by: float, times: int = 1) -> None:
     for row in table:
-        value = float(row[name]) + by
+        value = times * float(row[name]) + by
         row[name] = str(int(value)) if name == "stop" else repr(value)
-
-
-def exchanged(table: Rows, one: str, two: str) -> None:
-    for row in table:
-        row["stop"] = {one: two, two: one}.get(row["stop"], row["stop"])
-
-
-def other(ball: str) -> str:
-    return "2" if ball != "2" else "3"
-
-
-def turned_frame(record: dict) -> dict:
-    frame = record["frame"]
-    return {"axis": frame["zero"], "zero": frame["third"], "third": frame["axis"]}

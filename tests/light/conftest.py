@@ -1,10 +1,11 @@
-"""A small camera with all kinds of mirrors, an object, and the light field of it."""
+"""A small camera with all kinds of mirrors, an object, and the light field of it; any capture's."""
 
 from pathlib import Path
 
 import pytest
 
 from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.light.simulate.capture.files import read_object
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.scene.object import built_in_object
@@ -12,6 +13,8 @@ from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export, reflectors
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.viewer.render import Renderer
+from tests.ball_captures import ball, four  # noqa: F401 - fixtures
 
 CAPTURE_MM = 60.0
 
@@ -40,3 +43,20 @@ def light_field(cameras: tuple[Reflector, Reflector], knot: Scene) -> LightField
 @pytest.fixture(scope="session")
 def tiles(light_field: LightField) -> MirrorTiles:
     return MirrorTiles(light_field)
+
+
+@pytest.fixture(scope="session")
+def renderer(light_field: LightField) -> Renderer:
+    return Renderer(light_field)
+
+
+@pytest.fixture(scope="session")
+def scene(captured: Path) -> Scene:
+    """What was captured, whatever its lamps are."""
+    return prepared_scene(read_object(captured))
+
+
+@pytest.fixture(scope="session")
+def field(captured: Path) -> LightField:
+    """The light of it."""
+    return LightField.read(captured)
