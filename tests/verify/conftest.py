@@ -6,10 +6,19 @@ import shutil
 from pathlib import Path
 
 import pytest
+from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.shell.optics import OpticalSetup
 
 from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import Cells, Design, export
+
+SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
+
+
+@pytest.fixture(scope="session")
+def sample() -> Export:
+    """The committed one, as tbcad wrote it."""
+    return read_export(SAMPLE)
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tbcad_verify.as_built.verify import verify_as_built
+from tbcad_verify.as_built.verify import AsBuiltReport, verify_as_built
 from tbcad_verify.cli import main
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays
@@ -24,9 +24,11 @@ from tbcad_verify.prototype.light.ray_paths import ray_transfer
 from tbcad_verify.prototype.seats import touching_sphere
 from tbcad_verify.record.export import read_export
 
+from tests.exported_files import contents
 from tests.verify.prototype.synthetic_prototype import SyntheticPrototype, export
 
 Machine = dict[str, Any]
+Judged = Callable[[], AsBuiltReport]
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +89,12 @@ def calibration(machine: Machine, tmp_path: Path) -> Callable[[], Path]:
     return written
 
 
+@pytest.fixture
+def judged(prototype: Path, calibration: Callable[[], Path]) -> Judged:
+    """Verifies the machine as it then is."""
+    return lambda: verify_as_built(prototype, calibration())
+
+
 def designed_coverage(context: PrototypeContext) -> np.ndarray:
     """Coverage of each ball as the verification of the files has it, on the record's balls."""
     balls, none = context.prototype.balls, Obstacles(None, np.full(1, -1), ())
@@ -107,9 +115,9 @@ def designed_coverage(context: PrototypeContext) -> np.ndarray:
 
 
 def test_the_designed_machine_covers_what_its_files_do(
-    prototype: Path, context: PrototypeContext, calibration: Callable[[], Path]
+    context: PrototypeContext, judged: Judged
 ) -> None:
-    report = verify_as_built(prototype, calibration())
+    report = judged()
     assert report.passed
     found = [row.coverage_mm for row in report.balls]
     assert found == pytest.approx(designed_coverage(context).tolist(), rel=1e-3)
@@ -124,16 +132,13 @@ def test_the_designed_machine_covers_what_its_files_do(
 
 
 def test_shims_bring_a_ball_back(
-    prototype: Path,
-    context: PrototypeContext,
-    machine: Machine,
-    calibration: Callable[[], Path],
+    context: PrototypeContext, machine: Machine, judged: Judged
 ) -> None:
     """Pads raised by the shims, a ball put on them: it is where the others say it should be."""
     moved = np.array([0.3, -0.2, 0.4])
     ball = machine["spheres"][1]
     ball["centre_mm"] = (np.array(ball["centre_mm"]) + moved).tolist()
-    report = verify_as_built(prototype, calibration())
+    report = judged()
     seats, balls = context.prototype.seats, context.prototype.balls
     for row in report.balls:
         k = row.number - 1
@@ -149,15 +154,12 @@ def test_shims_bring_a_ball_back(
 
 
 def test_coverage_changes_where_a_ball_is_off_and_shims_bring_it_back(
-    prototype: Path, machine: Machine, calibration: Callable[[], Path]
+    machine: Machine, judged: Judged
 ) -> None:
-    good = verify_as_built(prototype, calibration())
-    ball = machine["spheres"][2]
-    ball["centre_mm"] = (1.05 * np.array(ball["centre_mm"])).tolist()
-    report = verify_as_built(prototype, calibration())
-    now, then = report.balls[2].coverage_mm, report.balls[2].shimmed_mm
-    assert now is not None
-    assert then is not None
+    good = judged()
+    machine["spheres"][2]["centre_mm"] = [1.05 * x for x in machine["spheres"][2]["centre_mm"]]
+    report = judged()
+    now, then = report.balls[2].coverage_mm or 0, report.balls[2].shimmed_mm or 0
     # Of four balls one that is off draws the base's fit with it, so not all is restored.
     expected = good.balls[2].coverage_mm
     assert abs(now - expected) > 1
@@ -165,45 +167,39 @@ def test_coverage_changes_where_a_ball_is_off_and_shims_bring_it_back(
 
 
 def test_another_zero_is_no_fault_of_the_seats(
-    prototype: Path, context: PrototypeContext, machine: Machine, calibration: Callable[[], Path]
+    context: PrototypeContext, machine: Machine, judged: Judged
 ) -> None:
     turn = Rotation.from_rotvec(np.radians(0.3) * context.frame[0])
     for ball in machine["spheres"]:
         ball["centre_mm"] = turn.apply(ball["centre_mm"]).tolist()
     machine["angle_deg"] = [angle - 0.3 for angle in machine["angle_deg"]]
-    report = verify_as_built(prototype, calibration())
+    report = judged()
     assert report.turn_deg == pytest.approx(0.3)
     assert report.passed
     assert max(abs(um) for row in report.balls for um in row.shim_um) < 1e-3
 
 
-def test_a_smaller_ball_is_told_by_its_radius_and_no_shim(
-    prototype: Path, machine: Machine, calibration: Callable[[], Path]
-) -> None:
+def test_a_smaller_ball_is_told_by_its_radius_and_no_shim(machine: Machine, judged: Judged) -> None:
     machine["spheres"][0]["radius_mm"] -= 1.0
-    report = verify_as_built(prototype, calibration())
+    report = judged()
     assert report.balls[0].radius_um == pytest.approx(-1000)
     assert report.balls[0].off_um == pytest.approx(0, abs=1e-3)
 
 
-def test_stops_that_are_not_calibrated_fail(
-    prototype: Path, machine: Machine, calibration: Callable[[], Path]
-) -> None:
+def test_stops_that_are_not_calibrated_fail(machine: Machine, judged: Judged) -> None:
     machine["frames"].pop(0)
     machine["angle_deg"].pop(0)
-    report = verify_as_built(prototype, calibration())
+    report = judged()
     failed = {check.name: check for check in report.checks if not check.passed}
     assert set(failed) == {"as built: stops"}
     unknown = np.isnan(list(report.coverage_mm.values())).sum()
     assert failed["as built: stops"].measured == unknown > 0
 
 
-def test_a_camera_that_looks_aside_fails(
-    prototype: Path, machine: Machine, calibration: Callable[[], Path]
-) -> None:
+def test_a_camera_that_looks_aside_fails(machine: Machine, judged: Judged) -> None:
     axes = np.array(machine["camera"]["axes"])
     machine["camera"]["axes"] = Rotation.from_rotvec(0.8 * axes[1]).apply(axes).tolist()
-    report = verify_as_built(prototype, calibration())
+    report = judged()
     assert [check.name for check in report.checks if not check.passed] == [
         "as built: windows in the picture"
     ]
@@ -223,15 +219,11 @@ def test_a_camera_that_looks_aside_fails(
     ],
 )
 def test_refused(
-    prototype: Path,
-    machine: Machine,
-    calibration: Callable[[], Path],
-    change: Callable[[Machine], object],
-    message: str,
+    machine: Machine, judged: Judged, change: Callable[[Machine], object], message: str
 ) -> None:
     change(machine)
     with pytest.raises(BadExport, match=message) as caught:
-        verify_as_built(prototype, calibration())
+        judged()
     assert "\n" not in str(caught.value)
 
 
@@ -243,7 +235,7 @@ def test_command(
     tmp_path: Path,
 ) -> None:
     copy = Path(shutil.copytree(prototype, tmp_path / "copy"))
-    before = {path.name: path.read_bytes() for path in copy.iterdir()}
+    before = contents(copy)
     assert main([str(copy), "--as-built", str(calibration())]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert max(map(len, shown)) <= 80
@@ -256,4 +248,4 @@ def test_command(
     assert None in document["mirrors"].values()
     assert main([str(copy), "--as-built", str(copy)]) == 2
     assert "machine.json" in capsys.readouterr().err
-    assert {path.name: path.read_bytes() for path in copy.iterdir()} == before
+    assert contents(copy) == before

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.verify.corpus.copies import change, load, put, store
+from tests.verify.corpus.copies import change, load, store
 from tests.verify.corpus.facets import (
     HALVES,
     Ball,
@@ -25,16 +25,14 @@ from tests.verify.corpus.facets import (
     write_3mf,
     write_stl,
 )
-from tests.verify.corpus.mesh_casings import aside, closed, dented_back, hanging, widened
-from tests.verify.corpus.mesh_casings import grown as grown_back
 from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
-from tests.verify.synthetic_export import normals
 
 # Takes a half's corners and its balls, those well inside first.
 Change = Callable[[Corners, list[Ball]], Corners]
 STL = "shell_a.stl"
 MICROMETRES_20 = 0.02
 INCH = np.float32(25.4)
+ASCII = b"solid shell_a\nfacet normal 0 0 1\n outer loop\n" + 3 * b"  vertex 1 2 3\n"
 
 
 def mesh(how: Change, named: int = 0, halves: Sequence[str] = "a") -> Job:
@@ -122,11 +120,6 @@ def warped(points: Corners, ball: Ball) -> Corners:
     return points + (height[:, None] * ball.normal).astype(np.float32)
 
 
-def sunk(points: Corners, ball: Ball) -> Corners:
-    """The mirror in a pit of a millimetre."""
-    return points - ball.normal.astype(np.float32)
-
-
 def flattened(points: Corners, ball: Ball) -> Corners:
     """The mirror becomes a plane through its apex."""
     height = (points - ball.apex) @ ball.normal
@@ -181,12 +174,12 @@ def tetrahedron(place: np.ndarray, size: float) -> Corners:
     return points[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]].astype(np.float32)
 
 
-def loose(way: float, size: float, turn: int = 1) -> Job:
+def loose(way: float, size: float) -> Job:
     """A tetrahedron in front of a mirror, or behind it where `way` is negative, mm."""
 
     def job(corners: Corners, every: list[Ball]) -> Corners:
         place = every[0].apex + way * every[0].normal
-        return np.concatenate([corners, tetrahedron(place, size)[:, ::turn]])
+        return np.concatenate([corners, tetrahedron(place, size)])
 
     return mesh(job)
 
@@ -205,20 +198,6 @@ def exchanged(folder: Path) -> None:
     one, two = (read(folder, half) for half in HALVES)
     write(folder, "a", two)
     write(folder, "b", one)
-
-
-def ascii_stl(folder: Path) -> None:
-    """Some of the mesh as text, which is all that is read of it."""
-    corners = read(folder, "a")[:2000]
-    lines = ["solid shell_a"]
-    for normal, facet in zip(normals(corners), corners, strict=True):
-        lines += [f"facet normal {_three(normal)}", " outer loop"]
-        lines += [*(f"  vertex {_three(corner)}" for corner in facet), " endloop", "endfacet"]
-    put(folder, STL, "\n".join([*lines, "endsolid", ""]).encode())
-
-
-def _three(values: np.ndarray) -> str:
-    return " ".join(f"{value:e}" for value in values)
 
 
 def post(folder: Path) -> Sequence[str]:
@@ -248,37 +227,22 @@ def both(how: Callable[[Corners], Corners]) -> Job:
 
 
 FOUND = ("mirrors found", "surface error")
-SIZE = "x the record's size"
 MESHES: tuple[Mutation, ...] = (
     *failing(
         "mesh",
         ("a mirror moved 20 um sideways", other_ball(moved), "centre error", "0.0200 mm"),
         (
-            "a mirror moved 20 um back",
-            other_ball(lambda b: replace(b, centre=b.centre - MICROMETRES_20 * b.normal)),
-            *("centre error", "0.0200 mm"),
-        ),
-        (
             "a mirror's radius 20 um too large",
             other_ball(lambda b: replace(b, radius=b.radius + MICROMETRES_20)),
             *("radius error", "0.0200 mm"),
         ),
-        (
-            "a mirror bent by 20 um",
-            other_ball(lambda b: b.bent(b.radius + MICROMETRES_20)),
-            *("radius error", "0.0200 mm"),
-        ),
         ("two mirrors' radii swapped", swapped, "radius error"),
         ("a mirror missing", mesh(lost, 1), FOUND),
-        ("a mirror in a pit", mesh(pushed(sunk), 1), "centre error", "1.0000 mm"),
         ("a mirror flattened", mesh(pushed(flattened), 1), FOUND),
         ("a mirror hollow", mesh(pushed(hollow), 1), FOUND),
         ("a mirror dented by 10 um", mesh(dented, 1), "surface error"),
         ("a mirror warped by 3 um", mesh(pushed(warped), 1), "form error", "RMS"),
         ("a mirror of too few facets", mesh(lambda c, e: fan(c, e[0]), 1), "coverage, facets"),
-        ("a tip below the foot", mesh(hanging), "mesh seam and foot", "beyond the foot"),
-        ("a wall of 1 mm in the mesh", mesh(grown_back(-2)), "mesh wall", "spec has 3"),
-        ("a wall of 9 mm in the mesh", mesh(grown_back(6)), "mesh wall", "spec has 3"),
         ("a crack, one last place wide", mesh(first_facet(cracked)), "watertight", "open"),
         ("a facet missing", mesh(one_missing), "watertight", "3 open"),
         (
@@ -295,8 +259,7 @@ MESHES: tuple[Mutation, ...] = (
             lambda folder: write_stl(folder, STL, read(folder, "a"), turn=-1),
             *("facets", "stored normal"),
         ),
-        ("in inches", both(lambda c: c / INCH), "mirrors found", SIZE),
-        ("scaled by 25.4", both(lambda c: c * INCH), "mirrors found", SIZE),
+        ("in inches", both(lambda c: c / INCH), "mirrors found", "x the record's size"),
         ("shrunk by 0.05 %", mesh(lambda c, _: c * np.float32(1.0005)), "centre error"),
         (
             "shifted by 20 um",
@@ -308,36 +271,19 @@ MESHES: tuple[Mutation, ...] = (
         ("the halves exchanged", exchanged, "mirrors found", "missing"),
         ("a loose piece in the light", loose(15, 3), "light paths"),
         ("a loose piece in the wall", loose(-1.5, 0.2), "components", "one piece"),
-        ("a bubble in the wall", loose(-1.5, 0.2, -1), "components", "one piece"),
         ("a post in the light", post, "light paths"),
         (
             "20 um off in the STL only",
             only_stl(lambda c, e: reshaped(c, e, moved(e[0]))),
             *("3MF", "elsewhere in the STL"),
         ),
-        (
-            "20 um off in the 3MF only",
-            only_3mf(lambda c, e: reshaped(c, e, moved(e[0]))),
-            *("3MF", "elsewhere in the STL"),
-        ),
         ("a facet more in the 3MF", only_3mf(doubled), "3MF", "facets, the STL has"),
-    ),
-    # The STEP is right, and so little material is moved that its volume agrees.
-    *failing(
-        "mesh",
-        ("a bolt hole 50 um too wide", mesh(widened), "mesh holes", "of 4.35 mm"),
-        ("a bolt hole 50 um aside", mesh(aside), "mesh holes", "0.05 mm from its"),
-        ("a bolt hole missing", mesh(closed), "mesh holes", "4 holes of 4.3 mm"),
-        ("a dent in the back", mesh(dented_back), "mesh wall", "the spec has 3"),
-        alone=True,
     ),
     *refusing(
         "mesh",
         ("NaN in a facet", number(np.nan), STL, "not finite"),
-        ("infinity in a facet", number(np.inf), STL, "not finite"),
-        ("an ASCII STL", ascii_stl, STL, "ASCII"),
+        ("an ASCII STL", stl_bytes(lambda _: ASCII), STL, "ASCII"),
         ("an STL cut short", stl_bytes(lambda b: b[:-70]), STL, "truncated"),
-        ("an STL with a tail", stl_bytes(lambda b: b + b"x"), STL, "truncated"),
         ("an STL of 4 G facets", stl_bytes(lies(2**32 - 1)), "4294967295 facets"),
         ("an STL of no facets", stl_bytes(lambda b: b[:80] + bytes(4)), "0 facets"),
         ("an empty STL", stl_bytes(lambda _: b""), STL, "0 bytes"),

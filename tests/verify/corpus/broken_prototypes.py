@@ -2,48 +2,234 @@
 
 from __future__ import annotations
 
-from tests.verify.corpus.mutation import Job, Mutation, fails, refused
-from tests.verify.corpus.prototype_changes import (
-    BALLS,
-    DESIGN,
-    GLB,
-    HOLES,
-    KLIPPER,
-    KLIPPER_CONFIG,
-    LAMP,
-    PLATE,
-    PROGRAM,
-    RECORD,
-    SETTINGS,
-    STEP,
-    UPRIGHT,
-    WHEEL,
-    at,
-    compact,
-    drawn_away,
-    empty_step,
-    fewer_circles,
-    flat_fold,
-    glb,
-    longer_outline,
-    mounted_in,
-    moved_part,
-    moved_point,
-    plus,
-    program,
-    redrawn,
-    row,
-    shifted,
-    shifted_circle,
-    spigot,
-    step_text,
-    table,
-    text_of,
-    undrawn,
-    wider_circle,
-)
+import io
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
-BOTH, PATTERN, DWELL = "STEP, GLB", "shroud_front.dxf", "G4 P0.500\n"
+import ezdxf
+import trimesh
+
+from tests.exported_files import Rows, edit_csv
+from tests.verify.corpus.copies import change, load, put, store
+from tests.verify.corpus.mutation import Job, Mutation, fails, refused
+
+RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
+STEP, GLB = "prototype.step", "prototype.glb"
+BALLS, HOLES = "balls.csv", "plate_holes.csv"
+SETTINGS = "grbl_settings.txt"
+PLATE, WHEEL, LAMP = (f"drawing_{name}.dxf" for name in ("plate", "wheel", "lamp"))
+KLIPPER = "rotation_plan_klipper.gcode"
+
+
+DROP = object()
+
+
+def at(path: str, to: object = DROP, file: str = RECORD) -> Job:
+    """Another value at a path of keys, or what a function makes of it; or none.
+
+    Items of a list are named by number, or by what the first one's name or part begins with.
+    """
+
+    def job(folder: Path) -> Sequence[str]:
+        value = inside = load(folder, file)
+        *keys, last = path.split("/")
+        for key in keys:
+            inside = inside[_place(inside, key)]
+        place = _place(inside, last)
+        if to is DROP:
+            del inside[place]
+        else:
+            inside[place] = to(inside[place]) if callable(to) else to
+        store(folder, file, value)
+        return ()
+
+    return job
+
+
+def _place(value: Any, key: str) -> str | int:
+    if isinstance(value, dict):
+        return key
+    if re.fullmatch(r"-?\d+", key):
+        return int(key)
+    names = [(one.get("name", ""), one.get("part", "")) for one in value]
+    return next(k for k, some in enumerate(names) if any(name.startswith(key) for name in some))
+
+
+def plus(by: float) -> Callable[[float], float]:
+    return lambda value: value + by
+
+
+def table(name: str, how: Callable[[Rows], object]) -> Job:
+    """Change the rows of a table."""
+
+    def job(folder: Path) -> Sequence[str]:
+        put(folder, name, (folder / name).read_bytes())  # a file of its own
+        edit_csv(folder / name, how)
+        return ()
+
+    return job
+
+
+def row(name: str, number: int, **cells: object) -> Job:
+    """Other cells in one row of a table."""
+    return table(name, lambda rows: rows[number].update({k: str(v) for k, v in cells.items()}))
+
+
+def redrawn(name: str, how: Callable[[Any], object]) -> Job:
+    """Change the entities of a DXF."""
+
+    def job(folder: Path) -> Sequence[str]:
+        document = ezdxf.filemanagement.readfile(folder / name)
+        how(document.modelspace())
+        text = io.StringIO()
+        document.write(text)
+        put(folder, name, text.getvalue().encode())
+        return ()
+
+    return job
+
+
+def circles(space: Any) -> list[Any]:
+    """Circles to be cut, the smallest first."""
+    found = [one for one in space.query("CIRCLE") if one.dxf.layer == "cut"]
+    return sorted(found, key=lambda one: one.dxf.radius)
+
+
+def shifted_circle(space: Any) -> None:
+    x, y, _ = circles(space)[0].dxf.center
+    circles(space)[0].dxf.center = (x + 0.01, y)
+
+
+def fewer_circles(space: Any) -> None:
+    space.delete_entity(circles(space)[0])
+
+
+def longer_outline(space: Any) -> None:
+    for line in space.query("LWPOLYLINE"):
+        if line.dxf.layer == "cut":
+            line.set_points([(1.001 * x, y, *rest) for x, y, *rest in line.get_points()])
+
+
+def rewritten(name: str, how: Callable[[str], str]) -> Job:
+    """Change a text."""
+
+    def job(data: bytes) -> bytes:
+        text = how(data.decode())
+        assert text.encode() != data
+        return text.encode()
+
+    return lambda folder: change(folder, name, job) or ()
+
+
+def text_of(name: str, pattern: str, new: str, count: int = 0) -> Job:
+    """Change a text, with a regular expression."""
+    return rewritten(name, lambda text: re.sub(pattern, new, text, count=count))
+
+
+def step_text(how: Callable[[str], str]) -> Job:
+    """Change the text of the STEP assembly."""
+    return rewritten(STEP, how)
+
+
+def together(*jobs: Job) -> Job:
+    """Several changes, in order."""
+    return lambda folder: [word for job in jobs for word in job(folder)]
+
+
+def undrawn(name: str) -> Job:
+    """A body that the assembly has not, neither as STEP nor as GLB."""
+
+    def other(scene: trimesh.Scene) -> None:
+        scene.delete_geometry(scene.graph[name][1])
+
+    return together(step_text(lambda text: text.replace(f"'{name}'", "'thing'")), glb(other))
+
+
+def glb(how: Callable[[trimesh.Scene], object]) -> Job:
+    """Change the scene of the GLB."""
+
+    def job(folder: Path) -> Sequence[str]:
+        scene = trimesh.load_scene(io.BytesIO((folder / GLB).read_bytes()), file_type="glb")
+        how(scene)
+        put(folder, GLB, bytes(trimesh.exchange.gltf.export_glb(scene)))
+        return ()
+
+    return job
+
+
+def mounted_in(body: str, key: str) -> Job:
+    """The first fastener that presses on a body is mounted in another step."""
+
+    def job(folder: Path) -> Sequence[str]:
+        value = load(folder, RECORD)
+        name = next(one["name"] for one in value["fasteners"] if one["through"][0] == body)
+        for step in value["assembly_steps"]:
+            step["mounts"] = [one for one in step["mounts"] if one != name]
+            if step["key"] == key:
+                step["mounts"].append(name)
+        store(folder, RECORD, value)
+        return ()
+
+    return job
+
+
+def spigot(cap: str, by: float) -> Job:
+    """Make the widest cylinder of a cap's own STEP file thinner, mm."""
+    pattern = re.compile(r"(CYLINDRICAL_SURFACE\('[^']*',#\d+,)([-+\d.E]+)")
+
+    def how(text: str) -> str:
+        widest = max(float(found[2]) for found in pattern.finditer(text))
+        return pattern.sub(
+            lambda m: f"{m[1]}{widest - by}" if float(m[2]) == widest else m[0], text
+        )
+
+    return rewritten(f"{cap}.step", how)
+
+
+def flat_fold(space: Any) -> None:
+    space.delete_entity(next(one for one in space.query("LINE") if one.dxf.layer == "fold"))
+
+
+def drawn_away(name: str, x: float, y: float = 0.0, z: float = 0.0) -> Job:
+    """Draw a body of the GLB elsewhere, mm."""
+
+    def how(scene: trimesh.Scene) -> None:
+        scene.geometry[scene.graph[name][1]].apply_translation([x, y, z])
+
+    return glb(how)
+
+
+def moved_point(text: str) -> str:
+    """The plate's box a millimetre longer: one coordinate of its corners."""
+    start = text.index("PRODUCT('plate'")
+    head, tail = text[:start], text[start:]
+    values = re.findall(r"CARTESIAN_POINT\('',\(([-\d.E+]+),", tail)
+    return head + tail.replace(f"({values[3]},", f"({float(values[3]) + 1.0!r},")
+
+
+def moved_part(text: str) -> str:
+    """The assembly moves a part by 5 mm."""
+    start = text.index("ITEM_DEFINED_TRANSFORMATION")
+    place = re.search(r"#(\d+),#(\d+)\)", text[start:])
+    assert place
+    point = re.search(rf"#{place[2]} = AXIS2_PLACEMENT_3D\('',#(\d+)", text)
+    assert point
+    old = f"#{point[1]} = CARTESIAN_POINT('',(0.,0.,0.))"
+    assert old in text
+    return text.replace(old, f"#{point[1]} = CARTESIAN_POINT('',(5.,0.,0.))")
+
+
+def shifted(key: str, by: float) -> Callable[[Rows], None]:
+    def how(rows: Rows) -> None:
+        for one in rows:
+            one[key] = repr(float(one[key]) + by)
+
+    return how
+
+
+BOTH, PATTERN = "STEP, GLB", "shroud_front.dxf"
 SPEC, SCREW, LAMP_X = "spec/prototype/", "fasteners/M5x16", "lamps/places/0/position_mm/0"
 HEAVY = row(BALLS, -1, mass_g=20_000.0)
 
@@ -60,9 +246,7 @@ def shorter_screws(some: list[dict[str, str]]) -> list[dict[str, str]]:
 Broken = dict[tuple[str, str], dict[str, tuple[Job, str]]]
 FAILING: Broken = {
     ("plan program", PROGRAM): {
-        "program: a foreign word": (program(DWELL, f"$SLP\n{DWELL}", 1), "line"),
-        "program: G92 X50": (program("G92 X.*", "G92 X50.0000"), "swing"),
-        "program: no LED": (program("M64 P2\n", ""), "outputs none on, not [2]"),
+        "program: G92 X50": (text_of(PROGRAM, "G92 X.*", "G92 X50.0000"), "swing"),
     },
     ("inventory", BOTH): {
         "a part not drawn": (undrawn("stage_post"), "stage_post is missing"),
@@ -70,8 +254,6 @@ FAILING: Broken = {
             glb(lambda scene: scene.add_geometry(next(iter(scene.geometry.values())), "extra")),
             "extra",
         ),
-        "an empty assembly": (step_text(empty_step), "solid in prototype.step"),
-        "no lid": (undrawn("shroud_lid"), "shroud_lid is missing"),
     },
     ("inventory", RECORD): {
         "a motor that turns": (at("bought/motor/turns", True), "motor turns"),
@@ -84,19 +266,12 @@ FAILING: Broken = {
             at(f"{SCREW}/through", ["stage_disc", "plate"]),
             "has no hole in stage_disc",
         ),
-        "a screw of the plate that turns": (at(f"{SCREW}/turns", True), "turns otherwise than"),
-        "a screw not drawn": (undrawn("M5x16_1"), "M5x16_1 in the assembly"),
     },
     ("key access", RECORD): {
         "screws of the wheel once the base is on its shaft": (
             mounted_in("wheel", "shaft"),
             "behind bearing_head at every base angle",
         ),
-        "a screw before what it holds": (
-            mounted_in("stage_foot", "coupon"),
-            "is mounted before stage_foot",
-        ),
-        "a screw in no step": (mounted_in("stage_foot", None), "is in no step"),
     },
     ("leds as designed", RECORD): {
         "an LED elsewhere": (at("leds/0/position_mm/0", plus(2.0)), "no pocket"),
@@ -104,10 +279,6 @@ FAILING: Broken = {
     },
     ("leds seen", RECORD): {"LEDs on one side": (at("leds", one_side), "past an object")},
     ("object room", DESIGN): {
-        "a wider room for the object": (
-            at(f"{SPEC}stage/object_diameter_mm", 44.0, DESIGN),
-            "stage_crown",
-        ),
         "a lower floor of the object's room": (
             at(f"{SPEC}stage/top_mm", -21.0, DESIGN),
             "stage_disc",
@@ -119,34 +290,30 @@ FAILING: Broken = {
     ("assembly step", BOTH): {
         "a plate of another size": (step_text(moved_point), "plate"),
         "the motor drawn aside": (drawn_away("motor", 0.1), "motor"),
-        "a disc drawn aside": (drawn_away("stage_disc", 0.1), "stage_disc"),
-        "a lid 5 mm aside": (drawn_away("shroud_lid", 5.0), "shroud_lid"),
     },
     ("plate holes", HOLES): {
         "a hole less": (table(HOLES, lambda rows: rows.pop()), "the plate has 16"),
-        "holes 10 mm aside": (table(HOLES, shifted("x_mm", 10.0)), "elsewhere"),
         "a hole 10 um aside": (table(HOLES, lambda r: shifted("y_mm", 0.01)(r[:1])), "hole 1"),
     },
     ("drawings", "DXF"): {
         f"drawing: {name} of {file}": (redrawn(file, how), words)
         for name, file, how, words in (
             ("a hole 10 um aside", PLATE, shifted_circle, "plate: no circle of 2.1 mm radius"),
-            ("a wider hole", PLATE, wider_circle, "plate: no circle of 2.1 mm radius"),
             ("a hole less", WHEEL, fewer_circles, "circles for 6 holes"),
-            ("a hole 10 um aside", WHEEL, shifted_circle, "wheel: no circle of 1.7 mm radius"),
             ("a longer outline", PLATE, longer_outline, "plate: its outline"),
-            ("a longer outline", UPRIGHT, longer_outline, "upright_left: its outline"),
             ("a longer strip", LAMP, longer_outline, "lamp_1: its outlines are not"),
         )
     },
     ("drawings", RECORD): {"no drawing of the plate": (at("drawings/0"), "no drawing")},
     ("controller settings", SETTINGS): {
-        f"settings: {name}": (text_of(SETTINGS, old, new), words)
-        for name, old, new, words in (
-            ("steps of another gear", r"\$100=.*", "$100=80", "$100 is 80"),
-            ("too short a travel", r"\$130=.*", "$130=100", "do not hold the program"),
-            ("too long a travel", r"\$130=.*", "$130=360", "above the program"),
-        )
+        "settings: too short a travel": (
+            text_of(SETTINGS, r"\$130=.*", "$130=100"),
+            "do not hold the program",
+        ),
+        "settings: too long a travel": (
+            text_of(SETTINGS, r"\$130=.*", "$130=360"),
+            "above the program",
+        ),
     },
     ("homing", RECORD): {
         "home: another angle of the switch": (
@@ -160,10 +327,6 @@ FAILING: Broken = {
         "klipper: another angle": (
             text_of(KLIPPER, r"(?<=: 2 mirrors\n)(.*MOVE=).*?( SPEED)", r"\g<1>5\2", 1),
             "at 5.0000 deg",
-        ),
-        "klipper: another gear": (
-            text_of(KLIPPER_CONFIG, "gear_ratio: .*", "gear_ratio: 5:1"),
-            "gear_ratio: 5:1",
         ),
     },
     ("camera mount", RECORD): {
@@ -190,15 +353,10 @@ FAILING: Broken = {
             at("camera_place/pictures/0/base_angle_deg", -150.0),
             "the base does not turn so far",
         ),
-        "gauge: printed elsewhere": (
-            at("parts/camera_gauge/origin_mm/0", plus(0.1)),
-            "a mark is no corner",
-        ),
     },
     ("cap tilt", STEP): {"cap: a spigot that is too thin": (spigot("cap_1", 1.0), "tilts")},
     ("ball sizes", BALLS): {
         "a cap of steel": (row(BALLS, 0, mass_g=9.0), "ball 1"),
-        "a heavy ball": (HEAVY, "ball"),
     },
     ("drive", BALLS): {"a heavy ball on the motor": (HEAVY, "the drive holds")},
     ("hold ratio", BALLS): {"a heavy ball on its magnet": (HEAVY, "ball")},
@@ -206,7 +364,6 @@ FAILING: Broken = {
         "a heavy ball on the zero pin": (row(BALLS, -1, mass_g=1e6), "zero pin's pressure"),
     },
     ("lamps", RECORD): {
-        "lamps: on their sides": (at("lamps/level", lambda v: not v), "is drawn elsewhere"),
         "lamps: one aside": (at(LAMP_X, plus(30.0)), "is drawn elsewhere"),
         "lamps: not listed": (at("lamps", None), "the record has none"),
     },
@@ -242,7 +399,6 @@ UNSURE: Broken = {
 }
 GOOD: tuple[Mutation, ...] = (
     Mutation("as it is", "none", lambda _: (), 0),
-    Mutation("prototype.json in one line", RECORD, compact, 0),
     Mutation("a note in the record", RECORD, at("note", "mine"), 0),
 )
 PROTOTYPES: tuple[Mutation, ...] = (

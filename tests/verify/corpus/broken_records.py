@@ -56,6 +56,16 @@ def design(how: Callable[[Record], object]) -> Job:
     return json_file(JSON, how)
 
 
+def top(**keys: object) -> Job:
+    """Other keys of design.json."""
+    return design(lambda value: value.update(keys))
+
+
+def camera(**keys: object) -> Job:
+    """Other keys of the first camera."""
+    return design(lambda value: value["cameras"][0].update(keys))
+
+
 def part(**keys: object) -> Job:
     """Other keys of the first part."""
     return design(lambda value: value["parts"][0].update(keys))
@@ -231,44 +241,20 @@ def not_aimed(folder: Path) -> Sequence[str]:
     return [array.ids[int(gap.argmax())]]
 
 
-FOOT, SEAM = ("shell", "foot_flange"), ("shell", "seam_flange")
-RULES: dict[str, dict[str, Any]] = {
-    "paper": {"radius_rule": "paper"},
-    "flat": {"radius_rule": "flat"},
-    "another margin": {"margin_mm": 1.0},
-    "a larger margin of one mirror": {"own_margins_mm": [2.0] * 48 + [2.01]},
-    "margins of fewer mirrors": {"own_margins_mm": [2.0] * 48},
-    "margins below that of all": {"margin_mm": 2.1, "own_margins_mm": [2.0] * 49},
-    "larger mirrors": {"max_radius_widths": 100.0},
-}
-FIGURES = ("size_mm", "theta0_deg", "theta1_deg", "polar_deg", "azimuth_deg")
+SEAM = ("shell", "seam_flange")
 OPTICS = "spec.optics is missing"
 RECORDS: tuple[Mutation, ...] = (
     *failing(
         TABLE,
         ("two ids exchanged", exchange, "step surfaces"),
-        ("a radius 20 um off", radius(0.02), "radius error"),
         ("a radius 1 nm off", radius(1e-6), "step surfaces"),
-        (
-            "a centre 10 nm off the normal",
-            mirror(lambda one: one.update(cy=one["cy"] + 1e-5)),
-            "poses",
-        ),
+        ("a centre 10 nm off the normal", times("cy", 1 + 1e-7), "poses"),
         ("a cell's area", times("cell_area_mm2", 1.0001), "cell areas"),
-        *((f"a mirror's {key}", times(key, 1 + 1e-6), "figures") for key in FIGURES),
+        ("a mirror's polar_deg", times("polar_deg", 1 + 1e-6), "figures"),
         ("a mirror 1 um further out", mirror(apex), "poses"),
         ("a mirror not in the record", mirrors(leave_out), "mirrors found", "1 not in the record"),
         ("a direction without its mirror", mirrors(leave_out), "directions", "1 vert"),
-        (
-            "a mirror twice in the record",
-            mirrors(lambda rows, name: rows.append(dict(row_of(rows, name), id="a9999"))),
-            *("directions", "a9999"),
-        ),
-        (
-            "an id twice in the record",
-            mirrors(lambda rows, _: rows[3].update(id="a0010")),
-            *("ids", "a0010"),
-        ),
+        ("an id twice", mirrors(lambda rows, _: rows[3].update(id="a0010")), "ids", "a0010"),
         ("an odd id", mirrors(lambda rows, _: rows[3].update(id="m 4")), "ids", "m 4"),
         ("a mirror's coverage", times("coverage_mm", 1.05), "recorded coverage"),
     ),
@@ -281,44 +267,23 @@ RECORDS: tuple[Mutation, ...] = (
         ("another view angle", angle(0.99, False), "requirements", "hfov"),
         ("a view angle half as wide, spec too", angle(0.5, True), "frame margin"),
         ("a sensor of 16 x 16 pixels, spec too", design(pixels), "pixels, minimum"),
-        ("a coat that is not there", design(coat), "radius error", "0.020"),
         ("a coat that is not there, by STEP", design(coat), "step surfaces", "0.02 mm"),
         ("a target not met", above_the_worst, "coverage, spheres"),
-        ("a target not met on facets", above_the_worst, "coverage, facets"),
-        (
-            "a lower target than the spec's",
-            design(lambda value: value.update(target_mm=30.0)),
-            *("requirements", "target_mm"),
-        ),
+        ("a lower target than the spec's", top(target_mm=30.0), "requirements", "target_mm"),
         ("the foot 10 um higher", design(foot), "step cells"),
         ("another n in the spec", design(subdivision), "directions", "without a mirror"),
+        ("the foot 10 um higher, by mesh", design(foot), "mesh seam and foot", "beyond the foot"),
         *(
-            (f"a wall of {mm:g} mm", spec("shell", wall_mm=mm), "step wall", "3.000 mm")
-            for mm in (1.0, 2.9, 9.0)
-        ),
-        ("20 bolts", spec(*SEAM, bolts=20), "step holes", "not 20"),
-        ("no dowels", spec(*FOOT, dowels=0), "step holes", "not 0"),
-        ("bolts of 10 mm", spec(*FOOT, bolt_hole_mm=10.0), "step holes", "10"),
-        ("a flange of 9 mm", spec(*SEAM, thickness_mm=9.0), "step holes", "not 9"),
-        (
-            "a flange wider by 1 mm",
-            spec(*FOOT, width_mm=13.0),
-            *("step holes", "from its place"),
+            (f"a wall of 2.9 mm, by {file}", spec("shell", wall_mm=2.9), f"{file} wall", "3.000 mm")
+            for file in ("step", "mesh")
         ),
         *(
-            (f"radius rule: {what}", spec("mirrors", **keys), "radius rule", "by rule")
-            for what, keys in RULES.items()
+            (f"20 bolts, by {file}", spec(*SEAM, bolts=20), f"{file} holes", "not 20")
+            for file in ("step", "mesh")
         ),
-        (
-            "a mesh error of 5 mm",
-            spec("mesh", structure_error_mm=5.0),
-            *("requirements", "mesh error"),
-        ),
-        (
-            "a part forgotten",
-            design(lambda value: value["parts"].pop()),
-            *("mirrors found", "missing: b0001"),
-        ),
+        ("another radius rule", spec("mirrors", radius_rule="paper"), "radius rule", "by rule"),
+        ("a mesh error", spec("mesh", structure_error_mm=5.0), "requirements", "mesh error"),
+        ("a part forgotten", design(lambda one: one["parts"].pop()), "mirrors found", "b0001"),
         ("no STEP", without("step"), "manifest", "shell_a.step"),
         ("no 3MF", without("3mf"), "manifest", "shell_a.3mf"),
         ("a part for the other camera", part(camera="b"), "mirrors found", "missing"),
@@ -334,61 +299,33 @@ RECORDS: tuple[Mutation, ...] = (
         TABLE,
         ("a second column", as_text(TABLE, second_column), "column radius_mm is there twice"),
         ("NaN", word(b"nan"), TABLE, "line 6: px is nan, allowed"),
-        ("infinity", word(b"1e999"), TABLE, "line 6: px is 1e999"),
-        ("a word", word(b"left"), TABLE, "line 6: px is left"),
         ("a field empty", word(b""), TABLE, "line 6: px is ''"),
         ("a field too many", word(b"1.0,2.0"), TABLE, "line 6 has"),
-        (
-            "cut in a line",
-            as_text(TABLE, lambda b: b[: b.index(b"\n", len(b) // 2) + 30]),
-            *(TABLE, "truncated"),
-        ),
-        ("empty", as_text(TABLE, lambda _: b""), TABLE, "first line"),
+        ("cut in a line", as_text(TABLE, lambda b: b[:-30]), TABLE, "truncated"),
         ("no heading", as_text(TABLE, lambda b: b.partition(b"\n")[2]), TABLE, "first line"),
     ),
     *refusing(
         JSON,
-        (
-            "a mesh error of 50 mm",
-            spec("mesh", structure_error_mm=50.0),
-            "spec.mesh.structure_error_mm is 50.0, allowed is a number from 0.002 to 5",
-        ),
         ("a spec that asks nothing", design(lambda value: value["spec"].pop("optics")), OPTICS),
         ("a second target", second_key(JSON, "target_mm", "1.0"), "key target_mm is"),
         ("cut short", as_text(JSON, lambda b: b[: len(b) // 2]), JSON, "broken JSON"),
-        ("empty", as_text(JSON, lambda _: b""), JSON, "broken JSON"),
         ("not UTF-8", as_text(JSON, lambda b: b"\xff" + b), JSON, "UTF-8"),
-        ("another program's", design(lambda value: value.update(schema="x")), "schema"),
         (
             "the version before",
-            design(lambda value: value.update(schema="tbcad-design/1")),
-            "schema is tbcad-design/1, this version verifies tbcad-design/2",
+            top(schema="tbcad-design/1"),
+            "verifies tbcad-design/2",
         ),
-        ("a table outside", design(lambda value: value.update(mirrors="../m.csv")), "../m.csv"),
-        (
-            "axes that are no axes",
-            design(lambda value: value["cameras"][0].update(forward=[0.0, 0.1, 1.0])),
-            *(JSON, "forward and right"),
-        ),
-        (
-            "a sensor without columns",
-            design(lambda value: value["cameras"][0].update(width_px=0)),
-            "width_px",
-        ),
-        ("a target in words", design(lambda value: value.update(target_mm="60")), "target_mm"),
-        ("no parts", design(lambda value: value.update(parts=[])), "parts"),
+        ("a table outside", top(mirrors="../m.csv"), "../m.csv"),
+        ("axes that are no axes", camera(forward=[0.0, 0.1, 1.0]), JSON, "forward and right"),
+        ("a sensor without columns", camera(width_px=0), "width_px"),
+        ("a target in words", top(target_mm="60"), "target_mm"),
+        ("no parts", top(parts=[]), "parts"),
         ("a part outside", part(stl="../shell_a.stl"), "plain file name"),
-        ("a part at the root", part(step="/etc/hostname"), "plain file name"),
         ("a part that is not there", part(**{"3mf": "x.3mf"}), "x.3mf", "missing"),
     ),
     *refusing(
         MANIFEST,
         ("a second list", second_key(MANIFEST, "files", "{}"), "key files is there twice"),
-        (
-            "another program's",
-            json_file(MANIFEST, lambda value: value.update(schema="x")),
-            "schema is x, this version verifies tbcad-manifest/1",
-        ),
         ("that of a capture", json_file(MANIFEST, lambda v: v.update(kind="capture")), "kind"),
         signed=False,
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tbcad_verify.mesh.fits import PatchVertices, _distances, _Frames, fit_surfaces, patch_vertices
+from tbcad_verify.mesh.fits import fit_surfaces, patch_vertices
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.segments import Segmentation
 from tbcad_verify.mesh.surfaces import (
@@ -24,22 +24,6 @@ def column(*values: float) -> np.ndarray:
 
 def sphere(centre: np.ndarray, radius: float, normal: np.ndarray) -> Surfaces:
     return Surfaces(centre + radius * normal, normal, np.array([1 / radius]))
-
-
-def test_distances_are_exact_for_any_sphere_in_any_frame() -> None:
-    """z = h + a x + b y - k/2 r^2 is a sphere about (a, b, -1) / k, of radius slope / k."""
-    h, a, b, k = solution = np.array([[0.4, -0.3], [0.7, -0.5], [-0.6, 0.8], [1.3, 0.4]])
-    points = RNG.normal(scale=0.3, size=(3, 40))
-    segment = np.repeat([0, 1], 20)
-    vertices = PatchVertices(segment, np.arange(40), np.array([0, 20]))
-    none = np.zeros((3, 2))
-    frames = _Frames(*points, np.zeros((3, 3, 2)), none, none[0])
-    distance, slope = _distances(frames, vertices, solution)
-    centre = np.stack([a, b, -np.ones(2)]) / k
-    radius = np.sqrt((centre**2).sum(axis=0) + 2 * h / k)
-    np.testing.assert_allclose(slope / k[segment], radius[segment])
-    expected = norm(points - centre[:, segment]) - radius[segment]
-    np.testing.assert_allclose(distance, expected, atol=1e-14)
 
 
 def test_vectors_agree_with_numpy() -> None:

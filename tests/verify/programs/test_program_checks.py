@@ -60,11 +60,8 @@ def test_good_programs_pass(export: Path, programs: Path) -> None:
     checks = ask(export)
     assert [(check.name, check.file, check.unit) for check in checks] == NAMES
     assert all(check.passed for check in checks)
-    assert [c.name for c in checks if c.limit is None] == [
-        "gmsh spheres",
-        "prusa filament",
-        "prusa time",
-    ]
+    free = [check.name for check in checks if check.limit is None]
+    assert free == ["gmsh spheres", "prusa filament", "prusa time"]
     assert figure(checks, "gmsh volume") == 0.5
     assert figure(checks, "admesh volume") == 0.25
     assert figure(checks, "prusa slices") == pytest.approx(42 * math.pi * 1.75**2 / 4 - 100)
@@ -124,27 +121,6 @@ def test_freecad(export: Path, programs: Path, changes: dict[str, float], wrong:
     assert figure(checks, "freecad valid") == flaws
 
 
-@pytest.mark.parametrize("key", ["solids", "volume"])
-@pytest.mark.parametrize("value", [None, "1", True, math.nan, 10**400])
-def test_freecad_must_answer_with_numbers(
-    export: Path, programs: Path, key: str, value: object
-) -> None:
-    text = json.dumps(SEEN | {key: value})
-    install(programs, freecadcmd=f"open('answer.json', 'w').write({text!r})")
-    checks = ask(export, replace(PART, files={"step": "part.step"}))
-    assert {c.passed for c in checks if c.name.startswith("freecad")} == {None}
-
-
-def test_our_script_says_why_it_broke(export: Path, programs: Path) -> None:
-    """Plain Python in FreeCAD's place: it runs the script, but has no Part."""
-    install(programs, freecadcmd="import sys; exec(open(sys.argv[1]).read())")
-    checks = ask(export, replace(PART, files={"step": "part.step"}))
-    detail = "gave up with exit status 3: ModuleNotFoundError: No module named 'Part'"
-    assert {(c.passed, c.detail) for c in checks if c.name.startswith("freecad")} == {
-        (None, detail)
-    }
-
-
 PACKAGE = """
 from types import SimpleNamespace as Space
 def initialize(**options): print("chatter")
@@ -184,21 +160,6 @@ def test_gmsh_as_a_package(export: Path, package: Path, solids: int, wrong: list
 
 
 @pytest.mark.parametrize(
-    ("body", "detail"),
-    [
-        ("raise OSError('libGLU.so.1: no such file')", "OSError: libGLU.so.1: no such file"),
-        ("import os; os.abort()", "crashed (SIGABRT)"),
-        ("import os; os._exit(0)", "ended without error, but left no readable answer"),
-    ],
-)
-def test_a_package_that_breaks(export: Path, package: Path, body: str, detail: str) -> None:
-    package.write_text(body, encoding="utf-8")
-    for check in gmsh_alone(export):
-        assert check.passed is None
-        assert check.detail.endswith(detail)
-
-
-@pytest.mark.parametrize(
     ("old", "new", "wrong"),
     [
         ("manifold = yes", "manifold = no\nopen_edges = 3", ["manifold"]),
@@ -235,18 +196,10 @@ def test_a_report_without_a_figure_is_unknown(
     assert {check.passed for check in checks} == {None}
 
 
-@pytest.mark.parametrize("length", ["0.00", "390.00", "440.00"])
-def test_a_print_of_another_volume_fails(export: Path, programs: Path, length: str) -> None:
-    install(programs, prusa_slicer=GOOD["prusa-slicer"].replace("420.00", length))
-    assert failed(ask(export)) == ["prusa slices"]
-
-
 @pytest.mark.parametrize(
     ("old", "new", "wrong"),
     [
         ("facets        :     0  ", "facets        :     3  ", ["repairs"]),
-        ("fixed           :     0", "fixed           :     1", ["repairs"]),
-        ("removed        :     0", "removed        :     1", ["repairs"]),
         ("added          :     0", "added          :     1", ["repairs"]),
         ("Backwards edges       :     0", "Backwards edges       :     1", ["repairs"]),
         ("parts       :     1", "parts       :     2", ["parts"]),
@@ -257,6 +210,11 @@ def test_admesh(export: Path, programs: Path, old: str, new: str, wrong: list[st
     assert old in ADMESH
     install(programs, admesh=f"print({ADMESH.replace(old, new)!r})")
     assert failed(ask(export)) == [f"admesh {name}" for name in wrong]
+
+
+def test_a_print_of_another_volume_fails(export: Path, programs: Path) -> None:
+    install(programs, prusa_slicer=GOOD["prusa-slicer"].replace("420.00", "390.00"))
+    assert failed(ask(export)) == ["prusa slices"]
 
 
 @pytest.mark.parametrize("gap", ["volume", "volume_error"])

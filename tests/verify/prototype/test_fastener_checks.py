@@ -11,17 +11,10 @@ from tbcad_verify.prototype.fastener_checks import faults_of, is_filled, size_of
 from tbcad_verify.record.prototype_sections import PlacedFastener
 from tbcad_verify.step.solids_text import RoundFace, TextSolid
 
+from tests.verify.prototype.screws import screw
+
 UP = np.array([0.0, 0.0, 1.0])
 CORE_M5 = (5.0 - 1.226869 * 0.8) / 2
-SCREW = {
-    "name": "M5x16_1",
-    "part": "M5x16",
-    "position_mm": [10.0, 5.0, 9.0],
-    "along": [0.0, 0.0, -1.0],
-    "through": ["bracket", "plate"],
-    "turns": False,
-    "finish": None,
-}
 
 
 def face(
@@ -45,7 +38,7 @@ def solids(**changed: TextSolid) -> dict[str, TextSolid]:
 
 
 def placed(**changed: Any) -> PlacedFastener:
-    return PlacedFastener.model_validate(SCREW | changed)
+    return screw(**{"position_mm": [10.0, 5.0, 9.0], "through": ["bracket", "plate"]} | changed)
 
 
 def faults(one: PlacedFastener, some: Mapping[str, TextSolid], *others: PlacedFastener) -> str:
@@ -75,21 +68,15 @@ def test_what_is_wrong_is_said(one: PlacedFastener, some: dict[str, TextSolid], 
 
 
 def test_an_insert_is_gripped_by_a_diameter() -> None:
-    insert = placed(
-        name="INSERT_M3_1",
-        part="INSERT-M3",
-        position_mm=[0, 0, 0],
-        along=[0, 0, -1],
-        through=["block"],
-    )
+    insert = screw(name="INSERT_M3_1", part="INSERT-M3", through=["block"])
     some = {"block": solid(face(0, -6, 0, 2.0, y=0)), "lid": solid(face(0, 0, 8, 1.7, y=0))}
     core = (3 - 1.226869 * 0.5) / 2
     for length, fault in ((12, ""), (10, "grips too little in block")):
         name = f"M3x{length}"
         some["M3"] = solid(face(0, 8 - length, 8, core, hollow=False, y=0))
-        screw = placed(name="M3", part=name, position_mm=[0, 0, 8], through=["lid", "block"])
-        assert fault in faults(screw, some, insert)
-        assert bool(faults(screw, some, insert)) == bool(fault)
+        one = placed(name="M3", part=name, position_mm=[0, 0, 8], through=["lid", "block"])
+        assert fault in faults(one, some, insert)
+        assert bool(faults(one, some, insert)) == bool(fault)
 
 
 def test_a_hole_is_filled_from_its_axis_or_a_slot_from_its_middle() -> None:
@@ -101,8 +88,8 @@ def test_a_hole_is_filled_from_its_axis_or_a_slot_from_its_middle() -> None:
 
 def test_sizes_follow_from_names() -> None:
     washer, magnet = size_of("WASHER-5"), size_of("MAGNET-15x3")
-    assert washer is not None
+    assert washer
     assert (washer.radius, washer.low, washer.high, washer.covers) == (5.0, -1.0, 0.0, True)
-    assert magnet is not None
+    assert magnet
     assert (magnet.radius, magnet.high) == (7.5, 3.0)
     assert size_of("NAIL-2x20") is None

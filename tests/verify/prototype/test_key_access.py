@@ -17,21 +17,9 @@ from tbcad_verify.record.prototype_sections import AssemblyStep, PlacedFastener
 from tbcad_verify.report.checks import check_names
 
 from tbcad.prototype.purchased.parts import load_parts
+from tests.verify.prototype.screws import screw
 
-SCREW = {
-    "name": "M5x16_1",
-    "part": "M5x16",
-    "position_mm": [0.0, 0.0, 0.0],
-    "along": [0.0, 0.0, -1.0],
-    "through": ["plate"],
-    "turns": False,
-    "finish": None,
-}
 KEY_RADIUS, KEY_END = 4.53 / 2, 5.0 + 74.0
-
-
-def placed(**changed: Any) -> PlacedFastener:
-    return PlacedFastener.model_validate(SCREW | changed)
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Shape:
@@ -54,7 +42,7 @@ def unreached(
     **changed: Any,
 ) -> str:
     """What is in the way of a screw's key on a plate; the base turns about x from -30 to 60."""
-    one = placed(**changed)
+    one = screw(**changed)
     steps = steps or {"one": ("plate", one.name, *bodies)}
     record = SimpleNamespace(
         assembly_steps=[AssemblyStep(key=key, mounts=list(some)) for key, some in steps.items()],
@@ -67,8 +55,8 @@ def unreached(
         prototype=record,
         base_rotation=lambda angle: Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0]),
     )
-    plate, screw = box((-20, -20, -10), (20, 20, 0)), box((-4, -4, -9), (4, 4, 5))
-    drawn = {"plate": plate, one.name: screw, **bodies}
+    plate, body = box((-20, -20, -10), (20, 20, 0)), box((-4, -4, -9), (4, 4, 5))
+    drawn = {"plate": plate, one.name: body, **bodies}
     names = check_names(key_access.CHECKS, "prototype.json")
     (check,) = key_access.checks(names, cast(PrototypeContext, context), drawn)
     assert check.passed == (check.measured == 0)
@@ -84,7 +72,7 @@ def test_tbcads_screws_have_keys() -> None:
     for name, part in load_parts().items():
         if part.kind not in ("screws", "setscrews"):
             continue
-        key = key_of(placed(part=name))
+        key = key_of(screw(part=name))
         flats = (HEAD_KEYS_MM if part.kind == "screws" else SET_KEYS_MM)[part["thread_mm"]]
         height = part["head_height_mm"] if part.kind == "screws" else 0.0
         assert key is not None
@@ -95,7 +83,7 @@ def test_tbcads_screws_have_keys() -> None:
 
 @pytest.mark.parametrize("along", [(0, 0, -1), (0, 0, 1), (1, 0, 0), (0.6, -0.8, 0)])
 def test_the_key_is_a_cylinder_from_the_head_outward(along: tuple[float, float, float]) -> None:
-    key = key_of(placed(along=list(along), position_mm=[3.0, 4.0, 5.0]))
+    key = key_of(screw(along=list(along), position_mm=[3.0, 4.0, 5.0]))
     assert key is not None
     assert key.solid.volume() == pytest.approx(np.pi * KEY_RADIUS**2 * 74, rel=0.02)
     middle = np.mean(np.split(np.array(key.solid.bounding_box()), 2), axis=0)
@@ -146,7 +134,7 @@ def test_a_base_that_turns_out_of_the_way() -> None:
 def test_the_base_is_not_there_before_its_shaft() -> None:
     wide = {"wall": box((-50, -100, 20), (50, 100, 25)), "shaft": box((90, 0, 0), (91, 1, 1))}
     steps = {"one": ("plate", "wall", "disc", "JOINT_1"), "two": ("M5x16_1",), "three": ("shaft",)}
-    joint = placed(name="JOINT_1", part="DOWEL-3x16", through=["wall", "disc"], turns=True)
+    joint = screw(name="JOINT_1", part="DOWEL-3x16", through=["wall", "disc"], turns=True)
     assert unreached(wide, steps, ("wall",), joint) == ""
     later = {"one": steps["one"], "two": ("shaft", "M5x16_1")}
     behind = "M5x16_1 behind wall at every base angle"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.record.export import Export
 from tbcad_verify.record.poses import (
     POSE_MM,
     contradictions,
@@ -20,13 +19,7 @@ from tbcad_verify.record.poses import (
     virtual_cameras,
 )
 
-SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 ROW = 3
-
-
-@pytest.fixture(scope="module")
-def sample() -> Export:
-    return read_export(SAMPLE)
 
 
 def changed(export: Export, column: str, by: float) -> Export:

@@ -16,29 +16,23 @@ from tbcad_verify import verify
 from tbcad_verify.mesh import rays
 from tbcad_verify.mesh.stl import read_facets
 from tbcad_verify.record.export import read_export
-from tbcad_verify.report.checks import (
-    Check,
-)
+from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import Report, summary_json
 from tbcad_verify.report.text import strictly
 from tbcad_verify.shell import pixels
 from tbcad_verify.shell.integrity import manifest_checks
 
+from tests.exported_files import contents
 from tests.verify.corpus.broken_meshes import MESHES
 from tests.verify.corpus.broken_records import RECORDS
 from tests.verify.corpus.mutation import attempt
 from tests.verify.optical_setups import IN_PROCESS
-from tests.verify.synthetic_export import (
-    Cells,
-    Design,
-    mirrored,
-    rows,
-    sign,
-    solid,
-    stl,
-    table,
-)
+from tests.verify.synthetic_export import Cells, Design, export, sign
 
+MIRROR_KEYS = [
+    *("id", "coverage_facet_mm", "coverage_fitted_mm"),
+    *("centre_error_mm", "radius_error_mm", "pixels"),
+]
 NAMES = ["design.json", "mirrors.csv", "shell_a.stl"]
 
 
@@ -70,14 +64,7 @@ def test_a_good_export_passes(export_folder: Path) -> None:
     assert ids == sorted(ids)
     assert len(ids) == 98
     for mirror in written["mirrors"]:
-        assert list(mirror) == [
-            "id",
-            "coverage_facet_mm",
-            "coverage_fitted_mm",
-            "centre_error_mm",
-            "radius_error_mm",
-            "pixels",
-        ]
+        assert list(mirror) == MIRROR_KEYS
         assert mirror["coverage_fitted_mm"] >= 40
         assert mirror["pixels"] > 0
 
@@ -85,13 +72,10 @@ def test_a_good_export_passes(export_folder: Path) -> None:
 @pytest.mark.slow
 def test_same_export_same_bytes(export_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     verify(export_folder, options=IN_PROCESS)
-    before = (export_folder / "verify.json").read_bytes()
+    before = contents(export_folder)
     monkeypatch.setattr(rays, "THREADS", rays.THREADS + 1)
     verify(export_folder, options=IN_PROCESS)
-    assert (export_folder / "verify.json").read_bytes() == before
-    assert [path.name for path in export_folder.iterdir() if "verify" in path.name] == [
-        "verify.json"
-    ]
+    assert contents(export_folder) == before
 
 
 def test_command_line(export_folder: Path) -> None:
@@ -135,22 +119,11 @@ def test_broken_export_fails_for_its_reason(
 
 def test_a_mirror_missing_from_mesh_and_record(tmp_path: Path) -> None:
     """Consistent, watertight, and every mirror left sees enough: but one is not there."""
-    design = Design()
-    from tests.verify.synthetic_export import document, poses, write
-
-    record = [m for m in poses(design) if m["number"] != 10]
-    facets = solid(Cells(Design(without=(10,)), poses(design)))
-    folder = write(
-        tmp_path / "x",
-        {
-            "design.json": json.dumps(document(design)).encode(),
-            "mirrors.csv": table(rows(design, record)),
-            "camera.json": b"for people",
-            "shell_a.stl": stl(facets),
-            "shell_b.stl": stl(mirrored(facets)),
-        },
-    )
-    assert failed(verify(folder, options=IN_PROCESS)) == {"directions"}
+    folder, _ = export(tmp_path / "x", Design(without=(10,)))
+    lines = (folder / "mirrors.csv").read_text().splitlines(keepends=True)
+    kept = [line for line in lines if line[1:5] != "0010"]
+    (folder / "mirrors.csv").write_text("".join(kept))
+    assert failed(verify(sign(folder), options=IN_PROCESS)) == {"directions"}
 
 
 def manifest_of(folder: Path) -> tuple[Check, ...]:

@@ -6,7 +6,6 @@ import os
 import re
 import signal
 import time
-from concurrent.futures import wait
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import NAME
-from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import CollectedResults, Results, ResultSink
 from tbcad_verify.run.verify import VerifyOptions, verify, watch
 
@@ -78,27 +76,6 @@ def test_no_worker_outlives_an_interrupt() -> None:
         watch(STAGES, results, 30, stages, "hangs")
     assert started
     assert not Path(f"/proc/{started[0]}").exists()
-
-
-def test_a_crash_beside_the_shells_is_known_by_its_stage() -> None:
-    results = CollectedResults()
-    watch(STAGES, results, 30, crash_beside)
-    assert [(check.name, check.passed) for check in results.checks] == [
-        ("a", True),
-        ("two", None),
-        ("three", None),
-    ]
-    assert results.checks[1].detail == "crashed (SIGKILL)"
-
-
-def crash_beside(report: ResultSink) -> None:
-    inbox: list[Results] = []
-    with Processes(1) as beside:
-        ending = beside.submit(stages, "crash", heard=inbox.append)
-        wait([ending])
-        for results in inbox:
-            report(results)
-        ending.result()
 
 
 def test_results_add_up() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from tbcad_verify.mesh.holes import RoundHoles, round_holes
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, mesh_from_facets
 from tbcad_verify.mesh.segments import measure_edges
 from tbcad_verify.mesh.stl import read_facets
-from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.record.export import Export
 from tbcad_verify.shell.mesh_casing import (
     MeshCasing,
     casing_checks,
@@ -21,13 +20,6 @@ from tbcad_verify.shell.mesh_casing import (
 )
 from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
 from tbcad_verify.shell.recover import recover
-
-SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
-
-
-@pytest.fixture(scope="module")
-def sample() -> Export:
-    return read_export(SAMPLE)
 
 
 @pytest.fixture(scope="module")

@@ -124,19 +124,21 @@ def test_a_ball_between_arcs_in_closed_form(kept: str) -> None:
         assert second == pytest.approx(whole, abs=1e-6 * area * 100)
 
 
-def test_widened_edges_say_nothing_about_their_faces() -> None:
+@pytest.fixture
+def face() -> TopoDS_Face:
+    """The round one of an eighth of a ball about the origin."""
     corner = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(50, 50, 50)).Shape()
     eighth = BRepAlgoAPI_Common(ball_at(gp_Pnt(0, 0, 0)), corner).Shape()
-    (face,) = [face for face in faces_of(eighth) if is_sphere(face)]
+    return next(face for face in faces_of(eighth) if is_sphere(face))
+
+
+def test_widened_edges_say_nothing_about_their_faces(face: TopoDS_Face) -> None:
     exact, kernels = 50 * np.pi, moments_of(face).area
     assert measure_face(face, np.zeros(3), 1e-7)[0]["area"] == pytest.approx(exact, rel=1e-14)
     assert measure_face(face, np.zeros(3), 1e-3)[0]["area"] == kernels
 
 
-def test_an_outline_the_other_way_round_holds_the_rest_of_the_ball() -> None:
-    corner = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(50, 50, 50)).Shape()
-    eighth = BRepAlgoAPI_Common(ball_at(gp_Pnt(0, 0, 0)), corner).Shape()
-    (face,) = [face for face in faces_of(eighth) if is_sphere(face)]
+def test_an_outline_the_other_way_round_holds_the_rest_of_the_ball(face: TopoDS_Face) -> None:
     turned = TopoDS.Face_s(face.EmptyCopied())
     for wire in each(face.Oriented(TopAbs_FORWARD), TopAbs_WIRE):
         BRep_Builder().Add(turned, wire.Reversed())

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.record.export import Export
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.step.solids_text import (
@@ -18,17 +16,10 @@ from tbcad_verify.step.solids_text import (
     wall,
 )
 
-SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
-
 
 @pytest.fixture(scope="module")
-def sample() -> Export:
-    return read_export(SAMPLE)
-
-
-@pytest.fixture(scope="module")
-def text() -> str:
-    return (SAMPLE / "shell_a.step").read_text()
+def text(sample: Export) -> str:
+    return (sample.folder / "shell_a.step").read_text()
 
 
 @pytest.fixture(scope="module")

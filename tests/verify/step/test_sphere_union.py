@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 from tbcad_verify.record.export import Camera, Export, read_export
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.step.sphere_union import (
-    ClosedFormCells,
-    bounds,
-    cells_of_export,
-    closed_form_cells,
-)
+from tbcad_verify.step.sphere_union import bounds, cells_of_export, closed_form_cells
 from tbcad_verify.types import Floats
 
 from tbcad.core.mirrors.array import MirrorDesign, design
@@ -23,14 +18,9 @@ from tbcad.core.mirrors.record import COLUMNS, mirror_rows
 from tbcad.core.optics.cells import cell_areas
 from tbcad.core.spec.load import load_spec
 
-SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 NO_WALLS = np.zeros((0, 4))
 PI = np.pi
 UP = np.array([[0, 0, 1.0]])
-
-
-def planes(normal: Floats, point: Floats, walls: Floats = NO_WALLS) -> ClosedFormCells:
-    return closed_form_cells(point, normal, np.zeros(len(point)), walls)
 
 
 def test_a_cap() -> None:
@@ -55,7 +45,8 @@ def test_an_octant() -> None:
 def test_the_inside_of_a_box_of_planes() -> None:
     inward = -np.concatenate([np.eye(3), -np.eye(3)])
     half = np.array([1.0, 2, 3, 1, 2, 3])
-    it = planes(inward, -inward * half[:, None] + np.array([5.0, 0, 0]))
+    point = -inward * half[:, None] + np.array([5.0, 0, 0])
+    it = closed_form_cells(point, inward, np.zeros(6), NO_WALLS)
     np.testing.assert_allclose(it.area, [24, 12, 8] * 2, rtol=1e-14)
     assert it.volume.sum() == pytest.approx(-48)
 
@@ -63,7 +54,7 @@ def test_the_inside_of_a_box_of_planes() -> None:
 def test_nearly_flat_balls_become_planes() -> None:
     """Curvatures from 1e-3 to 1e-12: figures change as little as the shape does."""
     inward = -np.concatenate([np.eye(3), -np.eye(3)])
-    flat = planes(inward, -inward)
+    flat = closed_form_cells(-inward, inward, np.zeros(6), NO_WALLS)
     for k in (1e-3, 1e-6, 1e-9, 1e-12):
         it = closed_form_cells(-inward, inward, np.full(6, k), NO_WALLS)
         np.testing.assert_allclose(it.area, flat.area, rtol=3 * k + 1e-14)
@@ -146,7 +137,7 @@ def made(name: str) -> MirrorDesign:
 
 def as_export(it: MirrorDesign) -> Export:
     """What a reader of this design's files would hand on."""
-    sample = read_export(SAMPLE)
+    sample = read_export(Path(__file__).parents[3] / "docs" / "sample")
     table = [row for array in it.arrays for row in mirror_rows(array)]
     views = {array.camera_id: array.camera.pinhole for array in it.arrays}
     cameras: dict[str, Camera] = {

@@ -112,12 +112,6 @@ def test_box_of_a_turned_ball_with_a_flat(tmp_path: Path, seed: int) -> None:
     assert found.mass.high == pytest.approx(high, abs=1e-6)
 
 
-def test_two_solids_are_counted(tmp_path: Path) -> None:
-    found = both(written(tmp_path, BOX, box((20, 0, 0), (21, 1, 1))))
-    assert found.counts["solids"] == 2
-    assert len(found.solids) == 2
-
-
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     file = written(tmp_path, BOX)
     found, here = examine(tmp_path, file.name, 60), both(file)
@@ -135,7 +129,6 @@ def test_what_takes_too_long_is_unknown(tmp_path: Path) -> None:
     "change",
     [
         lambda text: text.replace("ADVANCED_FACE('',(", "ADVANCED_FACE('',((", 1),
-        lambda text: text.replace("DATA;", "DATA;#1=(((((", 1),
         lambda text: text[: len(text) // 2] + "\nEND-ISO-10303-21;\n",
         lambda text: text.replace("CARTESIAN_POINT", "CARTESIAN_PINT"),
         lambda text: "ISO-10303-21;\nEND-ISO-10303-21;",
@@ -152,9 +145,7 @@ def test_broken_inside_is_unknown(tmp_path: Path, change: object) -> None:
     ("change", "words"),
     [
         (lambda data: b"", "does not begin"),
-        (lambda data: b"solid x", "does not begin"),
         (lambda data: data[: len(data) // 2], "does not end"),
-        (lambda data: b"PK" + data, "does not begin"),
     ],
 )
 def test_foreign_or_truncated_is_refused(tmp_path: Path, change: object, words: str) -> None:
