@@ -68,7 +68,7 @@ class BuildOptions(Call):
             "--process",
             metavar="NAME|FILE",
             help="Choose edges and coverage margins for a manufacturing process, and say what they "
-            "cost: nickel-diamond, cnc, sla ..., or a TOML file; see tbcad tolerance. A design that "
+            "cost: nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance. A design that "
             "names its edges keeps them.",
         ),
     ] = None
@@ -185,7 +185,7 @@ class ToleranceOptions(Call):
         str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help="How it is made: nickel-diamond, cnc, sla ..., or a TOML file. By default sla, and "
+            help="How it is made: nickel-diamond, cnc, sla ... or a TOML file. By default sla, and "
             "the yields of all of them are compared.",
         ),
     ] = None

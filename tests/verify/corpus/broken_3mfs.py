@@ -12,6 +12,11 @@ from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
 
 NAME = "shell_a.3mf"
 PLACE = "built once where it stands"
+# Beams between the mesh's corners, which slicers that know them print.
+BEAMS = (
+    '<b:beamlattice minlength="0.1" radius="1" clippingmode="none"><b:beams>'
+    '<b:beam v1="0" v2="1"/></b:beams></b:beamlattice>'
+)
 BOMB = 100_000_000  # bytes of zeros, which pack to a thousandth
 
 
@@ -42,6 +47,17 @@ def placed(transform: str) -> Job:
     return swapped('<item objectid="1"', f'<item objectid="1" transform="{transform}"')
 
 
+def assembled(transform: str, copies: int = 1) -> Job:
+    """The mesh is right; what is built is another object, which places it."""
+    component = f'<component objectid="1" transform="{transform}"/>' * copies
+    whole = f'<object id="2" type="model"><components>{component}</components></object>'
+    return text(
+        lambda model: model.replace("</resources>", whole + "</resources>").replace(
+            '<item objectid="1"', '<item objectid="2"'
+        )
+    )
+
+
 def first_triangle(how: Callable[[str], str]) -> Job:
     def job(model: str) -> str:
         start = model.index("<triangle ")
@@ -51,17 +67,27 @@ def first_triangle(how: Callable[[str], str]) -> Job:
     return text(job)
 
 
-def further(model: str) -> str:
+def vertex(by: float) -> Callable[[str], str]:
     """The first vertex moved along x."""
-    head, mark, rest = model.partition('x="')
-    value, quote, tail = rest.partition('"')
-    return f"{head}{mark}{float(value) + 1e-4:.6f}{quote}{tail}"
+
+    def how(model: str) -> str:
+        head, mark, rest = model.partition('x="')
+        value, quote, tail = rest.partition('"')
+        return f"{head}{mark}{float(value) + by:.6f}{quote}{tail}"
+
+    return how
 
 
 def nothing(model: str) -> str:
     """A mesh, and an empty list of what to print."""
     start, end = model.index("<item "), model.index("</build>")
     return model[:start] + model[end:]
+
+
+def twice(model: str) -> str:
+    start, end = model.index("<item "), model.index("</build>")
+    other = model[start:end].replace("p:UUID=", "partnumber=")
+    return model[:end] + other + model[end:]
 
 
 def bomb(found: dict[str, bytes]) -> dict[str, bytes]:
@@ -79,10 +105,13 @@ def renamed(data: bytes) -> bytes:
     return data.replace(b"3D/3dmodel.model", b"3D/3dmodel.modem", 1)
 
 
+AS_IS, INCHES = "1 0 0 0 1 0 0 0 1 0 0 0", "25.4 0 0 0 25.4 0 0 0 25.4 0 0 0"
+ASIDE, MIRRORED = "1 0 0 0 1 0 0 0 1 10 0 0", "-1 0 0 0 1 0 0 0 1 0 0 0"
 THREEMFS: tuple[Mutation, ...] = (
     *failing(
         "3MF",
-        ("a vertex moved 0.1 um", text(further), "3MF", "elsewhere in the STL"),
+        ("a vertex moved 0.1 mm", text(vertex(0.1)), "3MF", "elsewhere in the STL"),
+        ("a vertex moved 0.1 um", text(vertex(1e-4)), "3MF"),
         ("a triangle missing", first_triangle(lambda _: ""), "3MF", "the STL"),
     ),
     *refusing(
@@ -90,6 +119,7 @@ THREEMFS: tuple[Mutation, ...] = (
         ("inches", swapped('"millimeter"', '"inch"'), NAME, "millimetres"),
         ("cut short", data(lambda b: b[: len(b) // 2]), NAME, "zip"),
         ("no zip", data(lambda _: b"solid" * 100), NAME, "zip"),
+        ("empty", data(lambda _: b""), NAME, "zip"),
         ("a bomb", members(bomb), NAME, "claim to unpack"),
         ("a bomb that hides it", liar, NAME, "damaged"),
         ("a member's own head broken", data(renamed), NAME, "zip"),
@@ -97,13 +127,30 @@ THREEMFS: tuple[Mutation, ...] = (
         ("text that ends early", members(lambda m: {**m, MODEL: m[MODEL][:-5000]}), NAME),
         ("a vertex that is no number", swapped('x="', 'x="nan'), NAME),
         ("no such vertex", first_triangle(lambda t: t.replace('v1="', 'v1="99')), NAME),
-        ("placed 10 mm off", placed("1 0 0 0 1 0 0 0 1 10 0 0"), NAME, PLACE),
+        ("placed 10 mm off", placed(ASIDE), NAME, PLACE),
+        ("placed in inches", placed(INCHES), NAME, PLACE),
+        ("placed mirrored", placed(MIRRORED), NAME, PLACE),
         ("nothing to print", text(nothing), NAME, PLACE),
-        ("a support", swapped('type="model"', 'type="support"'), NAME, 'type="support"'),
+        ("printed twice", text(twice), NAME, PLACE),
+        ("a component as it is", assembled(AS_IS), NAME, "object"),
+        ("a component in inches", assembled(INCHES), NAME, "object"),
+        ("a component mirrored", assembled(MIRRORED), NAME, "object"),
+        ("a component moved", assembled(ASIDE), NAME, "object"),
+        ("a component twice", assembled(AS_IS, 2), NAME, "object"),
+        *(
+            (f"type {kind}", swapped('type="model"', f'type="{kind}"'), NAME, f'type="{kind}"')
+            for kind in ("support", "surface", "solidsupport", "other")
+        ),
+        ("a beam lattice", swapped("</mesh>", f"{BEAMS}</mesh>"), NAME, "beamlattice"),
         (
             "a second model",
             members(lambda m: {**m, "3D/other.model": m[MODEL]}),
             *(NAME, "3D/other.model"),
+        ),
+        (
+            "a colour on a facet",
+            first_triangle(lambda t: t.replace("/>", 'pid="1"/>')),
+            *(NAME, "with v1, v2, v3 only"),
         ),
         ("a comment", swapped("<vertices>", "<vertices><!-- -->"), NAME, "comments"),
         (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tests.verify.corpus import part21
-from tests.verify.corpus.copies import change
+from tests.verify.corpus.copies import change, put
 from tests.verify.corpus.facets import balls
 from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
 from tests.verify.corpus.part21 import (
@@ -67,6 +67,11 @@ def swap_names(folder: Path) -> Sequence[str]:
     return one, two
 
 
+def no_names(entities: Entities) -> None:
+    for number in all_of(entities, "ADVANCED_FACE"):
+        entities[number] = re.sub(r"'[^']*'", "''", entities[number], count=1)
+
+
 def inches(entities: Entities) -> None:
     """The same numbers, said to be inches."""
     unit = next(n for n, said in entities.items() if said == MILLIMETRE)
@@ -76,6 +81,11 @@ def inches(entities: Entities) -> None:
     entities[unit] = (
         f"( CONVERSION_BASED_UNIT('INCH',#{measure}) LENGTH_UNIT() NAMED_UNIT(#{size}) )"
     )
+
+
+def vague(entities: Entities) -> None:
+    """An uncertainty of a millimetre: readers may join whatever is nearer."""
+    swap(entities, all_of(entities, "UNCERTAINTY_MEASURE_WITH_UNIT")[0], "1.E-06", "1.")
 
 
 def complement(entities: Entities, name: str) -> None:
@@ -102,6 +112,19 @@ def solid_twice(entities: Entities) -> None:
     swap(entities, shape, f"#{solid})", f"#{solid},#{again})")
 
 
+def two_volumes(entities: Entities) -> None:
+    """A wrong claim before the right one."""
+    number = next(n for n, said in entities.items() if "'volume measure'" in said)
+    wrong = add(entities, entities[number])
+    shift(entities, wrong, 1000.0)
+    shape = next(n for n, said in entities.items() if said.startswith("REPRESENTATION('volume'"))
+    swap(entities, shape, f"(#{number})", f"(#{wrong},#{number})")
+
+
+def misnamed(entities: Entities) -> None:
+    swap(entities, all_of(entities, "MANIFOLD_SOLID_BREP")[0], "'shell_a'", "'shell_b'")
+
+
 def claim(words: str, by: float) -> Job:
     def how(entities: Entities) -> None:
         shift(entities, next(n for n, said in entities.items() if f"'{words}'" in said), by)
@@ -119,6 +142,15 @@ def crooked(entities: Entities) -> None:
     point, vector = references(entities[all_of(entities, "LINE")[0]])
     way = [abs(float(x)) for x in NUMBER.findall(entities[down(entities, vector, 0)])]
     shift(entities, point, 1.0, way.index(min(way)))
+
+
+def hole(entities: Entities) -> None:
+    """One hole 0.02 mm too wide, its edges with it."""
+    number = all_of(entities, "CYLINDRICAL_SURFACE")[0]
+    radius = entities[number].rpartition(",")[2]
+    for one in {number, *below(entities, _owner(entities, number), "CIRCLE")}:
+        if entities[one].endswith(f",{radius}"):
+            shift(entities, one, 0.01)
 
 
 def hole_aside(entities: Entities) -> None:
@@ -182,10 +214,26 @@ STEPS: tuple[Mutation, ...] = (
             step(lambda e, m: shift(e, surface(e, m), 1e-6)),
             *("step surfaces", "1e-06 mm"),
         ),
+        (
+            "a centre 1 nm off",
+            step(lambda e, m: shift(e, down(e, surface(e, m), 0, 0), 1e-6)),
+            *("step surfaces", "1e-06 mm"),
+        ),
         ("two names swapped", swap_names, "step surfaces"),
+        ("all names lost", whole(no_names), "step names", "a0001"),
         ("one name lost", step(lambda e, m: swap(e, face(e, m), m, "")), "step names", "(empty)"),
-        ("two of a name", step(lambda e, m: swap(e, face(e, "back"), "back", m)), "step names"),
+        (
+            "a wall with a mirror's name",
+            step(lambda e, m: swap(e, face(e, "back"), "back", m)),
+            "step names",
+        ),
+        (
+            "the other half",
+            lambda folder: put(folder, NAME, (folder / "shell_b.step").read_bytes()),
+            *("step names", "a0001"),
+        ),
         ("inches", whole(inches), "step volume", "mesh"),
+        ("true to a millimetre", whole(vague), CELLS),
         ("a face its complement", step(complement), CELLS),
         (
             "a face inside out",
@@ -205,27 +253,46 @@ STEPS: tuple[Mutation, ...] = (
             step(lambda e, m: [shift(e, edge(e, m, 0, 0), 0.01, k) for k in range(3)]),
             CELLS,
         ),
-        ("an edge's radius 10 um off", step(lambda e, m: shift(e, edge(e, m, 2), 0.01)), CELLS),
+        (
+            "an edge's radius 10 um too large",
+            step(lambda e, m: shift(e, edge(e, m, 2), 0.01)),
+            CELLS,
+        ),
+        (
+            "an edge's centre 10 um off",
+            step(lambda e, m: shift(e, edge(e, m, 2, 0, 0), 0.01)),
+            CELLS,
+        ),
         ("an edge 1 mm beside its corners", whole(crooked), "step gaps"),
+        ("a hole 20 um too wide", whole(hole), CLAIMS, "volume"),
         ("a hole 50 um aside", whole(hole_aside), "step holes", "0.05 mm from its"),
         ("the foot 50 um low", whole(foot_low), "step seam and foot", "beyond the foot"),
         ("the back 5 um off", whole(back), CLAIMS, "volume"),
         ("another volume claimed", claim("volume measure", 10.0), CLAIMS, "volume"),
+        ("another area claimed", claim("surface area measure", 1.0), CLAIMS, "area"),
         ("another centroid claimed", claim("centre point", 0.01), CLAIMS, "centroid"),
         ("nothing claimed", whole(no_claims), CLAIMS, "claims nothing"),
         ("a face and its bound turned", step(turned), "step outward"),
+        ("the solid misnamed", whole(misnamed), "step solid", "shell_b"),
     ),
     *refusing(
         "STEP",
         ("cut short", raw(lambda b: b[: len(b) // 2]), NAME, "truncated"),
+        ("empty", raw(lambda _: b""), NAME, "no STEP file"),
         ("an STL", raw(lambda b: b"solid x" + b), NAME, "no STEP file"),
     ),
     *failing(
         "STEP",
         ("cut short, with an end", raw(cut_with_end), "step solid"),
         ("a bracket lost", middle(b"(", b" "), "step solid", "broken STEP text"),
+        (
+            "a reference to nowhere",
+            middle(b"VERTEX_POINT('',#", b"VERTEX_POINT('',#9"),
+            "step solid",
+        ),
         ("a keyword misspelt", middle(b"CARTESIAN_POINT", b"CARTESIAN_PAINT"), "step solid"),
         ("zeros in the middle", middle(b"CIRCLE", bytes(6)), "step solid"),
+        ("two volumes claimed", whole(two_volumes), "step solid", "claimed twice"),
         unknown=True,
     ),
 )
