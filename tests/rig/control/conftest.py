@@ -24,7 +24,7 @@ from tests.rig.control.rig import Rig, connected_rig, klipper_rig_of
 
 LEDS = 4
 WIND_UP_DEG = 0.1  # at every stop
-Refused = Callable[[list[str]], str]
+Told = Callable[[list[str]], str]
 
 
 @pytest.fixture(autouse=True)
@@ -121,7 +121,7 @@ def either_rig(request: pytest.FixtureRequest) -> Rig:
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+def refused(capsys: pytest.CaptureFixture[str]) -> Told:
     """The line that a command ends with that is refused."""
 
     def line_of(words: list[str]) -> str:
@@ -131,3 +131,14 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
         return line
 
     return line_of
+
+
+@pytest.fixture
+def stopped(capsys: pytest.CaptureFixture[str]) -> Told:
+    """What a command says at the end of a run that is not complete."""
+
+    def text_of(words: list[str]) -> str:
+        assert tbcad(words) == 1
+        return capsys.readouterr().out
+
+    return text_of

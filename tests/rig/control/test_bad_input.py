@@ -11,7 +11,7 @@ import pytest
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.messages import opening_reason
 from tests.exported_files import edit_json
-from tests.rig.control.conftest import Refused
+from tests.rig.control.conftest import Told
 from tests.rig.control.grbl_double import BANNERS
 from tests.rig.control.rig import Rig
 
@@ -25,7 +25,7 @@ def test_ports_and_libraries(
     words: list[str],
     rig: Rig,
     monkeypatch: pytest.MonkeyPatch,
-    refused: Refused,
+    refused: Told,
 ) -> None:
     assert "--port is missing" in refused(words)
     assert "there is no such port" in refused([*words, "--port", "/dev/ttyNONE"])
@@ -38,7 +38,7 @@ def test_ports_and_libraries(
     assert not rig.out.exists()
 
 
-def test_port_without_controller(rig: Rig, refused: Refused) -> None:
+def test_port_without_controller(rig: Rig, refused: Told) -> None:
     rig.controller.unplug()
     assert "the controller does not answer" in refused(rig.words())
     assert not rig.out.exists()
@@ -59,14 +59,14 @@ folder:/no/such/folder | there is no such folder
 
 
 @pytest.mark.parametrize("case", CAMERAS.strip().splitlines())
-def test_camera_that_will_not_do(rig: Rig, case: str, refused: Refused) -> None:
+def test_camera_that_will_not_do(rig: Rig, case: str, refused: Told) -> None:
     camera, says = case.split(" | ")
     assert says in refused(rig.words(camera=camera))
     assert not rig.out.exists()
     assert not any(line.startswith("G1") for line in rig.controller.lines)
 
 
-def test_photograph_of_another_size(rig: Rig, refused: Refused) -> None:
+def test_photograph_of_another_size(rig: Rig, refused: Told) -> None:
     line = refused(rig.words("--size", "640x480"))
     assert "gives 416 x 310 pixels, 640 x 480 are wanted" in line
     assert not rig.out.exists()
@@ -74,9 +74,7 @@ def test_photograph_of_another_size(rig: Rig, refused: Refused) -> None:
     assert "WIDTHxHEIGHT" in refused(rig.words("--size", "big"))
 
 
-def test_settings_that_differ(
-    rig: Rig, refused: Refused, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_settings_that_differ(rig: Rig, refused: Told, capsys: pytest.CaptureFixture[str]) -> None:
     rig.controller.settings[1] = 25.0
     del rig.controller.settings[27]
     line = refused(rig.words())
@@ -104,7 +102,7 @@ def test_what_boards_may_lack(rig: Rig) -> None:
     ],
 )
 def test_controller_of_another_kind_is_sent_no_setting(
-    rig: Rig, greeting: str, says: str, refused: Refused
+    rig: Rig, greeting: str, says: str, refused: Told
 ) -> None:
     rig.controller.firmware, rig.controller.greeting = "grbl", greeting
     rig.controller.boots = "3.7" in greeting
@@ -115,7 +113,7 @@ def test_controller_of_another_kind_is_sent_no_setting(
     assert not any("=" in sent for sent in rig.controller.lines)
 
 
-def test_build_for_another_controller_is_refused(plain_rig: Rig, refused: Refused) -> None:
+def test_build_for_another_controller_is_refused(plain_rig: Rig, refused: Told) -> None:
     plain_rig.controller.firmware = "grblhal"
     plain_rig.controller.greeting = BANNERS["grblhal"]
     line = refused(plain_rig.words("--send-settings"))
@@ -124,14 +122,14 @@ def test_build_for_another_controller_is_refused(plain_rig: Rig, refused: Refuse
     assert not any("=" in sent for sent in plain_rig.controller.lines)
 
 
-def test_full_disk_is_foreseen(rig: Rig, monkeypatch: pytest.MonkeyPatch, refused: Refused) -> None:
+def test_full_disk_is_foreseen(rig: Rig, monkeypatch: pytest.MonkeyPatch, refused: Told) -> None:
     monkeypatch.setattr("tbcad.rig.control.selection.free_bytes", lambda folder: 300_000)
     line = refused(rig.words())
     assert "need about 1.2 MB, 0.3 MB are free" in line
     assert not rig.out.exists()
 
 
-def test_run_that_exists(rig: Rig, tmp_path: Path, refused: Refused) -> None:
+def test_run_that_exists(rig: Rig, tmp_path: Path, refused: Told) -> None:
     rig.out.mkdir()
     (rig.out / "notes.txt").touch()
     assert "is not empty: name a new folder" in refused(rig.words())

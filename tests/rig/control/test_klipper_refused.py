@@ -12,13 +12,13 @@ import pytest
 
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control import klipper_base, moonraker
-from tests.rig.control.conftest import Refused
+from tests.rig.control.conftest import Told
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
 
 
 @pytest.fixture
-def refused(klipper_rig: Rig, refused: Refused) -> Refused:
+def refused(klipper_rig: Rig, refused: Told) -> Told:
     """The one line that a command of the rig ends with, before anything moves."""
 
     def line_of(words: list[str]) -> str:
@@ -51,11 +51,11 @@ ADDRESSES = {
 
 
 @pytest.mark.parametrize(("port", "says"), ADDRESSES.items())
-def test_addresses(klipper_rig: Rig, refused: Refused, port: str, says: str) -> None:
+def test_addresses(klipper_rig: Rig, refused: Told, port: str, says: str) -> None:
     assert says in refused(words_to(klipper_rig, port))
 
 
-def test_server_that_does_not_listen_or_speak_so(klipper_rig: Rig, refused: Refused) -> None:
+def test_server_that_does_not_listen_or_speak_so(klipper_rig: Rig, refused: Told) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = f"moonraker:http://127.0.0.1:{server.getsockname()[1]}"
     line = refused(words_to(klipper_rig, port))
@@ -103,7 +103,7 @@ def other() -> Iterator[HTTPServer]:
 )
 def test_server_that_is_not_moonraker(
     klipper_rig: Rig,
-    refused: Refused,
+    refused: Told,
     other: HTTPServer,
     code: int,
     head: dict[str, str],
@@ -115,7 +115,7 @@ def test_server_that_is_not_moonraker(
     assert says in refused(words_to(klipper_rig, port))
 
 
-def test_key(klipper_rig: Rig, refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_key(klipper_rig: Rig, refused: Told, monkeypatch: pytest.MonkeyPatch) -> None:
     klipper_rig.controller.key = "1234"
     line = refused(klipper_rig.words())
     assert "does not let this computer in: set MOONRAKER_API_KEY" in line
@@ -135,7 +135,7 @@ unheard of |  | put the zero pin in first
 
 
 @pytest.mark.parametrize("case", STATES.strip().splitlines())
-def test_states(klipper_rig: Rig, refused: Refused, case: str) -> None:
+def test_states(klipper_rig: Rig, refused: Told, case: str) -> None:
     state, message, says = case.split(" | ")
     klipper_rig.controller.state, klipper_rig.controller.message = state, f"\n{message}\nmore"
     klipper_rig.controller.started = state != "disconnected"
@@ -157,7 +157,7 @@ def test_start_is_waited_for(klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch) 
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
 
 
-def test_neither_settings_nor_a_print_are_touched(klipper_rig: Rig, refused: Refused) -> None:
+def test_neither_settings_nor_a_print_are_touched(klipper_rig: Rig, refused: Told) -> None:
     assert "leave --send-settings out" in refused(klipper_rig.words("--send-settings"))
     klipper_rig.controller.print_state = "paused"
     assert "the printer prints a file" in refused(klipper_rig.words())
@@ -176,7 +176,7 @@ def test_neither_settings_nor_a_print_are_touched(klipper_rig: Rig, refused: Ref
     ],
 )
 def test_other_configuration(
-    klipper_rig: Rig, refused: Refused, section: str, option: str, value: object, says: str
+    klipper_rig: Rig, refused: Told, section: str, option: str, value: object, says: str
 ) -> None:
     settings = klipper_rig.controller.settings
     settings[section] |= {option: value}
@@ -248,7 +248,7 @@ def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None
 
 
 def test_exports_that_are_not_for_klipper(
-    control_export: Path, plain_export: Path, tmp_path: Path, klipper_rig: Rig, refused: Refused
+    control_export: Path, plain_export: Path, tmp_path: Path, klipper_rig: Rig, refused: Told
 ) -> None:
     klipper_rig.export = plain_export
     line = refused(klipper_rig.words())

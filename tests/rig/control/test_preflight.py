@@ -21,7 +21,7 @@ from tbcad.rig.control.shooting import Photograph, common_settings, take
 from tbcad.rig.runs import read_run
 from tests.rig.control import exposing_camera
 from tests.rig.control.exposing_camera import SIZE, radiance
-from tests.rig.control.rig import Rig, connected_rig, put, scene_of
+from tests.rig.control.rig import Rig, connected_rig
 from tests.rig.control.run_checks import events
 
 GOOD = ("--exposure-leds", "1/100", "--exposure-lit", "2")
@@ -84,20 +84,15 @@ def test_each_phase_has_its_exposure(lit_rig: Rig, capsys: pytest.CaptureFixture
 
 def test_camera_on_the_relay_is_looked_at_too(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
     """Its LEDs are at the largest number, and tbcad cannot change that."""
-    pictures = rig.folder / "pictures"
-    pictures.mkdir()
-    numbers = iter(range(1000))
-    rig.controller.released = lambda machine: put(
-        pictures / f"{next(numbers)}.jpg", scene_of(machine)
-    )
-    every = rig.words("--phases", "dark,led_1,lit", "--runs", "b", camera=f"folder:{pictures}")
+    every = rig.words("--phases", "dark,led_1,lit", "--runs", "b", camera=rig.released())
     assert tbcad([word for word in every if word != "--no-preflight"]) == 2
     err = capsys.readouterr().err
     assert "object turned by 180 degrees" in err
     assert "run b, stop 2 at" in err
     assert "led_1 is saturated" in err
     assert "change the camera's exposure" in err.splitlines()[-1]
-    assert next(numbers) == 4  # the trial and three phases: nothing else can be tried
+    # The trial and three phases: nothing else can be tried.
+    assert len([*(rig.folder / "pictures").iterdir()]) == 4
     assert not rig.out.exists()
 
 
