@@ -19,7 +19,6 @@ from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibrated_solids import colours, deviations, round_up
 from tbcad.rig.machine.machine import Machine, write_machine
-from tbcad.rig.runs import read_image
 from tests.machine_states import frames_of, machine_of, perturbed
 
 CENTRE = re.compile(r"CARTESIAN_POINT\('',\(([^)]*)\)\)")
@@ -72,12 +71,6 @@ class TestFiles:
         shown = [int(row["colour"][1:3], 16) / 255 for row in table]
         expected = colours(np.array(distance) / record["scale_um"][1])[:, 0]
         assert shown == pytest.approx(expected.tolist(), abs=0.5 / 255)
-
-    def test_the_legend_has_the_colours_of_the_scale(self, written: Path) -> None:
-        found = read_image(written / "legend.png")
-        ends = colours(np.array([0.0, 1.0]))
-        assert found[30, 40] / 255 == pytest.approx(ends[0], abs=0.01)
-        assert found[30, -41] / 255 == pytest.approx(ends[1], abs=0.01)
 
     def test_same_bytes_again(
         self, written: Path, export: ExportedDesign, plan: Plan, built: Machine, tmp_path: Path

@@ -10,7 +10,7 @@ import pytest
 from tbcad.app.cli import run as tbcad
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import home_angles
@@ -32,11 +32,6 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands in this process wait for the double as long as it needs, not as a board may."""
     for name, seconds in WAITS_S.items():
         monkeypatch.setattr(f"tbcad.rig.control.{name}", seconds)
-
-
-@pytest.fixture(scope="session")
-def layout(low_resolution_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(low_resolution_design.spec, low_resolution_design)
 
 
 @pytest.fixture(scope="session")
