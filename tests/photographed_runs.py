@@ -28,13 +28,9 @@ DEPENDS_ON = ("design.json", "mirrors.csv", "balls.csv", "prototype.json", "rota
 
 
 def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: Samples = 1) -> Bytes:
-    """The whole photograph of a stop, (h, w, 3).
+    """The whole photograph of a stop, from 0, (h, w, 3); a pixel is the mean of some rays.
 
-    Args:
-        run: of camera a's mirrors, or of camera b's with the object turned.
-        scene: the object.
-        stop: number of the stop, from 0.
-        samples: a pixel is the mean of these rays.
+    The run is of camera a's mirrors, or of camera b's with the object turned.
     """
     height, width = run.camera.height_px, run.camera.width_px
     bands = [np.arange(rows.start * width, rows.stop * width) for rows in row_bands(height)]
@@ -43,11 +39,7 @@ def stop_photograph(run: PrototypeRun, scene: Scene, stop: int, samples: Samples
 
 
 def photographs_of(
-    export: ExportedDesign,
-    plan: Plan,
-    machine: Machine,
-    frames: tuple[Frame, ...],
-    scene: Scene,
+    export: ExportedDesign, plan: Plan, machine: Machine, frames: tuple[Frame, ...], scene: Scene
 ) -> dict[str, np.ndarray]:
     """Photographs of the lit object, by name."""
     runs = machine_runs(export, plan, machine, frames)
@@ -92,14 +84,7 @@ def write_run(
     return folder
 
 
-def write_exposure(
-    images: Path,
-    frame: Frame,
-    phase: str,
-    image: np.ndarray,
-    file: str,
-    exposure_s: float | None = EXPOSURE_S,
-) -> None:
+def write_exposure(images: Path, frame: Frame, phase: str, image: np.ndarray, file: str) -> None:
     """A photograph with its sidecar."""
     written, data = cv2.imencode(Path(file).suffix, image[..., ::-1])
     assert written
@@ -111,7 +96,7 @@ def write_exposure(
         sha256=digest(images / file),
         width_px=image.shape[1],
         height_px=image.shape[0],
-        exposure_s=exposure_s,
+        exposure_s=EXPOSURE_S,
         taken=TAKEN,
         settings={},
     ).write((images / file).with_suffix(".json"))

@@ -22,17 +22,13 @@ from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.types import Floats
 
 FINER = 2  # pixels for one of the export's: highlights of few pixels are hard to see
+SEED = 3  # of build and noise
 BRIGHT = 3.0  # LEDs: the picture is still smaller than a real one
 
 
 @dataclass(frozen=True)
 class Small:
-    """A small run, and what is known of it before.
-
-    Attributes:
-        run: that is photographed.
-        prior: of its machine.
-    """
+    """A small run that is photographed, and the prior of its machine."""
 
     run: SimulatedRun
     prior: Prior
@@ -50,41 +46,26 @@ def fdm_errors() -> Errors:
 def finer(machine: Machine) -> Machine:
     """The same before a camera with more pixels."""
     camera = machine.camera
-    return replace(
-        machine,
-        camera=replace(
-            camera,
-            focal=FINER * camera.focal,
-            principal=FINER * (camera.principal + 0.5) - 0.5,
-            width_px=FINER * camera.width_px,
-            height_px=FINER * camera.height_px,
-        ),
-    )
+    size = {name: FINER * getattr(camera, name) for name in ("focal", "width_px", "height_px")}
+    principal = FINER * (camera.principal + 0.5) - 0.5
+    return replace(machine, camera=replace(camera, principal=principal, **size))
 
 
 def small_run(
     folder: Path,
     stops: Sequence[int],
-    seed: int = 3,
-    errors: Errors | None = None,
     chain: ImagingChain | None = None,
     subject_mm: float = 0.0,
 ) -> Small:
-    """A run of an export through some stops, twice.
+    """A run of an export through some stops, from 1, twice, by default with bright LEDs.
 
-    Args:
-        folder: of the export.
-        stops: from 1.
-        seed: of build and noise.
-        errors: of the process; by default those of fdm.
-        chain: from light to numbers; by default with bright LEDs.
-        subject_mm: size of the object that hides LEDs; none where it is zero.
+    The object hides LEDs if it has a size.
     """
     export = read_export(folder)
     plan = read_plan(export)
     designed = finer(designed_prototype(export, plan))
-    kinds = fdm_errors() if errors is None else errors
-    built = random_build(designed, plan, kinds, seed, wind_up=np.zeros(len(plan.angle)))
+    kinds = fdm_errors()
+    built = random_build(designed, plan, kinds, SEED, wind_up=np.zeros(len(plan.angle)))
     every = frames_of(np.degrees(plan.angle))
     kept = np.array([k for k, frame in enumerate(every) if frame.stop in stops])
     frames = tuple(every[k] for k in kept)
@@ -95,7 +76,7 @@ def small_run(
         scene,
         Occluders(scene.embree if subject_mm else None, None),
         chain or ImagingChain(led_light=BRIGHT),
-        seed,
+        SEED,
     )
     series = np.array([frame.object_turn_deg // 180 for frame in frames])
     known = plan.body_centre, is_cap(plan), series

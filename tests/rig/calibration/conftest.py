@@ -1,11 +1,9 @@
 """A small prototype whose run is calibrated from simulated highlights."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.study import designed_setup
@@ -15,11 +13,6 @@ from tests.rig.calibration.machines import every_highlight
 
 ERRORS = process_errors(load_process("fdm"))
 FAULT = "LED 3 never lights: its highlights are not used"
-
-
-@pytest.fixture(scope="session")
-def export(export_folder: Path) -> ExportedDesign:
-    return read_export(export_folder)
 
 
 @pytest.fixture(scope="session")

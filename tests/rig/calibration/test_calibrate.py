@@ -17,19 +17,17 @@ from tbcad.records.exposure import DARK, exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.estimate.jacobian import base_slopes
-from tbcad.rig.calibration.estimate.parameters import covariance
-from tbcad.rig.calibration.estimate.solve import Estimate, estimate
+from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.files import write_calibration
 from tbcad.rig.calibration.report.record import rays_table, residuals_table
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
-from tbcad.rig.machine.built import BuiltPrototype, random_build
+from tbcad.rig.machine.built import BuiltPrototype
 from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
 from tests.rig.calibration.machines import every_highlight
 
-BUILDS = 12
 BASIS = (
     *("run", "exports", "export_sha256", "source", "geometry", "camera"),
     *("photographs", "process", "lens", "measured_radii"),
@@ -58,21 +56,6 @@ def test_injected_errors_are_recovered(
     assert ratio < 2
 
 
-@pytest.mark.slow
-def test_most_figures_are_within_two_deviations(setup: Setup) -> None:
-    """Builds of the process, not drawn from the prior: each shares errors among its balls."""
-    inside = []
-    for seed in range(BUILDS):
-        machine, plan, still = setup.designed, setup.plan, np.zeros(len(setup.plan.angle))
-        true = random_build(machine, plan, ERRORS, seed=100 + seed, wind_up=still).machine
-        found = estimate(setup.prior(ERRORS), every_highlight(true, seed))
-        known = covariance(found.prior, found.information)
-        slopes = base_slopes(found.prior, found.values).matrix(found.prior)
-        sigma = np.sqrt(np.diagonal(known.of(slopes, 4), axis1=1, axis2=2))
-        inside.append(np.abs(_off(found, true)) < 2 * sigma)
-    assert np.mean(inside) >= 0.93
-
-
 def test_verdict_comes_first_and_fits_the_screen(calibrated: MachineCalibration) -> None:
     judged = verdict(calibrated)
     lines = verdict_text(calibrated, judged).splitlines()
@@ -96,10 +79,8 @@ def test_outliers_are_named(setup: Setup, detection: Detection) -> None:
     assert [row["photograph"] for row in rows if not row["used"]] == [name]
 
 
-def test_a_machine_that_is_not_that_of_the_model_is_doubted(
-    setup: Setup, detection: Detection
-) -> None:
-    """A ball that slips between both runs: no state of the machine explains both."""
+def test_a_slipped_ball_is_doubted(setup: Setup, detection: Detection) -> None:
+    """Between both runs: no state of the machine explains both."""
     h = detection.highlights
     second = h.frame >= len(setup.frames) // 2
     pixel = h.pixel + np.where((second & (h.sphere % 2 == 0))[:, None], [0.6, -0.4], 0.0)

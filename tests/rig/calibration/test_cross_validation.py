@@ -1,6 +1,6 @@
 """Halves of the data agree where the model holds, and not where one half is wrong."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -45,7 +45,6 @@ def test_halves_that_contradict_each_other_are_seen(prior: Prior) -> None:
 
 def test_halves_of_too_few_highlights_are_left_out(prior: Prior) -> None:
     highlights = every_highlight(drawn(prior, 1)[1], 2)
-    one_led = highlights.led == 0
-    kept = {name: getattr(highlights, name)[one_led] for name in ("frame", "sphere", "led")}
-    few = Highlights(**kept, pixel=highlights.pixel[one_led], sigma=highlights.sigma[one_led])
+    kept = np.flatnonzero(highlights.led == 0)
+    few = Highlights(*(getattr(highlights, one.name)[kept] for one in fields(highlights)))
     assert [half.by for half in _halves(prior, few)] == ["angles"]

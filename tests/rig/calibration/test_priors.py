@@ -46,6 +46,8 @@ def test_figures_are_those_of_the_process() -> None:
 
 
 def test_a_measured_radius_replaces_the_drawing() -> None:
+    parsed = parse_measured(("1=43.2", "2 = 34.61:0.005"), 5)
+    assert parsed == ((0, 43.2, MEASURED_MM), (1, 34.61, 0.005))
     prior = prior_of(measured=((CAP, 17.61, 0.004),))
     assert (prior.mean.radius[CAP], prior.sigma[Block.RADII][CAP]) == (17.61, 0.004)
     assert np.delete(prior.mean.radius, CAP) == pytest.approx(np.delete(MACHINE.radius, CAP))
@@ -60,20 +62,12 @@ def test_a_known_lens_is_fixed(of_shell: bool) -> None:
         assert not known.sigma[block].any()
 
 
-def test_measured_radii_are_parsed() -> None:
-    assert parse_measured(("1=43.2", "2 = 34.61:0.005"), 5) == (
-        (0, 43.2, MEASURED_MM),
-        (1, 34.61, 0.005),
-    )
+FORM = ("", "1", "1=", "1=-4", "a=4", "1=4:", "1=4.3.2", "1=nan")
+VALUE = ("0=4", "6=4", "1=0", "1=4:0")
 
 
-@pytest.mark.parametrize("text", ["", "1", "1=", "1=-4", "a=4", "1=4:", "1=4.3.2", "1=nan"])
+@pytest.mark.parametrize("text", [*FORM, *VALUE])
 def test_wrong_texts_are_refused(text: str) -> None:
-    with pytest.raises(InputError, match="is not BALL=RADIUS_MM"):
-        parse_measured((text,), 5)
-
-
-@pytest.mark.parametrize("text", ["0=4", "6=4", "1=0", "1=4:0"])
-def test_wrong_values_are_refused(text: str) -> None:
-    with pytest.raises(InputError, match="allowed is ball 1 to 5"):
+    says = "is not BALL=RADIUS_MM" if text in FORM else "allowed is ball 1 to 5"
+    with pytest.raises(InputError, match=says):
         parse_measured((text,), 5)

@@ -50,6 +50,7 @@ def test_centres_and_angles_are_those_of_the_tables(
     known: Covariance,
     built: BuiltPrototype,
 ) -> None:
+    assert len(kinds) == 11
     rows, centres = spheres_table(calibrated, known).records(), _named(kinds, "centres")
     for figure, name in (("recovered", "difference"), ("sigma", "sigma")):
         expected = [1000 * float(row[f"{name}_{axis}_mm"] or 0) for row in rows for axis in AXES]
@@ -59,14 +60,6 @@ def test_centres_and_angles_are_those_of_the_tables(
     angles, table = _named(kinds, "base angles"), angles_table(calibrated, known)
     assert angles.recovered == pytest.approx(table.column("difference_deg"))
     assert angles.sigma == pytest.approx(table.column("sigma_deg"))
-
-
-def test_errors_are_as_large_as_their_deviations(kinds: tuple[Kind, ...]) -> None:
-    """Every kind is there; errors are shared, so each kind alone varies much."""
-    assert len(kinds) == 11
-    for kind in kinds:
-        assert np.sqrt((kind.sigmas_off**2).mean()) < 3, kind.name
-    assert np.mean([kind.within for kind in kinds]) > 0.8
 
 
 def test_a_motion_and_growth_of_all_centres_is_taken_off(
@@ -118,14 +111,12 @@ def _turned(machine: Machine, angle: float) -> Machine:
         return rotated(many, x, np.full(len(many), angle)).reshape(np.shape(vectors))
 
     camera = machine.camera
+    places = ("axis", "axis_point", "centre", "leds")
     return replace(
         machine,
         camera=replace(camera, pinhole=turned(camera.pinhole), axes=turned(camera.axes)),
-        axis=turned(machine.axis),
-        axis_point=turned(machine.axis_point),
-        centre=turned(machine.centre),
-        leds=turned(machine.leds),
         shift=None if machine.shift is None else turned(machine.shift),
+        **{name: turned(getattr(machine, name)) for name in places},
     )
 
 

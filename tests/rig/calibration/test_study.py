@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tbcad.common.results import Study, study_files
+from tbcad.common.results import study_files
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.led_layout import NUMBERS
 from tbcad.rig.calibration.study import (
@@ -15,13 +15,10 @@ from tbcad.rig.calibration.study import (
 )
 
 
-@pytest.fixture(scope="module")
-def found(export: ExportedDesign) -> Study:
-    return calibration_study(export, lambda _: None)
-
-
 @pytest.mark.slow
-def test_every_case_has_figures(found: Study) -> None:
+def test_every_case_has_figures(export: ExportedDesign) -> None:
+    """More of the best LEDs and less noise bring rays closer."""
+    found = calibration_study(export, lambda _: None)
     alone, whole, places = found.tables
     layouts = len(NUMBERS) + 1
     assert len(alone.rows) == 3 * layouts + 1
@@ -37,12 +34,8 @@ def test_every_case_has_figures(found: Study) -> None:
     assert ONE_BALL in alone.column("centre and radius")
     files = study_files(found)
     assert files["calibration.png"].startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-def test_more_of_the_best_leds_and_less_noise_bring_rays_closer(found: Study) -> None:
-    whole = found.tables[1].records()
-    leds = [row["mm_50"] for row in whole if row["layout"] == "best"]
-    noises = [row["mm_50"] for row in whole if row["layout"] == "design"][: len(NOISES_PX)]
+    records = whole.records()
+    leds = [row["mm_50"] for row in records if row["layout"] == "best"]
+    noises = [row["mm_50"] for row in records if row["layout"] == "design"][: len(NOISES_PX)]
     assert leds == sorted(leds, reverse=True)
     assert noises == sorted(noises)

@@ -1,15 +1,16 @@
 """A small export with what a run reads, and a rig that answers as its machine."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tbcad.app.cli import run as tbcad
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
+from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.drive.loads import BaseTorques, choose_drive
 from tbcad.prototype.drive.travel import home_angles
@@ -23,6 +24,7 @@ from tests.rig.control.rig import Rig, connected_rig, klipper_rig_of
 
 LEDS = 4
 WIND_UP_DEG = 0.1  # at every stop
+Told = Callable[[list[str]], str]
 
 
 @pytest.fixture(autouse=True)
@@ -30,11 +32,6 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands in this process wait for the double as long as it needs, not as a board may."""
     for name, seconds in WAITS_S.items():
         monkeypatch.setattr(f"tbcad.rig.control.{name}", seconds)
-
-
-@pytest.fixture(scope="session")
-def layout(low_resolution_design: MirrorDesign) -> PrototypeLayout:
-    return prototype_layout(low_resolution_design.spec, low_resolution_design)
 
 
 @pytest.fixture(scope="session")
@@ -46,6 +43,7 @@ def export(
     folder: Path, design: MirrorDesign, layout: PrototypeLayout, drive: Drive, motion: MotionSpec
 ) -> Path:
     """What a run reads, by the export's own writers."""
+    folder.mkdir()
     write_export(folder, design, layout)
     angles = np.degrees(layout.stops.angle).tolist()
     write_stops(folder, angles, [WIND_UP_DEG] * len(angles))
@@ -54,36 +52,33 @@ def export(
     lit = [{"name": one.name, "output": one.output} for one in phases(LEDS, motion)]
     controller = {"firmware": motion.controller, "axis": motion.axis, "phases": lit}
     edit_json(folder / "prototype.json", lambda value: value.update(controller=controller))
-    edit_json(folder / "design.json", lambda value: _quick(value, motion))
+    quick = json.loads(motion.model_dump_json()) | {"light_s": 0.0}
+    edit_json(folder / "design.json", lambda value: value["spec"]["prototype"].update(motion=quick))
     return folder
 
 
-def _quick(design: dict, motion: MotionSpec) -> None:
-    design["spec"]["prototype"]["motion"] = json.loads(motion.model_dump_json()) | {"light_s": 0.0}
-
-
 @pytest.fixture(scope="session")
-def control_export(
+def exported(
     tmp_path_factory: pytest.TempPathFactory,
     low_resolution_design: MirrorDesign,
     layout: PrototypeLayout,
     drive: Drive,
-) -> Path:
+) -> Callable[[MotionSpec], Path]:
     folder = tmp_path_factory.mktemp("control")
-    return export(folder, low_resolution_design, layout, drive, MotionSpec())
+    return lambda motion: export(
+        folder / motion.controller, low_resolution_design, layout, drive, motion
+    )
 
 
 @pytest.fixture(scope="session")
-def plain_export(
-    tmp_path_factory: pytest.TempPathFactory,
-    low_resolution_design: MirrorDesign,
-    layout: PrototypeLayout,
-    drive: Drive,
-) -> Path:
+def control_export(exported: Callable[[MotionSpec], Path]) -> Path:
+    return exported(MotionSpec())
+
+
+@pytest.fixture(scope="session")
+def plain_export(exported: Callable[[MotionSpec], Path]) -> Path:
     """For GRBL 1.1, which has no outputs and does not home."""
-    folder = tmp_path_factory.mktemp("plain")
-    motion = MotionSpec(controller="grbl")
-    return export(folder, low_resolution_design, layout, drive, motion)
+    return exported(MotionSpec(controller="grbl"))
 
 
 @pytest.fixture(scope="session")
@@ -118,3 +113,27 @@ def either_rig(request: pytest.FixtureRequest) -> Rig:
     found = request.getfixturevalue(request.param)
     assert isinstance(found, Rig)
     return found
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Told:
+    """The line that a command ends with that is refused."""
+
+    def line_of(words: list[str]) -> str:
+        assert tbcad(words) == 2
+        *_, line = capsys.readouterr().err.splitlines()
+        assert line.startswith("tbcad: ")
+        return line
+
+    return line_of
+
+
+@pytest.fixture
+def stopped(capsys: pytest.CaptureFixture[str]) -> Told:
+    """What a command says at the end of a run that is not complete."""
+
+    def text_of(words: list[str]) -> str:
+        assert tbcad(words) == 1
+        return capsys.readouterr().out
+
+    return text_of

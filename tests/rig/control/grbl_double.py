@@ -40,7 +40,7 @@ KNOWN = {
     *("M2", "M8", "M9", "M64", "M65"),
 }
 OUTPUTS = 8
-TICK_S = 0.0005
+TICK_S, SPEED = 0.0005, 2000.0
 Fault = Callable[[int, str], str | None]
 """By a line's number and text: drop_ok, drop_line, reset, power, error, alarm, silence."""
 
@@ -62,19 +62,46 @@ class Machine:
     let_go: int = 0
 
 
-class FastTime:
-    """A time that runs faster than the clock."""
+class Double:
+    """What controls a machine, in a time that runs faster than the clock."""
 
-    def __init__(self, speed: float) -> None:
-        self.speed, self._since, self._until_then = speed, monotonic(), 0.0
+    def __init__(
+        self,
+        switch_deg: float,
+        angle: float = 3.7,
+        see: Callable[[Machine], None] = lambda _: None,
+    ) -> None:
+        """Control a machine whose switch is at an angle.
+
+        Args:
+            switch_deg: angle at which the home switch is pressed.
+            angle: of the base at the start, degrees.
+            see: shown the machine whenever it rests and a line is done.
+        """
+        self.speed, self._since, self._until_then = SPEED, monotonic(), 0.0
+        self.switch_deg, self.see = switch_deg, see
+        self.machine = Machine(angle)
+        self.released: Callable[[Machine], None] = lambda _: None
+        self.fault: Fault = lambda number, line: None
+        self.on_line: Callable[[int], None] = lambda number: None
+        self.lines: list[str] = []
 
     @property
     def now(self) -> float:
         return self._until_then + (monotonic() - self._since) * self.speed
 
     def run_at(self, speed: float) -> None:
-        """Let it run at another speed from now on."""
+        """Let its time run at another speed from now on."""
         self._until_then, self._since, self.speed = self.now, monotonic(), speed
+
+    def switch_light(self, output: int, *, on: bool) -> None:
+        (self.machine.lights.add if on else self.machine.lights.discard)(output)
+
+    def switch_relay(self, *, on: bool) -> None:
+        """Switch the camera's release; a photograph comes when it closes."""
+        if on and not self.machine.relay:
+            self.released(self.machine)
+        self.machine.relay = on
 
 
 @dataclass
@@ -89,7 +116,7 @@ class _Motion:
         return self.begin + share * (self.end - self.begin)
 
 
-class GrblDouble(threading.Thread, FastTime):
+class GrblDouble(threading.Thread, Double):
     """A controller; `port` is the port to open."""
 
     lines_before = 12  # from the connection to the first photograph
@@ -99,43 +126,22 @@ class GrblDouble(threading.Thread, FastTime):
         settings: dict[int, float],
         switch_deg: float,
         firmware: str = "grblhal",
-        speed: float = 2000.0,
         angle: float = 3.7,
         see: Callable[[Machine], None] = lambda _: None,
-        released: Callable[[Machine], None] = lambda _: None,
     ) -> None:
-        """Control a machine whose switch is at an angle.
-
-        Args:
-            settings: by number.
-            switch_deg: angle at which the home switch is pressed.
-            firmware: grblhal or grbl.
-            speed: how much faster than the clock its time runs.
-            angle: of the base at the start, degrees.
-            see: shown the machine whenever it rests and a line is done.
-            released: shown the machine when the relay closes.
-        """
+        """Control a machine by settings, by number; the firmware is grblhal or grbl."""
         threading.Thread.__init__(self, daemon=True)
-        FastTime.__init__(self, speed)
+        Double.__init__(self, switch_deg, angle, see)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._master)
         tty.setraw(self._slave)
         self.port = os.ttyname(self._slave)
-        self.firmware, self.switch_deg = firmware, switch_deg
-        self.greeting = BANNERS[firmware]
+        self.firmware, self.greeting = firmware, BANNERS[firmware]
         self.settings = dict(settings)
-        self.machine = Machine(angle)
-        self.see, self.released = see, released
-        self.fault: Fault = lambda number, line: None
-        self.lines: list[str] = []
         self.asked: list[float] = []
-        self.overflows = 0
-        self.homed = False
-        self.held = 0
-        self.outputs = OUTPUTS
+        self.overflows, self.held, self.homed = 0, 0, False
         self.deaf = False  # to a feed hold
         self.boots = False  # whether opening its port lets it begin anew, as many boards do
-        self.on_line: Callable[[int], None] = lambda number: None
         self._closing, self._silent = False, False
         self._mpos, self._zero = 0.0, self.machine.angle
         self._reports = 0
@@ -170,12 +176,8 @@ class GrblDouble(threading.Thread, FastTime):
 
     def put_into(self, state: str) -> None:
         """Sleep, check mode or an open door, by a person at the machine."""
-        if state == "Sleep":
-            self._sleep()
-        elif state == "Check":
-            self._check()
-        else:
-            self.state = state
+        self.state = state
+        {"Sleep": self._sleep, "Check": self._check}.get(state, lambda: None)()
 
     def stop_by_limit(self) -> None:
         """A switch is pressed."""
@@ -316,16 +318,15 @@ class GrblDouble(threading.Thread, FastTime):
         self._reply = fault != "drop_ok"
         if fault == "drop_line":
             return
-        if fault == "reset":
-            self.reset()
-        elif fault == "power":
-            self.power_cycle()
-        elif fault == "silence":
-            self._silent = True
-        elif fault == "error":
-            self._say("error:1")
-        elif fault == "alarm":
-            self._halt(1)
+        faults: dict[str | None, Callable[[], None]] = {
+            "reset": self.reset,
+            "power": self.power_cycle,
+            "silence": self.unplug,
+            "error": lambda: self._say("error:1"),
+            "alarm": self.stop_by_limit,
+        }
+        if fault in faults:
+            faults[fault]()
         elif (error := self._run_line(line)) is not None:
             self._say(f"error:{error}")
         elif self._wait is None:
@@ -357,16 +358,16 @@ class GrblDouble(threading.Thread, FastTime):
         return self._gcode(codes, words)
 
     def _system(self, line: str) -> int | None:
-        if line == "$H":
-            return self._home()
-        if line in ("$$", "$X", "$C", "$I", "$SLP"):
-            return {
-                "$$": self._list,
-                "$X": self._unlock,
-                "$C": self._check,
-                "$I": self._tell,
-                "$SLP": self._sleep,
-            }[line]()
+        commands: dict[str, Callable[[], int | None]] = {
+            "$H": self._home,
+            "$$": self._list,
+            "$X": self._unlock,
+            "$C": self._check,
+            "$I": self._tell,
+            "$SLP": self._sleep,
+        }
+        if line in commands:
+            return commands[line]()
         if match := re.fullmatch(r"\$(\d+)=(-?[\d.]+)", line):
             if self.state not in ("Idle", "Alarm") or self._motion:
                 return 8
@@ -433,7 +434,7 @@ class GrblDouble(threading.Thread, FastTime):
         elif codes & {"M64", "M65"}:
             return self._output(int(values["P"]), on="M64" in codes)
         elif codes & {"M8", "M9"}:
-            self._when(self._at_rest, lambda: self._relay("M8" in codes))
+            self._when(self._at_rest, lambda: self.switch_relay(on="M8" in codes))
         elif "X" in values:
             return self._move(values["X"] + self._offset)
         return None
@@ -451,15 +452,10 @@ class GrblDouble(threading.Thread, FastTime):
     def _output(self, output: int, *, on: bool) -> int | None:
         if self.firmware == "grbl":
             return 20
-        if output >= self.outputs:
+        if output >= OUTPUTS:
             return 39
-        (self.machine.lights.add if on else self.machine.lights.discard)(output)
+        self.switch_light(output, on=on)
         return None
-
-    def _relay(self, on: bool) -> None:
-        if on and not self.machine.relay:
-            self.released(self.machine)
-        self.machine.relay = on
 
     def _move(self, target: float) -> int | None:
         if not self._feed:

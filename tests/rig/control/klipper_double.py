@@ -23,7 +23,7 @@ from threading import Lock, RLock, Thread
 from time import sleep
 from typing import Any
 
-from tests.rig.control.grbl_double import FastTime, Fault, Machine
+from tests.rig.control.grbl_double import Double, Machine
 
 AHEAD_S, QUEUE_S, TICK_S = 0.25, 1.0, 0.0005
 MOTOR = "manual_stepper base"
@@ -39,7 +39,7 @@ class Shutdown(Exception):
     """Klipper shut down while it did something."""
 
 
-class KlipperDouble(FastTime):
+class KlipperDouble(Double):
     """A printer; `port` is what tbcad is given."""
 
     lines_before = 34  # from the connection to the first photograph
@@ -48,19 +48,11 @@ class KlipperDouble(FastTime):
         self,
         settings: dict[str, dict[str, Any]],
         switch_deg: float,
-        speed: float = 2000.0,
-        angle: float = 3.7,
         see: Callable[[Machine], None] = lambda _: None,
-        released: Callable[[Machine], None] = lambda _: None,
     ) -> None:
-        """Control a machine whose switch is at an angle; as GrblDouble, but for its settings."""
-        self.settings, self.switch_deg = settings, switch_deg
-        super().__init__(speed)
-        self.machine = Machine(angle)
-        self.see, self.released = see, released
-        self.fault: Fault = lambda number, line: None
-        self.on_line: Callable[[int], None] = lambda number: None
-        self.lines: list[str] = []
+        """Control a machine by settings, by section."""
+        super().__init__(switch_deg, see=see)
+        self.settings = settings
         self.unknown: list[str] = []
         self.state, self.message = "ready", "Printer is ready"
         self.started, self.key, self.emergency_stops = True, "", 0
@@ -126,9 +118,8 @@ class KlipperDouble(FastTime):
         """What has happened until now."""
         with self._lock:
             begin, end, start, stop = self._motion
-            share = (
-                1.0 if stop <= start else min(1.0, max(0.0, (self.now - start) / (stop - start)))
-            )
+            share = (self.now - start) / (stop - start) if stop > start else 1.0
+            share = min(1.0, max(0.0, share))
             self.machine.angle = begin + share * (end - begin) + self._zero
             while self._later and self._later[0][0] <= self.now:
                 self._later.pop(0)[1]()
@@ -147,19 +138,12 @@ class KlipperDouble(FastTime):
                 self._line(line)
 
     def _inject(self, fault: str | None) -> None:
-        match fault:
-            case "error":
-                raise CommandError("Timer too close")
-            case "shutdown":
-                self.stop_at_once()
-            case "disconnected":
-                self.stop_at_once("disconnected", "")
-            case "drop":
-                raise ConnectionAbortedError
-            case None:
-                pass
-            case _:
-                raise AssertionError(fault)
+        if fault == "error":
+            raise CommandError("Timer too close")
+        if fault == "drop":
+            raise ConnectionAbortedError
+        if fault is not None:
+            self.stop_at_once(fault, ESTOP if fault == "shutdown" else "")
 
     def _line(self, line: str) -> None:
         command, _, rest = line.partition(" ")
@@ -235,13 +219,10 @@ class KlipperDouble(FastTime):
             raise CommandError(f"The value '{name}' is not valid for PIN")
 
         def switch() -> None:
-            if name != "release":
-                output = OUTPUTS[name]
-                (self.machine.lights.add if on else self.machine.lights.discard)(output)
-                return
-            if on and not self.machine.relay:
-                self.released(self.machine)
-            self.machine.relay = on
+            if name == "release":
+                self.switch_relay(on=on)
+            else:
+                self.switch_light(OUTPUTS[name], on=on)
 
         with self._lock:
             self._end = self._begin()
@@ -287,10 +268,9 @@ class _Handler(BaseHTTPRequestHandler):
         if self.path == "/server/info":
             return self._say({"klippy_connected": not gone, "klippy_state": printer.state})
         if gone:
-            missing = self.path == "/printer/info" and not printer.started
-            return self._error(
-                *((404, "Not Found") if missing else (503, "Klippy Host not connected"))
-            )
+            if self.path == "/printer/info" and not printer.started:
+                return self._error(404, "Not Found")
+            return self._error(503, "Klippy Host not connected")
         if printer.searching:
             printer.searching -= 1
             return self._error(404, "Not Found")

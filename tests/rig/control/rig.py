@@ -16,7 +16,7 @@ from PIL import Image
 
 from tbcad.rig.control.plan import read_settings
 from tests.rig.control.exposing_camera import SIZE
-from tests.rig.control.grbl_double import GrblDouble, Machine
+from tests.rig.control.grbl_double import Fault, GrblDouble, Machine
 from tests.rig.control.klipper_double import KlipperDouble, printer_settings
 
 ROOT = Path(__file__).parents[3]
@@ -85,6 +85,28 @@ class Rig:
             *(("--stops", stops) if stops else ()),
         ]
 
+    def counting(self, cases: str) -> str:
+        """--camera of a command that copies the picture, or else by the call: cases of a shell."""
+        script = self.folder / "camera.sh"
+        script.write_text(
+            f"cd {self.folder}; echo >> n; case $(wc -l < n) in {cases};; "
+            f'*) cp {self.picture} "$1.jpg";; esac\n'
+        )
+        return f"command:sh {script} {{output}}"
+
+    def released(self, missed: Sequence[int] = ()) -> str:
+        """--camera of a folder into which a release brings a photograph, but for some releases."""
+        pictures = self.folder / "pictures"
+        pictures.mkdir()
+        numbers = iter(range(1, 1000))
+
+        def release(machine: Machine) -> None:
+            if (number := next(numbers)) not in missed:
+                put(pictures / f"DSC_{number:04d}.JPG", scene_of(machine))
+
+        self.controller.released = release
+        return f"folder:{pictures}"
+
     def resume(self) -> list[str]:
         """The command line that goes on."""
         return self.words("--resume", stops=None)
@@ -152,6 +174,23 @@ def _started(controller: Any, export: Path, folder: Path) -> Rig:
     controller.see(controller.machine)
     controller.start()
     return Rig(controller, export, folder)
+
+
+def at(
+    start: str, what: str | None, act: Callable[[], object] = lambda: None, number: int = 2
+) -> Fault:
+    """A fault of the second line that begins so, or of another number."""
+    seen: list[str] = []
+
+    def fault(_: int, line: str) -> str | None:
+        if line.startswith(start):
+            seen.append(line)
+            if len(seen) == number:
+                act()
+                return what
+        return None
+
+    return fault
 
 
 def until(condition: Callable[[], bool], seconds: float = 600.0) -> None:

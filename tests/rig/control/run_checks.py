@@ -4,10 +4,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+from tbcad.app.cli import run as tbcad
 from tbcad.rig.runs import read_photograph, read_run
-from tests.rig.control.rig import SIZE, scene
+from tests.rig.control.rig import SIZE, Rig, scene
 
 OUTPUTS = {"dark": (), "led_1": (1,), "led_2": (2,), "led_3": (3,), "led_4": (4,), "lit": (0,)}
+ALL = 2 * 2 * len(OUTPUTS)  # photographs at two stops
+FAST = 2000.0  # of the controller's time
 TIMES = {"taken", "seconds"}
 NEIGHBOURS = (-1, 0, 1)  # tenths of a degree: the program's angles are truncated
 
@@ -29,6 +32,15 @@ def check_every_photograph(folder: Path, count: int) -> None:
     taken = [line["name"] for line in journal(folder) if line["event"] == "taken"]
     assert set(taken) == set(run.exposures)
     assert len(taken) == len(run.exposures)
+
+
+def check_goes_on(rig: Rig, count: int) -> None:
+    """Without faults the run that was stopped becomes complete."""
+    rig.controller.fault = lambda number, line: None
+    rig.controller.on_line = lambda number: None
+    rig.controller.run_at(FAST)
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, count)
 
 
 def journal(folder: Path) -> list[dict[str, Any]]:

@@ -4,7 +4,6 @@ import errno
 import re
 import shutil
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 from unittest.mock import patch
@@ -15,32 +14,16 @@ from tbcad.app.cli import run as tbcad
 from tbcad.rig import runs
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.plan import read_settings
+from tests.rig.control.conftest import Told
 from tests.rig.control.grbl_double import GrblDouble
-from tests.rig.control.rig import Rig, until
-from tests.rig.control.run_checks import check_every_photograph, events
-
-ALL = 24
-FAST = 2000.0  # of the controller's time
-LATER = 40  # lines after which faults come: the base is homed, some photographs are taken
-
-
-def at_first(start: str, what: str, after: int = LATER) -> Callable[[int, str], str | None]:
-    """A fault of the first line after some that begins so."""
-    done: list[int] = []
-
-    def fault(number: int, line: str) -> str | None:
-        if done or number < after or not line.startswith(start):
-            return None
-        done.append(number)
-        return what
-
-    return fault
+from tests.rig.control.rig import Rig, at, until
+from tests.rig.control.run_checks import ALL, FAST, check_every_photograph, check_goes_on, events
 
 
 @pytest.mark.parametrize("what", ["drop_ok", "drop_line"])
 def test_lost_ok_or_line(rig: Rig, what: str, capsys: pytest.CaptureFixture[str]) -> None:
     """One of each kind of line: a motion, a dwell, a light on, a light off."""
-    faults = [at_first(start, what, LATER) for start in ("G1 ", "G4 ", "M64 ", "M65 ")]
+    faults = [at(start, what) for start in ("G1 ", "G4 ", "M64 ", "M65 ")]
     rig.controller.fault = lambda number, line: next(
         (found for fault in faults if (found := fault(number, line))), None
     )
@@ -49,10 +32,9 @@ def test_lost_ok_or_line(rig: Rig, what: str, capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().err.count("no ok came; once more") == len(faults)
 
 
-def test_no_ok_at_all_stops(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_ok_at_all_stops(rig: Rig, stopped: Told) -> None:
     rig.controller.fault = lambda number, line: "drop_ok" if line == "M64 P2" else None
-    assert tbcad(rig.words()) == 1
-    assert "'M64 P2': the controller is idle but sends no ok" in capsys.readouterr().out
+    assert "'M64 P2': the controller is idle but sends no ok" in stopped(rig.words())
     assert not rig.controller.machine.lights
 
 
@@ -63,23 +45,19 @@ def test_no_ok_at_all_stops(rig: Rig, capsys: pytest.CaptureFixture[str]) -> Non
         ("alarm", "stopped at 'M64 P3': ALARM:1: a limit switch was pressed in mid-motion"),
     ],
 )
-def test_controller_stops(
-    rig: Rig, what: str, says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rig.controller.fault = at_first("M64 P3", what)
-    assert tbcad(rig.words()) == 1
-    out = capsys.readouterr().out
+def test_controller_stops(rig: Rig, what: str, says: str, stopped: Told) -> None:
+    rig.controller.fault = at("M64 P3", what)
+    out = stopped(rig.words())
     assert out.startswith("NOT COMPLETE: ")
     assert says in out
     assert "LOOK AT THE MACHINE" not in out
     assert not rig.controller.machine.lights
     assert events(rig.out)[-1] == "stopped"
-    assert tbcad(rig.resume()) == 0
-    check_every_photograph(rig.out, ALL)
+    check_goes_on(rig, ALL)
     assert rig.controller.lines.count("$H") == 2
 
 
-def test_reset_in_mid_motion(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reset_in_mid_motion(rig: Rig, stopped: Told) -> None:
     """The program is told by alarm and banner, before its `ok` would come."""
     rig.controller.run_at(20.0)
     moves: list[str] = []
@@ -89,26 +67,21 @@ def test_reset_in_mid_motion(rig: Rig, capsys: pytest.CaptureFixture[str]) -> No
         return "reset" if len(moves) == 2 and line.startswith("G4") else None
 
     rig.controller.fault = fault
-    assert tbcad(rig.words("--phases", "dark", "--runs", "a", stops="1,9")) == 1
-    assert "ALARM:3: reset in mid-motion: the angle is lost" in capsys.readouterr().out
-    rig.controller.fault = lambda number, line: None
-    rig.controller.run_at(FAST)
-    assert tbcad(rig.resume()) == 0
-    check_every_photograph(rig.out, 2)
+    out = stopped(rig.words("--phases", "dark", "--runs", "a", stops="1,9"))
+    assert "ALARM:3: reset in mid-motion: the angle is lost" in out
+    check_goes_on(rig, 2)
 
 
-def test_unplugged(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    rig.controller.fault = at_first("M64 P3", "silence")
-    assert tbcad(rig.words()) == 1
-    out = capsys.readouterr().out
+def test_unplugged(rig: Rig, stopped: Told) -> None:
+    rig.controller.fault = at("M64 P3", "silence")
+    out = stopped(rig.words())
     assert "stopped: 'M64 P3': the controller does not answer" in out
     assert "LOOK AT THE MACHINE: the controller does not answer: lights may be on; " in out
     assert "leave the supply on, for only the motor holds the base: zero pin in first" in out
     assert "switch" not in out.replace("is it plugged in and switched on?", "")
     assert len(out.splitlines()) <= 12
     rig.controller.plug_in()
-    assert tbcad(rig.resume()) == 0
-    check_every_photograph(rig.out, ALL)
+    check_goes_on(rig, ALL)
 
 
 def test_interrupt_holds_base_and_switches_lights_off(either_rig: Rig) -> None:
@@ -142,10 +115,7 @@ def test_interrupt_holds_base_and_switches_lights_off(either_rig: Rig) -> None:
     else:
         assert controller.motor_on
         assert not controller.emergency_stops
-    controller.fault = lambda number, line: None
-    controller.run_at(FAST)
-    assert tbcad(either_rig.resume()) == 0
-    check_every_photograph(either_rig.out, 2)
+    check_goes_on(either_rig, 2)
 
 
 @pytest.mark.parametrize("reports", [True, False])
@@ -153,7 +123,7 @@ def test_interrupted_homing_stops_with_the_motor_on(rig: Rig, reports: bool) -> 
     """The controller answers nothing while it homes, unless bit 12 of $10 is set."""
     controller = rig.controller
     if not reports:
-        edit_settings(rig, controller, lambda text: text.replace("$10=4607", "$10=511"))
+        edit_settings(rig, "$10=4607", "$10=511")
     begun = controller.machine.angle
     controller.on_line = lambda number: controller.run_at(
         0.1 if controller.lines[-1] == "$H" else FAST
@@ -170,29 +140,25 @@ def test_interrupted_homing_stops_with_the_motor_on(rig: Rig, reports: bool) -> 
     assert begun > controller.machine.angle > controller.switch_deg
     assert (controller.machine.let_go, controller.state) == (0, "Idle")
     assert not controller.machine.lights
-    controller.on_line = lambda number: None
-    controller.run_at(FAST)
-    assert tbcad(rig.resume()) == 0
-    check_every_photograph(rig.out, ALL)
+    check_goes_on(rig, ALL)
 
 
-def edit_settings(rig: Rig, controller: GrblDouble, how: Callable[[str], str]) -> None:
+def edit_settings(rig: Rig, old: str, new: str) -> None:
     """Another grbl_settings.txt, in a copy of the export, and the same on the controller."""
     rig.export = Path(shutil.copytree(rig.export, rig.folder / "export"))
     path = rig.export / "grbl_settings.txt"
-    path.write_text(how(path.read_text()))
-    controller.settings |= read_settings(path)
+    path.write_text(path.read_text().replace(old, new))
+    rig.controller.settings |= read_settings(path)
 
 
-def test_homing_that_does_not_end(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_homing_that_does_not_end(rig: Rig, stopped: Told) -> None:
     """The time-out names the state; the base is stopped by a reset, and lights are off."""
-    edit_settings(rig, rig.controller, lambda text: text.replace("$10=4607", "$10=511"))
+    edit_settings(rig, "$10=4607", "$10=511")
     rig.controller.on_line = lambda number: rig.controller.run_at(
         0.01 if rig.controller.lines[-1] == "$H" else FAST
     )
     with patch.object(Base, "_homing_s", lambda self: 0.1):
-        assert tbcad(rig.words()) == 1
-    out = capsys.readouterr().out
+        out = stopped(rig.words())
     assert re.search(r"'\$H': the controller does not answer: .*; its last state: homing\)", out)
     assert "LOOK AT THE MACHINE" not in out
     assert rig.controller.machine.let_go == 0
@@ -226,43 +192,25 @@ def test_interrupted_dwell(rig: Rig) -> None:
         ("Door:1", "error:13: the safety door is open"),
     ],
 )
-def test_state_that_stops_a_run_is_named(
-    rig: Rig, state: str, says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_state_that_stops_a_run_is_named(rig: Rig, state: str, says: str, stopped: Told) -> None:
     controller = rig.controller
-    homed: list[int] = []
-
-    def fault(number: int, line: str) -> None:
-        if line.startswith("G1 X") and len(homed) < 1:
-            homed.append(number)
-            controller.put_into(state)
-
-    controller.fault = fault
-    assert tbcad(rig.words("--phases", "lit", "--runs", "a", stops="1")) == 1
-    out = capsys.readouterr().out
+    controller.fault = at("G1 X", None, lambda: controller.put_into(state), 1)
+    out = stopped(rig.words("--phases", "lit", "--runs", "a", stops="1"))
     assert says in out
     assert ("zero pin in" in out) == (state != "Check")
 
 
-def test_reset_or_silent_alarm_at_the_start(plain_rig: Rig) -> None:
-    """GRBL answers nothing but a reset after a hard limit."""
-    plain_rig.controller.stop_by_limit()
-    assert tbcad(plain_rig.words(stops="1")) == 0
-
-
-def test_alarm_after_which_grbl_answers_a_reset_only(
-    plain_rig: Rig, capsys: pytest.CaptureFixture[str]
-) -> None:
-    plain_rig.controller.fault = at_first("G1 X", "alarm", 8)
-    assert tbcad(plain_rig.words(stops="1")) == 1
-    out = capsys.readouterr().out
+def test_alarm_after_which_grbl_answers_a_reset_only(plain_rig: Rig, stopped: Told) -> None:
+    """In mid-run, and at the start of the next."""
+    plain_rig.controller.fault = at("G1 X", "alarm")
+    out = stopped(plain_rig.words(stops="1"))
     assert "ALARM:1: a limit switch was pressed in mid-motion" in out
     assert "LOOK AT THE MACHINE" not in out
+    plain_rig.controller.stop_by_limit()
+    assert tbcad(plain_rig.resume()) == 0
 
 
-def test_base_that_does_not_stop_is_not_let_fall(
-    rig: Rig, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_base_that_does_not_stop_is_not_let_fall(rig: Rig, stopped: Told) -> None:
     """A reset in mid-motion would switch the motor off."""
     controller = rig.controller
     controller.deaf = True
@@ -274,8 +222,8 @@ def test_base_that_does_not_stop_is_not_let_fall(
         return None
 
     controller.fault = fault
-    assert tbcad(rig.words("--phases", "lit", "--runs", "a", stops="1,30")) == 1
-    assert "LOOK AT THE MACHINE: the base did not stop (Run)" in capsys.readouterr().out
+    out = stopped(rig.words("--phases", "lit", "--runs", "a", stops="1,30"))
+    assert "LOOK AT THE MACHINE: the base did not stop (Run)" in out
     assert controller.state != "Alarm"
 
 
@@ -287,27 +235,16 @@ def test_complete_run_needs_no_more(rig: Rig, capsys: pytest.CaptureFixture[str]
     assert "COMPLETE: 2 of 2 photographs" in capsys.readouterr().out
 
 
-def failing_camera(rig: Rig, calls: set[int]) -> str:
-    """A camera that gives no photograph when it is called for the n-th time."""
-    script = rig.folder / "camera.sh"
-    faulty = "|".join(map(str, sorted(calls)))
-    script.write_text(
-        f"n=$(cat {rig.folder}/n 2>/dev/null || echo 0); n=$((n + 1)); echo $n > {rig.folder}/n\n"
-        f'case $n in {faulty}) echo "no focus" >&2; exit 3;; esac\ncp {rig.picture} "$1.jpg"\n'
-    )
-    return f"command:sh {script} {{output}}"
+NO_FOCUS = ') echo "no focus" >&2; exit 3'
 
 
-def test_photograph_missed_twice_is_named_and_the_rest_goes_on(
-    rig: Rig, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_photograph_missed_twice_is_named_and_the_rest_goes_on(rig: Rig, stopped: Told) -> None:
     """The first call is for the trial, the fourth and fifth for the third photograph.
 
     One that is missed once is taken again at once.
     """
-    camera = failing_camera(rig, {4, 5, 9})
-    assert tbcad(rig.words(camera=camera)) == 1
-    out = capsys.readouterr().out
+    camera = rig.counting(f"4|5|9{NO_FOCUS}")
+    out = stopped(rig.words(camera=camera))
     assert out.startswith(f"NOT COMPLETE: {ALL - 1} of {ALL} photographs")
     assert "missing: a_0001_led_2: the camera's command ended with 3: no focus" in out
     assert events(rig.out).count("missed") == 1
@@ -315,17 +252,14 @@ def test_photograph_missed_twice_is_named_and_the_rest_goes_on(
     check_every_photograph(rig.out, ALL)
 
 
-def test_dead_camera_stops_the_run(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tbcad(rig.words(camera=failing_camera(rig, set(range(6, 200))))) == 1
-    out = capsys.readouterr().out
+def test_dead_camera_stops_the_run(rig: Rig, stopped: Told) -> None:
+    out = stopped(rig.words(camera=rig.counting(f"[6-9]|??*{NO_FOCUS}")))
     assert "12 photographs in a row are missing" in out
     assert "missing: 7 more, in journal.jsonl" in out
     assert len(out.splitlines()) <= 12
 
 
-def test_full_disk(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_disk(rig: Rig, monkeypatch: pytest.MonkeyPatch, stopped: Told) -> None:
     whole, writes = runs.write_safely, list[Path]()
 
     def full(path: Path, data: bytes) -> None:
@@ -335,10 +269,7 @@ def test_full_disk(
         whole(path, data)
 
     monkeypatch.setattr(runs, "write_safely", full)
-    assert tbcad(rig.words()) == 1
-    out = capsys.readouterr().out
-    assert "cannot be written: No space left on device" in out
+    assert "cannot be written: No space left on device" in stopped(rig.words())
     assert not rig.controller.machine.lights
     monkeypatch.setattr(runs, "write_safely", whole)
-    assert tbcad(rig.resume()) == 0
-    check_every_photograph(rig.out, ALL)
+    check_goes_on(rig, ALL)

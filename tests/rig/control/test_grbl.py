@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tbcad.errors import InputError
 from tbcad.rig.control.grbl import SYNC, Grbl
 from tbcad.rig.control.machine import MachineFault
 from tbcad.rig.control.messages import SerialPort, Status, parse
@@ -49,24 +50,17 @@ def test_motions_wait_for_each_other(homed: Grbl, double: GrblDouble) -> None:
     assert homed.status().state == "Idle"
 
 
-@pytest.mark.parametrize(
-    ("line", "says"),
-    [
+def test_lines_that_are_refused_or_not_sent(homed: Grbl, double: GrblDouble) -> None:
+    for line, says in (
         ("G1 X1", "error:22: no feed is set"),
         ("G2 X1 F1", "error:20: the command is not supported"),
         ("M64 P9", "error:39: the value is out of range"),
         ("$Q", r"error:3: the \$ command is not known"),
-    ],
-)
-def test_refused_lines(homed: Grbl, line: str, says: str) -> None:
-    with pytest.raises(MachineFault, match=says):
-        homed.command(line)
-
-
-def test_line_that_is_too_long_is_not_sent(homed: Grbl, double: GrblDouble) -> None:
-    with pytest.raises(MachineFault, match="longer than 79 characters"):
-        homed.command("G4 P" + "0" * 80)
-    assert double.lines[-1] == "G92 X-98"
+        ("G4 P" + "0" * 80, "longer than 79 characters"),
+    ):
+        with pytest.raises(MachineFault, match=says):
+            homed.command(line)
+    assert double.lines[-1] == "$Q"
 
 
 def test_soft_limit(homed: Grbl, double: GrblDouble) -> None:
@@ -101,37 +95,24 @@ def test_rest_of_a_line_of_a_killed_program_is_forgotten(double: GrblDouble) -> 
     port.close()
 
 
-def test_port_is_ours_alone(grbl: Grbl, double: GrblDouble) -> None:
-    from tbcad.errors import InputError
-
-    with pytest.raises(InputError, match="another program uses it"):
-        SerialPort(double.port)
-
-
-def test_line_stays_up_when_the_port_is_closed(double: GrblDouble) -> None:
+def test_port_is_ours_alone_and_its_line_stays_up_when_closed(double: GrblDouble) -> None:
     """Else the next start would reset the board, and the motor would let the base go."""
     termios = pytest.importorskip("termios")
     with open(double.port, "rb", buffering=0) as line:
         modes = termios.tcgetattr(line)
         modes[2] |= termios.HUPCL
         termios.tcsetattr(line, termios.TCSANOW, modes)
-        SerialPort(double.port).close()
+        port = SerialPort(double.port)
+        with pytest.raises(InputError, match="another program uses it"):
+            SerialPort(double.port)
+        port.close()
         assert not termios.tcgetattr(line)[2] & termios.HUPCL
 
 
-@pytest.mark.parametrize(
-    ("line", "kind", "code"),
-    [
-        ("GrblHAL 1.1f ['$' or '$HELP' for help]", "banner", 0),
-        ("[MSG:'$H'|'$X' to unlock]", "other", 0),
-        (">G54G20:ok", "other", 0),
-        ("okay", "other", 0),
-        ("<broken", "other", 0),
-    ],
-)
-def test_lines_as_the_manuals_show_them(line: str, kind: str, code: int) -> None:
-    found = parse(line)
-    assert (found.kind, found.code) == (kind, code)
+@pytest.mark.parametrize("line", ["[MSG:'$H'|'$X' to unlock]", ">G54G20:ok", "okay", "<broken"])
+def test_lines_that_tell_nothing(line: str) -> None:
+    assert (parse(line).kind, parse(line).code) == ("other", 0)
+    assert parse("GrblHAL 1.1f ['$' or '$HELP' for help]").kind == "banner"
 
 
 def test_status_reports() -> None:

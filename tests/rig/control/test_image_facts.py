@@ -7,10 +7,10 @@ import pytest
 from PIL import Image
 from PIL.TiffImagePlugin import IFDRational, ImageFileDirectory_v2
 
-from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.camera import EXIF, EXPOSURE, MAKE, MODEL, image_facts
 from tbcad.rig.control.machine import CameraFault
-from tests.rig.control.rig import SIZE, Rig
+from tests.rig.control.conftest import Told
+from tests.rig.control.rig import SIZE, Rig, put
 
 ISO, WHITE_BALANCE = 0x8827, 0xA403
 
@@ -42,11 +42,15 @@ def test_facts(kind: str, suffix: str) -> None:
     assert found.settings == {"exposure_s": 0.008, "iso": 200, "white_balance": 0}
 
 
-def test_facts_of_a_bare_file() -> None:
-    file = io.BytesIO()
-    Image.new("L", SIZE).save(file, "PNG")
-    found = image_facts(file.getvalue(), ".png")
-    assert (found.model, found.exposure_s, found.settings) == ("", None, {})
+def test_files_that_tell_little() -> None:
+    """A bare one, and one whose exposure is zero over zero, as some cameras write it."""
+    tags = Image.Exif()
+    tags.get_ifd(EXIF)[EXPOSURE] = IFDRational(0, 0)
+    for kind, exif in (("PNG", None), ("JPEG", tags)):
+        file = io.BytesIO()
+        Image.new("L", SIZE).save(file, kind, exif=exif or b"")
+        found = image_facts(file.getvalue(), f".{kind.lower()}")
+        assert (found.model, found.exposure_s, found.settings) == ("", None, {})
 
 
 @pytest.mark.parametrize(
@@ -64,29 +68,12 @@ def test_files_that_will_not_do(suffix: str, cut: int | None, says: str) -> None
         image_facts(photograph(Fraction(1, 8))[:cut], suffix)
 
 
-def test_exposure_that_is_never_told() -> None:
-    """Zero over zero, as some cameras write it."""
-    tags = Image.Exif()
-    tags.get_ifd(EXIF)[EXPOSURE] = IFDRational(0, 0)
-    file = io.BytesIO()
-    Image.new("L", SIZE).save(file, "JPEG", exif=tags)
-    found = image_facts(file.getvalue(), ".jpg")
-    assert (found.exposure_s, found.settings) == (None, {})
-
-
-def test_another_exposure_is_named_and_the_rest_goes_on(
-    rig: Rig, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (rig.folder / "1.jpg").write_bytes(photograph(Fraction(1, 10)))
-    (rig.folder / "2.jpg").write_bytes(photograph(Fraction(1, 20)))
-    script = rig.folder / "camera.sh"
-    script.write_text(
-        f'cd {rig.folder}; echo >> n; case $(wc -l < n) in 3|4) cp 2.jpg "$1.jpg";; '
-        '*) cp 1.jpg "$1.jpg";; esac\n'
-    )
-    camera = f"command:sh {script} {{output}}"
-    words = rig.words("--phases", "dark,led_1,lit", "--runs", "a", camera=camera, stops="1")
-    assert tbcad(words) == 1
-    out = capsys.readouterr().out
+def test_another_exposure_is_named_and_the_rest_goes_on(rig: Rig, stopped: Told) -> None:
+    (rig.folder / "other.jpg").write_bytes(photograph(Fraction(1, 20)))
+    rig.controller.see = lambda _: put(rig.picture, photograph(Fraction(1, 10)))
+    rig.controller.see(rig.controller.machine)
+    camera = rig.counting('3|4) cp other.jpg "$1.jpg"')
+    words = ("--phases", "dark,led_1,lit", "--runs", "a")
+    out = stopped(rig.words(*words, camera=camera, stops="1"))
     assert out.startswith("NOT COMPLETE: 2 of 3 photographs")
     assert "missing: a_0001_led_1: exposure_s is 0.05, and the run is locked to 0.1" in out

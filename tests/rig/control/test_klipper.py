@@ -8,11 +8,9 @@ import pytest
 
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.klipper_base import PIECE_S
-from tests.rig.control.rig import Rig, until
-from tests.rig.control.run_checks import check_every_photograph, events
-
-ALL = 24
-FAST = 2000.0
+from tests.rig.control.conftest import Told
+from tests.rig.control.rig import Rig, at, until
+from tests.rig.control.run_checks import ALL, check_every_photograph, check_goes_on, events
 
 
 @pytest.fixture(autouse=True)
@@ -56,22 +54,6 @@ def test_motions_come_in_short_pieces(klipper_rig: Rig) -> None:
     assert max(float(a) - float(b) for a, b in pairwise(["0", *search])) <= 8.3
 
 
-def at_line(rig: Rig, line: str, what: str | None, act: Any = lambda: None) -> None:
-    """Let something happen once, when a line comes for the second time."""
-    seen: list[int] = []
-
-    def fault(number: int, text: str) -> str | None:
-        if text != line:
-            return None
-        seen.append(number)
-        if len(seen) == 2:
-            act()
-            return what
-        return None
-
-    rig.controller.fault = fault
-
-
 LED = "SET_PIN PIN=led_3 VALUE=1"
 
 
@@ -90,37 +72,30 @@ LED = "SET_PIN PIN=led_3 VALUE=1"
         ),
     ],
 )
-def test_klipper_stops(
-    klipper_rig: Rig, what: str, says: str, look: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    at_line(klipper_rig, LED, what)
-    assert tbcad(klipper_rig.words()) == 1
-    out = capsys.readouterr().out
+def test_klipper_stops(klipper_rig: Rig, what: str, says: str, look: str, stopped: Told) -> None:
+    klipper_rig.controller.fault = at(LED, what)
+    out = stopped(klipper_rig.words())
     assert says in out
     assert look in out
     assert "LOOK AT THE MACHINE" in out
     assert events(klipper_rig.out)[-1] == "stopped"
-    klipper_rig.controller.fault = lambda number, line: None
     klipper_rig.controller.restart()
-    assert tbcad(klipper_rig.resume()) == 0
-    check_every_photograph(klipper_rig.out, ALL)
+    check_goes_on(klipper_rig, ALL)
 
 
-def test_refused_line(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_refused_line(klipper_rig: Rig, stopped: Told) -> None:
     """While an LED is on, which must not stay so."""
-    at_line(klipper_rig, "G4 P0", "error")
-    assert tbcad(klipper_rig.words()) == 1
-    out = capsys.readouterr().out
+    klipper_rig.controller.fault = at("G4 P0", "error")
+    out = stopped(klipper_rig.words())
     assert "stopped: Klipper refuses 'G4 P0': Timer too close" in out
     assert not klipper_rig.controller.machine.lights
     assert "LOOK AT THE MACHINE" not in out
-    assert tbcad(klipper_rig.resume()) == 0
-    check_every_photograph(klipper_rig.out, ALL)
+    check_goes_on(klipper_rig, ALL)
 
 
 @pytest.mark.parametrize("before", ["MOVE=", "G4 P0"])
 def test_shutdown_while_something_is_waited_for(
-    klipper_rig: Rig, before: str, capsys: pytest.CaptureFixture[str]
+    klipper_rig: Rig, before: str, stopped: Told
 ) -> None:
     """M400 ends without an error then: nothing may be photographed after it."""
     controller = klipper_rig.controller
@@ -130,50 +105,36 @@ def test_shutdown_while_something_is_waited_for(
         return "shutdown" if later and line == "M400" and before in controller.lines[-2] else None
 
     controller.fault = fault
-    assert tbcad(klipper_rig.words()) == 1
-    assert "stopped: Klipper is in state shutdown" in capsys.readouterr().out
-    controller.fault = lambda number, line: None
+    assert "stopped: Klipper is in state shutdown" in stopped(klipper_rig.words())
     controller.restart()
-    assert tbcad(klipper_rig.resume()) == 0
-    check_every_photograph(klipper_rig.out, ALL)
+    check_goes_on(klipper_rig, ALL)
 
 
 @pytest.mark.parametrize(
     ("act", "line"), [("let_go", LED), ("restart", "SET_PIN PIN=lamp VALUE=0")]
 )
-def test_motor_that_was_let_go(
-    klipper_rig: Rig, act: str, line: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_motor_that_was_let_go(klipper_rig: Rig, act: str, line: str, stopped: Told) -> None:
     """By M84 or RESTART in another window: the next motion would switch it on again."""
-    at_line(klipper_rig, line, None, getattr(klipper_rig.controller, act))
-    assert tbcad(klipper_rig.words()) == 1
-    out = capsys.readouterr().out
+    controller = klipper_rig.controller
+    controller.fault = at(line, None, getattr(controller, act))
+    out = stopped(klipper_rig.words())
     assert "stopped: Klipper has let the motor go" in out
     assert "LOOK AT THE MACHINE: Klipper has let the motor go" in out
     assert "put the zero pin in first" in out
-    assert not moves_after(klipper_rig, line)
-    klipper_rig.controller.fault = lambda number, line: None
-    assert tbcad(klipper_rig.resume()) == 0
-    check_every_photograph(klipper_rig.out, ALL)
-
-
-def moves_after(rig: Rig, line: str) -> list[str]:
-    lines = rig.controller.lines
-    last = len(lines) - lines[::-1].index(line)
-    return [one for one in lines[last:] if "MOVE=" in one]
+    last = controller.lines[::-1].index(line)
+    assert not any("MOVE=" in one for one in controller.lines[len(controller.lines) - last :])
+    check_goes_on(klipper_rig, ALL)
 
 
 def test_connection_that_breaks_once(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    at_line(klipper_rig, "M400", "drop")
+    klipper_rig.controller.fault = at("M400", "drop")
     assert tbcad(klipper_rig.words()) == 0
     check_every_photograph(klipper_rig.out, ALL)
     assert capsys.readouterr().err.count("once more") == 1
 
 
 @pytest.mark.parametrize("seen", [0, 1])
-def test_moonraker_that_begins_anew(
-    klipper_rig: Rig, seen: int, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_moonraker_that_begins_anew(klipper_rig: Rig, seen: int) -> None:
     """It finds Klipper after it listens again, whichever connection tells of it first."""
     controller = klipper_rig.controller
 
@@ -181,23 +142,20 @@ def test_moonraker_that_begins_anew(
         controller.searching = 3
         until(lambda: controller.searching <= 3 - seen)
 
-    at_line(klipper_rig, "M400", "drop", restart)
+    controller.fault = at("M400", "drop", restart)
     assert tbcad(klipper_rig.words("--phases", "dark")) == 0
     assert controller.searching == 0
 
 
-def test_moonraker_that_goes(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_moonraker_that_goes(klipper_rig: Rig, stopped: Told) -> None:
     controller = klipper_rig.controller
-    at_line(klipper_rig, LED, "drop", lambda: setattr(controller, "away", True))
-    assert tbcad(klipper_rig.words()) == 1
-    out = capsys.readouterr().out
+    controller.fault = at(LED, "drop", lambda: setattr(controller, "away", True))
+    out = stopped(klipper_rig.words())
     assert "stopped: Moonraker: " in out
     assert "LOOK AT THE MACHINE: lights may be on: Moonraker: " in out
     assert "before any supply is cut, hold the base by hand and put the zero pin in first" in out
     controller.away = False
-    controller.fault = lambda number, line: None
-    assert tbcad(klipper_rig.resume()) == 0
-    check_every_photograph(klipper_rig.out, ALL)
+    check_goes_on(klipper_rig, ALL)
 
 
 def test_other_programs_motion_is_waited_for(
@@ -210,7 +168,7 @@ def test_other_programs_motion_is_waited_for(
         before = controller.asked
         until(lambda: controller.asked > before + 2)
 
-    at_line(klipper_rig, "M400", None, busy)
+    controller.fault = at("M400", None, busy)
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
     assert "does another program give it G-code?" in capsys.readouterr().err
 
@@ -223,12 +181,7 @@ def test_other_programs_motion_is_waited_for(
     ],
 )
 def test_homing_that_fails(
-    klipper_rig: Rig,
-    attribute: str,
-    value: object,
-    says: str,
-    capsys: pytest.CaptureFixture[str],
+    klipper_rig: Rig, attribute: str, value: object, says: str, stopped: Told
 ) -> None:
     setattr(klipper_rig.controller, attribute, value)
-    assert tbcad(klipper_rig.words()) == 1
-    assert says in capsys.readouterr().out
+    assert says in stopped(klipper_rig.words())

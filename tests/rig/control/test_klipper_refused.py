@@ -2,7 +2,7 @@
 
 import shutil
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import astuple
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -12,20 +12,17 @@ import pytest
 
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control import klipper_base, moonraker
+from tests.rig.control.conftest import Told
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
 
-Refused = Callable[[list[str]], str]
-
 
 @pytest.fixture
-def refused(klipper_rig: Rig, capsys: pytest.CaptureFixture[str]) -> Refused:
+def refused(klipper_rig: Rig, refused: Told) -> Told:
     """The one line that a command of the rig ends with, before anything moves."""
 
     def line_of(words: list[str]) -> str:
-        assert tbcad(words) == 2
-        *_, line = capsys.readouterr().err.splitlines()
-        assert line.startswith("tbcad: ")
+        line = refused(words)
         assert not klipper_rig.out.exists()
         assert not klipper_rig.controller.lines
         return line
@@ -40,31 +37,31 @@ def words_to(rig: Rig, port: str) -> list[str]:
 
 
 FORM = "allowed is moonraker:http://HOST"
+KEY = "an API key goes into MOONRAKER_API_KEY"
+ADDRESSES = {
+    "http://printer": "for Klipper say moonraker:http://HOST",
+    "moonraker:ftp://printer": FORM,
+    "moonraker:http://printer:99999": FORM,
+    "moonraker:http://printer\n": FORM,
+    "moonraker:http://[::1": FORM,
+    "moonraker:http://user:secret@printer": KEY,
+    "moonraker:http://printer/?token=1": KEY,
+    "moonraker:http://no-such-printer.invalid": "there is no such host",
+}
 
 
-@pytest.mark.parametrize(
-    ("port", "says"),
-    [
-        ("http://printer", "for Klipper say moonraker:http://HOST"),
-        ("moonraker:", FORM),
-        ("moonraker:ftp://printer", FORM),
-        ("moonraker:http://printer:99999", FORM),
-        ("moonraker:http://printer\n", FORM),
-        ("moonraker:http://[::1", FORM),
-        ("moonraker:http://user:secret@printer", "an API key goes into MOONRAKER_API_KEY"),
-        ("moonraker:http://printer/?token=1", "an API key goes into MOONRAKER_API_KEY"),
-        ("moonraker:http://no-such-printer.invalid", "there is no such host"),
-    ],
-)
-def test_addresses(klipper_rig: Rig, refused: Refused, port: str, says: str) -> None:
+@pytest.mark.parametrize(("port", "says"), ADDRESSES.items())
+def test_addresses(klipper_rig: Rig, refused: Told, port: str, says: str) -> None:
     assert says in refused(words_to(klipper_rig, port))
 
 
-def test_nothing_listens(klipper_rig: Rig, refused: Refused) -> None:
+def test_server_that_does_not_listen_or_speak_so(klipper_rig: Rig, refused: Told) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = f"moonraker:http://127.0.0.1:{server.getsockname()[1]}"
     line = refused(words_to(klipper_rig, port))
     assert "nothing listens there: is this Moonraker? It listens at port 7125" in line
+    secure = klipper_rig.controller.port.replace("http:", "https:")
+    assert "it does not speak https: say http://" in refused(words_to(klipper_rig, secure))
 
 
 class Other(BaseHTTPRequestHandler):
@@ -106,7 +103,7 @@ def other() -> Iterator[HTTPServer]:
 )
 def test_server_that_is_not_moonraker(
     klipper_rig: Rig,
-    refused: Refused,
+    refused: Told,
     other: HTTPServer,
     code: int,
     head: dict[str, str],
@@ -118,13 +115,7 @@ def test_server_that_is_not_moonraker(
     assert says in refused(words_to(klipper_rig, port))
 
 
-def test_http_that_is_said_to_be_https(klipper_rig: Rig, refused: Refused) -> None:
-    port = klipper_rig.controller.port.replace("http:", "https:")
-    line = refused(words_to(klipper_rig, port))
-    assert "it does not speak https: say http://" in line
-
-
-def test_key(klipper_rig: Rig, refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_key(klipper_rig: Rig, refused: Told, monkeypatch: pytest.MonkeyPatch) -> None:
     klipper_rig.controller.key = "1234"
     line = refused(klipper_rig.words())
     assert "does not let this computer in: set MOONRAKER_API_KEY" in line
@@ -134,26 +125,19 @@ def test_key(klipper_rig: Rig, refused: Refused, monkeypatch: pytest.MonkeyPatch
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
 
 
-@pytest.mark.parametrize(
-    ("state", "message", "says"),
-    [
-        (
-            "startup",
-            "\nPrinter is not ready\n",
-            "Klipper is in state startup: Printer is not ready",
-        ),
-        (
-            "error",
-            "Section 'x' is not valid\nmore",
-            "then mend what it says and say FIRMWARE_RESTART",
-        ),
-        ("shutdown", "Lost communication", "put the zero pin in first, then say FIRMWARE_RESTART"),
-        ("disconnected", "", "put the zero pin in first, then start the service klipper"),
-        ("unheard of", "", "put the zero pin in first"),
-    ],
-)
-def test_states(klipper_rig: Rig, refused: Refused, state: str, message: str, says: str) -> None:
-    klipper_rig.controller.state, klipper_rig.controller.message = state, message
+STATES = """
+startup | Printer is not ready | Klipper is in state startup: Printer is not ready
+error | Section 'x' is not valid | then mend what it says and say FIRMWARE_RESTART
+shutdown | Lost communication | put the zero pin in first, then say FIRMWARE_RESTART
+disconnected |  | put the zero pin in first, then start the service klipper
+unheard of |  | put the zero pin in first
+"""
+
+
+@pytest.mark.parametrize("case", STATES.strip().splitlines())
+def test_states(klipper_rig: Rig, refused: Told, case: str) -> None:
+    state, message, says = case.split(" | ")
+    klipper_rig.controller.state, klipper_rig.controller.message = state, f"\n{message}\nmore"
     klipper_rig.controller.started = state != "disconnected"
     line = refused(klipper_rig.words())
     assert says in line
@@ -173,7 +157,7 @@ def test_start_is_waited_for(klipper_rig: Rig, monkeypatch: pytest.MonkeyPatch) 
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
 
 
-def test_neither_settings_nor_a_print_are_touched(klipper_rig: Rig, refused: Refused) -> None:
+def test_neither_settings_nor_a_print_are_touched(klipper_rig: Rig, refused: Told) -> None:
     assert "leave --send-settings out" in refused(klipper_rig.words("--send-settings"))
     klipper_rig.controller.print_state = "paused"
     assert "the printer prints a file" in refused(klipper_rig.words())
@@ -182,47 +166,35 @@ def test_neither_settings_nor_a_print_are_touched(klipper_rig: Rig, refused: Ref
 @pytest.mark.parametrize(
     ("section", "option", "value", "says"),
     [
-        (
-            MOTOR,
-            "rotation_distance",
-            40.0,
-            "rotation_distance of [manual_stepper base] is 40.0, not",
-        ),
-        (MOTOR, "gear_ratio", [[2.0, 1.0]], "gear_ratio of [manual_stepper base] is [[2.0, 1.0]]"),
-        (MOTOR, "accel", None, "accel of [manual_stepper base] is missing"),
-        (MOTOR, "endstop_pin", "^!PA1", "endstop_pin of [manual_stepper base] is '^!PA1', not ^"),
-        (MOTOR, "endstop_pin", "PA1", "endstop_pin of [manual_stepper base] is 'PA1', not ^"),
-        (MOTOR, "dir_pin", "FILL_IN", "dir_pin of [manual_stepper base] is 'FILL_IN'"),
-        (MOTOR, "dir_pin", None, "dir_pin of [manual_stepper base] is missing"),
-        ("printer", "kinematics", "corexy", "kinematics of [printer] is 'corexy', not none"),
-        ("output_pin led_4", None, None, "[output_pin led_4] is missing"),
+        (MOTOR, "rotation_distance", 40.0, " is 40.0, not"),
+        (MOTOR, "gear_ratio", [[2.0, 1.0]], " is [[2.0, 1.0]]"),
+        (MOTOR, "accel", None, " is missing"),
+        (MOTOR, "endstop_pin", "PA1", " is 'PA1', not ^"),
+        (MOTOR, "dir_pin", "FILL_IN", " is 'FILL_IN'"),
+        ("printer", "kinematics", "corexy", " is 'corexy', not none"),
         ("idle_timeout", "timeout", 600.0, "idle_timeout"),
     ],
 )
 def test_other_configuration(
-    klipper_rig: Rig,
-    refused: Refused,
-    section: str,
-    option: str | None,
-    value: object,
-    says: str,
+    klipper_rig: Rig, refused: Told, section: str, option: str, value: object, says: str
 ) -> None:
     settings = klipper_rig.controller.settings
-    if option is None:
-        del settings[section]
-    elif value is None:
+    settings[section] |= {option: value}
+    if value is None:
         del settings[section][option]
-    else:
-        settings[section][option] = value
     line = refused(klipper_rig.words())
-    assert says in line
+    assert (says if section == "idle_timeout" else f"{option} of [{section}]{says}") in line
     assert "zero pin in first" in line
+    del settings["output_pin led_4"]
+    assert "[output_pin led_4] is missing" in refused(klipper_rig.words())
 
 
-@pytest.mark.parametrize(("option", "value"), [("enable_pin", "!PB3"), ("dir_pin", "! PB4")])
-def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig, option: str, value: str) -> None:
-    klipper_rig.controller.settings[MOTOR][option] = value
+def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig) -> None:
+    klipper_rig.controller.settings[MOTOR] |= {"enable_pin": "!PB3", "dir_pin": "! PB4"}
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
+
+
+IDLE = {"timeout": 1e7, "gcode": "\nM84\n"}
 
 
 @pytest.mark.parametrize(
@@ -231,8 +203,8 @@ def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig, option: str, value:
         ({}, {}, 600.0),
         ({"timeout": 300.0, "gcode": "\nm84\n"}, {}, 300.0),
         ({"timeout": 300.0, "gcode": "M117 idle"}, {}, None),
-        ({"timeout": 1e7, "gcode": "\nM84\n"}, {}, None),
-        ({"timeout": 1e7, "gcode": "\nM84\n"}, {"idle_timeout": 60.0}, 60.0),
+        (IDLE, {}, None),
+        (IDLE, {"idle_timeout": 60.0}, 60.0),
     ],
 )
 def test_idle_printer(
@@ -275,15 +247,12 @@ def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None
     assert astuple(moonraker.read_address(text)) == address
 
 
-def test_build_for_plain_grbl(plain_export: Path, klipper_rig: Rig, refused: Refused) -> None:
+def test_exports_that_are_not_for_klipper(
+    control_export: Path, plain_export: Path, tmp_path: Path, klipper_rig: Rig, refused: Told
+) -> None:
     klipper_rig.export = plain_export
     line = refused(klipper_rig.words())
     assert "rotation_plan_klipper.gcode is not there: build for grblHAL" in line
-
-
-def test_files_that_are_not_tbcads(
-    control_export: Path, tmp_path: Path, klipper_rig: Rig, refused: Refused
-) -> None:
     klipper_rig.export = Path(shutil.copytree(control_export, tmp_path / "copy"))
     program = klipper_rig.export / "rotation_plan_klipper.gcode"
     program.write_text(program.read_text().replace("STOP_ON_ENDSTOP=1", "STOP_ON_ENDSTOP=-1"))

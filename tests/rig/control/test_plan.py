@@ -9,7 +9,7 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.rig.control.plan import read_control_plan
 from tbcad.rig.control.selection import chosen_frames, chosen_phases
-from tests.exported_files import edit_csv, edit_json
+from tests.exported_files import Rows, edit_csv
 
 
 @pytest.fixture
@@ -40,34 +40,28 @@ def replaced(name: str, old: str, new: str) -> Callable[[Path], object]:
     return change
 
 
+def missing(name: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / name).unlink()
+
+
+def of_stops(change: Callable[[Rows], object]) -> Callable[[Path], object]:
+    return lambda folder: edit_csv(folder / "stops.csv", change)
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda folder: (folder / "prototype.json").unlink(), "prototype.json is not there"),
-        (lambda folder: (folder / "rotation_plan.nc").unlink(), "rotation_plan.nc is not there"),
-        (lambda folder: (folder / "balls.csv").unlink(), "balls.csv is not there"),
-        (lambda folder: (folder / "grbl_settings.txt").unlink(), "grbl_settings.txt is not there"),
+        (missing("prototype.json"), "prototype.json is not there"),
+        (missing("rotation_plan.nc"), "rotation_plan.nc is not there"),
+        (missing("balls.csv"), "balls.csv is not there"),
+        (missing("grbl_settings.txt"), "grbl_settings.txt is not there"),
         (replaced("rotation_plan.nc", "(stop 2 of", "(stop 9 of"), "not numbered from 1"),
         (replaced("rotation_plan.nc", "M0 (MSG, turn", "M1 (MSG, turn"), "is no program of tbcad"),
         (replaced("rotation_plan.nc", "G92 X", "G92 Y"), "sets no angle"),
         (replaced("grbl_settings.txt", "$1=255", "motor on"), "line 5 is no setting"),
-        (
-            lambda folder: edit_csv(folder / "stops.csv", lambda rows: rows.pop()),
-            "another number of stops",
-        ),
-        (
-            lambda folder: edit_csv(
-                folder / "stops.csv", lambda rows: rows[2].update(base_angle_deg="3")
-            ),
-            "does not drive to stop 3",
-        ),
-        (
-            lambda folder: edit_json(
-                folder / "prototype.json",
-                lambda value: value["controller"]["phases"][1].update(name="lamp"),
-            ),
-            "controller.phases.1.name",
-        ),
+        (replaced("prototype.json", '"led_1"', '"lamp"'), "controller.phases.1.name"),
+        (of_stops(lambda rows: rows.pop()), "another number of stops"),
+        (of_stops(lambda rows: rows[2].update(base_angle_deg="3")), "does not drive to stop 3"),
     ],
 )
 def test_broken_export_is_refused(
@@ -78,15 +72,11 @@ def test_broken_export_is_refused(
         read_control_plan(export)
 
 
-def test_phases_are_in_the_order_of_the_plan(control_export: Path) -> None:
+def test_phases_and_stops_that_are_chosen(control_export: Path) -> None:
+    """Phases in the order of the plan, stops by numbers and ranges."""
     plan = read_control_plan(control_export)
     assert [one.name for one in chosen_phases(plan, "lit, dark")] == ["dark", "lit"]
-    leds = chosen_phases(plan, "leds")
-    assert [one.output for one in leds] == [1, 2, 3, 4]
-
-
-def test_stops_are_numbers_and_ranges(control_export: Path) -> None:
-    plan = read_control_plan(control_export)
+    assert [one.output for one in chosen_phases(plan, "leds")] == [1, 2, 3, 4]
     found = chosen_frames(plan, "5,1-3", "ab")
     assert [one.stop for one in found] == [1, 2, 3, 5] * 2
     assert {one.object_turn_deg for one in chosen_frames(plan, None, "b")} == {180}

@@ -9,11 +9,9 @@ import pytest
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.grbl import STATUS_S, Grbl
 from tbcad.rig.runs import read_run
-from tests.rig.control.grbl_double import Machine
-from tests.rig.control.rig import Rig, put, scene_of
-from tests.rig.control.run_checks import OUTPUTS, check_every_photograph, events
-
-ALL = 2 * 2 * len(OUTPUTS)
+from tests.rig.control.conftest import Told
+from tests.rig.control.rig import Rig
+from tests.rig.control.run_checks import ALL, check_every_photograph, events
 
 
 def test_every_photograph_of_a_run(either_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,16 +60,13 @@ def test_status_is_asked_for_five_times_a_second_at_most(
 
 def test_stops_are_reached_from_below(rig: Rig) -> None:
     assert tbcad(rig.words("--phases", "dark", "--runs", "b", stops="2,5")) == 0
-    angles = [float(line.split("X")[1].split()[0]) for line in _moves(rig)]
+    lines = [line for line in rig.controller.lines if line.startswith("G1 ")]
+    angles = [float(line.split("X")[1].split()[0]) for line in lines]
     start, second, fifth, end = angles
     assert start < second < fifth
     assert end == 0
     run = read_run(rig.out)
     assert [(one.object_turn_deg, one.stop) for one in run.record.frames] == [(180, 2), (180, 5)]
-
-
-def _moves(rig: Rig) -> list[str]:
-    return [line for line in rig.controller.lines if line.startswith("G1 ")]
 
 
 def test_plain_grbl_photographs_the_lit_object_only(plain_rig: Rig) -> None:
@@ -83,33 +78,17 @@ def test_plain_grbl_photographs_the_lit_object_only(plain_rig: Rig) -> None:
 
 
 def test_folder_that_the_released_camera_fills(either_rig: Rig) -> None:
-    pictures = either_rig.folder / "pictures"
-    pictures.mkdir()
-    (pictures / "old.jpg").write_bytes(b"of another day")
-    numbers = iter(range(1000))
-    either_rig.controller.released = lambda machine: put(
-        pictures / f"DSC_{next(numbers):04d}.JPG", scene_of(machine)
-    )
-    words = either_rig.words("--phases", "dark,lit", camera=f"folder:{pictures}", stops="1")
-    assert tbcad(words) == 0
+    camera = either_rig.released()
+    (either_rig.folder / "pictures" / "old.jpg").write_bytes(b"of another day")
+    assert tbcad(either_rig.words("--phases", "dark,lit", camera=camera, stops="1")) == 0
     check_every_photograph(either_rig.out, 4)
 
 
-def test_release_that_brings_no_photograph(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_release_that_brings_no_photograph(rig: Rig, stopped: Told) -> None:
     """The first release is for the trial; the third and fourth are for the second photograph."""
-    pictures = rig.folder / "pictures"
-    pictures.mkdir()
-    numbers = iter(range(1, 1000))
-
-    def release(machine: Machine) -> None:
-        if (number := next(numbers)) not in (3, 4):
-            put(pictures / f"{number}.jpg", scene_of(machine))
-
-    rig.controller.released = release
-    camera = f"folder:{pictures}"
-    words = rig.words("--phases", "dark,led_1,lit", "--timeout", "1", camera=camera, stops="1")
-    assert tbcad(words) == 1
-    out = capsys.readouterr().out
+    phases, camera = ("--phases", "dark,led_1,lit"), rig.released(missed=(3, 4))
+    out = stopped(rig.words(*phases, "--timeout", "1", camera=camera, stops="1"))
+    pictures = camera.removeprefix("folder:")
     assert f"missing: a_0001_led_1: no photograph came into {pictures} within 1 s" in out
     assert set(read_run(rig.out).faults) == {"a_0001_led_1"}
 

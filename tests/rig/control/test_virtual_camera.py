@@ -25,15 +25,6 @@ def test_camera_on_usb(rig: Rig) -> None:
     assert {one.exposure_s for one in run.exposures.values()} == {0.01}
 
 
-def test_another_size_is_refused_at_the_first(rig: Rig) -> None:
-    process = rig.start(rig.words("--size", "4160x3104", camera="gphoto2"))
-    _, err = process.communicate(timeout=600)
-    assert process.returncode == 2
-    assert "gives 416 x 310 pixels, 4160 x 3104 are wanted" in err.splitlines()[-1]
-    assert not rig.out.exists()
-    assert "$H" not in rig.controller.lines
-
-
 def test_another_camera_is_refused_when_a_run_goes_on(rig: Rig) -> None:
     """The run was begun with a command, whose photographs name no camera."""
     assert tbcad(rig.words(stops="1")) == 0

@@ -91,7 +91,6 @@ def loop(drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loo
     folder = tmp_path_factory.mktemp("loop")
     small = design(load_spec(None, list(DESIGN)))
     layout = prototype_layout(small.spec, small)
-    (folder / "exports").mkdir()
     exports = export(folder / "exports", small, layout, drive, MotionSpec())
     simulated = folder / "simulated"
     assert tbcad(["simulate-run", str(exports), "--seed", "3", "--out", str(simulated)]) == 0

@@ -61,20 +61,13 @@ def test_refused(tmp_path: Path, key: str, value: object, message: str) -> None:
         read_machine(path)
 
 
-def test_axis_point_and_radius_stay() -> None:
-    frame, sphere = np.array([0, 1]), np.array([2, 2])
-    here, there = replace(MACHINE, shift=None).centres(frame, sphere)
-    for point in (here, there):
-        assert norm(point - MACHINE.axis_point) == pytest.approx(
-            norm(MACHINE.centre[2] - MACHINE.axis_point)
-        )
-    assert (there - here) @ MACHINE.axis == pytest.approx(0, abs=1e-12)
-
-
-def test_a_shift_moves_all_spheres_of_a_frame() -> None:
+def test_spheres_turn_about_the_axis_and_shift_together() -> None:
     assert MACHINE.shift is not None
     frame, sphere = np.array([0, 1, 1]), np.array([2, 2, 0])
     still = replace(MACHINE, shift=None).centres(frame, sphere)
+    away = norm(still - MACHINE.axis_point)
+    assert away == pytest.approx(norm(MACHINE.centre[sphere] - MACHINE.axis_point))
+    assert (still[1] - still[0]) @ MACHINE.axis == pytest.approx(0, abs=1e-12)
     assert MACHINE.centres(frame, sphere) - still == pytest.approx(MACHINE.shift[frame])
 
 

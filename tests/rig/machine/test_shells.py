@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.core.mirrors.record import write_record
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.prototype.run import HALF_TURN
@@ -34,17 +32,12 @@ from tbcad.tolerancing.montecarlo.sharpness import built_reflector
 FLIPS = (np.ones(3), HALF_TURN)
 ROWS = slice(60, 300, 8)  # of the picture, that are compared
 ERRORS = Errors(
-    **{
-        kind: Error(size)
-        for kind, size in {
-            "sphere_centre": 0.05,
-            "sphere_radius": 0.02,
-            "scale_isotropic": 0.002,
-            "shell_shift": 0.1,
-            "shell_tilt": 0.002,
-            "camera_shift": 0.2,
-        }.items()
-    }
+    sphere_centre=Error(0.05),
+    sphere_radius=Error(0.02),
+    scale_isotropic=Error(0.002),
+    shell_shift=Error(0.1),
+    shell_tilt=Error(0.002),
+    camera_shift=Error(0.2),
 )
 
 
@@ -81,18 +74,15 @@ def test_photographs_are_those_of_the_shell(export: ExportedDesign, half: int) -
     assert not mine[~lit].any()
 
 
-@pytest.mark.parametrize("half", [0, 1])
-def test_builds_are_those_of_the_tolerance_study(export: ExportedDesign, half: int) -> None:
-    built = random_half(export, half, ERRORS, seed=7).machine
-    reflector = export.reflectors[half]
-    expected = built_reflector(reflector, draw(ERRORS, 7, [0], len(reflector))[half], 0)
-    assert built.centre * FLIPS[half] == pytest.approx(expected.mirrors.centre, abs=1e-9)
-    assert built.radius == pytest.approx(expected.mirrors.radius)
-    assert built.camera.pinhole * FLIPS[half] == pytest.approx(expected.camera.pinhole)
-
-
-def test_both_cameras_see_the_same_leds(export: ExportedDesign) -> None:
+def test_builds_are_those_of_the_tolerance_study(export: ExportedDesign) -> None:
+    """Both cameras are lenses of their own and see the same LEDs."""
     a, b = (random_half(export, half, ERRORS, seed=7).machine for half in (0, 1))
+    for half, built in enumerate((a, b)):
+        reflector = export.reflectors[half]
+        expected = built_reflector(reflector, draw(ERRORS, 7, [0], len(reflector))[half], 0)
+        assert built.centre * FLIPS[half] == pytest.approx(expected.mirrors.centre, abs=1e-9)
+        assert built.radius == pytest.approx(expected.mirrors.radius)
+        assert built.camera.pinhole * FLIPS[half] == pytest.approx(expected.camera.pinhole)
     assert b.leds * HALF_TURN == pytest.approx(a.leds)
     assert np.abs(a.camera.distortion - b.camera.distortion).max() > 0
 
@@ -101,6 +91,7 @@ def test_machines_are_tied_by_their_leds(export: ExportedDesign) -> None:
     machines = [designed_half(export, half) for half in (0, 1)]
     lost = machines[1].moved(np.array([0.3, -0.2, 0.1]))
     frames = [(shell_frame(half),) for half in (0, 1)]
+    assert tied([(machines[0], frames[0])]) == [machines[0]]
     first, found = tied([(machines[0], frames[0]), (lost, frames[1])])
     assert first is machines[0]
     for name in ("centre", "leds", "axis_point"):
@@ -108,17 +99,7 @@ def test_machines_are_tied_by_their_leds(export: ExportedDesign) -> None:
     assert found.camera.pinhole == pytest.approx(machines[1].camera.pinhole)
 
 
-def test_one_machine_stays_where_it_is(export: ExportedDesign) -> None:
-    dark = replace(designed_half(export, 0), leds=np.zeros((0, 3)))
-    assert tied([(dark, (shell_frame(0),))]) == [dark]
-
-
-def test_planar_mirrors_are_refused(
-    low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    folder = tmp_path_factory.mktemp("planar")
-    write_record(folder, low_resolution_design, shells=False)
-    export = read_export(folder)
+def test_planar_mirrors_are_refused(export: ExportedDesign) -> None:
     a, b = export.reflectors
     flat = replace(a.cells.surfaces, curvature=0 * a.cells.surfaces.curvature)
     planar = replace(a, cells=replace(a.cells, surfaces=flat))

@@ -1,6 +1,5 @@
 """Merged photographs against the merge that is simulated, and what a real run may lack."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -241,36 +240,19 @@ def test_one_run_of_two(setting: Setting) -> None:
     assert synthesise(MirrorTiles(field), at, "nearest", None).image.any()
 
 
-def other_camera(setting: Setting, _run: Path) -> None:
-    path = setting.calibration / "machine.json"
-    edit_json(path, lambda record: record["camera"].update(width_px=417))
-
-
-def other_export(_setting: Setting, run: Path) -> None:
-    edit_json(run / "run.json", lambda record: record["export_sha256"].update({"balls.csv": "0"}))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (other_camera, "416 x 310 pixels, the camera of .* 417 x 310"),
-        (other_export, "balls.csv is not the file that"),
-    ],
-)
-def test_what_does_not_belong_together(
-    setting: Setting, change: Callable[[Setting, Path], None], message: str
-) -> None:
-    run = setting.run()
-    change(setting, run)
-    setting.refused(run, message)
-
-
 def test_refused(setting: Setting) -> None:
-    dark = setting.run((DARK,))
-    setting.refused(dark, "no photograph of the lit object")
-    with pytest.raises(InputError, match="name it with --exports"):
-        merge(dark, setting.calibration, out=setting.folder / "merged")
+    run = setting.run()
+    machine = setting.calibration / "machine.json"
+    edit_json(machine, lambda record: record["camera"].update(width_px=417))
+    setting.refused(run, "416 x 310 pixels, the camera of .* 417 x 310")
+    setting.calibrated(setting.machine, setting.frames)
     small = np.full((100, 200, 3), 255, np.uint8)
     write_exposure(setting.folder, FIRST, LIT, small, "a_0001_lit.png")
     message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
-    setting.refused(dark, message, flat=(setting.folder / "a_0001_lit.png",))
+    setting.refused(run, message, flat=(setting.folder / "a_0001_lit.png",))
+    with pytest.raises(InputError, match="name it with --exports"):
+        merge(run, setting.calibration, out=setting.folder / "merged")
+    edit_json(run / "run.json", lambda record: record["export_sha256"].update({"balls.csv": "0"}))
+    setting.refused(run, "balls.csv is not the file that")
+    dark = replace(setting, folder=setting.folder / "dark").run((DARK,))
+    setting.refused(dark, "no photograph of the lit object")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tbcad.light.simulate.prototype.ball_rays import camera_colours, trace_balls
-from tbcad.light.simulate.prototype.run import read_plan
-from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.detection.matching import expected_highlights
 from tbcad.rig.machine.designed import machine_runs
 from tbcad.rig.simulated_run.led_light import DOME_MM, balls_of_frame
@@ -38,11 +38,8 @@ def test_a_photograph_does_not_depend_on_the_others(small: Small, export_folder:
     some = alone.run.frame_photographs(0, ("led_2", "lit"))
     assert (whole["led_2"] == some["led_2"]).all()
     assert (whole["lit"] == some["lit"]).all()
-
-
-def test_photographs_of_one_frame_have_noise_of_their_own(small: Small) -> None:
-    one, two = (small.run.frame_photographs(k, ("dark",))["dark"] for k in (0, 1))
-    assert (one != two).any()
+    other = small.run.frame_photographs(number - 1, ("dark",))["dark"]
+    assert (other != whole["dark"]).any()  # noise of its own
 
 
 def test_highlights_are_where_the_machine_shows_them(export_folder: Path) -> None:
@@ -64,9 +61,9 @@ def test_highlights_are_where_the_machine_shows_them(export_folder: Path) -> Non
     assert max(off) < 0.03
 
 
-def test_the_lit_object_is_what_a_capture_traces(export_folder: Path) -> None:
-    small = small_run(export_folder, STOPS)
-    export = read_export(export_folder)
+def test_the_lit_object_is_what_a_capture_traces(
+    small: Small, export: ExportedDesign, plan: Plan
+) -> None:
     run, machine = small.run, small.machine
     number = 3
     assert run.frames[number].object_turn_deg == 180
@@ -74,7 +71,7 @@ def test_the_lit_object_is_what_a_capture_traces(export_folder: Path) -> None:
     mine = object_light(
         machine.camera.pinhole, directions, balls_of_frame(run.built, number), run.scene, True
     )
-    _, half = machine_runs(export, read_plan(export), machine, run.frames)
+    _, half = machine_runs(export, plan, machine, run.frames)
     turned = np.array([-1.0, -1.0, 1.0])
     flat = directions.reshape(-1, 3) * turned
     stop = np.full(len(flat), run.frames[number].stop - 1)
@@ -84,18 +81,12 @@ def test_the_lit_object_is_what_a_capture_traces(export_folder: Path) -> None:
     assert same.mean() > 0.999
 
 
-def test_an_led_that_is_off_leaves_darkness(export_folder: Path) -> None:
-    dead = ImagingChain(
-        SimulatedSensor(noise=0.0, hot_share=0.0), led_light=(BRIGHT, 0.0, BRIGHT, BRIGHT)
-    )
-    images = small_run(export_folder, STOPS, chain=dead).run.frame_photographs(0, phases_of(4))
+def test_light_ends_at_darkness_and_saturation(small: Small) -> None:
+    sensor = SimulatedSensor(noise=0.0, hot_share=0.0)
+    chain = ImagingChain(sensor, led_light=(50.0, 0.0, BRIGHT, BRIGHT))
+    images = replace(small.run, chain=chain).frame_photographs(0, phases_of(4))
+    assert images["led_1"].max() == 255
     assert images["led_2"].max() == 0
-    assert images["led_1"].max() > 50
-
-
-def test_light_saturates(small: Small) -> None:
-    bright = replace(small.run, chain=ImagingChain(led_light=50.0))
-    assert bright.frame_photographs(0, ("led_1",))["led_1"].max() == 255
 
 
 # So wide that sums over pixels are integrals: what is left of one cycle a pixel is 6e-5.

@@ -1,20 +1,20 @@
 """The folder of a simulated run, and what is refused."""
 
 import hashlib
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.rig.machine.machine import TRUTH, read_machine
 from tbcad.rig.runs import read_photograph, read_run
 from tbcad.rig.simulated_run import simulate
+from tbcad.rig.simulated_run.photographs import SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.prototype.draws import read_wind_up
 from tests.exported_files import contents
@@ -75,31 +75,34 @@ def test_nothing_is_left_of_a_run_that_fails(
     assert not list(tmp_path.iterdir())
 
 
-options_of = partial(SimulateRunOptions, "exports")
+Prepared = tuple[tuple[SimulatedRun, ...], tuple[str, ...]]
+
+
+def prepared(folder: Path, errors: Errors | None = None, **options: Any) -> Prepared:
+    """Runs of an export with the object that fits in, and their phases."""
+    export = read_export(folder)
+    subject = simulate.run_object(export, None)
+    assert subject.radius <= export.spec.prototype.stage.object_diameter_mm / 2
+    asked = SimulateRunOptions("exports", **options)
+    return simulate.prepare_run(export, errors or fdm_errors(), subject, asked)
 
 
 def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
-    export = read_export(export_with_wind_up)
-    subject = simulate.run_object(export, None)
-    options = options_of(seed=1, stops="2,3", phases="led_2,dark", perfect=True)
-    (run,), phases = simulate.prepare_run(export, fdm_errors(), subject, options)
+    options = {"seed": 1, "stops": "2,3", "phases": "led_2,dark", "perfect": True}
+    (run,), phases = prepared(export_with_wind_up, **options)
     assert phases == ("dark", "led_2")
     assert [(f.object_turn_deg, f.stop) for f in run.frames] == [(0, 2), (0, 3), (180, 2), (180, 3)]
     assert not run.built.machine.camera.distortion.any()
-    assert subject.radius <= export.spec.prototype.stage.object_diameter_mm / 2
 
 
 def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> None:
     """A dark photograph for each exposure; sidecars say it; a bright LED takes a short one."""
-    export = read_export(export_with_wind_up)
-    subject = simulate.run_object(export, None)
-    usual = options_of(stops="20", phases="dark,led_1,lit")
-    bright = replace(usual, led_brightness=100.0, exposure_leds=0.01, exposure_lit="1/2")
-    folders = []
-    for name, options in (("usual", usual), ("bright", bright)):
-        runs, phases = simulate.prepare_run(export, fdm_errors(), subject, options)
-        folders.append(tmp_path / name)
-        simulate.write_run(runs, phases, export_with_wind_up, folders[-1], lambda _: None)
+    usual = {"stops": "20", "phases": "dark,led_1,lit"}
+    bright = {"led_brightness": 100.0, "exposure_leds": 0.01, "exposure_lit": "1/2"}
+    folders = [tmp_path / name for name in ("usual", "bright")]
+    for folder, options in zip(folders, (usual, usual | bright), strict=True):
+        runs, phases = prepared(export_with_wind_up, **options)
+        simulate.write_run(runs, phases, export_with_wind_up, folder, lambda _: None)
     before, after = (read_run(folder) for folder in folders)
     assert after.record.phases == ("dark", "led_1", "dark_lit", "lit")
     times = {one.phase: one.exposure_s for one in after.exposures.values()}
@@ -116,22 +119,17 @@ def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> 
 
 
 def test_seeds_make_different_builds(export_with_wind_up: Path) -> None:
-    export = read_export(export_with_wind_up)
-    subject = simulate.run_object(export, None)
     one, two, again = (
-        simulate.prepare_run(export, fdm_errors(), subject, options_of(seed=seed, stops="1"))[0][0]
+        prepared(export_with_wind_up, seed=seed, stops="1")[0][0].built.machine.centre
         for seed in (1, 2, 1)
     )
-    assert (one.built.machine.centre == again.built.machine.centre).all()
-    assert np.abs(one.built.machine.centre - two.built.machine.centre).max() > 0.01
+    assert (one == again).all()
+    assert np.abs(one - two).max() > 0.01
 
 
-def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path) -> None:
-    export = read_export(export_with_wind_up)
-    plan, subject = read_plan(export), simulate.run_object(export, None)
-    whole = Errors(wind_up=Error(mean=1.0))
-    (run,), _ = simulate.prepare_run(export, whole, subject, options_of())
-    wind_up = read_wind_up(export, plan)
+def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path, plan: Plan) -> None:
+    (run,), _ = prepared(export_with_wind_up, Errors(wind_up=Error(mean=1.0)))
+    wind_up = read_wind_up(read_export(export_with_wind_up), plan)
     assert wind_up.max() > 0
     assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
 

@@ -1,10 +1,8 @@
 """Highlights of simulated photographs are found where they are; what is wrong is named."""
 
-import json
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +16,11 @@ from tbcad.rig.calibration.detection.detection import Detection, Rejection, no_h
 from tbcad.rig.calibration.detection.matching import Room, expected_highlights
 from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.rig.machine.machine import Highlights
-from tbcad.rig.runs import read_run
+from tbcad.rig.runs import read_image, read_run
 from tbcad.rig.simulated_run.photographs import ImagingChain
 from tbcad.types import Floats
+from tests.exported_files import edit_json
+from tests.photographed_runs import digest
 from tests.simulated_runs import BRIGHT, Small, small_run
 
 TARGET_PX = 0.05
@@ -114,10 +114,14 @@ def _moved(small: Small, first: int, shift: Floats) -> Small:
     return replace(small, run=run)
 
 
-def test_photographs_that_are_missing_or_damaged(copied: Path, small: Small) -> None:
+def test_photographs_that_are_missing_or_damaged(
+    copied: Path, small: Small, whole: Detection
+) -> None:
     photographs, frames = copied / "photographs", small.run.frames
     lost, damaged = (exposure_name(frames[k], "led_2") for k in (2, 4))
-    (photographs / f"{lost}.json").unlink()
+    dark = exposure_name(frames[3], "dark")
+    for name in (lost, dark):
+        (photographs / f"{name}.json").unlink()
     (photographs / f"{damaged}.png").write_bytes(b"no picture")
     found = detected(copied, small)
     assert all(any(name in line for line in found.faults) for name in (lost, damaged))
@@ -128,22 +132,19 @@ def test_photographs_that_are_missing_or_damaged(copied: Path, small: Small) -> 
     used = {*zip(found.highlights.frame.tolist(), found.highlights.led.tolist(), strict=True)}
     assert not used & absent
     assert (2, 0) in used
-
-
-def test_a_dark_photograph_that_is_missing(copied: Path, small: Small, whole: Detection) -> None:
-    name = exposure_name(small.run.frames[3], "dark")
-    (copied / "photographs" / f"{name}.json").unlink()
-    found = detected(copied, small)
-    assert f"{name} is not there: its frame goes on with that of another" in " ".join(found.faults)
+    assert f"{dark} is not there: its frame goes on with that of another" in " ".join(found.faults)
     # Hot pixels stay where they are, so nothing is lost.
     assert (found.highlights.frame == 3).sum() == (whole.highlights.frame == 3).sum()
 
 
-def test_another_exposure_is_named_and_scaled(copied: Path, small: Small, whole: Detection) -> None:
+def edit(run: Path, name: str, **changes: object) -> None:
+    """Change what is told of a photograph."""
+    edit_json(run / "photographs" / f"{name}.json", lambda record: record.update(changes))
+
+
+def test_another_exposure_is_named_and_scaled(copied: Path, small: Small) -> None:
     name = exposure_name(small.run.frames[5], "led_1")
-    path = copied / "photographs" / f"{name}.json"
-    sidecar = json.loads(path.read_text())
-    path.write_text(json.dumps({**sidecar, "exposure_s": 0.5}))
+    edit(copied, name, exposure_s=0.5)
     found = detected(copied, small)
     assert f"{name} and 0 more were exposed otherwise" in " ".join(found.faults)
     # Its light is as before, so it now seems twice too bright.
@@ -156,8 +157,7 @@ def test_a_dark_photograph_of_another_exposure(
     copied: Path, small: Small, whole: Detection, seconds: float, says: str
 ) -> None:
     frame = small.run.frames[3]
-    path = copied / "photographs" / f"{exposure_name(frame, 'dark')}.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "exposure_s": seconds}))
+    edit(copied, exposure_name(frame, "dark"), exposure_s=seconds)
     found = detected(copied, small)
     (line,) = found.faults
     name = exposure_name(frame, "led_1")
@@ -213,27 +213,6 @@ def test_light_larger_than_a_highlight() -> None:
     assert "most are full of light: darken the room" in error
 
 
-def _painted(folder: Path, name: str, at: Floats, brightness: int, size: int = 2) -> None:
-    """Paint a square spot into a photograph."""
-    path = folder / "photographs" / f"{name}.png"
-    with Image.open(path) as image:
-        pixels = np.array(image)
-    x, y = np.rint(at).astype(int)
-    pixels[y : y + size, x : x + size] = brightness
-    Image.fromarray(pixels).save(path)
-    sidecar = path.with_suffix(".json")
-    record = json.loads(sidecar.read_text())
-    record["sha256"] = sha256(path.read_bytes()).hexdigest()
-    sidecar.write_text(json.dumps(record))
-
-
-def _first(found: Detection) -> tuple[int, int, int, Floats]:
-    """A highlight in the middle of the run."""
-    h = found.highlights
-    k = len(h) // 2
-    return int(h.frame[k]), int(h.sphere[k]), int(h.led[k]), h.pixel[k]
-
-
 @pytest.mark.parametrize(
     ("aside", "brightness", "reason"),
     [(7.0, 200, Rejection.DOUBLE), (2.0, 200, Rejection.MERGED), (0.0, 255, Rejection.SATURATED)],
@@ -241,9 +220,15 @@ def _first(found: Detection) -> tuple[int, int, int, Floats]:
 def test_spots_that_are_no_highlights(
     copied: Path, small: Small, whole: Detection, aside: float, brightness: int, reason: Rejection
 ) -> None:
-    frame, sphere, led, place = _first(whole)
+    h, k = whole.highlights, len(whole.highlights) // 2
+    frame, sphere, led = int(h.frame[k]), int(h.sphere[k]), int(h.led[k])
     name = exposure_name(small.run.frames[frame], f"led_{led + 1}")
-    _painted(copied, name, place + np.array([aside, 0.0]), brightness)
+    path = copied / "photographs" / f"{name}.png"
+    pixels = np.array(read_image(path))
+    x, y = np.rint(h.pixel[k] + np.array([aside, 0.0])).astype(int)
+    pixels[y : y + 2, x : x + 2] = brightness
+    Image.fromarray(pixels).save(path)
+    edit(copied, name, sha256=digest(path))
     found = detected(copied, small)
     mine = [
         one for one in found.rejected if (one.frame, one.sphere, one.led) == (frame, sphere, led)
@@ -266,8 +251,6 @@ def test_a_hidden_highlight_is_not_taken_for_another(
 
 
 def test_a_run_without_leds(copied: Path, small: Small) -> None:
-    path = copied / "run.json"
-    record = json.loads(path.read_text())
-    path.write_text(json.dumps({**record, "phases": ["dark", "lit"]}))
+    edit_json(copied / "run.json", lambda record: record.update(phases=["dark", "lit"]))
     with pytest.raises(InputError, match="has no photographs of single LEDs"):
         detected(copied, small)

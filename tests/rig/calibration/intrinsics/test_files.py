@@ -24,14 +24,19 @@ LENS = CalibratedLens(
 )
 FOUR = "1058.3 1057.9 1040.75 771.0"
 MRCAL = """# mrcal camera model; comments may be anywhere
-{{
-    'lensmodel':  '{model}',
+{
+    'lensmodel':  'LENSMODEL_OPENCV4',
     'extrinsics': [ 0., 0, 0, 0, 0, 0,],
-    'intrinsics': [ 1058.3, 1057.9, 1040.25, 770.5{more}],
+    'intrinsics': [ 1058.3, 1057.9, 1040.25, 770.5, -0.05, 0.01, 1e-3, -5e-4],
     'imagersize': [ 2080, 1552,],
     'icam_intrinsics': 0,
-}}
+}
 """
+
+
+def mrcal(model: str, more: str) -> str:
+    """The same of another model, with other coefficients."""
+    return MRCAL.replace("OPENCV4", model).replace("-0.05, 0.01, 1e-3, -5e-4", more)
 
 
 def _written(path: Path, extension: str) -> Path:
@@ -61,18 +66,6 @@ def test_own_file_is_read_by_opencv_and_here(tmp_path: Path) -> None:
     _same(read_lens(file), LENS.distortion)
 
 
-def test_mrcal(tmp_path: Path) -> None:
-    file = tmp_path / "camera.cameramodel"
-    file.write_text(MRCAL.format(model="LENSMODEL_OPENCV4", more=", -0.05, 0.01, 1e-3, -5e-4"))
-    _same(read_lens(file), np.array([-0.05, 0.01, 1e-3, -5e-4, 0]))
-
-
-def test_colmap_counts_from_the_pixels_corner(tmp_path: Path) -> None:
-    file = tmp_path / "cameras.txt"
-    file.write_text(f"# Camera list\n1 OPENCV 2080 1552 {FOUR} -0.05 0.01 1e-3 -5e-4\n")
-    _same(read_lens(file), np.array([-0.05, 0.01, 1e-3, -5e-4, 0]))
-
-
 def _same(found: CalibratedLens, distortion: np.ndarray) -> None:
     assert found.focal == pytest.approx(LENS.focal)
     assert found.principal == pytest.approx(LENS.principal)
@@ -82,30 +75,15 @@ def _same(found: CalibratedLens, distortion: np.ndarray) -> None:
 
 REFUSED: dict[str, tuple[str, str]] = {
     "nothing": ("hello", "is no lens"),
-    "splines": (
-        MRCAL.format(model="LENSMODEL_SPLINED_STEREOGRAPHIC_order=3", more=""),
-        "SPLINED_STEREOGRAPHIC",
-    ),
+    "splines": (mrcal("SPLINED_STEREOGRAPHIC_order=3", ""), "SPLINED_STEREOGRAPHIC"),
     "rational in mrcal": (
-        MRCAL.format(model="LENSMODEL_OPENCV8", more=", 0, 0, 0, 0, 0, .1, 0, 0"),
+        mrcal("OPENCV8", "0, 0, 0, 0, 0, .1, 0, 0"),
         "mrcal-convert-lensmodel LENSMODEL_OPENCV5",
     ),
-    "few in mrcal": (
-        MRCAL.format(model="LENSMODEL_OPENCV8", more=", 0, 0, 0, 0"),
-        "has 8 numbers",
-    ),
-    "overflow in mrcal": (
-        MRCAL.format(model="LENSMODEL_OPENCV4", more=f", {'9' * 400}, 0, 0, 0"),
-        "no finite number",
-    ),
-    "digits in mrcal": (
-        MRCAL.format(model="LENSMODEL_OPENCV4", more=f", {'9' * 5000}, 0, 0, 0"),
-        "no .cameramodel",
-    ),
-    "signs in mrcal": (
-        MRCAL.format(model="LENSMODEL_OPENCV4", more=", " + "-" * 100_000 + "1"),
-        "nested too deeply",
-    ),
+    "few in mrcal": (mrcal("OPENCV8", "0, 0, 0, 0"), "has 8 numbers"),
+    "overflow in mrcal": (mrcal("OPENCV4", f"{'9' * 400}, 0, 0, 0"), "no finite number"),
+    "digits in mrcal": (mrcal("OPENCV4", f"{'9' * 5000}, 0, 0, 0"), "no .cameramodel"),
+    "signs in mrcal": (mrcal("OPENCV4", "-" * 100_000 + "1"), "nested too deeply"),
     "references": ("a: &a [1, 1]\nb: [*a, *a]\n", "references (*a)"),
     "entities": ('<!DOCTYPE a [<!ENTITY a "b">]><a>&a;</a>', "document type"),
     "deep list": ("camera_matrix: " + "[" * 100_000, "no YAML"),
@@ -113,10 +91,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "deep elements": ("<a>" * 50_000 + "</a>" * 50_000, "nested too deeply"),
     "lines": ("\n" * 100_000 + "1 PINHOLE", "is no lens"),
     "twice": ("image_width: 1\nimage_width: 2\n", "image_width twice"),
-    "no size": (
-        "camera_matrix: [1, 0, 1, 0, 1, 1, 0, 0, 1]\nD: []\n",
-        "no size of its pictures",
-    ),
+    "no size": ("camera_matrix: [1, 0, 1, 0, 1, 1, 0, 0, 1]\nD: []\n", "no size of its pictures"),
     "broken": ("{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [", "no .cameramodel"),
     "fisheye": (f"1 OPENCV_FISHEYE 2080 1552 {FOUR} 0 0 0 0\n", "OPENCV_FISHEYE"),
     "two": (f"1 PINHOLE 2080 1552 {FOUR}\n2 PINHOLE 2080 1552 {FOUR}\n", "has 2 cameras"),
@@ -124,10 +99,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "tiny": ("1 PINHOLE 2080 1552 3.5 3.5 1040 776\n", "do not fit a picture"),
     "folded": ("1 RADIAL 2080 1552 1058.3 1040 776 -0.9 0\n", "folds the picture"),
     "no matrix": ("%YAML:1.0\n---\nimage_width: 2080\n", "no camera_matrix"),
-    "skewed": (
-        opencv_text(LENS, {}).replace("[ 1058.3, 0.0,", "[ 1058.3, 5.0,"),
-        "skewed pixels",
-    ),
+    "skewed": (opencv_text(LENS, {}).replace("[ 1058.3, 0.0,", "[ 1058.3, 5.0,"), "skewed pixels"),
     "fisheye in OpenCV": (opencv_text(LENS, {"fisheye_model": 1}), "lens model fisheye_model: 1"),
     "damaged": ("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: [", "line 5: no YAML"),
 }
@@ -172,9 +144,13 @@ image_size: [2080, 1552]
 """
 
 
-@pytest.mark.parametrize("text", [ROS, ROS_MESSAGE, KALIBR, TUTORIAL])
-def test_yaml_of_other_programs(tmp_path: Path, text: str) -> None:
-    k3 = 0 if text == KALIBR else 1e-3
+COLMAP = f"# Camera list\n1 OPENCV 2080 1552 {FOUR} -0.05 0.01 1e-3 -5e-4\n"  # from a corner
+WITH_K3 = (ROS, ROS_MESSAGE, TUTORIAL)
+
+
+@pytest.mark.parametrize("text", [*WITH_K3, KALIBR, MRCAL, COLMAP])
+def test_files_of_other_programs(tmp_path: Path, text: str) -> None:
+    k3 = 1e-3 if text in WITH_K3 else 0
     _same(_read(tmp_path, text), np.array([-0.05, 0.01, 1e-3, -5e-4, k3]))
 
 
@@ -205,7 +181,6 @@ def test_models_that_are_named_are_refused_whatever_the_key(tmp_path: Path) -> N
 
 TAIL = {
     "xi: 0.9": "lens model xi",
-    "xi: {rows: 1, cols: 1, data: [0.9]}": "lens model xi",
     "is_fisheye: true": "lens model is_fisheye",
     "fisheye: {a: 1}": "lens model fisheye",
     "lens: {model: [pinhole, equi]}": "lens model model: equi",
@@ -221,14 +196,10 @@ TAIL = {
 
 CHANGED = {
     ("1058.3", "1e400"): "'1e400' is no finite number",
-    ("1058.3", "9" * 5000): "is no finite number",
     ("1058.3", ".nan"): "'.nan' is no finite number",
     ("1058.3", "-1058.3"): "must be above 0",
-    ("1057.9", "0"): "must be above 0",
     ("1040.25", "2090"): "outside of a picture of 2080 x 1552",
     ("2080", "2080.5"): "whole numbers",
-    ("2080", "1e9"): "whole numbers",
-    ("cols: 5", "cols: 4"): "not rows times cols",
     ("cols: 5\n  data: [-0.05, ", "cols: 3\n  data: ["): "rows times cols",
     ("cols: 5\n  data: [-0.05, 0.01, ", "cols: 3\n  data: ["): "3 coefficients",
     ("1e-3]", "1e-3, 0.1, 0, 0]"): "rows times cols",
@@ -266,10 +237,7 @@ WRONG = {
     **REFUSED,
     **{tail: (f"{ROS}{tail}\n", message) for tail, message in TAIL.items()},
     **{f"{old} {new:.9}": (ROS.replace(old, new), text) for (old, new), text in CHANGED.items()},
-    "no model": (
-        KALIBR.replace("  distortion_model: radtan\n", ""),
-        "names no camera_model and distortion_model",
-    ),
+    "no model": (KALIBR.replace("  distortion_model: radtan\n", ""), "names no camera_model and"),
     "two of Kalibr": (KALIBR + KALIBR.replace("cam0", "cam1"), "2 cameras (cam0, cam1): which"),
 }
 
