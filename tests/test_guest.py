@@ -96,6 +96,7 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.slow
 def test_a_build_in_a_script_with_threads_changes_nothing_else(tmp_path: Path) -> None:
     """Without what only a POSIX system has; the next test has it."""
     run_script(tmp_path, "shell", 1, hidden=True)

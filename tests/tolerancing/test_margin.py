@@ -151,6 +151,7 @@ class TestRealDesigns:
     def worst(errors: Errors, models: EdgeModels) -> np.ndarray:
         return simulate(MonteCarloCase(models, errors, 1), 40).worst
 
+    @pytest.mark.slow
     def test_margin_gives_the_yield(self, spec: Spec) -> None:
         made, wanted = process_errors(load_process("sla")), 0.9
         found = margin(spec, made, wanted, self.worst)

@@ -4,6 +4,7 @@ from threading import Event
 from time import sleep
 
 import numpy as np
+import pytest
 
 from tbcad.app.cli import run as tbcad
 from tests.rig.control.rig import Rig, until
@@ -52,6 +53,7 @@ def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
     assert code is None, output
 
 
+@pytest.mark.slow
 def test_three_kills(either_rig: Rig) -> None:
     """Forty of them, with the virtual camera, are in test_whole_loop."""
     rig, kills = either_rig, 3

@@ -210,5 +210,6 @@ def _light_key(
     lamps: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
 ) -> object:
     edges, all_of = (some.grazing, some.bodies) if isinstance(some, EdgedBodies) else (None, some)
-    bodies = all_of.turning, all_of.still, all_of.context.frame
-    return lamps, points, normals, edges, *bodies, angle
+    drawn = all_of.assembly.drawn
+    bodies = [[(name, drawn[name]) for name in names] for names in (all_of.moving, all_of.fixed)]
+    return lamps, points, normals, edges, bodies, all_of.context.frame, angle

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import zip_longest
 
 from tbcad_verify.prototype.context import PrototypeContext
@@ -83,8 +84,8 @@ def program_faults(context: PrototypeContext) -> Iterator[str]:
     off, feed = next(iter(machine.driven), math.nan), next(iter(machine.feeds), math.nan)
     if not (abs(off - homed) <= SAME_DEG and feed <= motion.feed_deg_min):
         yield "drives off the switch to another angle, or too fast"
-    del machine.moves[2:3], machine.feeds[:1]
-    yield from deviations(context, machine)
+    moves = machine.moves[:2] + machine.moves[3:]
+    yield from deviations(context, replace(machine, moves=moves, feeds=machine.feeds[1:]))
 
 
 def run_klipper(text: str, axis: str, switch: float, homed: float) -> Machine:
