@@ -224,6 +224,7 @@ class TestCluster:
         assert sorted(told) == list(range(20))
         assert all(marks.of("ended", worker.pid) for worker in standing.workers)
 
+    @pytest.mark.slow
     def test_a_worker_killed_in_mid_run_loses_nothing(
         self, cluster: Cluster, tmp_path: Path
     ) -> None:

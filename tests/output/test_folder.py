@@ -396,7 +396,11 @@ print(limit, sorted(map(str, seen)))
 
 
 @pytest.mark.parametrize(
-    ("moves", "seen", "step"), [(False, ["1", "2"], 41), (True, ["1", "2", "missing"], 11)]
+    ("moves", "seen", "step"),
+    [
+        (False, ["1", "2"], 41),
+        pytest.param(True, ["1", "2", "missing"], 11, marks=pytest.mark.slow),
+    ],
 )
 def test_a_kill_at_any_call_leaves_one_whole_export(
     out: Path, moves: bool, seen: list[str], step: int

@@ -72,6 +72,7 @@ def test_reset_in_mid_motion(rig: Rig, stopped: Told) -> None:
     check_goes_on(rig, 2)
 
 
+@pytest.mark.slow
 def test_unplugged(rig: Rig, stopped: Told) -> None:
     rig.controller.fault = at("M64 P3", "silence")
     out = stopped(rig.words())
@@ -200,6 +201,7 @@ def test_state_that_stops_a_run_is_named(rig: Rig, state: str, says: str, stoppe
     assert ("zero pin in" in out) == (state != "Check")
 
 
+@pytest.mark.slow
 def test_alarm_after_which_grbl_answers_a_reset_only(plain_rig: Rig, stopped: Told) -> None:
     """In mid-run, and at the start of the next."""
     plain_rig.controller.fault = at("G1 X", "alarm")

@@ -12,6 +12,7 @@ pytest.importorskip("gphoto2", reason="the extra `machine` is not installed")
 SETTINGS = {"shutterspeed": "0.0100s", "f-number": "f/2.8", "imagesize": "640x480"}
 
 
+@pytest.mark.slow
 def test_camera_on_usb(rig: Rig) -> None:
     """More photographs than its store has room for: a session that fails is opened again."""
     process = rig.start(rig.words(camera="gphoto2", stops="1-3"), module="tbcad")

@@ -128,6 +128,7 @@ with Processes(1) as processes:
 """
 
 
+@pytest.mark.slow
 def test_they_end_with_their_parent(tmp_path: Path) -> None:
     command = [sys.executable, "-c", KILLED, str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
