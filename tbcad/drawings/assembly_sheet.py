@@ -26,7 +26,7 @@ from tbcad.cad.drafting.views import as_entities
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.cad.kernel.projection import Segment
 from tbcad.drawings.export import DrawnExport
-from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.report.exploded import EDGE, RADIUS, Callout, place_callouts
 from tbcad.types import Bools, Floats, Ints
 
@@ -141,7 +141,7 @@ class AssemblyJob:
     title: str  # of the design
 
 
-def assembly_job(export: DrawnExport, machine: Machine) -> AssemblyJob:
+def assembly_job(export: DrawnExport, machine: AssembledMachine) -> AssemblyJob:
     """What is needed to draw the assembly.
 
     Raises:

@@ -7,7 +7,7 @@ from pathlib import Path
 from tbcad.cad.formats.checked_files import Row
 from tbcad.errors import InputError
 from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
-from tbcad.prototype.assembly_steps.machine import Machine, read_machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.records.design import NAME as DESIGN
 from tbcad.records.design import DesignRecord
 from tbcad.records.document import Manifest
@@ -26,7 +26,7 @@ class DrawnExport:
     folder: Path  # of it
     manifest: Manifest  # its files
     design: DesignRecord  # design.json
-    machine: Machine | None  # its prototype, None where it has none
+    machine: AssembledMachine | None  # its prototype, None where it has none
     shells: tuple[str, ...]  # names of the shells that it has
 
     @property

@@ -15,7 +15,7 @@ from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.fits import ListedSeat, Mate, purchased_mate, reamed_to, seats_table
 from tbcad.drawings.holes import Fastener, mm
 from tbcad.drawings.part_sheet import PartText, part_sheets
-from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.records.prototype import PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow
 from tbcad.tolerancing.process.process import load_process
@@ -85,7 +85,7 @@ def part_job(export: DrawnExport, part: PrintedPartRecord) -> PartJob:
 
 
 def _on_axis(
-    machine: Machine, part: PrintedPartRecord, place: Floats, along: Floats
+    machine: AssembledMachine, part: PrintedPartRecord, place: Floats, along: Floats
 ) -> Iterator[Mate | None]:
     """Shaft and bearings, which are on the axis of rotation."""
     if part.role not in ON_AXIS:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.output.single_files import check_file
-from tbcad.prototype.assembly_steps.machine import RESISTORS, Machine
+from tbcad.prototype.assembly_steps.machine import RESISTORS, AssembledMachine
 from tbcad.prototype.assembly_steps.steps import Step
 from tbcad.report.drawing import check_prototype_files, draw_apart
 
@@ -69,7 +69,7 @@ WITHOUT_BODY = {
 def write_page(
     folder: Path,
     out: Path,
-    machine: Machine,
+    machine: AssembledMachine,
     steps: Sequence[Step],
     *,
     pictures: bool = True,
@@ -88,7 +88,7 @@ def write_page(
     return replace_files(out, {NAME: text.encode("utf-8")})[0]
 
 
-def page(machine: Machine, steps: Sequence[Step], pictures: Mapping[str, bytes]) -> str:
+def page(machine: AssembledMachine, steps: Sequence[Step], pictures: Mapping[str, bytes]) -> str:
     """The page as HTML; pictures: PNG files by keys of steps."""
     what = {int(row["item"] or 0): str(row["what"]) for row in machine.rows}
     body = (
@@ -111,14 +111,14 @@ def page(machine: Machine, steps: Sequence[Step], pictures: Mapping[str, bytes])
     )
 
 
-def _tools(machine: Machine) -> Iterator[str]:
+def _tools(machine: AssembledMachine) -> Iterator[str]:
     """What is needed beside the parts of the list."""
     kinds = {machine.kind(part) for part in machine.items}
     yield from TOOLS
     yield from (tool for kind, tool in TOOLS_OF_KINDS.items() if kind in kinds)
 
 
-def _not_drawn(machine: Machine, steps: Sequence[Step]) -> Iterator[str]:
+def _not_drawn(machine: AssembledMachine, steps: Sequence[Step]) -> Iterator[str]:
     """Parts without a body, by the reason."""
     kinds: dict[str, list[str]] = {}
     for use in (use for step in steps for use in step.parts if not use.bodies):

@@ -13,7 +13,7 @@ from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
 from tbcad.core.geometry.vectors import unit
-from tbcad.prototype.assembly_steps.machine import Machine, read_machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
 from tbcad.report.exploded import Callout, draw_callouts, offsets, place_callouts
 from tbcad.report.prototype_pictures import Drawn, assembly_bodies, placed_mesh
@@ -93,7 +93,7 @@ def draw(folder: Path, pictures: Path) -> None:
             _picture(machine, step, bodies, frozenset(new)).save(pictures / f"{step.key}.png")
 
 
-def _meshes(folder: Path, machine: Machine) -> dict[str, pyvista.PolyData]:
+def _meshes(folder: Path, machine: AssembledMachine) -> dict[str, pyvista.PolyData]:
     """Bodies of the assembly, and the tools that are not in it."""
     drawn: list[Drawn] = assembly_bodies(folder, machine.record)
     meshes = {body.name: body.mesh for body in drawn}
@@ -102,7 +102,10 @@ def _meshes(folder: Path, machine: Machine) -> dict[str, pyvista.PolyData]:
 
 
 def _picture(
-    machine: Machine, step: Step, bodies: Mapping[str, pyvista.PolyData], new: frozenset[str]
+    machine: AssembledMachine,
+    step: Step,
+    bodies: Mapping[str, pyvista.PolyData],
+    new: frozenset[str],
 ) -> Image.Image:
     moved = offsets(machine, new)
     shown = [name for name in (*new, *step.near) if name in bodies]

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from tbcad.core.geometry.vectors import unit
-from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.records.prototype import FastenerRecord
 from tbcad.types import Floats
 
@@ -30,7 +30,7 @@ PANELS = {
 }
 
 
-def offsets(machine: Machine, new: frozenset[str]) -> dict[str, Floats]:
+def offsets(machine: AssembledMachine, new: frozenset[str]) -> dict[str, Floats]:
     """By how much each new body of a step is moved, mm, (3,).
 
     Bodies are moved against the direction of the screws that hold them, and fasteners with them.
@@ -45,7 +45,7 @@ def offsets(machine: Machine, new: frozenset[str]) -> dict[str, Floats]:
     return moved | {one.name: _fastener(machine, one, moved) for one in fasteners}
 
 
-def _own(machine: Machine, name: str, axis: Floats) -> Floats:
+def _own(machine: AssembledMachine, name: str, axis: Floats) -> Floats:
     if name.startswith("ball_"):
         seat = machine.record.seats[int(name.removeprefix("ball_")) - 1]
         return np.asarray(-BALL_MM * np.array(seat.axis))
@@ -72,7 +72,7 @@ def _by_screws(name: str, new: frozenset[str], fasteners: Iterable[FastenerRecor
     return total
 
 
-def _fastener(machine: Machine, one: FastenerRecord, moved: dict[str, Floats]) -> Floats:
+def _fastener(machine: AssembledMachine, one: FastenerRecord, moved: dict[str, Floats]) -> Floats:
     """Out of the first body that it goes into, by its length and a gap."""
     part = machine.listed(one.part)
     size = LENGTHS.get(part.kind, "") if part else ""

@@ -26,7 +26,7 @@ from tbcad.drawings.fits import (
 from tbcad.drawings.holes import DrawnHole, numbered_holes, table_rows
 from tbcad.drawings.printed_parts import draw_part, part_job
 from tbcad.output.manifest import read_manifest, write_manifest
-from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.files.bom import COLUMNS
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import DesignRecord
@@ -193,7 +193,7 @@ def export(folder: Path, carrier: Solid) -> DrawnExport:
         ],
     )
     row = {"item": 65, "part": "carrier", "quantity": 1, "material": "PETG"}
-    machine = Machine(
+    machine = AssembledMachine(
         (dict.fromkeys(COLUMNS, None) | row,), Prototype.model_validate(record), (), {}, PARTS
     )
     design = DesignRecord.model_construct(spec=load_spec(None, ["n=6"]))

@@ -57,7 +57,7 @@ class Build(InFolder):
 
 
 @dataclass(frozen=True)
-class Plan:
+class BuildPlan:
     """A build that can be begun."""
 
     spec: Spec  # as asked for, before a process changes it
@@ -66,7 +66,7 @@ class Plan:
     process: Process | None  # that edges and margins are chosen for
 
 
-def planned(options: BuildOptions) -> Plan:
+def planned(options: BuildOptions) -> BuildPlan:
     """Refuse, before any work, what cannot be built or replaced."""
     from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
@@ -84,7 +84,7 @@ def planned(options: BuildOptions) -> Plan:
     file = None if isinstance(options.spec, Spec) else options.spec
     inputs = [*design_files(spec, file), *files_named(options.for_process)]
     check_replaceable(Path(options.out), "build", options.force, inputs)
-    return Plan(spec, parts, process)
+    return BuildPlan(spec, parts, process)
 
 
 @keywords(BuildOptions)
@@ -119,7 +119,7 @@ def _asked_process(options: BuildOptions) -> Process | None:
     return None if options.for_process is None else load_process(options.for_process)
 
 
-def spec_for_process(plan: Plan, options: BuildOptions) -> Spec:
+def spec_for_process(plan: BuildPlan, options: BuildOptions) -> Spec:
     """The design with edges and margins for its process; the answer says what they cost."""
     spec, process = plan.spec, plan.process
     if process is None:
@@ -147,7 +147,7 @@ def spec_for_process(plan: Plan, options: BuildOptions) -> Spec:
     return found.spec
 
 
-def _build_files(plan: Plan, options: BuildOptions) -> Build:
+def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
     """Write all files, verify them, write report.html, and replace the folder.
 
     The files are read back before they replace the old ones.

@@ -22,7 +22,7 @@ RESISTORS, OWN = "resistors", "own"
 
 
 @dataclass(frozen=True)
-class Machine:
+class AssembledMachine:
     """What a prototype consists of."""
 
     rows: tuple[Row, ...]  # of its list of parts
@@ -89,7 +89,7 @@ class Machine:
         return self.ref(self.bodies[body])
 
 
-def read_machine(folder: Path) -> Machine:
+def read_machine(folder: Path) -> AssembledMachine:
     """The prototype of an export.
 
     Raises:
@@ -101,7 +101,7 @@ def read_machine(folder: Path) -> Machine:
         raise InputError(f"{wiring} is not there: name a folder with a prototype by tbcad build")
     lines = [row for _, row in read_rows(wiring, WIRING, electronics.COLUMNS)]
     sizes = {ball.number: ball.size for ball in BallRow.read(folder) if ball.kind == "ball"}
-    return Machine(rows, record, tuple(lines), sizes, load_parts())
+    return AssembledMachine(rows, record, tuple(lines), sizes, load_parts())
 
 
 Words: TypeAlias = tuple[list[str], ...]
@@ -113,7 +113,7 @@ class StepPlan:
     """A step as it is planned for all designs."""
 
     title: str  # of the step
-    words: Callable[[Machine], Words]  # for a prototype; it has the step's name for files
+    words: Callable[[AssembledMachine], Words]  # for a prototype; it has the step's name for files
     bodies: tuple[str, ...]  # patterns of names of the bodies that it mounts
     loose: tuple[str, ...]  # parts, or kinds of them, without bodies that it takes
     near: tuple[str, ...]  # bodies that the picture shows, too
@@ -123,7 +123,7 @@ class StepPlan:
         """Name of the step for files."""
         return self.words.__name__
 
-    def needed(self, machine: Machine) -> bool:
+    def needed(self, machine: AssembledMachine) -> bool:
         """Whether a prototype has any of its bodies; a step of none is always needed."""
         return not self.bodies or any(map(self.mounts, machine.bodies))
 
@@ -134,7 +134,7 @@ class StepPlan:
 
 def planned(
     title: str, *bodies: str, loose: tuple[str, ...] = (), near: tuple[str, ...] = ()
-) -> Callable[[Callable[[Machine], Words]], StepPlan]:
+) -> Callable[[Callable[[AssembledMachine], Words]], StepPlan]:
     """Plan a step whose words a function gives."""
     return lambda words: StepPlan(title, words, bodies, loose, near)
 

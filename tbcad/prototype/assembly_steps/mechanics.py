@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tbcad.prototype.assembly_steps.machine import Machine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.base.hub import PIN_MM, SOCKET_MM
 from tbcad.prototype.frame.head import GAP_MM
 from tbcad.prototype.frame.purchased import PLATE_MM
@@ -13,7 +13,7 @@ UPRIGHTS = 2
 
 
 @planned("Try the seats", "coupon_*")
-def coupon(machine: Machine) -> Words:
+def coupon(machine: AssembledMachine) -> Words:
     """The coupons, before the carrier is printed."""
     names = [machine.body_ref(body) for body in machine.bodies if body.startswith("coupon_")]
     black = sum(part.finish == MATT_BLACK for part in machine.record.parts)
@@ -35,7 +35,7 @@ def coupon(machine: Machine) -> Words:
 
 
 @planned("Drill the plate, cut the uprights", "plate")
-def shop(machine: Machine) -> Words:
+def shop(machine: AssembledMachine) -> Words:
     """Plate and uprights as drawn; what must be matt black is blackened before it is mounted."""
     stock = machine.record.frame_stock
     plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
@@ -59,7 +59,7 @@ def shop(machine: Machine) -> Words:
 
 
 @planned("The carrier", "carrier", "carrier_*", loose=("GLUE-EPOXY",))
-def carrier(machine: Machine) -> Words:
+def carrier(machine: AssembledMachine) -> Words:
     """What is glued and pressed into the carrier, and its joints."""
     cut, shaft = machine.has("carrier_1"), machine.has("shaft")
     magnets = [one for one in machine.record.holding.balls if one.by == "magnet"]
@@ -100,7 +100,7 @@ def carrier(machine: Machine) -> Words:
 
 
 @planned("Make the caps", "cap_*")
-def caps(machine: Machine) -> Words:
+def caps(machine: AssembledMachine) -> Words:
     """Mirrors that are printed or turned."""
     caps = machine.record.caps
     drawings = ", ".join(str(one.pdf) for one in caps)
@@ -120,7 +120,7 @@ def caps(machine: Machine) -> Words:
 
 
 @planned("Feet and uprights on the plate", "upright_*")
-def frame(machine: Machine) -> Words:
+def frame(machine: AssembledMachine) -> Words:
     """Feet and uprights; how many T-nuts each upright has in its front slot and in its back one."""
     axis = np.array(machine.record.frame.axis)
     nuts = [one.along @ axis for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
@@ -144,7 +144,7 @@ def frame(machine: Machine) -> Words:
 
 
 @planned("Bearing head on the uprights", "bearing_*")
-def head(machine: Machine) -> Words:
+def head(machine: AssembledMachine) -> Words:
     """Bearings and head."""
     bearings = machine.has("bearing_front")
     seat = "Press a bearing into either side of the head, until it sits on its shoulder."
@@ -162,7 +162,7 @@ def head(machine: Machine) -> Words:
 
 
 @planned("Rotary stage on the head", "rotary_stage*")
-def table(machine: Machine) -> Words:
+def table(machine: AssembledMachine) -> Words:
     """The rotary stage."""
     does = "Screw the rotary stage on the head's front from behind, its turning side toward the "
     check = "The stage turns by its knob or motor, and its top does not move when it is pushed."
@@ -170,7 +170,7 @@ def table(machine: Machine) -> Words:
 
 
 @planned("Zero disc on the hub", "zero_disc", "wheel", "coupling")
-def hub(machine: Machine) -> Words:
+def hub(machine: AssembledMachine) -> Words:
     """Zero disc, and what drives it, on the hub."""
     wheel = machine.has("wheel")
     part = machine.listed(machine.bodies["wheel"]) if wheel else None
@@ -196,7 +196,7 @@ def hub(machine: Machine) -> Words:
     return does, checks
 
 
-def _drilled(machine: Machine) -> str:
+def _drilled(machine: AssembledMachine) -> str:
     sheet = machine.record.drawing_of(machine.bodies["wheel"])
     drill = when(sheet, f"Drill the wheel as {sheet} shows. ")
     text = f"{drill}Screw it on through its four holes: wheel, disc, inserts of the hub."
@@ -212,7 +212,7 @@ NEAR_SHAFT = ("carrier", "bearing_head", "wheel")
 
 
 @planned("Base on its shaft", "shaft", "collar", loose=("belts",), near=NEAR_SHAFT)
-def shaft(machine: Machine) -> Words:
+def shaft(machine: AssembledMachine) -> Words:
     """The base on its shaft."""
     does = [
         f"Push the shaft {machine.body_ref('shaft')} into the hub from behind until it ends in "
@@ -237,7 +237,7 @@ def shaft(machine: Machine) -> Words:
 
 
 @planned("Motor", "motor", "pinion", near=("wheel",))
-def motor(machine: Machine) -> Words:
+def motor(machine: AssembledMachine) -> Words:
     """The motor, with belt, or straight on the shaft."""
     if machine.has("pinion"):
         return _belt(machine)
@@ -252,7 +252,7 @@ def motor(machine: Machine) -> Words:
     return does, ["Turned by hand, the base takes the motor's shaft along and does not slip on it."]
 
 
-def _belt(machine: Machine) -> Words:
+def _belt(machine: AssembledMachine) -> Words:
     drive = machine.record.drive
     does = [
         _pinion(machine),
@@ -270,7 +270,7 @@ def _belt(machine: Machine) -> Words:
     return does, checks
 
 
-def _pinion(machine: Machine) -> str:
+def _pinion(machine: AssembledMachine) -> str:
     """Where the pinion is on the motor's shaft: its teeth in line with the wheel's."""
     part, motor = (machine.listed(machine.bodies[body]) for body in ("pinion", "motor"))
     if not (part and motor):
@@ -287,7 +287,7 @@ def _pinion(machine: Machine) -> str:
 
 
 @planned("Switch and zero pin", "home_*", loose=("shafts",), near=("zero_disc",))
-def homing(machine: Machine) -> Words:
+def homing(machine: AssembledMachine) -> Words:
     """Switch, bracket and the zero pin."""
     home = machine.record.home
     does = [

@@ -1,6 +1,6 @@
 """Steps of light, object, camera and electronics, and of the first run."""
 
-from tbcad.prototype.assembly_steps.machine import Machine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.frame.camera_mount import GAP_MM
 
 DIGITAL = "digital"
@@ -9,7 +9,7 @@ OWN_WIRES = ("motor", "supply")  # lines whose way is told instead of an output
 
 
 @planned("Lamps", "lamp_*", loose=("strips",), near=("plate",))
-def lamps(machine: Machine) -> Words:
+def lamps(machine: AssembledMachine) -> Words:
     """Stands, holders and strips."""
     light = machine.record.lamps
     assert light is not None
@@ -35,7 +35,7 @@ def lamps(machine: Machine) -> Words:
 
 
 @planned("Object stage", "stage_*", loose=("WIRE-28", "WIRE-30"))
-def stage(machine: Machine) -> Words:
+def stage(machine: AssembledMachine) -> Words:
     """The object's stage with its LEDs; x is toward the camera, y to its right as it looks back."""
     leds = machine.record.leds
     does = [
@@ -71,7 +71,7 @@ def stage(machine: Machine) -> Words:
     "Bracket, plate and fence of the camera",
     *("camera_bracket", "camera_plate", "camera_fence", "camera"),
 )
-def camera(machine: Machine) -> Words:
+def camera(machine: AssembledMachine) -> Words:
     """The camera's mount."""
     does = [
         "Press the inserts into the camera plate from behind.",
@@ -93,7 +93,7 @@ def camera(machine: Machine) -> Words:
 
 
 @planned("Wiring", loose=("electronics", "wires", "connectors", "resistors"))
-def wiring(machine: Machine) -> Words:
+def wiring(machine: AssembledMachine) -> Words:
     """Lines of the controller, one each; without lamps, where light comes from instead."""
     does = [
         "Controller, supply, relay and switch modules stand outside the shroud. Supply off.",
@@ -126,7 +126,7 @@ def wiring(machine: Machine) -> Words:
     return does, checks, ["Solder or crimp all joints, and insulate each one."]
 
 
-def _line(machine: Machine, row: dict[str, str]) -> str:
+def _line(machine: AssembledMachine, row: dict[str, str]) -> str:
     """A line of wiring.csv in words."""
     line, part = f"Line {row['line']}, {row['signal'].replace('_', ' ')}:", machine.ref(row["part"])
     if row["signal"] in OWN_WIRES:
@@ -140,7 +140,7 @@ def _line(machine: Machine, row: dict[str, str]) -> str:
 
 
 @planned("Angle zero")
-def zero(machine: Machine) -> Words:
+def zero(machine: AssembledMachine) -> Words:
     """Settings, homing and the trim."""
     drive, home, off = machine.record.drive, machine.record.home, machine.record.power_off
     current = drive.hold_current_a
@@ -197,7 +197,7 @@ def zero(machine: Machine) -> Words:
 
 
 @planned("Camera in its place", "camera_gauge", near=("carrier",))
-def gauge(machine: Machine) -> Words:
+def gauge(machine: AssembledMachine) -> Words:
     """The camera's alignment by the gauge."""
     place = machine.record.camera_place
     assert place is not None
@@ -242,7 +242,7 @@ def gauge(machine: Machine) -> Words:
 
 
 @planned("Balls into their seats", "ball_*", near=("carrier",))
-def balls(machine: Machine) -> Words:
+def balls(machine: AssembledMachine) -> Words:
     """Balls in their seats, by what holds them."""
     held = [one for one in machine.record.holding.balls if one.ball in machine.sizes]
     magnets = [one for one in held if one.by == "magnet"]
@@ -271,7 +271,7 @@ def balls(machine: Machine) -> Words:
 
 
 @planned("Shroud", "shroud_*", loose=("sheets",))
-def shroud(machine: Machine) -> Words:
+def shroud(machine: AssembledMachine) -> Words:
     """The box of card."""
     box = machine.record.shroud
     assert box is not None
@@ -293,7 +293,7 @@ def shroud(machine: Machine) -> Words:
 
 
 @planned("First photographs")
-def first(machine: Machine) -> Words:
+def first(machine: AssembledMachine) -> Words:
     """The program's first run."""
     phases = machine.record.controller.phases
     low, high = machine.record.swing_deg

@@ -22,7 +22,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.prototype.assembly_steps import mechanics, start
-from tbcad.prototype.assembly_steps.machine import Machine, StepPlan
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, StepPlan
 from tbcad.prototype.fasteners import core_radius
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.records.prototype import AssemblyStep, FastenerRecord
@@ -84,7 +84,7 @@ class Step:
     near: tuple[str, ...]  # bodies, mounted before, that the parts are joined to
 
 
-def assembly_steps(machine: Machine) -> tuple[Step, ...]:
+def assembly_steps(machine: AssembledMachine) -> tuple[Step, ...]:
     """All steps that a prototype needs, in order.
 
     Raises:
@@ -101,7 +101,7 @@ def assembly_steps(machine: Machine) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def mounting_steps(machine: Machine) -> tuple[list[StepPlan], dict[str, str]]:
+def mounting_steps(machine: AssembledMachine) -> tuple[list[StepPlan], dict[str, str]]:
     """The steps that a prototype needs, and which of them mounts each body and fastener.
 
     Raises:
@@ -116,7 +116,7 @@ def mounting_steps(machine: Machine) -> tuple[list[StepPlan], dict[str, str]]:
     return plans, bodies | mounted
 
 
-def mounting_record(machine: Machine) -> tuple[AssemblyStep, ...]:
+def mounting_record(machine: AssembledMachine) -> tuple[AssemblyStep, ...]:
     """What each step mounts, for prototype.json."""
     plans, mounting = mounting_steps(machine)
     mounts: dict[str, list[str]] = {plan.key: [] for plan in plans}
@@ -138,7 +138,10 @@ def _first(what: str, keys: Iterator[str]) -> str:
 
 
 def _latest(
-    plans: Sequence[StepPlan], bodies: dict[str, str], machine: Machine, fastener: FastenerRecord
+    plans: Sequence[StepPlan],
+    bodies: dict[str, str],
+    machine: AssembledMachine,
+    fastener: FastenerRecord,
 ) -> str:
     """The last step that mounts a body that a fastener goes through, or what it holds.
 
@@ -155,7 +158,7 @@ def _latest(
 
 
 def _loose(
-    plans: Sequence[StepPlan], machine: Machine, parts: dict[str, str]
+    plans: Sequence[StepPlan], machine: AssembledMachine, parts: dict[str, str]
 ) -> dict[str, Counter[str]]:
     """By step, how many of each part that no body is of."""
     drawn = Counter(part for part in parts.values() if machine.by_body(part))
@@ -173,7 +176,7 @@ def _loose(
     return taken
 
 
-def _uses(machine: Machine, parts: dict[str, str], loose: Counter[str]) -> tuple[Use, ...]:
+def _uses(machine: AssembledMachine, parts: dict[str, str], loose: Counter[str]) -> tuple[Use, ...]:
     """What a step takes, by its bodies' parts, and loose."""
     here: dict[str, list[str]] = {part: [] for part in loose}
     for body, part in parts.items():
@@ -187,7 +190,7 @@ def _uses(machine: Machine, parts: dict[str, str], loose: Counter[str]) -> tuple
     return tuple(sorted(uses, key=lambda use: use.item))
 
 
-def _step(machine: Machine, number: int, plan: StepPlan, uses: tuple[Use, ...]) -> Step:
+def _step(machine: AssembledMachine, number: int, plan: StepPlan, uses: tuple[Use, ...]) -> Step:
     names = {body for use in uses for body in use.bodies}
     fasteners = [one for one in machine.fasteners if one.name in names]
     through = {body for one in fasteners for body in one.through}
@@ -197,7 +200,7 @@ def _step(machine: Machine, number: int, plan: StepPlan, uses: tuple[Use, ...]) 
     return Step(number, plan.key, plan.title, uses, tuple(does), fits, tuple(checks), near)
 
 
-def _torques(machine: Machine, fasteners: Iterable[FastenerRecord]) -> list[str]:
+def _torques(machine: AssembledMachine, fasteners: Iterable[FastenerRecord]) -> list[str]:
     """A line for each kind of screw, torque, and what holds it."""
     screws = [one for one in fasteners if machine.kind(one.part) in SCREWED]
     counts = Counter((one.part, *tightening(machine, one)) for one in screws)
@@ -207,7 +210,7 @@ def _torques(machine: Machine, fasteners: Iterable[FastenerRecord]) -> list[str]
     ]
 
 
-def _fits(machine: Machine, uses: Iterable[Use]) -> list[str]:
+def _fits(machine: AssembledMachine, uses: Iterable[Use]) -> list[str]:
     kinds: dict[str, list[str]] = {}
     for use in uses:
         if (kind := machine.kind(use.part)) in FITS:
@@ -215,7 +218,7 @@ def _fits(machine: Machine, uses: Iterable[Use]) -> list[str]:
     return [f"{', '.join(parts)}: {FITS[kind]}" for kind, parts in kinds.items()]
 
 
-def tightening(machine: Machine, screw: FastenerRecord) -> tuple[str, str]:
+def tightening(machine: AssembledMachine, screw: FastenerRecord) -> tuple[str, str]:
     """How tight a screw or set screw is, as text, and what holds it."""
     part, last = machine.listed(screw.part), screw.through[-1]
     thread = part["thread_mm"] if part else 0.0
@@ -230,7 +233,7 @@ def tightening(machine: Machine, screw: FastenerRecord) -> tuple[str, str]:
     return f"{max(STEP_NM * math.floor(torque / STEP_NM), STEP_NM):.2g} N m", held_by
 
 
-def _kinds_on_axis(machine: Machine, screw: FastenerRecord, thread: float) -> set[str]:
+def _kinds_on_axis(machine: AssembledMachine, screw: FastenerRecord, thread: float) -> set[str]:
     """Kinds of what has the screw's thread, is on its axis and in its last body alone."""
     mates = [one for one in machine.fasteners if one.through == (screw.through[-1],)]
     away = np.array([one.position_mm for one in mates]).reshape(-1, 3) - screw.position_mm
@@ -240,7 +243,7 @@ def _kinds_on_axis(machine: Machine, screw: FastenerRecord, thread: float) -> se
     return {one.kind for one in parts if one and one.kind in HOLDS and one["thread_mm"] == thread}
 
 
-def _head_force(machine: Machine, screw: FastenerRecord, part: PurchasedPart) -> float:
+def _head_force(machine: AssembledMachine, screw: FastenerRecord, part: PurchasedPart) -> float:
     """What the plastic below the head bears, N; without limit below a head on metal."""
     if part.kind == "setscrews" or not machine.is_printed(screw.through[0]):
         return math.inf
@@ -256,7 +259,7 @@ def _head_force(machine: Machine, screw: FastenerRecord, part: PurchasedPart) ->
     return PRESSURE_MPA * math.pi / 4 * (max([part["head_mm"], *outer]) ** 2 - hole**2)
 
 
-def _thread_force(machine: Machine, thread: float, held_by: str) -> float:
+def _thread_force(machine: AssembledMachine, thread: float, held_by: str) -> float:
     """What the screw's core bears, and the plastic round any insert of its thread, N."""
     forces = [PROOF_SHARE * PROOF_MPA * math.pi * core_radius(thread) ** 2]
     for one in machine.fasteners if held_by == "insert" else ():

@@ -27,7 +27,7 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
 from tbcad.prototype import electronics
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
-from tbcad.prototype.assembly_steps.machine import Machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
@@ -101,7 +101,7 @@ def export_prototype(
     record = prototype_record(built, bill, drawings)
     caps = enumerate(built.layout.balls.cap.tolist(), 1)
     sizes = {ball: "" for ball, cap in caps if not cap}
-    steps = mounting_record(Machine((), record, (), sizes, built.parts))
+    steps = mounting_record(AssembledMachine((), record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
     return spec
 

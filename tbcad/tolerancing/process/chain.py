@@ -27,7 +27,7 @@ CUTTER = "cutter_radius_mm"
 NOTHING = "No step adds to it"
 
 
-class Step(Section):
+class ChainStep(Section):
     """One step of a chain: what it adds to a shell. Kinds that it has nothing of are left out."""
 
     title: str = Field(pattern=r"\S", max_length=200)
@@ -70,14 +70,14 @@ def chained(names: object, own: object, where: str) -> Table:
     steps = {name: _step(name, tables, where) for name in names}
     mandrels = {name: step for name, step in steps.items() if step.mandrel}
     whole: dict[str, Any] = {"steps": names, "mandrel_cutter_mm": _cutter(mandrels)}
-    for kind in sorted(Step.model_fields.keys() - {"title", "mandrel"}):
+    for kind in sorted(ChainStep.model_fields.keys() - {"title", "mandrel"}):
         those = steps if kind != CUTTER else steps.keys() - mandrels.keys()
         parts = {name: getattr(steps[name], kind) for name in names if name in those}
         whole[kind] = _sum({name: part for name, part in parts.items() if part is not None}, kind)
     return whole
 
 
-def _cutter(mandrels: dict[str, Step]) -> float | None:
+def _cutter(mandrels: dict[str, ChainStep]) -> float | None:
     """Radius of the largest cutter of a mandrel, mm, 0 if no step names one; None: no mandrel."""
     radii = [step.cutter_radius_mm.magnitude for step in mandrels.values() if step.cutter_radius_mm]
     return max(radii, default=0.0) if mandrels else None
@@ -89,7 +89,7 @@ def _built_in() -> Table:
     return read_toml(file, STEPS_FILE, "process")
 
 
-def _step(name: object, tables: Table, where: str) -> Step:
+def _step(name: object, tables: Table, where: str) -> ChainStep:
     if name not in tables:
         close = get_close_matches(str(name), tables, 1)
         hint = f"did you mean {close[0]}?" if close else f"write its table, [step.{name}]"
@@ -97,9 +97,9 @@ def _step(name: object, tables: Table, where: str) -> Step:
             f"{where}: there is no step {short_text(name)}, allowed are {', '.join(tables)}: {hint}"
         )
     try:
-        return Step.model_validate(tables[str(name)])
+        return ChainStep.model_validate(tables[str(name)])
     except ValidationError as error:
-        raise validation_error(error, Step, f"{where}, step {name}", set()) from None
+        raise validation_error(error, ChainStep, f"{where}, step {name}", set()) from None
 
 
 def _sum(parts: dict[str, ErrorSpec], kind: str) -> Table:

@@ -12,7 +12,7 @@ import pytest
 from tbcad.app.cli import run
 from tbcad.cad.formats.checked_files import write_table
 from tbcad.errors import InputError
-from tbcad.prototype.assembly_steps.machine import Machine, read_machine
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
 from tbcad.prototype.electronics import COLUMNS as WIRING
 from tbcad.prototype.files.bom import COLUMNS
@@ -93,7 +93,7 @@ def write(folder: Path, design: Record, more: dict[str, int]) -> Path:
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Machine:
+def machine(tmp_path: Path) -> AssembledMachine:
     return read_machine(write(tmp_path, belt_design(), LOOSE))
 
 
@@ -108,7 +108,7 @@ def taken(steps: tuple[Step, ...]) -> Counter[str]:
     return sums
 
 
-def test_steps_take_exactly_the_parts_of_the_list(machine: Machine) -> None:
+def test_steps_take_exactly_the_parts_of_the_list(machine: AssembledMachine) -> None:
     """And mount each body and fastener once; a fastener waits for the last that it goes through."""
     steps, recorded = assembly_steps(machine), mounting_record(machine)
     assert taken(steps) == Counter(machine.quantities)
@@ -125,7 +125,7 @@ def test_steps_take_exactly_the_parts_of_the_list(machine: Machine) -> None:
     assert bodies["SET_M3x12_1"] == bodies["shaft"]
 
 
-def test_a_design_gets_the_steps_that_it_needs(machine: Machine) -> None:
+def test_a_design_gets_the_steps_that_it_needs(machine: AssembledMachine) -> None:
     """The belt is on the wheel before the shaft is in the bearings."""
     steps = assembly_steps(machine)
     keys = [step.key for step in steps]
@@ -137,7 +137,7 @@ def test_a_design_gets_the_steps_that_it_needs(machine: Machine) -> None:
     assert 0 <= does.index("the belt round the wheel") < does.index("through both bearings")
 
 
-def test_the_base_is_held_by_pin_or_motor_once_it_is_up(machine: Machine) -> None:
+def test_the_base_is_held_by_pin_or_motor_once_it_is_up(machine: AssembledMachine) -> None:
     """Hanging down, it would strike the stage's post."""
     steps = assembly_steps(machine)
     zero = of(steps, "zero").does
@@ -219,7 +219,7 @@ def test_what_does_not_add_up_is_refused(
 
 
 def test_json_and_page_have_the_same_steps(
-    machine: Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    machine: AssembledMachine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["assembly", str(tmp_path), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)["steps"]
