@@ -167,7 +167,8 @@ def edges_for_process(
         spec = spec_with(spec, shell={"negative": True, "edges": edges})
     if _names_edges(spec):
         made = design_for_process(spec, process, wanted_yield, progress)
-        _check_reach(made.spec, process)
+        if process.mandrel_cutter_mm is not None:
+            _check_reach(made.spec, process, process.mandrel_cutter_mm)
         return EdgeChoice(made, seeing_pixels(made.spec), None)
     valley = _tried("valley", spec, process, wanted_yield, progress)
     pedestal = _too_few(spec, valley, progress) or _tried(
@@ -184,9 +185,8 @@ def _names_edges(spec: Spec) -> bool:
     return "edges" in spec.shell.model_fields_set
 
 
-def _check_reach(spec: Spec, process: Process) -> None:
+def _check_reach(spec: Spec, process: Process, cutter: float) -> None:
     """InputError where a cutter does not fit into the mandrel's pockets of the mirrors' radii."""
-    cutter = process.mandrel_cutter_mm or 0.0
     smallest = 1 / design(spec).arrays[0].modelled_cells.surfaces.curvature.max()
     if cutter >= smallest:
         raise InputError(

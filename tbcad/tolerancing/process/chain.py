@@ -60,26 +60,31 @@ def chained(names: object, own: object, where: str) -> Table:
         where: what messages name.
 
     Raises:
-        SpecError: no list of names, an unknown step, or a table that is not allowed.
+        SpecError: no list of names, an unknown step, one that is not used, or a table that is not
+            allowed.
     """
-    if not isinstance(names, list) or not names:
+    if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
         raise SpecError(
             f"{where}: steps is {short_text(names)}, allowed is a list of names of steps"
         )
-    tables = {**_built_in(), **(own if isinstance(own, dict) else {})}
-    steps = {name: _step(name, tables, where) for name in names}
-    mandrels = {name: step for name, step in steps.items() if step.mandrel}
+    if not isinstance(own, dict):
+        raise SpecError(f"{where}: step is {short_text(own)}, allowed are tables [step.NAME]")
+    if unused := [name for name in own if name not in names]:
+        raise SpecError(f"{where}: step {unused[0]} is not in steps: add it there, or leave it out")
+    tables = {**_built_in(), **own}
+    steps = [(name, _step(name, tables, where)) for name in names]
+    mandrels = [step for _, step in steps if step.mandrel]
     whole: dict[str, Any] = {"steps": names, "mandrel_cutter_mm": _cutter(mandrels)}
     for kind in sorted(ChainStep.model_fields.keys() - {"title", "mandrel"}):
-        those = steps if kind != CUTTER else steps.keys() - mandrels.keys()
-        parts = {name: getattr(steps[name], kind) for name in names if name in those}
-        whole[kind] = _sum({name: part for name, part in parts.items() if part is not None}, kind)
+        those = [pair for pair in steps if kind != CUTTER or not pair[1].mandrel]
+        parts = [(name, getattr(step, kind)) for name, step in those]
+        whole[kind] = _sum([(name, part) for name, part in parts if part is not None], kind)
     return whole
 
 
-def _cutter(mandrels: dict[str, ChainStep]) -> float | None:
+def _cutter(mandrels: list[ChainStep]) -> float | None:
     """Radius of the largest cutter of a mandrel, mm, 0 if no step names one; None: no mandrel."""
-    radii = [step.cutter_radius_mm.magnitude for step in mandrels.values() if step.cutter_radius_mm]
+    radii = [step.cutter_radius_mm.magnitude for step in mandrels if step.cutter_radius_mm]
     return max(radii, default=0.0) if mandrels else None
 
 
@@ -89,33 +94,34 @@ def _built_in() -> Table:
     return read_toml(file, STEPS_FILE, "process")
 
 
-def _step(name: object, tables: Table, where: str) -> ChainStep:
+def _step(name: str, tables: Table, where: str) -> ChainStep:
     if name not in tables:
-        close = get_close_matches(str(name), tables, 1)
+        close = get_close_matches(name, tables, 1)
         hint = f"did you mean {close[0]}?" if close else f"write its table, [step.{name}]"
         raise SpecError(
             f"{where}: there is no step {short_text(name)}, allowed are {', '.join(tables)}: {hint}"
         )
     try:
-        return ChainStep.model_validate(tables[str(name)])
+        return ChainStep.model_validate(tables[name])
     except ValidationError as error:
         raise validation_error(error, ChainStep, f"{where}, step {name}", set()) from None
 
 
-def _sum(parts: dict[str, ErrorSpec], kind: str) -> Table:
+def _sum(parts: list[tuple[str, ErrorSpec]], kind: str) -> Table:
     """One kind of error of all steps that have it, as a table."""
     if not parts:
         return {"magnitude": 0, "source": NOTHING} | (
             {"length_mm": 80} if kind == "warp_um" else {}
         )
-    largest = max(parts.values(), key=lambda part: part.magnitude)
-    source = "; ".join(f"{name}: {part.source.strip()}" for name, part in parts.items())
+    kinds = [part for _, part in parts]
+    largest = max(kinds, key=lambda part: part.magnitude)
+    source = "; ".join(f"{name}: {part.source.strip()}" for name, part in parts)
     if len(parts) == 1 or isinstance(largest, FilletRadius):
         return {**largest.model_dump(), "source": source}
     return {
         **largest.model_dump(),
-        "magnitude": hypot(*map(_sigma, parts.values())),
-        "mean": sum(part.mean for part in parts.values()),
+        "magnitude": hypot(*map(_sigma, kinds)),
+        "mean": sum(part.mean for part in kinds),
         "distribution": "normal",
         "source": source,
     }

@@ -296,6 +296,12 @@ ridge_rounding_um = { magnitude = 1, source = "y" }
         assert (nickel.cutter_radius_mm.magnitude, nickel.mandrel_cutter_mm) == (0, 0.5)
         assert load_process("cnc").mandrel_cutter_mm is None
 
+    def test_a_step_that_is_taken_twice_counts_twice(self, file: Path) -> None:
+        file.write_text('based_on = "cnc"\nsteps = ["coat", "coat"]\n', encoding="utf-8")
+        coat, once = load_process(str(file)).coating_um, load_process("cnc").coating_um
+        assert coat.mean == pytest.approx(2 * once.mean)
+        assert coat.magnitude == pytest.approx(math.sqrt(2) * once.magnitude)
+
     def test_what_no_step_has_is_zero_whatever_it_rests_on(self) -> None:
         inserts = load_process("inserts")
         assert load_process("cnc").ridge_rounding_um.magnitude > 0
@@ -306,9 +312,11 @@ ridge_rounding_um = { magnitude = 1, source = "y" }
         ("text", "said"),
         [
             ('steps = "mill"', "steps is 'mill', allowed is a list of names of steps"),
+            ('steps = [["mill"]]', "allowed is a list of names of steps"),
             ('steps = ["mil"]', "there is no step 'mil', allowed are mill, "),
             ('steps = ["x"]\n[step.x]\nseat_um = {}', "step x: title is missing"),
-            ('steps = ["x"]\nstep = 3', "there is no step 'x'"),
+            ('steps = ["coat"]\nstep = 3', "step is 3, allowed are tables [step.NAME]"),
+            ('steps = ["coat"]\n[step.x]\ntitle = "x"', "step x is not in steps"),
             ("step = 3", "unknown key step: did you mean steps?"),
         ],
     )
