@@ -5,25 +5,21 @@
 tests/app/reference compares them with their records.
 """
 
-import re
 from pathlib import Path
 
-from tbcad_verify.report.methods import AS_BUILT, EXPORT, markdown_table
+from tbcad_verify.report.methods import markdown_tables
 
 from tbcad.app.reference.entries import glossary_page
 
 ROOT = Path(__file__).parents[1]
-HEADS = {EXPORT: ("check", "method", "tolerance"), AS_BUILT: ("check", "figure", "limit")}
+BEGIN, END = "<!-- checks: begin -->\n", "<!-- checks: end -->\n"
 
 
 def pages() -> dict[Path, str]:
     """The text of each page."""
     readme = ROOT / "verify" / "README.md"
-    text = readme.read_text(encoding="utf-8")
-    for table, head in HEADS.items():
-        first = re.escape(f"| {' | '.join(head)} |")
-        begin, end = next(re.finditer(rf"^{first}\n(\|.*\n)+", text, re.MULTILINE)).span()
-        text = text[:begin] + markdown_table(table, head) + text[end:]
+    before, _, rest = readme.read_text(encoding="utf-8").partition(BEGIN)
+    text = before + BEGIN + markdown_tables() + END + rest.partition(END)[2]
     return {ROOT / "docs" / "glossary.md": glossary_page(), readme: text}
 
 

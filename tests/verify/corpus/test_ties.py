@@ -14,7 +14,7 @@ from tbcad_verify.shell.integrity import is_paper
 
 pytestmark = pytest.mark.corpus
 
-README = Path(__file__).parents[3] / "verify" / "README.md"
+FIELDS = Path(__file__).parents[3] / "docs" / "fields.md"
 KINDS = {"measured", "worked out", "spec", "form", "hash"}
 MAPS = {"files", "versions", "totals.bought_price", "totals.filament_price"}  # keys are data
 
@@ -45,7 +45,7 @@ def fields(folder: Path) -> dict[str, set[str]]:
 
 def ties() -> dict[str, set[str]]:
     """Fields of the list, by file."""
-    text = README.read_text(encoding="utf-8")
+    text = FIELDS.read_text(encoding="utf-8")
     table = text.partition("<!-- ties: begin -->")[2].partition("<!-- ties: end -->")[0]
     found: dict[str, set[str]] = {}
     for line in table.strip().splitlines()[2:]:

@@ -14,9 +14,7 @@ from tbcad_verify import main
 from tbcad_verify.programs.program_query import skipped
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.methods import (
-    AS_BUILT,
     ELSE,
-    EXPORT,
     KEY_FIGURES,
     LABEL_WIDTH,
     UNKNOWN,
@@ -208,9 +206,7 @@ def test_every_check_has_a_remedy_that_fits(shell_report: Report, tmp_path: Path
     checks = (*shell_report.checks, *verify(folder, options=IN_PROCESS).checks)
     failing = [replace(check, passed=False) for check in checks if check.limit is not None]
     assert [check.name for check in failing if remedy(check) == ELSE] == []
-    every = [
-        text for table in (EXPORT, AS_BUILT) for one in methods(table) for text in one.remedies
-    ]
+    every = [text for one in methods() for text in one.remedies]
     for text in (*every, UNKNOWN, ELSE):
         assert len(f"    -> {text}") <= WIDTH
 

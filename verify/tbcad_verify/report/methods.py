@@ -15,7 +15,14 @@ if TYPE_CHECKING:
 
 UNKNOWN = "it could not be measured: verify again, with a larger --time-limit"
 ELSE = "build again; if it stays, report it with verify.json"
-EXPORT, AS_BUILT = "check", "as_built"  # tables of checks.toml
+QUESTIONS = {
+    "see": "Does it see the object?",
+    "files": "Do the files agree?",
+    "made": "Can it be made?",
+    "fit": "Do the parts fit?",
+    "move": "Does it move safely?",
+}
+"""What a person asks, in the order of checks.toml."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +30,7 @@ class Method:
     """How some checks are made."""
 
     title: str  # of the row in the table of verify/README.md
+    question: str  # that they answer: a key of QUESTIONS
     names: tuple[str, ...]  # of the checks in verify.json, or what they begin with before a blank
     method: str  # what is compared, and how
     tolerance: str  # of the figure, or where it comes from
@@ -30,19 +38,19 @@ class Method:
 
 
 @cache
-def methods(table: str) -> tuple[Method, ...]:
-    """All methods of one table, in its order: EXPORT or AS_BUILT."""
+def methods() -> tuple[Method, ...]:
+    """All methods, in the order of checks.toml."""
     text = (files("tbcad_verify.report") / "checks.toml").read_text(encoding="utf-8")
-    rows = tomllib.loads(text)[table]
     return tuple(
         Method(
             row["title"],
+            row["question"],
             tuple(row["names"]),
             row["method"],
             row["tolerance"],
             tuple(row.get("remedies") or [row["remedy"]] * len(row["names"])),
         )
-        for row in rows
+        for row in tomllib.loads(text)["check"]
     )
 
 
@@ -50,7 +58,7 @@ def method_of(check: str) -> tuple[Method, str] | None:
     """The method of a check, by its name, and the remedy; None if it is unknown."""
     every = [
         (name, one, what)
-        for one in (*methods(EXPORT), *methods(AS_BUILT))
+        for one in methods()
         for name, what in zip(one.names, one.remedies, strict=True)
     ]
     fitting = [row for row in every if check == row[0] or check.startswith(row[0] + " ")]
@@ -68,11 +76,17 @@ def remedy_by_name(check: str) -> str:
     return found[1] if found else ELSE
 
 
-def markdown_table(table: str, head: Sequence[str]) -> str:
-    """The methods of one table as a table of Markdown, with the words of its head."""
-    rows = [(one.title, one.method, one.tolerance) for one in methods(table)]
-    lines = [f"| {' | '.join(row)} |" for row in (tuple(head), *rows)]
-    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]]) + "\n"
+def markdown_tables() -> str:
+    """All methods as tables of Markdown, one for each question."""
+    return "\n".join(
+        f"### {asked}\n\n| check | method | limit |\n|---|---|---|\n"
+        + "".join(
+            f"| {one.title} | {one.method} | {one.tolerance} |\n"
+            for one in methods()
+            if one.question == question
+        )
+        for question, asked in QUESTIONS.items()
+    )
 
 
 @dataclass(frozen=True)

@@ -51,14 +51,15 @@ def explain(
 
 def _checks() -> "Iterator[ReferenceEntry]":
     """The checks of the verification, as it describes them itself."""
-    from tbcad_verify.report.methods import AS_BUILT, EXPORT, KEY_FIGURES, methods, remedy_by_name
+    from tbcad_verify.report.methods import KEY_FIGURES, QUESTIONS, methods, remedy_by_name
 
     from tbcad.app.reference.entries import ReferenceEntry
 
     labels = {one.check: one.label for one in KEY_FIGURES}
-    for one in (*methods(EXPORT), *methods(AS_BUILT)):
+    for one in methods():
         for check in one.names:
             facts: dict[str, str | list[str]] = {
+                "answers": QUESTIONS[one.question],
                 "compares": one.method,
                 "tolerance": one.tolerance,
                 "if it fails": remedy_by_name(check),
