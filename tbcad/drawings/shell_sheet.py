@@ -52,7 +52,7 @@ def shell_job(export: DrawnExport, name: str) -> ShellJob:
     text = (
         f"Wall {wall:g} mm behind the deepest valley of the mirrors.",
         f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
-        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad inspection.",
+        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad order.",
         "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
     )
     return _job(export, name, text)
@@ -91,7 +91,7 @@ def _job(export: DrawnExport, name: str, notes: tuple[str, ...]) -> ShellJob:
         quantity=1,
         material="by process",
         view="section y = 0",
-        tolerances="inspection table",
+        tolerances="of tbcad order",
     )
     where = (
         f"Shape and what has no size here: {step},",

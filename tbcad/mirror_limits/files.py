@@ -1,14 +1,13 @@
-"""The folder of an inspection: a table and a STEP file with tolerances for each half, a record.
+"""The files of an order: a table and STEP files with tolerances for each half, a record.
 
 Tolerances are read back from STEP as a reader gets them, and compared with those that were meant.
 """
 
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,18 +25,17 @@ from tbcad.core.mirrors.array import mirror_ids
 from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.reflection import roughness_nm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.mirror_limits.sensitivity import MM_PER_UM, MirrorLimits, Sensitivities
+from tbcad.mirror_limits.sensitivity import MM_PER_UM, MirrorLimits
 from tbcad.shell.files import wall_names
 from tbcad.types import Floats
 
-SCHEMA = "tbcad-inspection/1"
-RECORD = "inspection.json"
+SCHEMA = "tbcad-order/1"
+RECORD = "order.json"
 DATUM_FACES = {"A": "foot", "B": "seam"}
-WAVELENGTH_NM = 550.0  # the middle of the visible
-SCATTERED = 0.01  # share of the light that roughness may scatter: a judgement
 UNITS = ("offset_um", "tilt_mrad", "radius_mm", "wall_um")
 SPHERE_KINDS = UNITS[:3]
 COLUMNS = (
@@ -45,8 +43,9 @@ COLUMNS = (
     *("apex_x_mm", "apex_y_mm", "apex_z_mm", "normal_x", "normal_y", "normal_z"),
     *("offset_limit_um", "tilt_limit_mrad", "radius_limit_mm", "profile_mm"),
     *("offset_sigma_um", "tilt_sigma_mrad", "radius_sigma_mm"),
+    *("offset_chain_um", "tilt_chain_mrad", "radius_chain_mm"),  # two standard deviations
 )
-WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um")  # of mirrors on pedestals
+WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um", "wall_chain_um")  # of mirrors on pedestals
 Key = TypeVar("Key", str, int, frozenset[str])
 SAME = 1e-9  # mm: numbers in a file have 15 digits
 SAME_PLANE = 1e-6  # of normal and distance (mm): at n = 18 no two walls are closer than 2e-4
@@ -62,6 +61,7 @@ class Half:
     ids: tuple[str, ...]
     surfaces: Surfaces  # of the solid, below the coat
     limits: MirrorLimits
+    chain: Floats  # two standard deviations of what the chain makes, (m, kinds)
     dowel_mm: float  # diameter of the holes for dowel pins
     # of each mirror's pedestal: names of the faces, with a point (mm) and the normal of their
     # planes, (6,); none where spheres meet
@@ -89,23 +89,30 @@ class Half:
         """Columns of the table."""
         return COLUMNS if self.wall_um is None else COLUMNS + WALL_COLUMNS
 
+    def mandrel(self, share: Floats) -> "Half":
+        """Its negative, which may use a share (m, kinds) of the limits."""
+        name = self.name.replace("shell", "mandrel")
+        return replace(self, name=name, limits=self.limits.part(share))
+
     def rows(self) -> list[Row]:
         """Rows of the table."""
-        each, sigma = (
-            np.hsplit(of, [len(SPHERE_KINDS)]) for of in (self.limits.each, self.limits.sigma)
+        each, sigma, chain = (
+            np.hsplit(of, [len(SPHERE_KINDS)])
+            for of in (self.limits.each, self.limits.sigma, self.chain)
         )
         numbers = np.column_stack(
             [
                 *(self.surfaces.centre, self.surfaces.radius, self.surfaces.apex),
-                *(self.surfaces.normal, each[0], self.profile_mm, sigma[0], each[1], sigma[1]),
+                *(self.surfaces.normal, each[0], self.profile_mm, sigma[0], chain[0]),
+                *(each[1], sigma[1], chain[1]),
             ]
         ).tolist()
         named = zip(self.ids, numbers, strict=True)
         return [dict(zip(self.columns, (name, *row), strict=True)) for name, row in named]
 
 
-def halves(export: ExportedDesign, limits: MirrorLimits) -> tuple[Half, Half]:
-    """Both halves of an export with their part of the limits."""
+def halves(export: ExportedDesign, limits: MirrorLimits, chain: Floats) -> tuple[Half, Half]:
+    """Both halves of an export with their part of the limits, and of what a chain holds."""
     coat = export.spec.mirrors.coating_um * MM_PER_UM
     m = len(export.reflectors[0])
     a, b = (
@@ -114,6 +121,7 @@ def halves(export: ExportedDesign, limits: MirrorLimits) -> tuple[Half, Half]:
             tuple(mirror_ids(one.camera_id, m)),
             one.mirrors.offset(-coat),
             MirrorLimits(limits.each[k * m :][:m], limits.sigma[k * m :][:m], limits.seat_um),
+            chain[k * m :][:m],
             export.spec.shell.foot_flange.dowel_hole_mm,
             _walls(tuple(mirror_ids(one.camera_id, m)), one.cells),
         )
@@ -139,24 +147,30 @@ def _walls(ids: tuple[str, ...], cells: Cells) -> tuple[dict[str, Floats], ...]:
     return walls
 
 
-def write_half(folder: Path, export: Path, half: Half) -> dict[str, str]:
-    """Write table and STEP file of one half, read the tolerances back, and name both files.
+def write_table_of(folder: Path, half: Half) -> str:
+    """Write the table of one half, and return its name."""
+    table = f"inspection_{half.name[-1]}.csv"
+    write_table(folder / table, half.columns, half.rows())
+    return table
+
+
+def write_solid(folder: Path, export: Path, half: Half, chain: Mapping[str, str]) -> str:
+    """Write a half's STEP file with notes on its chain, read the tolerances back, and name it.
 
     InputError if the export has no such solid, or it is not that of its mirrors.
     """
-    table, step = f"inspection_{half.name[-1]}.csv", f"{half.name}_tolerances.step"
-    write_table(folder / table, half.columns, half.rows())
+    step = f"{half.name}_tolerances.step"
     solid = read_named_solid(export / f"{half.name}.step")
     names = {name for name, _ in solid.faces}
     missing = sorted({*half.ids, *DATUM_FACES.values()} - names)
     if missing:
         raise InputError(f"{export / half.name}.step has no face {missing[0]}: run tbcad build")
     given = tolerances(half, dowel_face(solid, half.dowel_mm))
-    write_tolerances(folder / step, solid, given)
+    write_tolerances(folder / step, solid, replace(given, notes={**given.notes, **chain}))
     centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
     walls = {name: plane for of_mirror in half.walls for name, plane in of_mirror.items()}
     check_read_back(folder / step, given, centres, walls)
-    return {"table": table, "solid": step}
+    return step
 
 
 def tolerances(half: Half, dowel: str) -> FaceTolerances:
@@ -174,9 +188,14 @@ def tolerances(half: Half, dowel: str) -> FaceTolerances:
 
 
 def dowel_face(solid: Solid, diameter: float) -> str:
-    """Name of the first dowel hole in the foot flange."""
+    """Name of the first dowel hole in the foot flange; InputError if it has none."""
     holes = (one for one in solid.faces if one[0].startswith("foot_hole"))
-    return next(name for name, face in holes if isclose(2 * cylinder_radius(face), diameter))
+    dowels = [name for name, face in holes if isclose(2 * cylinder_radius(face), diameter)]
+    if not dowels:
+        raise InputError(
+            f"{solid.name} has no dowel hole for datum C: make shell.foot_flange.dowels 1 or more"
+        )
+    return dowels[0]
 
 
 def notes(wall_um: Floats | None = None) -> dict[str, str]:
@@ -190,32 +209,6 @@ def notes(wall_um: Floats | None = None) -> dict[str, str]:
         "limits": "of mirrors: as reflecting, coated; each zone by its own mirror",
         "datums": "A foot plane, B seam plane, C dowel hole",
     }
-
-
-def roughness_nm() -> float:
-    """RMS roughness that scatters the share of light: (4 pi Rq / wavelength)^2 (ISO 10110-8)."""
-    return WAVELENGTH_NM * float(np.sqrt(SCATTERED)) / (4 * np.pi)
-
-
-def write_record(
-    folder: Path, found: Sensitivities, limits: MirrorLimits, facts: dict[str, Any]
-) -> dict[str, Any]:
-    """Write the record of an inspection, and return it."""
-    smallest = limits.each.min(axis=0).tolist()
-    median = np.median(limits.each, axis=0).tolist()
-    record = {
-        "schema": SCHEMA,
-        **facts,
-        "designed_minimum_mm": float(found.coverage.min()),
-        "limits": {
-            "smallest": dict(zip(UNITS, smallest, strict=False)),
-            "median": dict(zip(UNITS, median, strict=False)),
-            "seat_um": limits.seat_um,
-            "roughness_rq_nm": roughness_nm(),
-        },
-    }
-    (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    return record
 
 
 def check_read_back(

@@ -203,6 +203,10 @@ class MirrorLimits:
     sigma: Floats  # standard deviations with which the wanted share is good, (2 m, kinds)
     seat_um: float  # by which each half may sit wrong, also with all mirrors at their limits
 
+    def part(self, share: Floats) -> "MirrorLimits":
+        """The same for what may use a share (2 m, kinds) of each limit, rounded down."""
+        return replace(self, each=_floor(self.each * share, PLACES[: share.shape[1]]))
+
     def within(self, steps: Floats, found: Sensitivities) -> "MirrorLimits":
         """The same, no limit more than its part of the deviation whose loss is known."""
         largest = _floor(steps / kinds_and_seat(found), PLACES[: steps.shape[1]])

@@ -161,18 +161,26 @@ def check_yield(wanted_yield: float) -> None:
 
 
 @dataclass(frozen=True)
-class InspectionOptions(Call):
-    """The shells of an export, and how many of them must be good."""
+class OrderOptions(Call):
+    """The shells of an export, the chain that makes them, and how many must be good."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY
+    chain: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="How they are made: nickel-diamond, cnc, sla ... or a TOML file; see tbcad "
+            "tolerance.",
+        ),
+    ] = "nickel-diamond"
     wanted: Annotated[
         float,
         typer.Option(
             "--yield", help="Share of the shells that must be good with the standard deviations."
         ),
     ] = 0.99
-    out: OutReplaced[AnyPath] = Path("inspection")
+    out: OutReplaced[AnyPath] = Path("order")
     force: Force = False
 
 

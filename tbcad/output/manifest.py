@@ -91,11 +91,11 @@ RECORDS: dict[Kind, str] = {
     "calibration": "calibration.json",
     "capture": "capture.json",
     "dataset": "dataset.json",
-    "inspection": "inspection.json",
+    "order": "order.json",
     "as-built": "as_built.json",
 }
 WORDS: dict[str, str] = {
-    "inspection": "an inspection",
+    "order": "an order",
     "as-built": "solids as built",
     "": "content of tbcad of an unknown kind",
 }

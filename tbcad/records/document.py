@@ -53,7 +53,7 @@ SCHEMA = "tbcad-manifest/1"
 MAX_FILES = 30_000  # three for each of 6578 mirrors at n = 36, and more
 
 Kind = Literal[
-    "build", "capture", "merged run", "run", "calibration", "dataset", "inspection", "as-built"
+    "build", "capture", "merged run", "run", "calibration", "dataset", "order", "as-built"
 ]
 """What a folder holds that a command writes; a run has no manifest, since it grows."""
 

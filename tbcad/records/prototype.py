@@ -160,7 +160,7 @@ class CapRecord(RecordSection):
     radius_tolerance_mm: Finite
     body_tolerance_mm: Finite
     irregularity_fringes: Finite
-    roughness_ra_um: Finite
+    roughness_rq_nm: Finite
     incidence_deg: Finite
     reflectance_min: Finite
     material: str

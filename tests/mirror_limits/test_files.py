@@ -1,4 +1,4 @@
-"""Files of an inspection: tables, and STEP with tolerances as other readers get them."""
+"""Files of an order: tables, and STEP with tolerances as other readers get them."""
 
 import csv
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 
-from tbcad.app.api import inspect
+from tbcad.app.api import order
 from tbcad.app.cli import run
 from tbcad.cad.formats.step import read_named_solid
 from tbcad.core.mirrors.array import MirrorDesign, design
@@ -33,8 +33,8 @@ def exports(coated: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> P
 
 @pytest.fixture(scope="module")
 def written(exports: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("inspection") / "out"
-    inspect(exports, out=out)
+    out = tmp_path_factory.mktemp("order") / "out"
+    order(exports, chain="cnc", out=out)
     return out
 
 
@@ -103,12 +103,14 @@ def test_what_is_refused(
         ([str(sample), "--out", out], "its mirrors are planar"),
         ([str(exports), "--yield", "1.5"], "--yield 1.5: allowed is"),
     ):
-        assert run(["inspection", *words]) == 2
+        assert run(["order", "--chain", "cnc", *words]) == 2
         assert wrong in capsys.readouterr().err
+    assert run(["inspection", str(exports)]) == 2
+    assert "tbcad inspection is called order: write tbcad order" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:
-    inspect(exports, out=tmp_path / "again")
+    order(exports, chain="cnc", out=tmp_path / "again")
     for file in sorted(written.iterdir()):
         assert file.read_bytes() == (tmp_path / "again" / file.name).read_bytes(), file.name

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
-from tbcad.mirror_limits.inspect import minimum_at_limits
+from tbcad.mirror_limits.order import minimum_at_limits
 from tbcad.mirror_limits.sensitivity import (
     Deviation,
     MirrorLimits,

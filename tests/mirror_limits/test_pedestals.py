@@ -10,7 +10,7 @@ import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.TopoDS import TopoDS_Face
 
-from tbcad.app.api import inspect
+from tbcad.app.api import order
 from tbcad.cad.formats.step import StepError, read_named_solid
 from tbcad.cad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
 from tbcad.core.mirrors.array import MirrorDesign
@@ -18,7 +18,7 @@ from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.pedestals.cells import groove_walls
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.mirror_limits.files import Half, check_read_back, dowel_face, halves, tolerances
-from tbcad.mirror_limits.inspect import found_limits, minimum_at_limits
+from tbcad.mirror_limits.order import found_limits, minimum_at_limits
 from tbcad.mirror_limits.sensitivity import MirrorLimits, Sensitivities, sensitivities
 from tbcad.shell.files import shell_envelope, wall_names, write_shell_solids
 from tests.pedestal_designs import pedestal_design
@@ -88,13 +88,14 @@ def test_one_kind_alone_may_take_the_whole_margin(
     assert minimum_at_limits(export, replace(found[1], each=8 * alone)) < TARGET
 
 
+@pytest.mark.slow
 def test_files_name_walls_and_their_limits(
     folder: Path, made: MirrorDesign, tmp_path: Path
 ) -> None:
-    inspect(folder, out=tmp_path / "out")
+    order(folder, chain="diamond", out=tmp_path / "out")
     with (tmp_path / "out" / "inspection_b.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    record = json.loads((tmp_path / "out" / "inspection.json").read_text(encoding="utf-8"))
+    record = json.loads((tmp_path / "out" / "order.json").read_text(encoding="utf-8"))
     smallest = record["limits"]["smallest"]
     assert min(float(row["wall_limit_um"]) for row in rows) >= smallest["wall_um"] > 0
     assert record["simulated_minimum_mm"] >= TARGET
@@ -126,7 +127,7 @@ def test_a_solid_that_is_read_has_each_face_by_its_name(folder: Path, made: Mirr
 
 @pytest.fixture(scope="module")
 def half(export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]) -> Half:
-    return halves(export, found[1])[0]
+    return halves(export, found[1], found[1].each)[0]
 
 
 @pytest.fixture(scope="module")

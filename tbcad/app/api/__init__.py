@@ -17,7 +17,7 @@ from tbcad.app.api.captures import (
 from tbcad.app.api.designs import design, optimize, to_cadquery
 from tbcad.app.api.machines import as_built, calibrate, intrinsics, merge, run, simulate_run
 from tbcad.app.api.reconstructions import reconstruct
-from tbcad.app.api.verification import analyse, inspect, tolerance, verify, verify_as_built
+from tbcad.app.api.verification import analyse, order, tolerance, verify, verify_as_built
 from tbcad.app.api.views import Views, refocus, view
 
 __all__ = [
@@ -33,10 +33,10 @@ __all__ = [
     "dataset",
     "design",
     "export",
-    "inspect",
     "intrinsics",
     "merge",
     "optimize",
+    "order",
     "photograph",
     "reconstruct",
     "refocus",

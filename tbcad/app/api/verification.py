@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tbcad.core.spec.load import option_texts
 from tbcad.errors import InputError
 from tbcad.options.builds import (
-    InspectionOptions,
+    OrderOptions,
     ToleranceOptions,
     VerificationOptions,
     check_yield,
@@ -114,29 +114,37 @@ def checked_process(options: ToleranceOptions) -> Process:
     return process
 
 
-@keywords(InspectionOptions)
-def inspect(options: InspectionOptions) -> dict[str, Any]:
-    """Write by how much each mirror of a shell may be off: tables, and STEP with tolerances.
+@keywords(OrderOptions)
+def order(options: OrderOptions) -> dict[str, Any]:
+    """Write what a workshop needs to make the shells of a build by a process chain.
+
+    By how much each mirror may be off and what the chain holds of it: tables, STEP with tolerances,
+    and a page that says the rest.
 
     Returns:
-        What is in inspection.json.
+        What is in order.json.
 
     Raises:
-        InputError: the export has no shells, their mirrors are planar or may not be off at all,
-            the share is not between 0 and 1, or out cannot be replaced.
+        InputError: the export has no shells, or no mandrels that the chain needs, their mirrors are
+            planar or may not be off at all, the chain cannot be read, the share is not between 0
+            and 1, or out cannot be replaced.
     """
     exports, out = Path(options.exports), Path(options.out)
     check_is_export(exports)
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
+    from tbcad.tolerancing.process.process import load_process
 
     check_yield(options.wanted)
-    check_replaceable(out, "inspection", options.force, (exports,))
-    from tbcad.mirror_limits.inspect import checked_export
-    from tbcad.mirror_limits.inspect import inspect as write_files
+    process = load_process(options.chain)
+    check_replaceable(out, "order", options.force, (exports,))
+    from tbcad.drawings.order_sheet import write_sheet
+    from tbcad.mirror_limits.order import checked_export, write_order
 
-    export = checked_export(exports)
-    with replacing(out, "inspection", options.force, (exports,)) as folder:
-        record = write_files(export, options.wanted, folder, options.progress)
-        write_manifest(folder, "inspection")
+    export = checked_export(exports, process, options.chain)
+    with replacing(out, "order", options.force, (exports,)) as folder:
+        record = write_order(export, process, options, folder)
+        options.progress("page")
+        write_sheet(folder, exports, record, export.spec)
+        write_manifest(folder, "order")
     return record

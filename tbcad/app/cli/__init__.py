@@ -29,6 +29,7 @@ from tbcad.app.cli.help_texts import add_examples, order_help
 from tbcad.app.cli.endings import (
     INTERRUPTED,
     Stopped,
+    check_is_not_renamed,
     shortage,
     signals_as_interrupt,
     usage_error_text,
@@ -59,6 +60,7 @@ def _show_warning(
 
 def _run(arguments: list[str]) -> int:
     try:
+        check_is_not_renamed(arguments)
         code = int(app(arguments, prog_name="tbcad", standalone_mode=False) or 0)
     except typer.Exit as stop:
         return stop.exit_code

@@ -5,7 +5,7 @@ import os
 import re
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tbcad.errors import ProcessLost, one_line
+from tbcad.errors import InputError, ProcessLost, one_line
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -85,6 +85,15 @@ def _interrupt(again: list[threading.Timer], number: int, frame: FrameType | Non
 _PARAMETER, _OPTION, _LIKELY = "param", "option_name", "possibilities"
 
 _EXTRA = re.compile(r"^Got unexpected extra argument\(s\) \(")
+
+
+RENAMED = {"inspection": "order"}  # commands, as they were called and are
+
+
+def check_is_not_renamed(arguments: Sequence[str]) -> None:
+    """Refuse the former name of a command, and say the new one."""
+    if arguments and (new := RENAMED.get(arguments[0])):
+        raise InputError(f"tbcad {arguments[0]} is called {new}: write tbcad {new}")
 
 
 def usage_error_text(error: typer.TyperException) -> str:

@@ -8,7 +8,7 @@ HEADINGS = {
         *("init", "optimize", "build", "verify", "report", "picture", "camera"),
         *("explain", "doctor"),
     ),
-    "Order and assemble": ("inspection", "parts", "drawings", "assembly"),
+    "Order and assemble": ("order", "parts", "drawings", "assembly"),
     "Run the machine": ("run", "intrinsics", "calibrate", "merge", "as-built"),
     "Simulate and analyse": ("capture", "simulate-run", "tolerance", "study"),
     "Look at light fields": ("reconstruct", "show", "view", "refocus", "export"),
@@ -55,8 +55,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ('"coverage, facets"', "a check of the verification"),
     ),
     "doctor": (("", "what is missing, and the command that repairs it"),),
-    "inspection": (
-        ("exports/ --out inspection/", "tables and STEP with tolerances, for a workshop"),
+    "order": (
+        (
+            "exports/ --out order/",
+            "a page, tables, STEP with tolerances: nickel from a mandrel",
+        ),
+        ("exports/ --chain cnc", "what milling can hold of each limit"),
     ),
     "parts": (
         ("exports/", "totals, and what costs most"),

@@ -49,6 +49,11 @@ def text_width(text: str, height: float) -> float:
     return sum(_widths()[character] for character in text) / EM * height / CAPITAL
 
 
+def drawable(text: str) -> str:
+    """A text with a question mark for each character that drawings lack."""
+    return "".join(one if one in _widths() else "?" for one in text)
+
+
 def write_pdf(
     path: Path, title: str, size: tuple[float, float], entities: Iterable[Entity]
 ) -> None:

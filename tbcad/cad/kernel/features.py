@@ -78,10 +78,15 @@ def distance(shape: TopoDS_Shape, point: Floats) -> float:
     return float(BRepExtrema_DistShapeShape(vertex, shape).Value())
 
 
+def round_faces(some: Iterable[TopoDS_Face]) -> list[RoundFace]:
+    """Cylindrical faces among some, as of `cylinders`, whose ends are not looked at."""
+    walls = [wall for face in some if (wall := _wall(face))]
+    return [_joined(group) for group in _groups(walls)]
+
+
 def cylinders(shape: TopoDS_Shape) -> list[RoundFace]:
     """All cylindrical faces, those with one axis and radius that meet as one."""
-    walls = [wall for face in faces(shape) if (wall := _wall(face))]
-    found = [_joined(group) for group in _groups(walls)]
+    found = round_faces(faces(shape))
     holes = [k for k, one in enumerate(found) if one.hollow]
     if holes:
         reach = np.array([PROBE_MM * found[k].axis for k in holes])

@@ -9,6 +9,8 @@ import numpy as np
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.types import Floats
 
+WAVELENGTH_NM = 550.0  # the middle of the visible
+SCATTERED = 0.01  # share of the light that the roughness of mirrors may scatter: a judgement
 ITERATIONS = 40  # of the search for the point of reflection; each gains a digit or so
 
 
@@ -18,6 +20,19 @@ def reflect(ray: Floats, normal: Floats) -> Floats:
     Lengths stay as they are; the sign of the normal does not matter.
     """
     return np.asarray(ray - 2 * dot(ray, normal)[..., None] * normal)
+
+
+def scattered_share(roughness_nm: float, wavelength_nm: float = WAVELENGTH_NM) -> float:
+    """Total integrated scatter of an RMS roughness Rq: 1 - exp(-(4 pi Rq / wavelength)^2).
+
+    Source: Bennett and Porteus, J. Opt. Soc. Am. 51 (1961) 123, at normal incidence.
+    """
+    return float(-np.expm1(-((4 * np.pi * roughness_nm / wavelength_nm) ** 2)))
+
+
+def roughness_nm(scattered: float = SCATTERED, wavelength_nm: float = WAVELENGTH_NM) -> float:
+    """RMS roughness Rq that scatters a share of the light, nm: `scattered_share` inverted."""
+    return float(wavelength_nm * np.sqrt(-np.log1p(-scattered)) / (4 * np.pi))
 
 
 def reflected_rays(pinhole: Floats, point: Floats, normal: Floats) -> Floats:

@@ -147,9 +147,11 @@ def validation_error(
 
 
 def _wrong_value(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:
-    field = dict(dotted_fields(model))[key]
+    field = dict(dotted_fields(model)).get(key)
     entry = "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
     value = "missing" if first["type"] == "missing" else short_text(first["input"])
+    if field is None:  # in a table that may be left out, or in a list of tables
+        return f"{key}{entry} is {value}: {first['msg'].lower()}: change it"
     permitted = allowed_text(field.annotation, field.metadata)
     reasons = "".join(f" ({one.text})" for one in field.metadata if isinstance(one, Reason))
     return f"{key}{entry} is {value}, allowed is {permitted}{reasons}: change it"

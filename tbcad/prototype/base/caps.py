@@ -12,6 +12,7 @@ shared equally (root sum of squares) by radius, figure, tilt and seat.
 import numpy as np
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.reflection import roughness_nm
 from tbcad.core.spec.design import Spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part, seat_magnets
@@ -40,7 +41,7 @@ SHOULDER_MM = 0.1  # of the flat round the spigot
 SHARES = 4  # of the margin: radius, figure, tilt, seat
 MIN_MARGIN_MM = 0.3
 FRINGE_MM = 546.07e-6 / 2  # ISO 10110-5: half a wavelength of the green mercury line
-MIN_REFLECTANCE = 0.55  # of polished steel, as the balls
+MIN_REFLECTANCE = 0.55  # of polished steel, as the balls: without what roughness scatters
 MATERIAL = "resin"
 FINISH = "polished and coated with aluminium as its drawing asks"
 POLARITY = "north pole toward the object, as all magnets of the seats"
@@ -130,7 +131,7 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
         radius_tolerance_mm=slope * radius**2 / used,
         body_tolerance_mm=2 * (slope * radius * float(np.cos(base.seats.tilt))),
         irregularity_fringes=slope * used / 2 / FRINGE_MM,
-        roughness_ra_um=prototype.grade.roughness_ra_um,
+        roughness_rq_nm=roughness_nm(),
         incidence_deg=float(np.degrees(np.arccos(between))) / 2,
         reflectance_min=MIN_REFLECTANCE,
         material=MATERIAL,

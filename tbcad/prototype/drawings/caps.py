@@ -6,6 +6,7 @@ import numpy as np
 
 from tbcad.cad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
 from tbcad.cad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
+from tbcad.core.optics.reflection import scattered_share
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_edge, cap_pocket, cap_spigot, flat_depth
 from tbcad.prototype.base.layout import BaseLayout
@@ -104,14 +105,15 @@ def _table(one: CapRecord, radius: float, body: float) -> Iterator[Entity]:
 
 
 def _blocks(one: CapRecord, radius: float, diameter: float) -> tuple[tuple[str, ...], ...]:
+    finish, scattered = one.roughness_rq_nm, scattered_share(one.roughness_rq_nm)
     front = (
         "Front",
         f"R {radius:.1f} +-{one.radius_tolerance_mm:.2f} CX",
         f"effective diameter {one.aperture_mm:.1f}",
         f"3/ -({one.irregularity_fringes:.1f}), fringes of 546 nm over it",
         f"4/ centre of R within {one.centre_shift_mm:.2f} of the spigot's axis",
-        f"Ra {one.roughness_ra_um:g} um or better, polished",
-        f"coat: reflects {one.reflectance_min:.0%} or more, 400 to 700 nm at "
+        f"Rq {finish:.1f} nm or better: scatters {scattered:.0%} at 550 nm",
+        f"coat: reflects {one.reflectance_min:.0%} or more unscattered, 400 to 700 nm at "
         f"{one.incidence_deg:.0f} degrees",
     )
     material = (

@@ -3,7 +3,7 @@
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
-from math import hypot, sqrt
+from math import hypot
 from typing import Any
 
 from pydantic import Field, ValidationError
@@ -13,8 +13,10 @@ from tbcad.core.spec.errors import SpecError, short_text, validation_error
 from tbcad.core.spec.section import Section
 from tbcad.tolerancing.process.kinds import (
     ErrorSpec,
+    Fact,
     FilletMicrometres,
     FilletRadius,
+    Instrument,
     Micrometres,
     Millimetres,
     Permille,
@@ -24,6 +26,7 @@ from tbcad.tolerancing.process.kinds import (
 
 STEPS_FILE = "steps.toml"
 CUTTER = "cutter_radius_mm"
+FACTS = {"title", "mandrel", "material", "treatment", "measured_with"}  # of a step, not its errors
 NOTHING = "No step adds to it"
 
 
@@ -34,6 +37,12 @@ class ChainStep(Section):
     """The step in words."""
     mandrel: bool = False
     """Whether what it makes is the negative, from which a later step takes the shell."""
+    material: Fact | None = None
+    """What it makes the part of, with temper; none: it works on what is there."""
+    treatment: Fact | None = None
+    """How stress is relieved, or what protects a coat."""
+    measured_with: Instrument | None = None
+    """Instrument for the mirrors' form after this step."""
     sphere_centre_um: Micrometres | None = None
     sphere_radius_um: Micrometres | None = None
     warp_um: SmoothMicrometres | None = None
@@ -75,7 +84,8 @@ def chained(names: object, own: object, where: str) -> Table:
     steps = [(name, _step(name, tables, where)) for name in names]
     mandrels = [step for _, step in steps if step.mandrel]
     whole: dict[str, Any] = {"steps": names, "mandrel_cutter_mm": _cutter(mandrels)}
-    for kind in sorted(ChainStep.model_fields.keys() - {"title", "mandrel"}):
+    whole["made"] = [tables[name] for name in names]
+    for kind in sorted(ChainStep.model_fields.keys() - FACTS):
         those = [pair for pair in steps if kind != CUTTER or not pair[1].mandrel]
         parts = [(name, getattr(step, kind)) for name, step in those]
         whole[kind] = _sum([(name, part) for name, part in parts if part is not None], kind)
@@ -120,13 +130,8 @@ def _sum(parts: list[tuple[str, ErrorSpec]], kind: str) -> Table:
         return {**largest.model_dump(), "source": source}
     return {
         **largest.model_dump(),
-        "magnitude": hypot(*map(_sigma, kinds)),
+        "magnitude": hypot(*(part.sigma for part in kinds)),
         "mean": sum(part.mean for part in kinds),
         "distribution": "normal",
         "source": source,
     }
-
-
-def _sigma(part: ErrorSpec) -> float:
-    """Standard deviation, in the unit of the kind."""
-    return part.magnitude if part.distribution == "normal" else part.magnitude / sqrt(3)

@@ -14,6 +14,22 @@ MICROMETRE = 1e-3  # mm
 Source: TypeAlias = Annotated[str, Field(pattern=r"\S", max_length=2000)]
 
 
+class Fact(Section):
+    """What a workshop is told of a step."""
+
+    value: str = Field(pattern=r"^[ -~]*[!-~][ -~]*$", max_length=120)
+    """In words, ASCII."""
+    source: Source
+    """Where it comes from; says so where it is a judgement."""
+
+
+class Instrument(Fact):
+    """What measures the form of mirrors."""
+
+    uncertainty_um: float = Field(gt=0, le=1000)
+    """Expanded uncertainty (k = 2) of a height within a mirror and its neighbours, micrometres."""
+
+
 class ErrorSpec(Section):
     """One kind of error: common to all builds (mean), and different in each (magnitude)."""
 
@@ -32,6 +48,11 @@ class ErrorSpec(Section):
     def error(self) -> Error:
         """The same in mm, radians or as a share."""
         return Error(self.unit * self.magnitude, self.unit * self.mean, self.distribution)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation, in the unit of the file."""
+        return Error(self.magnitude, 0.0, self.distribution).sigma
 
 
 class Micrometres(ErrorSpec):

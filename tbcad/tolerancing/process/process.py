@@ -25,7 +25,7 @@ from tbcad.core.spec.prototype import GradeName
 from tbcad.core.spec.section import Section, as_tuple
 from tbcad.prototype.balls.catalogue import load_grades
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.process.chain import chained
+from tbcad.tolerancing.process.chain import ChainStep, chained
 from tbcad.tolerancing.process.kinds import (
     MICROMETRE,
     Degrees,
@@ -68,6 +68,8 @@ class Process(Section):
     """Version of this table's keys."""
     steps: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
     """Steps of a chain, whose errors are added up; none: the figures are the process' own."""
+    made: Annotated[tuple[ChainStep, ...], BeforeValidator(as_tuple)] = ()
+    """What a workshop is told: each step with material, treatment and instrument."""
     mandrel_cutter_mm: float | None = Field(None, ge=0, le=100)
     """Radius of the cutter of a mandrel, the shell's negative that the shell is taken from; none:
     the shell itself is made."""

@@ -48,7 +48,7 @@ OTHER_RECORDS = {
     "calibration.json": "a calibration",
     "capture.json": "a capture or a merged run",
     "dataset.json": "a dataset",
-    "inspection.json": "an inspection",
+    "order.json": "an order",
     "as_built.json": "a prototype as built",
 }
 MOST = 1000  # cameras or parts

@@ -8,7 +8,7 @@ import typer
 from tbcad.app.cli.app import app, command
 from tbcad.app.cli.output_mode import print_json, print_result
 from tbcad.common.screen import stages
-from tbcad.options.builds import InspectionOptions
+from tbcad.options.builds import OrderOptions
 from tbcad.options.checks import check_is_export, check_is_folder
 from tbcad.options.shared import Design, Exports, ForceFile, JsonResult, Out, Settings
 
@@ -61,30 +61,30 @@ def camera(
 
 
 @command()
-def inspection(options: InspectionOptions, json: JsonResult = False) -> int:
-    """Write what a workshop needs for the shells: limits of every mirror, tolerances in STEP.
+def order(options: OrderOptions, json: JsonResult = False) -> int:
+    """Write what a workshop needs for the shells: limits, what a chain holds of them, a page.
 
-    inspection_a.csv and inspection_b.csv have each mirror's sphere and by how much it may be off;
-    shell_a_tolerances.step and shell_b_tolerances.step (AP242) the same with datums A, B, C.
+    order.pdf answers a workshop's questions; inspection_a.csv and inspection_b.csv have each
+    mirror's sphere, its limits and what the chain holds of them; *_tolerances.step (AP242) the same
+    with datums A, B, C, also of the mandrel where the chain has one. Exit code 0: the chain holds
+    the design. 1: it does not. 2: bad input.
     """
-    from tbcad.app.api import inspect
+    from tbcad.app.api import order as write_order
 
     out = Path(options.out)
-    with stages(3) as screen:
-        record = inspect(options.on(screen))
-    if json:
-        print_json(record)
-        return 0
-    smallest = record["limits"]["smallest"]
-    walls = f", its walls by {smallest['wall_um']:.1f} um" if "wall_um" in smallest else ""
-    typer.echo(
-        f"Every mirror may be off by {smallest['offset_um']:.2f} um along its normal, "
-        f"{smallest['tilt_mrad']:.2f} mrad and {smallest['radius_mm'] * 1000:.0f} um of radius"
-        f"{walls}, all at once;\nmost by more: see the tables. Shells at their limits show "
-        f"{record['simulated_minimum_mm']:.2f} of {record['target_mm']:g} mm (simulated)."
-    )
-    typer.echo(f"{out}: {', '.join(sorted(p.name for p in out.iterdir()))}")
-    return 0
+    with stages(0) as screen:
+        record = write_order(options.on(screen))
+    chain, told = record["chain"], [f"{record['chain']['name']}: {record['chain']['verdict']}"]
+    for one in chain["figures"]:
+        limit = "any" if one["limit"] is None else f"{one['limit']:.3g} {one['unit']}"
+        told.append(f"  {one['name']}: {one['chain']:.3g} of {limit}: {one['verdict']}")
+    told += [
+        f"Shells at their limits show {record['simulated_minimum_mm']:.2f} of "
+        f"{record['target_mm']:g} mm (simulated).",
+        f"{out}: {', '.join(sorted(p.name for p in out.iterdir()))}",
+    ]
+    print_result(record, told, json)
+    return 0 if chain["holds"] else 1
 
 
 @app.command()

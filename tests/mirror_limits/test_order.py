@@ -1,0 +1,166 @@
+"""What a chain holds of limits, what is measured, and the page that a workshop reads."""
+
+import csv
+import json
+from math import hypot, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.app.cli import run
+from tbcad.cad.formats.step_tolerances import read_tolerances
+from tbcad.core.mirrors.array import design
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.optics.reflection import roughness_nm, scattered_share
+from tbcad.core.spec.load import load_spec
+from tbcad.drawings.order_sheet import order_sheet
+from tbcad.errors import InputError
+from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.mirror_limits.held import Patches, chain_of, two_sigma
+from tbcad.mirror_limits.measuring import confidence, needed, sampled
+from tbcad.mirror_limits.sensitivity import MirrorLimits
+from tbcad.shell.files import design_mandrel, shell_envelope, write_mandrels, write_shell_solids
+from tbcad.tolerancing.process.chain import ChainStep
+from tbcad.tolerancing.process.process import BUILT_IN, load_process
+from tests.sheet_texts import check_texts, texts
+
+OWN = """based_on = "nickel-diamond"
+steps = ["diamond-mandrel", "bath", "coat"]
+[step.bath]
+title = "electroformed in K\u00f6ln"
+"""
+
+
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("mandrels")
+    made = design(load_spec(None, ["n=4", "shell.negative=true", "mirrors.margin_mm=0.8"]))
+    mandrel = design_mandrel(made)
+    write_record(folder, made, shells=True)
+    write_shell_solids(made, shell_envelope(made), folder)
+    write_mandrels(made, mandrel, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(exports: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("order") / "out"
+    assert run(["order", str(exports), "--out", str(out)]) == 0
+    return out
+
+
+def table(folder: Path, column: str) -> np.ndarray:
+    with (folder / "inspection_a.csv").open(encoding="utf-8") as file:
+        return np.array([float(row[column]) for row in csv.DictReader(file)])
+
+
+def test_mandrel_and_nickel_share_the_limit(written: Path) -> None:
+    """Linearly, by what each adds: both at their parts are at the limit of the shell."""
+    defocus = sqrt(3 * 4 / 21)  # 1 of 3 terms of order 2, which have 4 / 7 of the variance
+    mandrel, nickel = (
+        hypot(centre, radius, defocus * waviness)
+        for centre, radius, waviness in ((0.25, 0.25, 0.06), (0.1, 0.1, 0.05))
+    )
+    read = read_tolerances(written / "mandrel_a_tolerances.step")
+    zones = sorted(one.value for one in read if one.kind == "profile")
+    parts = table(written, "offset_limit_um") * mandrel / (mandrel + nickel)
+    assert zones == pytest.approx(np.sort(2e-3 * parts), abs=3e-6)
+    whole = 2 * hypot(0.25, 0.25, 0.1, 0.1, defocus * 0.06, defocus * 0.05)
+    assert table(written, "offset_chain_um") == pytest.approx(whole)
+
+
+def test_radius_is_what_a_fit_of_the_patch_finds() -> None:
+    """Of a sphere with defocus, by least squares over the patch."""
+    step = ChainStep.model_validate(
+        {"title": "x", "waviness_um": {"magnitude": 0.3, "source": "test"}}
+    )
+    radius, half = 40.0, 3.5
+    held = two_sigma([step], Patches(np.array([radius]), np.array([half])), 80.0)[0]
+    rho = np.sqrt(np.linspace(0, 1, 2001))
+    amplitude = 2 * 0.3e-3 * sqrt(4 / 21)
+    height = amplitude * sqrt(3) * (2 * rho**2 - 1)
+    fit = np.polynomial.polynomial.polyfit((half * rho) ** 2 / 2, height, 1)
+    assert held[0] == pytest.approx(-1e3 * fit[0])
+    assert held[2] == pytest.approx(fit[1] * radius**2)
+
+
+def test_the_page_is_whole_and_legible(exports: Path, written: Path) -> None:
+    record = json.loads((written / "order.json").read_text(encoding="utf-8"))
+    sheet = order_sheet(exports, record, load_spec(None, ["n=4"]))
+    check_texts(sheet)
+    told = [one.text for one in texts(sheet)]
+    assert min(one.height for one in texts(sheet)) >= 1.6
+    assert {"A", "B", "C", "S1", "F1", "MS1", "MF1", "through 5", "blind 8.6"} <= set(told)
+    whole = " ".join(told)
+    for words in ("Rq (Sq) 4.4 nm", "190 degrees", "SiO2", "ball cutter R 0.5 mm", "0.99^60 = 45%"):
+        assert words in whole, words
+    assert b"/Count 1" in (written / "order.pdf").read_bytes()
+
+
+def test_what_is_not_held_is_never_quoted_as_held(
+    exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run(["order", str(exports), "--chain", "sla", "--out", str(out)]) == 1
+    remedy = "not held: order a larger margin with --for-process sla"
+    offset = next(line for line in capsys.readouterr().out.splitlines() if "offset" in line)
+    assert offset.endswith(remedy)
+    assert (out / "shell_a_tolerances.step").read_text("ascii").count(remedy) >= 2
+    record = json.loads((out / "order.json").read_text(encoding="utf-8"))
+    assert not record["chain"]["holds"]
+    assert (table(out, "offset_chain_um") > table(out, "offset_limit_um")).any()
+
+
+def test_chains_that_are_refused(
+    exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own, out = tmp_path / "own.toml", tmp_path / "out"
+    for text, wrong in (
+        (OWN + "material = { value = 'Ω', source = 'test' }", "step bath"),
+        (OWN + "measured_with = { value = 'a', source = 'test', uncertainty_um = 0 }", "step bath"),
+    ):
+        own.write_text(text, encoding="utf-8")
+        assert run(["order", str(exports), "--chain", str(own), "--out", str(out)]) == 2
+        assert wrong in capsys.readouterr().err
+    process = load_process("nickel-milled").model_copy(update={"mandrel_cutter_mm": 90.0})
+    limits = MirrorLimits(np.ones((98, 3)), np.ones((98, 3)), 1.0)
+    with pytest.raises(InputError, match="radius of 90 mm, allowed is less than"):
+        chain_of(read_export(exports), process, "big", limits, 0.99)
+    (tmp_path / "shells").mkdir()
+    for file in exports.iterdir():
+        if "mandrel" not in file.name:
+            (tmp_path / "shells" / file.name).write_bytes(file.read_bytes())
+    assert run(["order", str(tmp_path / "shells"), "--out", str(out)]) == 2
+    assert "tbcad build --set shell.negative=true" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_every_built_in_chain_says_what_it_is_made_of() -> None:
+    for name in BUILT_IN:
+        steps = load_process(name).made
+        assert any(step.material for step in steps), name
+        assert any(step.measured_with for step in steps), name
+
+
+def test_samples_are_tight_ones_all_over_the_shell() -> None:
+    places = np.random.default_rng(3).uniform(0, 100, (400, 3)) * (1, 1, 0)
+    each = np.random.default_rng(4).uniform(1, 2, (800, 3))
+    each[[17, 417 + 5]] = 0.1
+    chosen = sampled(places, MirrorLimits(each, each, 1.0), 20)
+    assert len(set(chosen.tolist())) == 20
+    assert {17, 22} & set(chosen.tolist())
+    tight = (each / np.median(each, axis=0)).min(axis=1).reshape(2, -1).min(axis=0)
+    assert tight[chosen].max() < np.median(tight)
+    away = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
+    assert away.max() < 45  # of a side of 100
+    assert confidence(299) >= 0.95 > confidence(298)
+    assert needed(0.95) == 299
+
+
+def test_scatter_of_roughness() -> None:
+    """Small: (4 pi Rq / wavelength)^2; balls at the limit of G40 scatter most of the light."""
+    assert scattered_share(0.1) == pytest.approx((4 * np.pi * 0.1 / 550) ** 2, rel=1e-5)
+    assert scattered_share(roughness_nm(0.37)) == pytest.approx(0.37)
+    assert roughness_nm() == pytest.approx(4.388, abs=1e-3)
+    assert scattered_share(60 * sqrt(np.pi / 2)) == pytest.approx(0.947, abs=1e-3)
