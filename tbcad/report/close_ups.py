@@ -19,8 +19,7 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.optics.windows import cut_images, seam_gaps
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
-from tbcad.report.section import EdgeSection, section_of
-from tbcad.report.shell_pictures import coloured
+from tbcad.report.shell_pictures import EdgeSection, coloured, section_of
 from tbcad.types import Floats
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.optics.windows import seam_gaps
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
-from tbcad.report.section import section_of
+from tbcad.report.shell_pictures import section_of
 from tests.mirror_arrays import mirror_design
 from tests.shell_meshes import export_with_meshes
 

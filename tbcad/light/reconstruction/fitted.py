@@ -9,16 +9,8 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.checkpoint import (
-    Checkpoint,
-    read_checkpoint,
-    settings_of,
-    settings_record,
-    write_checkpoint,
-)
-from tbcad.light.reconstruction.choice import chosen
 from tbcad.light.reconstruction.field import FACT, Field, light_field_fingerprint
-from tbcad.light.reconstruction.fit import all_spans, fit, squared_error
+from tbcad.light.reconstruction.fit import all_spans, chosen, fit, squared_error
 from tbcad.light.reconstruction.marching import Singles
 from tbcad.light.reconstruction.rays import (
     NO_FOOTPRINT,
@@ -29,12 +21,17 @@ from tbcad.light.reconstruction.rays import (
 )
 from tbcad.light.reconstruction.start import (
     CENTRAL,
+    Checkpoint,
     Level,
     Settings,
     State,
     first_state,
     hull,
+    read_checkpoint,
+    settings_of,
+    settings_record,
     start,
+    write_checkpoint,
 )
 from tbcad.light.reconstruction.surface import best_level, resolved_mm
 from tbcad.light.simulate.capture.light_field import RAY_SIGMAS, LightField

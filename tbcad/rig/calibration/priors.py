@@ -13,7 +13,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.parameters import Block, Prior
-from tbcad.rig.machine.built import LED_MM
+from tbcad.rig.machine.designed import LED_MM
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats, Ints
@@ -25,7 +25,7 @@ OBLONG = 1e-3
 """By which pixels are not square: mask-made sensors are square to better; judgement."""
 DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
 """k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
-15); judgement, wider than tbcad.rig.machine.built, because highlights tell it well. k3 is fixed:
+15); judgement, wider than tbcad.rig.machine.designed, because highlights tell it well. k3 is fixed:
 those of a few balls do not tell it from k2."""
 MEASURED_MM = 0.01
 """Standard deviation of a radius that is measured without saying how well: by a micrometer screw

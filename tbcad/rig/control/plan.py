@@ -8,11 +8,11 @@ import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.errors import InputError
+from tbcad.errors import InputError, one_line
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import DesignRecord
 from tbcad.records.exposure import Frame
@@ -20,6 +20,7 @@ from tbcad.records.prototype import NAME as RECORD
 from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
+from tbcad.types import Progress
 
 PROGRAM = "rotation_plan.nc"
 _MOVE = re.compile(r"G1 ([XA])(-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$")
@@ -44,6 +45,10 @@ TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
 DIRECTION = 3  # the setting that is changed where the base turns against its arrow
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
+PIN_FIRST = (
+    "leave the supply on, for only the motor holds the base: zero pin in first, or the base falls"
+)
+"""What is safe when a machine does not do what it is told."""
 
 
 @dataclass(frozen=True)
@@ -209,3 +214,51 @@ def _sha256(path: Path) -> str:
         raise InputError(f"{path} is not there: {Prototype.MISSING}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}: {REBUILD}") from None
+
+
+class _Fault(Exception):
+    def __init__(self, text: str) -> None:
+        """Keep the text as one line: parts of it come from a controller or a camera."""
+        super().__init__(one_line(text))
+
+
+class MachineFault(_Fault):
+    """The base cannot go on: the run stops here, and can be resumed."""
+
+
+class ControllerReset(MachineFault):
+    """The controller began anew in mid-run: it has forgotten its angle."""
+
+
+class CameraFault(_Fault):
+    """A photograph that was not taken, or cannot be used: the run goes on with the next."""
+
+
+class DrivenMachine(Protocol):
+    """Motions and lights of one machine; all but `secure` raise MachineFault when it fails."""
+
+    switch_s: float  # that it needs for the lights of a photograph
+
+    def connect(self) -> None:
+        """Wait until the controller answers."""
+
+    def check_settings(self, note: Progress, *, send: bool) -> None:
+        """Refuse settings that are not the build's by an InputError, or send and tell them."""
+
+    def home(self) -> None:
+        """Bring the base to a known angle, all lights off."""
+
+    def drive(self, move: Move, settle_s: float = 0.0) -> None:
+        """Drive to a place and rest there."""
+
+    def light(self, output: int, *, on: bool) -> None:
+        """Switch a light; the base is at rest then."""
+
+    def wait(self, seconds: float) -> None:
+        """Let lights that were switched settle."""
+
+    def release(self) -> None:
+        """Close the camera's relay for as long as it needs."""
+
+    def secure(self) -> str:
+        """Hold the base and switch all lights off; return what could not be done, if anything."""

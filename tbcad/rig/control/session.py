@@ -10,8 +10,7 @@ from tbcad.errors import InputError
 from tbcad.options.runs import Ask, Preflight, Show
 from tbcad.records.exposure import Frame, exposure_name
 from tbcad.rig.control.camera import RunCamera, Shot
-from tbcad.rig.control.machine import CameraFault, DrivenMachine, MachineFault
-from tbcad.rig.control.plan import ControlPlan
+from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault
 from tbcad.rig.control.selection import (
     Outcome,
     RunSelection,

@@ -18,8 +18,13 @@ from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.calibration import NAME, CalibrationRecord
 from tbcad.records.exposure import Frame
 from tbcad.records.run import Geometry
-from tbcad.rig.machine.built import BuiltPrototype, built_camera, draw_other_errors
-from tbcad.rig.machine.designed import TURNS, designed_shell
+from tbcad.rig.machine.designed import (
+    TURNS,
+    BuiltPrototype,
+    built_camera,
+    designed_shell,
+    draw_other_errors,
+)
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_models, warp_maps_of

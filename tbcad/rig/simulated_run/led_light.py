@@ -21,7 +21,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
-from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.types import Bools, Floats, Ints
 
 NEAR_MM = 0.05  # of the LED: its dome stands in its pocket

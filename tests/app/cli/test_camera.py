@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.app.cli import run
-from tbcad.core.camera.catalogue import CAMERA_COLUMNS
+from tbcad.core.camera.sheet import CAMERA_COLUMNS
 
 
 def test_lines_of_the_sheet(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.core.camera.catalogue import (
+from tbcad.core.camera.requirements import CameraRequirements
+from tbcad.core.camera.sheet import (
     CAMERA_COLUMNS,
     LENS_COLUMNS,
     CameraBody,
     RectilinearLens,
+    candidates,
     load_cameras,
     load_lenses,
 )
-from tbcad.core.camera.requirements import CameraRequirements
-from tbcad.core.camera.sheet import candidates
 from tbcad.errors import InputError
 
 NEEDED = CameraRequirements(90.0, 70.0, 2000, 1400, 100.0, 150.0, 120.0, 0.8, 2.0, 2.0, 2.8)

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tbcad.core.optics.geodesic import geodesic
-from tbcad.light.reconstruction.field import Field
-from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.field import Field, Grid
 from tbcad.light.reconstruction.marching import MATT
 from tbcad.light.reconstruction.rays import CapturedRays, entries
 from tbcad.types import Bools, Floats

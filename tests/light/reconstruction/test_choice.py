@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.light.reconstruction import choice
-from tbcad.light.reconstruction.choice import (
+from tbcad.light.reconstruction import fit as choice
+from tbcad.light.reconstruction.fit import (
     FACTOR,
     LEVELS,
     chosen,

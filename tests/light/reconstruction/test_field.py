@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.reconstruction.field import (
     Field,
+    Grid,
     field_bytes,
     field_file,
     field_of,
@@ -23,7 +24,6 @@ from tbcad.light.reconstruction.field import (
     wanted_field,
     write_field,
 )
-from tbcad.light.reconstruction.grid import Grid
 from tbcad.light.reconstruction.marching import GLOSSY, MATT
 from tbcad.light.simulate.capture.light_field import LightField
 from tests.light.viewer.fields import ball, write_ball

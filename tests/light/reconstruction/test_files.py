@@ -11,9 +11,8 @@ from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
 from tbcad.errors import InputError
 from tbcad.light.reconstruction import files
-from tbcad.light.reconstruction.field import Field, write_field
+from tbcad.light.reconstruction.field import Field, Grid, write_field
 from tbcad.light.reconstruction.files import MESH_SUFFIXES, mesh_file
-from tbcad.light.reconstruction.grid import Grid
 from tbcad.light.reconstruction.surface import field_mesh
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
 from tests.light.reconstruction.balls import BELOW, COLOUR, NODES, RADIUS, WIDTH_MM, ball, made_of

@@ -11,10 +11,10 @@ import pytest
 
 from tbcad.app.api import reconstruct
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.checkpoint import part_file
 from tbcad.light.reconstruction.field import read_field
 from tbcad.light.reconstruction.fitted import levels, reconstruction, used_rays
 from tbcad.light.reconstruction.rays import captured_rays
+from tbcad.light.reconstruction.start import part_file
 from tbcad.light.simulate.capture.light_field import RAY_SIGMAS, LightField
 from tbcad.options.captures import ReconstructOptions
 from tests.ball_captures import RADIUS_MM, quick_choice, without_trials  # noqa: F401

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.light.reconstruction.grid import LONGEST_LEAP, SIDES, Grid, resampled
+from tbcad.light.reconstruction.field import LONGEST_LEAP, SIDES, Grid, resampled
 from tbcad.types import Bools
 from tests.ray_fields import whole_cells
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.light.reconstruction.mesh_distance import mesh_distance
+from tbcad.light.reconstruction.files import mesh_distance
 from tbcad.light.simulate.scene.object import patterned_ball
 from tests.light.reconstruction.balls import parallel_rays
 

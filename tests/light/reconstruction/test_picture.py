@@ -8,8 +8,7 @@ import pytest
 from PIL import Image
 
 from tbcad.light.depth.depth_map import depth_png, depth_points
-from tbcad.light.reconstruction.field import Field
-from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.field import Field, Grid
 from tbcad.light.reconstruction.picture import (
     FieldPicture,
     field_normals,

@@ -18,11 +18,11 @@ from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.estimate.jacobian import base_slopes
 from tbcad.rig.calibration.estimate.solve import Estimate
-from tbcad.rig.calibration.report.files import write_calibration
 from tbcad.rig.calibration.report.record import rays_table, residuals_table
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
-from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.rig.calibration.run import write_calibration
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT

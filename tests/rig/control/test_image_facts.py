@@ -8,7 +8,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import IFDRational, ImageFileDirectory_v2
 
 from tbcad.rig.control.camera import EXIF, EXPOSURE, MAKE, MODEL, image_facts
-from tbcad.rig.control.machine import CameraFault
+from tbcad.rig.control.plan import CameraFault
 from tests.rig.control.conftest import Told
 from tests.rig.control.rig import SIZE, Rig, put
 

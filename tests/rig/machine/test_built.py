@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.geometry.vectors import norm
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.rig.machine.built import BuiltPrototype, draw_other_errors, random_build
+from tbcad.rig.machine.designed import BuiltPrototype, draw_other_errors, random_build
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tests.machine_states import machine_of

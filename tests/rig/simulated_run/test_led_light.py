@@ -10,7 +10,7 @@ from tbcad.core.optics.pedestals.cells import NO_WALLS
 from tbcad.light.simulate.prototype.ball_rays import balls_between
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
-from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import Machine
 from tbcad.rig.simulated_run import led_light as module
 from tbcad.rig.simulated_run.led_light import Occluders, led_light

@@ -18,7 +18,7 @@ from tbcad.rig.calibration.estimate.parameters import Block, Covariance
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
-from tbcad.rig.machine.built import is_cap
+from tbcad.rig.machine.designed import is_cap
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 
