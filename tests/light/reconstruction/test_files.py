@@ -1,5 +1,6 @@
 """Files of a field's mesh and volume, read back."""
 
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -12,12 +13,23 @@ from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 from tbcad.errors import InputError
 from tbcad.light.reconstruction import files
 from tbcad.light.reconstruction.field import Field, Grid, write_field
-from tbcad.light.reconstruction.files import MESH_SUFFIXES, mesh_file
+from tbcad.light.reconstruction.files import MESH_SUFFIXES, mesh_distance, mesh_file
 from tbcad.light.reconstruction.surface import field_mesh
+from tbcad.light.simulate.scene.object import patterned_ball
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
-from tests.light.reconstruction.balls import BELOW, COLOUR, NODES, RADIUS, WIDTH_MM, ball, made_of
+from tests.light.reconstruction.balls import (
+    BELOW,
+    COLOUR,
+    NODES,
+    RADIUS,
+    WIDTH_MM,
+    ball,
+    made_of,
+    parallel_rays,
+)
 
 MIDDLE, SMALL = (1.0, 2.0, 3.0), 4.0
+RAYS = parallel_rays(lambda away: away < 7, across=41)
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +106,29 @@ def test_numpy_has_the_same_from_the_fields_file(tmp_path: Path) -> None:
     assert np.allclose(colour[at], COLOUR)
     assert density.sum() == density[at].sum()
     assert density[NODES // 2, NODES // 2, int((5 / WIDTH_MM + 0.5) * (NODES - 1))] > RADIUS
+
+
+def sphere(radius: float) -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(subdivisions=5, radius=radius)
+
+
+def test_of_two_spheres_it_is_the_difference_of_their_radii() -> None:
+    found = mesh_distance(sphere(6.5), patterned_ball(7.0), RAYS)
+    for value in (found.mean_mm, found.percentile_95_mm, found.hausdorff_mm,
+                  found.whole_mean_mm, found.whole_hausdorff_mm):  # fmt: skip
+        assert value == pytest.approx(0.5, abs=0.01)
+
+
+def test_what_no_ray_meets_counts_for_the_whole_alone() -> None:
+    """A ball that ends at z = -4, though the true one goes on, seen from above."""
+    flat = sphere(7.0)
+    points = np.array(flat.vertices)
+    points[:, 2] = np.maximum(points[:, 2], -4.0)
+    steep = RAYS.direction[:, 2] < -0.9
+    above = replace(RAYS, entry=RAYS.entry[steep], direction=RAYS.direction[steep])
+    found = mesh_distance(
+        trimesh.Trimesh(points, flat.faces, process=False), patterned_ball(7.0), above
+    )
+    assert found.hausdorff_mm < 0.1
+    assert found.whole_hausdorff_mm == pytest.approx(3.0, abs=0.05)
+    assert found.whole_mean_mm > found.mean_mm

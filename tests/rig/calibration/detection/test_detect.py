@@ -13,7 +13,12 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import exposure_name
 from tbcad.rig.calibration.detection.detect import detect
 from tbcad.rig.calibration.detection.detection import Detection, Rejection, no_highlights
-from tbcad.rig.calibration.detection.matching import Room, expected_highlights
+from tbcad.rig.calibration.detection.matching import (
+    Expected,
+    Room,
+    expected_highlights,
+    highlights_of,
+)
 from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.rig.machine.machine import Highlights
 from tbcad.rig.runs import read_image, read_run
@@ -26,6 +31,11 @@ from tests.simulated_runs import BRIGHT, Small, small_run
 TARGET_PX = 0.05
 STOPS = range(8, 48, 6)
 FEW = (8, 26, 44)  # stops
+SLOPE = np.array([-0.02, 0.01])  # of the light for a pixel: larger than lenses have
+WIDTH_PX = np.array([2.5, 1.5])  # standard deviations of the spot
+BLUR_PX = 1.0  # of that, what is no image of a dome
+PLACE = np.array([20.3, 18.6])
+ONE = np.zeros(1, dtype=np.int64)
 
 
 def detected(folder: Path, small: Small) -> Detection:
@@ -254,3 +264,18 @@ def test_a_run_without_leds(copied: Path, small: Small) -> None:
     edit_json(copied / "run.json", lambda record: record.update(phases=["dark", "lit"]))
     with pytest.raises(InputError, match="has no photographs of single LEDs"):
         detected(copied, small)
+
+
+def test_a_lens_that_darkens_one_side_does_not_shift_a_highlight() -> None:
+    places = np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1) - PLACE
+    spot = np.exp(-(places**2 / (2 * WIDTH_PX**2)).sum(axis=-1)) * np.exp(places @ SLOPE)
+    image = np.rint(60_000 * spot / spot.max()).astype(np.uint16)
+    found, _ = find_spots(np.dstack([image] * 3), None, 0, 0)
+    zero = np.zeros((1, 2))
+    dome = np.diag(WIDTH_PX**2 - BLUR_PX**2)[None]
+    sure = np.ones(1, dtype=bool)
+    expected = Expected(ONE, ONE, ONE, zero, zero, dome, zero, np.ones(1), sure)
+    darker = replace(expected, brighter=SLOPE[None])
+    plain, right = (highlights_of(one, ONE, found, 0.01).pixel[0] for one in (expected, darker))
+    assert plain - PLACE == pytest.approx(WIDTH_PX**2 * SLOPE, rel=0.05)
+    assert right == pytest.approx(PLACE, abs=0.05 * np.abs(WIDTH_PX**2 * SLOPE).max())
