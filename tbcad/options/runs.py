@@ -113,11 +113,7 @@ class RunOptions(Call):
     ] = None
 
     def size(self) -> tuple[int, int] | None:
-        """Columns and rows of a photograph.
-
-        Raises:
-            InputError: they are none.
-        """
+        """Columns and rows of a photograph; InputError: they are none."""
         if self.size_px is None or isinstance(self.size_px, tuple):
             return self.size_px
         match = _SIZE.match(self.size_px)

@@ -23,9 +23,8 @@ MESH_SUFFIXES = (".stl", ".glb")
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
     """Draw one of SUBJECTS of an export to a PNG file, which is replaced as a whole.
 
-    Raises:
-        InputError: when the export or a screen is missing, a file of the export is not as it was
-            written, the picture exists, or drawing fails.
+    InputError: the export or a screen is missing, a file of the export is not as it was written,
+    the picture exists, or drawing fails.
     """
     if subject not in SUBJECTS:
         raise InputError(f"{subject!r} cannot be drawn: name one of {', '.join(SUBJECTS)}")
@@ -44,8 +43,7 @@ def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False)
 def draw_apart(module: str, *arguments: str) -> None:
     """Run a module of tbcad.report as a program in a process of its own.
 
-    Raises:
-        InputError: when there is no screen, or drawing fails.
+    InputError: there is no screen, or drawing fails.
     """
     _run(_on_screen([sys.executable, "-m", f"tbcad.report.{module}", *arguments]))
 
@@ -53,8 +51,7 @@ def draw_apart(module: str, *arguments: str) -> None:
 def check_prototype_files(folder: Path) -> None:
     """Refuse an export whose prototype is missing or not as it was written.
 
-    Raises:
-        InputError: it names the file.
+    InputError: it names the file.
     """
     _check_files(folder, PROTOTYPE[0])
 
@@ -96,8 +93,7 @@ def _is_drawn(name: str) -> bool:
 def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str]:
     """The command that draws in a process of its own, under a virtual screen where needed.
 
-    Raises:
-        InputError: when there is neither a screen nor a virtual one.
+    InputError: there is neither a screen nor a virtual one.
     """
     module, what = "shell_pictures", []
     if subject != SHELL:

@@ -85,14 +85,10 @@ def _show_all(plotter: pyvista.Plotter, points: Floats, direction: Floats) -> No
 
 
 def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats]:
-    """Pinhole and focus (3,) of a camera in whose square picture points (n, 3) just fit.
+    """Pinhole and focus (3,) of a camera in whose square picture points (n, 3), mm, just fit.
 
     A point is in the picture where |across - centre| <= slope (distance + depth), for both axes of
-    the picture: the distance follows from the outermost points on either side.
-
-    Args:
-        points: to show, mm.
-        direction: of the view, (3,).
+    the picture: the distance follows from the outermost points on either side of a direction (3,).
     """
     forward = unit(direction)
     right = unit(np.cross(forward, UP))

@@ -141,11 +141,7 @@ def terms_and_keys() -> Iterator[ReferenceEntry]:
 
 
 def explained(word: str, entries: Iterable[ReferenceEntry]) -> list[ReferenceEntry]:
-    """All entries of one name.
-
-    Raises:
-        InputError: there is none; it names those that are alike.
-    """
+    """All entries of one name; InputError: there is none; it names those that are alike."""
     by_name: dict[str, list[ReferenceEntry]] = {}
     shown: dict[str, str] = {}
     for entry in entries:

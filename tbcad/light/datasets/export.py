@@ -221,11 +221,7 @@ def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> Spa
 def write_ray_table(
     folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
 ) -> int:
-    """Write origin, direction, colour and virtual camera of each ray that meets the sphere.
-
-    Returns:
-        The number of rays.
-    """
+    """Write origin, direction, colour and virtual camera of the n rays that meet the sphere; n."""
     total = int(virtual.rays.sum())
     with zipfile.ZipFile(folder / RAYS, "w") as packed:
         for name, (kind, last) in RAY_COLUMNS.items():

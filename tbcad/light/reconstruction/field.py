@@ -196,11 +196,7 @@ def field_bytes(made: Field) -> bytes:
 
 
 def read_field(path: Path) -> Field:
-    """Read a field.
-
-    Raises:
-        InputError: there is none, or it is damaged.
-    """
+    """Read a field; InputError: there is none, or it is damaged."""
     if not path.is_file():
         raise InputError(f"{path}: no such file; write it with `tbcad reconstruct`")
     try:
@@ -273,8 +269,7 @@ def field_file(folder: Path, frame: int | None = None) -> Path:
 def field_of(file: Path, source: LightField) -> Field:
     """Read the field of a light field.
 
-    Raises:
-        InputError: there is none, it is damaged, or it is of another light field.
+    InputError: there is none, it is damaged, or it is of another light field.
     """
     made = read_field(file)
     again = "write it again with `tbcad reconstruct`"
@@ -290,16 +285,9 @@ def wanted_field(
 ) -> Field | None:
     """The field that views are made from; None: the light field itself.
 
-    Args:
-        method: "field", None for the default, or another one.
-        capture: folder of the capture, or its light field's file.
-        source: the light field, or a frame of it.
-        frame: its number; None: there is one only.
-
-    By default a field that lies beside the light field; one that is of no use is told in a warning.
-
-    Raises:
-        InputError: as `field_of`, when a field is asked for.
+    By default (method None) it is a field that lies beside the light field of a capture's folder or
+    file; one that is of no use is told in a warning. InputError: as `field_of`, if method is
+    "field".
     """
     file = field_file(capture if capture.is_dir() else capture.parent, frame)
     if method == "field":

@@ -42,15 +42,10 @@ CELL_MM = 0.25  # of what is seen, one point in each cell of that size
 
 
 def mesh_file(mesh: trimesh.Trimesh, suffix: str) -> bytes:
-    """The file of a mesh, the same bytes for the same mesh.
+    """The file of a mesh in mm with colours (sRGB) at its points; the same bytes for the same mesh.
 
-    Args:
-        mesh: points in mm, with colours there (sRGB).
-        suffix: .glb in metres and y up, as glTF demands; .ply in mm with colours; .stl in mm,
-            binary, without colours.
-
-    Raises:
-        InputError: the suffix is another.
+    By the suffix: .glb in metres and y up, as glTF demands; .ply in mm with colours; .stl in mm,
+    binary, without colours. InputError: the suffix is another.
     """
     kind = suffix.lower()
     if kind not in MESH_SUFFIXES:
@@ -132,13 +127,7 @@ class MeshDistance:
 
 
 def mesh_distance(mesh: trimesh.Trimesh, truth: SceneObject, rays: CapturedRays) -> MeshDistance:
-    """Compare a found mesh with the true object.
-
-    Args:
-        mesh: the found one, mm.
-        truth: `tbcad.light.simulate.capture.files.read_object`.
-        rays: of the capture: what they meet first is seen.
-    """
+    """Compare a found mesh, mm, with the true object; what rays meet first of it is seen."""
     true = trimesh.Trimesh(truth.points, truth.faces, process=False)
     seen = _both(mesh, true, _seen(mesh, rays), _seen(true, rays))
     whole = _both(mesh, true, _even(mesh), _even(true))

@@ -50,11 +50,7 @@ def fit(
 ) -> Iterator[State]:
     """Fit a field; each epoch's state is given before the next, which changes it.
 
-    Args:
-        rays: what was captured.
-        settings: how.
-        used: which rays it is fitted to, (n,); None: all.
-        state: to go on from; None: from the hull.
+    It is fitted to used rays (n,), None: all, and goes on from a state, None: from the hull.
     """
     state = state or first_state(hull(rays), rays.capture_mm, settings)
     while state.level < len(settings.levels):
@@ -125,14 +121,9 @@ def _gradient(pixels: Pixels, medium: Medium, batch: Ints, seed: int, parts: Sin
 
 
 def _step(settings: Settings, state: State, progress: float, share: float, parts: Singles) -> None:
-    """One step of Adam on the gradient in `parts`, which is empty afterwards.
+    """One step of Adam on the gradient in `parts`, which is empty afterwards; the state is changed.
 
-    Args:
-        settings: of the fit.
-        state: changed.
-        progress: share of the level's steps that are done.
-        share: rays of the batch for each node.
-        parts: of the gradient of the batch.
+    Progress is the share of the level's steps that are done, share the rays of a batch for a node.
     """
     state.step += 1
     columns = _columns(settings, state, progress, share)
@@ -210,20 +201,10 @@ def chosen(
     orders: tuple[int, ...],
     progress: Progress,
 ) -> tuple[Settings, list[Trial]]:
-    """Choose the weights of smoothness and sparsity, and the order of view dependence.
+    """Choose the weights of smoothness and sparsity, and the order of view dependence, by trials.
 
-    All weights are changed by one factor, as long as held-out rays are predicted better by a
-    coarse fit; then orders are compared.
-
-    Args:
-        rays: what was captured.
-        inside: their hull.
-        settings: to begin with.
-        orders: that may be chosen, the first is begun with.
-        progress: called with each trial.
-
-    Returns:
-        The settings, and the trials in their order.
+    All weights are changed by one factor, as long as held-out rays are predicted better by a coarse
+    fit in the rays' hull; then orders are compared, of which the first is begun with.
     """
     trials: list[Trial] = []
 

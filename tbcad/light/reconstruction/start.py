@@ -116,13 +116,9 @@ def _begun(level: int, grid: Grid, values: Singles) -> State:
 
 
 def start(inside: Bools, last: Field | None, capture_mm: float, settings: Settings) -> State:
-    """An even fog in a hull (k, k, k), or what the last field has there on a finer grid.
+    """An even fog in the hull (k, k, k), where the object may be now, or the last frame's field.
 
-    Args:
-        inside: where the object may be now.
-        last: field of the frame before.
-        capture_mm: diameter of the capture sphere.
-        settings: of the fit.
+    What the last field has there is taken on a finer grid.
     """
     if last is None or len(settings.levels) <= SKIPPED:
         return first_state(inside, capture_mm, settings)
@@ -139,8 +135,7 @@ def start(inside: Bools, last: Field | None, capture_mm: float, settings: Settin
 def hull(rays: CapturedRays) -> Bools:
     """Nodes of a lattice (k, k, k) over the capture sphere's cube where the object may be.
 
-    Raises:
-        InputError: the photographs show nothing, or no background.
+    InputError: the photographs show nothing, or no background.
     """
     level = rays.dark_level()
     dark = rays.colour.max(axis=1) < level
@@ -256,8 +251,7 @@ def write_checkpoint(file: Path, kept: Checkpoint) -> None:
 def read_checkpoint(file: Path, asked: dict[str, Any], places: Singles) -> Checkpoint:
     """Read a checkpoint of the same options and light field.
 
-    Raises:
-        InputError: it is of others, or damaged.
+    InputError: it is of others, or damaged.
     """
     try:
         with np.load(file, allow_pickle=False) as store:
@@ -275,11 +269,7 @@ def read_checkpoint(file: Path, asked: dict[str, Any], places: Singles) -> Check
 
 
 def check_same(file: Path, found: dict[str, Any], asked: dict[str, Any]) -> None:
-    """Refuse to go on with what was begun otherwise.
-
-    Raises:
-        InputError: it was, by what is named.
-    """
+    """Refuse to go on with what was begun otherwise; InputError: it was, by what is named."""
     was, now = _flat(found), _flat(asked)
     for name, value in now.items():
         if was.get(name) != value:

@@ -73,8 +73,7 @@ class ViewRenderer(ABC):
     def jpeg(self, query: Query) -> bytes:
         """The picture of a query, as a JPEG file.
 
-        Raises:
-            Superseded: another one was asked for while the lens's pinholes were being added up.
+        Superseded: another one was asked for while the lens's pinholes were being added up.
         """
         number = self._latest = next(self._numbers)
 

@@ -79,8 +79,7 @@ def write_report(
 ) -> Path:
     """Write the page of an export, by default as its report.html, which may show a capture of it.
 
-    Raises:
-        InputError: the file exists, the export or the capture cannot be read, or writing fails.
+    InputError: the file exists, the export or the capture cannot be read, or writing fails.
     """
     file = out or folder / REPORT
     check_writable(file, force)
@@ -111,8 +110,7 @@ def page(
 ) -> str:
     """The page of an export; linked: with links to its files.
 
-    Raises:
-        InputError: the export or the capture cannot be read.
+    InputError: the export or the capture cannot be read.
     """
     manifest = _checked_manifest(folder)
     export, verdict = read_export(folder), read_verdict(folder)

@@ -122,10 +122,9 @@ def merged_pixels(
 ) -> tuple[Ints, BallHits, Bools, Floats]:
     """The n pixels of a band, each rotated with its mirror's window.
 
-    Returns:
-        The mirror that each belongs to, from 1, 0 for none, (n,); what it meets, where only the
-        ball in place of its mirror is a ball; whether the object itself is in front of that, (n,);
-        and the rotated unit directions, (n, 3).
+    Returns the mirror that each belongs to, from 1, 0 for none, (n,); what it meets, where only the
+    ball in place of its mirror is a ball; whether the object itself is in front of that, (n,); and
+    the rotated unit directions, (n, 3).
     """
     run = plan.run
     mirror = plan.trace_shell(rows, shift).mirror.ravel().astype(np.int64)
