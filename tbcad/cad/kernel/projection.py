@@ -24,8 +24,7 @@ from tbcad.cad.kernel.solids import edges
 from tbcad.types import Floats
 
 Place: TypeAlias = tuple[float, float]
-Shape: TypeAlias = TopoDS_Shape
-"""Any shape of the kernel."""
+Shape: TypeAlias = TopoDS_Shape  # any shape of the kernel
 FIRST = np.eye(3)
 ANGLE, CHORD_MM = 0.1, 0.01  # of chains of points: turn from one to the next, rad, and deviation
 DIGITS = 5  # of mm; equal edges are drawn once

@@ -45,8 +45,7 @@ EXPOSED = 99.5
 # Directions of the sky that the ground truth is lit from.
 TRUE_LIGHTS = 512
 BYTES_PER_VALUE = 2
-Light = Callable[[int, Spots], Floats]
-"""Light (k,) of a lamp by its number on spots (k,)."""
+Light = Callable[[int, Spots], Floats]  # light (k,) of a lamp by its number on spots (k,)
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ ALIGNED = 4  # bytes: typed arrays of a browser begin at multiples of their item
 # Kinds of numbers by the names of JavaScript's typed arrays.
 KINDS = {"Int16Array": "<i2", "Uint16Array": "<u2", "Uint32Array": "<u4", "Float32Array": "<f4"}
 
-Place = list[int | str]
-"""Where an array lies: first byte, number of items, kind."""
+Place = list[int | str]  # where an array lies: first byte, number of items, kind
 
 
 @dataclass

@@ -21,8 +21,7 @@ from tbcad.types import Bools, Floats, Ints
 PRINCIPAL_SHARE = 0.01
 """Of the width, by which the principal point is off: a sensor placed to 0.25 mm is 72 px of 3.45 um
 off at 2,080 px (Allied Vision Prosilica GT), lenses are centred better; judgement between both."""
-OBLONG = 1e-3
-"""By which pixels are not square: mask-made sensors are square to better; judgement."""
+OBLONG = 1e-3  # by which pixels are not square: mask-made sensors are square to better; judgement
 DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
 """k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
 15); judgement, wider than tbcad.rig.machine.designed, because highlights tell it well. k3 is fixed:

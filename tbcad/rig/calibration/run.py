@@ -53,8 +53,7 @@ from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machin
 from tbcad.rig.runs import Run, check_same_export, read_run
 from tbcad.tolerancing.process.process import Process, load_process, process_errors
 
-DEFAULT_PROCESS = "fdm"
-"""A prototype is printed; its design does not say how."""
+DEFAULT_PROCESS = "fdm"  # a prototype is printed; its design does not say how
 SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
 READING, DETECTING, ESTIMATING, WRITING = (
     "run and export",

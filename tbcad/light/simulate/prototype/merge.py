@@ -31,8 +31,7 @@ from tbcad.light.simulate.scene.rays import Shift, TracedRays, exact_tracer, pix
 from tbcad.light.simulate.scene.reflector import MARGIN_PX
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
-NO_BALL = -1
-"""In place of a ball's number: what is on no mirror is shown by no ball."""
+NO_BALL = -1  # in place of a ball's number: what is on no mirror is shown by no ball
 
 
 class StopPhotographs(Protocol):
