@@ -1,8 +1,6 @@
 """`tbcad calibrate`: from a run's folder to the folder of its calibration."""
 
-import math
 import textwrap
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,15 +13,15 @@ from tbcad.common.results import csv_text
 from tbcad.common.screen import WIDTH
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.options.machines import CalibrateOptions
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.manifest import write_manifest
-from tbcad.output.single_files import Source, files_named
+from tbcad.output.single_files import files_named
 from tbcad.records.calibration import NAME as RECORD
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detect import detect
-from tbcad.rig.calibration.detection.matching import Room
+from tbcad.rig.calibration.detection.matching import object_room
 from tbcad.rig.calibration.estimate.parameters import covariance
 from tbcad.rig.calibration.intrinsics.files import read_lens
 from tbcad.rig.calibration.priors import parse_measured
@@ -103,52 +101,33 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     for name in machines:
         check_replaceable(out / name, "calibration", options.force, inputs)
     export = read_export(exports)
-    setups = [_setup(one, export, options) for one in machines.values()]
+    lens = None if options.intrinsics is None else read_lens(Path(options.intrinsics))
+    size = run.record.width_px, run.record.height_px
+    setups = [
+        prepared_setup(export, one.record.frames, size, lens, run.record.geometry)
+        for one in machines.values()
+    ]
     truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
     found = []
     for one, setup in zip(machines.values(), setups, strict=True):
         progress(DETECTING)
         measured = parse_measured(tuple(options.measured), len(setup.plan))
         prior = setup.prior(process_errors(process), measured)
-        detection = detect(one, prior, _room(setup), dome_radius(export), detail)
+        detection = detect(one, prior, object_room(export), dome_radius(export), detail)
         progress(ESTIMATING)
         found.append(calibrate(setup, detection, prior, detail))
     progress(WRITING)
-    first, *others = (
-        _written(
-            result,
-            truth,
-            out / name,
-            _basis(one, result.setup, options, process),
-            inputs,
-            options,
-        )
-        for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
-    )
+    written = []
+    for (name, one), result, truth in zip(machines.items(), found, truths, strict=True):
+        judged, basis = verdict(result), _basis(one, result.setup, options, process)
+        with replacing(out / name, "calibration", options.force, inputs) as new:
+            record = write_calibration(new, result, judged, basis, options.plot)
+            text = verdict_text(result, judged)
+            if truth is not None:
+                text += "\n" + write_recovered(new, result, truth, options.plot)
+        written.append(WrittenCalibration(out / name, result, judged, text, record))
+    first, *others = written
     return replace(first, others=tuple(others))
-
-
-def _setup(run: Run, export: ExportedDesign, options: CalibrateOptions) -> Setup:
-    record = run.record
-    lens = None if options.intrinsics is None else read_lens(Path(options.intrinsics))
-    size = record.width_px, record.height_px
-    return prepared_setup(export, record.frames, size, lens, record.geometry)
-
-
-def _written(
-    result: MachineCalibration,
-    truth: Machine | None,
-    out: Path,
-    basis: dict[str, Any],
-    inputs: Iterable[Source],
-    options: CalibrateOptions,
-) -> WrittenCalibration:
-    judged = verdict(result)
-    with replacing(out, "calibration", options.force, inputs) as new:
-        record = write_calibration(new, result, judged, basis, options.plot)
-        texts = [] if truth is None else [write_recovered(new, result, truth, options.plot)]
-    text = "\n".join([verdict_text(result, judged), *texts])
-    return WrittenCalibration(out, result, judged, text, record)
 
 
 def _truth(run: Run, setup: Setup) -> Machine | None:
@@ -168,16 +147,8 @@ def _truth(run: Run, setup: Setup) -> Machine | None:
     return truth
 
 
-def _room(setup: Setup) -> Room:
-    """What the design lets an object fill: a cylinder on the disc within the capture sphere."""
-    stage = setup.export.spec.prototype.stage
-    radius = stage.object_diameter_mm / 2
-    return Room(radius, stage.top_mm, math.sqrt((setup.export.capture_mm / 2) ** 2 - radius**2))
-
-
 def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) -> dict[str, Any]:
     """What the calibration is based on, for its record."""
-    lens = "estimated" if options.intrinsics is None else str(options.intrinsics)
     return {
         "run": str(run.folder.resolve()),
         "exports": str(setup.export.folder.resolve()),
@@ -195,7 +166,7 @@ def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) 
             "given": options.process is not None,
             "settings": list(options.settings),
         },
-        "lens": lens,
+        "lens": str(options.intrinsics or "estimated"),
         "measured_radii": list(options.measured),
     }
 
