@@ -25,9 +25,12 @@ def check_is_folder(folder: Path) -> None:
 
 def check_is_export(folder: Path) -> None:
     """Refuse a folder without the record of a design; InputError: it has none."""
-    path = folder / DESIGN_FILE
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad build wrote")
+    _check_has(folder, DESIGN_FILE, "build")
+
+
+def _check_has(folder: Path, file: str, writer: str) -> None:
+    if not (folder / file).is_file():
+        raise InputError(f"{folder / file} is not there: name a folder that tbcad {writer} wrote")
 
 
 def check_is_object(path: Path | None, up: str | None, unit: str | None) -> None:
@@ -67,30 +70,25 @@ def check_is_capture(path: Path) -> None:
 
 def check_is_run(folder: Path) -> None:
     """Refuse a folder without the record of a run; InputError: it has none."""
-    path = folder / RUN_FILE
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad run or simulate-run wrote")
+    _check_has(folder, RUN_FILE, "run or simulate-run")
 
 
 def check_is_calibration(folder: Path) -> None:
     """Refuse a folder without a calibrated prototype; InputError: it has none."""
-    if any((one / MACHINE_FILE).is_file() for one in _cameras(folder)) or _is_of_shell(folder):
+    if any((folder / one / MACHINE_FILE).is_file() for one in SHELL_CAMERAS) or _is_of_shell(
+        folder
+    ):
         raise InputError(
             f"{folder} is the calibration of a shell, which only tbcad merge takes: name that of a "
             "prototype"
         )
-    _check_has_machine(folder)
+    _check_has(folder, MACHINE_FILE, "calibrate")
 
 
 def check_is_any_calibration(folder: Path) -> None:
     """Refuse a folder without a calibrated prototype or shell; InputError: it has neither."""
-    if not any((one / MACHINE_FILE).is_file() for one in _cameras(folder)):
-        _check_has_machine(folder)
-
-
-def _cameras(folder: Path) -> list[Path]:
-    """Folders of a shell's calibration, in that of the run."""
-    return [folder / name for name in SHELL_CAMERAS]
+    if not any((folder / one / MACHINE_FILE).is_file() for one in SHELL_CAMERAS):
+        _check_has(folder, MACHINE_FILE, "calibrate")
 
 
 def _is_of_shell(folder: Path) -> bool:
@@ -103,9 +101,3 @@ def _is_of_shell(folder: Path) -> bool:
     except (OSError, ValueError):
         return False  # its readers say so
     return isinstance(record, dict) and record.get("geometry") == "shell"
-
-
-def _check_has_machine(folder: Path) -> None:
-    path = folder / MACHINE_FILE
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad calibrate wrote")

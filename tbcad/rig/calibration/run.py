@@ -53,12 +53,10 @@ from tbcad.tolerancing.process.process import Process, load_process, process_err
 
 DEFAULT_PROCESS = "fdm"  # a prototype is printed; its design does not say how
 SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
-READING, DETECTING, ESTIMATING, WRITING = (
-    "run and export",
-    "highlights in photographs",
-    "machine and its uncertainty",
-    "files",
-)
+READING = "run and export"
+DETECTING = "highlights in photographs"
+ESTIMATING = "machine and its uncertainty"
+WRITING = "files"
 COVARIANCE = "covariance.npz"
 
 

@@ -1,114 +1,28 @@
 """Build, verify and draw: heavy libraries are imported inside the commands."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tbcad.app.cli.app import Full, Json, Quiet, app, command, output_mode, print_json
-from tbcad.common.screen import Stages, report_console, stages
-from tbcad.core.mirrors.array import design
-from tbcad.core.spec.design import Spec
-from tbcad.core.spec.load import spec_dict
+from tbcad.common.screen import report_console, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import BuildOptions, ReportOptions, VerificationOptions
 from tbcad.options.checks import check_is_calibration
 from tbcad.options.shared import Exports, ForceFile, JsonResult
-from tbcad.output.overview import Overview, PrintEstimate, PrototypeOverview, overview
-from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 
-if TYPE_CHECKING:
-    from tbcad_verify.report.report import Output
-MINUTE = 60
-# Seconds of a verified build of the paper's design (n = 18) on two cores: whatever the mirrors, and
-# in proportion to their number but for a fixed share.
-SECONDS = {(SHELL,): (1.0, 25.8), (PROTOTYPE,): (20.7, 12.8), PARTS: (20.7, 18.8)}
-N, FIXED_SHARE = 18, 0.2
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Output
 
     from tbcad.app.doctor import Finding
+
+
 # About as many stages has a build, without and with its verification.
 SHELL_STAGES, PROTOTYPE_STAGES, VERIFICATION_STAGES = (5, 14), (9, 27), 19
 FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
-
-
-def show_overview(
-    spec: Spec, parts: Sequence[str], optional: bool, output: "Output", screen: Stages
-) -> int:
-    """Print what a build would give, as a record when that is the output."""
-    screen.stage("mirrors: radii and cells")
-    figures = overview(design(spec), parts, screen.stage, optional_prototype=optional)
-    there = [part for part in parts if part != PROTOTYPE or figures.prototype]
-    fixed, of_mirrors = SECONDS[tuple(there)]
-    share = FIXED_SHARE + (1 - FIXED_SHARE) * (spec.optics.n / N) ** 2
-    seconds = fixed + share * of_mirrors
-    if output == "json":
-        typer.echo(json.dumps(overview_record(figures, seconds), indent=1))
-    else:
-        typer.echo("\n".join(overview_lines(figures, seconds)))
-    return 0
-
-
-def overview_lines(figures: Overview, seconds: float) -> list[str]:
-    """Lines of at most 80 columns; seconds: that the build is expected to take."""
-    radii = "planar"
-    if figures.radius_mm is not None:
-        radii = "radius {:.1f} to {:.1f} mm".format(*figures.radius_mm)
-    lines = [
-        f"mirrors           {figures.mirrors} ({figures.virtual_cameras} virtual cameras), {radii}",
-        f"minimum coverage  {figures.minimum_coverage_mm:.2f} mm, of "
-        f"{figures.spec.optics.capture_diameter_mm:g} mm",
-        f"lens              {figures.view_angle_deg:g} degrees across "
-        f"{figures.spec.camera.width_px} pixels",
-    ]
-    if figures.shell_prints:
-        lines.append(f"both shells       {_print_text(figures.shell_prints)}")
-    if figures.prototype:
-        lines += _prototype_lines(figures.prototype)
-    if figures.note:
-        lines.append(figures.note)
-    minutes = max(seconds / MINUTE, 0.1)
-    return [
-        *lines,
-        f"build             about {minutes:.1f} minutes with verification, on two cores",
-    ]
-
-
-def overview_record(figures: Overview, seconds: float) -> dict[str, Any]:
-    """The same for programs: fields of `Overview`, masses in grams, prices by currency."""
-    record = asdict(figures) | {"spec": spec_dict(figures.spec)}
-    return record | {"build_seconds": round(seconds)}
-
-
-def _prototype_lines(figures: PrototypeOverview) -> Iterator[str]:
-    caps = f" and {figures.caps} caps" if figures.caps else ""
-    yield f"prototype         {figures.balls} balls{caps}, {figures.stops} stops, " + (
-        f"swing {figures.swing_deg:.0f} degrees"
-    )
-    yield f"  coverage        {figures.minimum_coverage_mm:.2f} mm, " + (
-        f"{figures.kept_share:.0%} of the shell's pixels"
-    )
-    yield f"  balls           {figures.ball_mass_g:.0f} g, {_price_text(figures.ball_price)}"
-    yield f"  turning         {figures.turning_mass_g:.0f} g, driven by {figures.motor}"
-    yield f"  printed parts   {_print_text(figures.prints)}"
-
-
-def _print_text(figures: PrintEstimate) -> str:
-    return (
-        f"{figures.volume_cm3:.0f} cm3, about {figures.mass_g:.0f} g, {figures.hours:.0f} h, "
-        f"{_price_text(figures.price)} by FDM"
-    )
-
-
-def _price_text(prices: Mapping[str, float]) -> str:
-    """Sums in all currencies of the list of prices."""
-    sums = (f"{amount:.0f} {currency}" for currency, amount in prices.items())
-    return f"about {' and '.join(sums)}" if prices else "no price"
 
 
 @command()
@@ -145,7 +59,7 @@ def build(
     with stages(number, silent=quiet) as screen:
         shown = options.on(screen)
         if dry_run:
-            from tbcad.app.cli.commands.build import show_overview
+            from tbcad.app.cli.commands.dry_run import show_overview
 
             spec = spec_for_process(plan, shown)
             return show_overview(spec, plan.parts, options.parts is None, output, screen)

@@ -97,14 +97,11 @@ def export(options: ExportOptions, json: JsonResult = False) -> int:
         record = exported(options.on(screen))
     figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
     files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
-    lines = _scene_lines(record) if to == "mitsuba" else _lines(record)
+    facets = record.get("facets", {})  # of a scene
+    scene = [f"{part}: {count} facets" for part, count in facets.items()]
+    lines = scene if to == "mitsuba" else _lines(record)
     print_result(record, [*lines, files], json)
     return 0
-
-
-def _scene_lines(record: dict[str, Any]) -> Iterator[str]:
-    for part, count in record["facets"].items():
-        yield f"{part}: {count} facets"
 
 
 def _lines(record: dict[str, Any]) -> Iterator[str]:

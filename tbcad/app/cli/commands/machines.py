@@ -3,6 +3,7 @@
 import shlex
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,6 +26,11 @@ if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
 FAILED = 1  # exit code of a calibration that is not good enough
 FEW_NAMES = 6  # of missing mirrors in a line
+NOT_WHOLE = {
+    "photographs_not_used": "photographs not used",
+    "without_dark": "without a dark photograph of their exposure",
+    "dark_scaled": "whose dark photograph was exposed otherwise, and is scaled",
+}
 
 
 @command("simulate-run")
@@ -154,20 +160,11 @@ def _merge_lines(record: dict[str, Any]) -> list[str]:
         )
         for reason, names in half["mirrors_missing"].items():
             lines.append(f"  {len(names)} missing ({_few(names)}): {reason}")
-        unused = half["photographs_not_used"]
-        if unused:
-            lines.append(f"  {len(unused)} photographs not used: {_few(list(unused))}")
-        if half["without_dark"]:
-            names = half["without_dark"]
-            lines.append(
-                f"  {len(names)} without a dark photograph of their exposure: {_few(names)}"
-            )
-        if half["dark_scaled"]:
-            names = half["dark_scaled"]
-            lines.append(
-                f"  {len(names)} whose dark photograph was exposed otherwise, and is scaled: "
-                f"{_few(names)}"
-            )
+        lines += [
+            f"  {len(names)} {what}: {_few(list(names))}"
+            for key, what in NOT_WHOLE.items()
+            if (names := half[key])
+        ]
     return lines
 
 
@@ -187,14 +184,12 @@ def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
 
     with stages(1) as screen:
         record = written(options.on(screen))
-    if json:
-        print_json(record)
-        return 0
-    typer.echo(
+    lines = (
         f"{record['balls']} balls: centres off by {record['median_um']:.0f} micrometres (median), "
-        f"{record['largest_um']:.0f} at most"
+        f"{record['largest_um']:.0f} at most",
+        f"{options.out}: as_built.step, deviations.csv, legend.png, as_built.json",
     )
-    typer.echo(f"{options.out}: as_built.step, deviations.csv, legend.png, as_built.json")
+    print_result(record, lines, json)
     return 0
 
 
@@ -254,36 +249,29 @@ def run(
             "the machine is ready"
         )
     from tbcad.app.api import run as photograph
-    from tbcad.common.screen import stages
     from tbcad.rig.control.selection import outcome_lines, preflight_lines
 
     look: Preflight = "only" if preflight_only else "off" if no_preflight else "first"
-    ask = _yes if yes else _asked
-    outcome = photograph(replace(options, preflight=look, ask=ask, show=stages, progress=_note))
-    resuming = _resuming(options)
+    outcome = photograph(
+        replace(options, preflight=look, ask=partial(_asked, yes), show=stages, progress=_note)
+    )
+    words = ["tbcad", "run", options.exports, "--port", options.port, "--camera", options.camera]
+    resuming = shlex.join(map(str, [*words, "--out", options.out, "--resume"]))
     lines = preflight_lines(outcome) if preflight_only else outcome_lines(outcome, resuming)
     for line in lines:
         typer.echo(line)
     return 0 if outcome.complete else 1
 
 
-def _resuming(options: RunOptions) -> str:
-    """The command that goes on with a run."""
-    words = ["tbcad", "run", options.exports, "--port", options.port, "--camera", options.camera]
-    return shlex.join(map(str, [*words, "--out", options.out, "--resume"]))
-
-
-def _asked(question: str) -> bool:
-    """Ask the operator; end of input is a no."""
+def _asked(yes: bool, question: str) -> bool:
+    """Ask the operator, unless all is taken for granted; end of input is a no."""
+    if yes:
+        _note(f"{question}: taken for granted")
+        return True
     try:
         return typer.confirm(f"{question}: done?", default=True, err=True)
     except typer.Abort:
         return False
-
-
-def _yes(question: str) -> bool:
-    _note(f"{question}: taken for granted")
-    return True
 
 
 def _note(text: str) -> None:

@@ -177,10 +177,8 @@ def paired(expected: Expected, places: Floats, spots: BrightSpots, radius: float
     places_of_spots = stacked(spots.frame, spots.led, spots.pixel)
     if not len(mine) or not len(spots):
         return partner
-    nearest, back = (
-        np.array(cKDTree(places_of_spots).query(tree.data, distance_upper_bound=radius)[1]),
-        np.array(tree.query(places_of_spots)[1]),
-    )
+    nearest = np.array(cKDTree(places_of_spots).query(tree.data, distance_upper_bound=radius)[1])
+    back = np.array(tree.query(places_of_spots)[1])
     near = np.flatnonzero(nearest < len(spots))  # others have no neighbour within the radius
     mutual = near[back[nearest[near]] == near]
     partner[mine[mutual]] = nearest[mutual]
