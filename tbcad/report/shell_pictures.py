@@ -1,4 +1,4 @@
-"""Pictures of the shells, drawn from an export's STL files and mirrors.csv.
+"""Pictures and sections of the shells, from an export's STL files and mirrors.csv.
 
 Run as a program, `python -m tbcad.report.shell_pictures DIR FILE`: drawing without a screen may
 crash the process, so the command starts it as a child.
@@ -14,9 +14,8 @@ import pyvista
 from scipy.spatial import cKDTree
 
 from tbcad.cad.formats.checked_files import columns
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.pedestals.cells import PedestalCells
-from tbcad.core.optics.surfaces import Surfaces
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.records.design import NAME, DesignRecord
 from tbcad.records.tables import MirrorRow
@@ -72,16 +71,12 @@ def draw(folder: Path, picture: Path) -> None:
                 specular_power=20,
             )
         points = np.concatenate([np.asarray(array.points) for array in placed])
-        _show_all(plotter, points, np.array(direction))
+        eye, focus = camera_that_shows(points, np.array(direction))
+        plotter.camera_position = [tuple(eye), tuple(focus), UP]
+        plotter.camera.view_angle = ANGLE_DEG
+        plotter.reset_camera_clipping_range()
     plotter.screenshot(picture)
     plotter.close()
-
-
-def _show_all(plotter: pyvista.Plotter, points: Floats, direction: Floats) -> None:
-    eye, focus = camera_that_shows(points, direction)
-    plotter.camera_position = [tuple(eye), tuple(focus), UP]
-    plotter.camera.view_angle = ANGLE_DEG
-    plotter.reset_camera_clipping_range()
 
 
 def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats]:
@@ -125,23 +120,15 @@ def mirror_of_facets(corners: Floats, mirrors: ModelledMirrors) -> tuple[Ints, B
     smallest = np.full(len(corners), np.inf)
     for tried in nearest.T:
         one = ModelledMirrors(*(values[tried] for values in mirrors))
-        distance = np.max([np.abs(_height(corners[:, k], one)) for k in range(3)], axis=0)
-        distance[dot(facing, _outward(middle, one)) < FACING_COS] = np.inf
+        # Heights to the first order, (|p - centre|^2 - r^2) / 2r: the plane's at no curvature.
+        offset = corners - one.apex[:, None]
+        curved = one.curvature[:, None] * dot(offset, offset) / 2
+        distance = np.abs(dot(offset, one.normal[:, None]) + curved).max(axis=1)
+        outward = unit(one.normal + one.curvature[:, None] * (middle - one.apex))
+        distance[dot(facing, outward) < FACING_COS] = np.inf
         better = distance < smallest
         best[better], smallest[better] = tried[better], distance[better]
     return best, smallest < CORNER_TOLERANCE_MM
-
-
-def _height(points: Floats, mirrors: ModelledMirrors) -> Floats:
-    """Height of points (f, 3) above the surface of a mirror each, mm, to the first order."""
-    offset, curved = points - mirrors.apex, mirrors.curvature
-    # (|p - centre|^2 - r^2) / 2r, which is the plane's height where the curvature is zero.
-    return np.asarray(dot(offset, mirrors.normal) + curved * dot(offset, offset) / 2)
-
-
-def _outward(points: Floats, mirrors: ModelledMirrors) -> Floats:
-    """Unit normals of mirrors at points (f, 3) near them, toward the object."""
-    return unit(mirrors.normal + mirrors.curvature[:, None] * (points - mirrors.apex))
 
 
 def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
@@ -152,10 +139,6 @@ def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
     radius = np.array([row.radius_mm or np.inf for row in rows])
     polar = columns(rows, "polar_deg")[:, 0]
     return ModelledMirrors(apex - coat * normal, normal, 1 / (radius - coat), polar)
-
-
-if __name__ == "__main__":
-    draw(Path(sys.argv[1]), Path(sys.argv[2]))
 
 
 @dataclass(frozen=True)
@@ -193,10 +176,9 @@ def section_of(export: ExportedDesign, middle: int) -> EdgeSection:
     lines = np.asarray(cut.lines).reshape(-1, 3)[:, 1:]
     start = int(np.linalg.norm(place, axis=1).argmin())
     outline = _path(place @ frame.T, lines, start, reach)
-    on = [
-        _on_sphere(outline @ frame, reflector.mirrors.subset(np.array([k])), apex[middle])
-        for k in mirrors
-    ]
+    spheres, outer = reflector.mirrors.subset(np.array(mirrors)), outline @ frame + apex[middle]
+    height = norm(outer[None] - spheres.centre[:, None]) - spheres.radius[:, None]
+    on = np.abs(height) < ON_MIRROR_MM
     edges = [_edge(outline, apexes[k : k + 2], on[k], on[k + 1]) for k in (0, 1)]
     return EdgeSection(mirrors, outline, apexes, (edges[0], edges[1]))
 
@@ -217,12 +199,6 @@ def _path(points: Floats, lines: Ints, start: int, reach: float) -> Floats:
     whole = [*sides[0][::-1], start, *sides[1]]
     ordered = points[whole]
     return ordered if ordered[0, 0] < ordered[-1, 0] else ordered[::-1]
-
-
-def _on_sphere(place: Floats, sphere: Surfaces, origin: Floats) -> Bools:
-    """Which points (p, 3) from an origin are on a sphere."""
-    off = np.linalg.norm(place + origin - sphere.centre, axis=1) - sphere.radius
-    return np.asarray(np.abs(off) < ON_MIRROR_MM)
 
 
 def _opposite_neighbours(reflector: Reflector, mirror: int) -> tuple[int, int]:
@@ -271,3 +247,7 @@ def _words(outline: Floats, left: Floats, right: Floats, lowest: int) -> str:
     ways = outline[[lowest - 1, lowest + 1]] - bottom
     steep = np.arctan2(ways[:, 1], np.abs(ways[:, 0]))
     return f"opening {180 - np.degrees(steep.sum()):.0f}°"
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), Path(sys.argv[2]))
