@@ -67,11 +67,13 @@ def _run(command: list[str]) -> None:
 
 def _check_files(folder: Path, subject: str) -> None:
     """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
-    part = "prototype" if subject in PROTOTYPE else "shell"
     manifest = read_manifest(folder)
     listed = manifest.files if manifest else {}
-    required = PROTOTYPE_FILES if subject in PROTOTYPE else SHELL_FILES
-    needed = [*required, *(name for name in listed if part == "prototype" and _is_drawn(name))]
+    part, needed = "shell", [*SHELL_FILES]
+    if subject in PROTOTYPE:
+        meshes = (name for name in listed if name.endswith(MESH_SUFFIXES))
+        part = "prototype"
+        needed = [*PROTOTYPE_FILES, *(name for name in meshes if name not in SHELL_FILES)]
     for name in (MANIFEST, *needed):
         if not (folder / name).is_file():
             raise InputError(
@@ -83,11 +85,6 @@ def _check_files(folder: Path, subject: str) -> None:
             f"{folder / altered[0]} is not as tbcad wrote it (cut off, or changed since): "
             "build the export again"
         )
-
-
-def _is_drawn(name: str) -> bool:
-    """Whether a file may be a mesh of the prototype."""
-    return name.endswith(MESH_SUFFIXES) and name not in SHELL_FILES
 
 
 def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str]:

@@ -272,13 +272,9 @@ def files_html(sizes: Mapping[str, int], linked: bool) -> Iterator[str]:
     for name in sorted(sizes):
         shown = escape(name)
         link = f'<a href="{escape(quote(name))}">{shown}</a>' if linked else shown
-        kind = KINDS.get(_suffix(name), "text")
+        kind = KINDS.get("." + name.rpartition(".")[2].lower(), "text")
         yield f"<li>{link} <small>{kind}, {_size(sizes[name])}</small>"
     yield "</ul></details>"
-
-
-def _suffix(name: str) -> str:
-    return "." + name.rpartition(".")[2].lower()
 
 
 def _size(size: int) -> str:
