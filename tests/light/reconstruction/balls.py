@@ -37,13 +37,7 @@ def nothing() -> Field:
 def parallel_rays(
     bright: Callable[[Floats], Bools], across: int = 61, capture_mm: float = WIDTH_MM
 ) -> CapturedRays:
-    """Rays of beams from the upper hemisphere, a mirror each.
-
-    Args:
-        bright: whether rays at such distances from the origin, mm, see something.
-        across: rays in a beam's width.
-        capture_mm: diameter of the capture sphere.
-    """
+    """Rays of beams from the upper hemisphere, a mirror each, some bright by their distance."""
     u = geodesic(3)[0]
     u = u[u[:, 2] > 0]
     x, y = (k.ravel() for k in np.meshgrid(*[np.linspace(-1, 1, across) * capture_mm / 2] * 2))

@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +17,18 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import MIN_SEEN
 from tbcad.records.exposure import DARK, exposure_name
-from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
+from tbcad.rig.calibration.calibrate import (
+    Halves,
+    MachineCalibration,
+    Setup,
+    calibrate,
+    cross_validation,
+    prepared_setup,
+)
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.estimate.jacobian import base_slopes, highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, covariance
-from tbcad.rig.calibration.estimate.solve import Estimate
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, covariance
+from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.led_layout import (
     best_layout,
     layout_cost,
@@ -39,17 +46,18 @@ from tbcad.rig.calibration.run import write_calibration
 from tbcad.rig.calibration.study import whole_errors
 from tbcad.rig.calibration.uncertainty import known_rays
 from tbcad.rig.machine.designed import BuiltPrototype, designed_shell, read_leds
-from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
+from tbcad.rig.machine.machine import TRUTH, Highlights, Machine, read_machine, write_machine
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
-from tests.rig.calibration.machines import every_highlight
+from tests.rig.calibration.machines import drawn, every_highlight, small_machine, small_prior
 
 BASIS = (
     *("run", "exports", "export_sha256", "source", "geometry", "camera"),
     *("photographs", "process", "lens", "measured_radii"),
 )
 NOISE_PX, SIGMA_MM = 0.05, 0.025
+BUILDS = 3
 
 
 def _off(found: Estimate, true: Machine) -> np.ndarray:
@@ -270,3 +278,39 @@ def test_less_noise_and_a_better_process_bound_rays_closer(setup: Setup) -> None
     usual = np.median(whole_errors(setup, leds, "fdm", 0.1).relative.place_mm)
     assert np.median(whole_errors(setup, leds, "fdm", 0.05).relative.place_mm) < usual
     assert np.median(whole_errors(setup, leds, "cnc", 0.1).relative.place_mm) < usual
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return small_prior(small_machine(stops=6))
+
+
+def _halves(prior: Prior, highlights: Highlights) -> tuple[Halves, ...]:
+    frame, sphere = np.zeros(len(prior.mean.radius), dtype=np.int64), np.arange(5)
+    return cross_validation(estimate(prior, highlights), frame, sphere, lambda _: None)
+
+
+def test_halves_differ_by_what_their_covariances_say(prior: Prior) -> None:
+    """Mean squares over several machines: a handful of shared errors make each one vary."""
+    ratios: dict[str, list[float]] = {}
+    for seed in range(BUILDS):
+        for half in _halves(prior, every_highlight(drawn(prior, seed)[1], 50 + seed)):
+            ratios.setdefault(half.by, []).append(half.ratio**2)
+    assert set(ratios) == {"angles", "LEDs"}
+    assert all(0.2 < np.mean(squares) < 3 for squares in ratios.values())
+
+
+def test_halves_that_contradict_each_other_are_seen(prior: Prior) -> None:
+    highlights = every_highlight(drawn(prior, 1)[1], 2)
+    aside = np.where((highlights.frame % 2 == 0)[:, None], [0.0, 0.5], 0.0)
+    wrong = replace(highlights, pixel=highlights.pixel + aside * (highlights.sphere[:, None] % 3))
+    right, found = (_halves(prior, one)[0] for one in (highlights, wrong))
+    assert found.by == "angles"
+    assert found.found_mm > 2 * right.found_mm
+
+
+def test_halves_of_too_few_highlights_are_left_out(prior: Prior) -> None:
+    highlights = every_highlight(drawn(prior, 1)[1], 2)
+    kept = np.flatnonzero(highlights.led == 0)
+    few = Highlights(*(getattr(highlights, one.name)[kept] for one in fields(highlights)))
+    assert [half.by for half in _halves(prior, few)] == ["angles"]

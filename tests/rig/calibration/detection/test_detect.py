@@ -1,5 +1,6 @@
 """Highlights of simulated photographs are found where they are; what is wrong is named."""
 
+import shutil
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,11 +24,13 @@ from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.rig.machine.machine import Highlights
 from tbcad.rig.runs import read_image, read_run
 from tbcad.rig.simulated_run.photographs import ImagingChain
+from tbcad.rig.simulated_run.simulate import write_run
 from tbcad.types import Floats
 from tests.exported_files import edit_json
 from tests.photographed_runs import digest
 from tests.simulated_runs import BRIGHT, Small, small_run
 
+PHASES = ("dark", "led_1", "led_2", "led_3", "led_4")
 TARGET_PX = 0.05
 STOPS = range(8, 48, 6)
 FEW = (8, 26, 44)  # stops
@@ -36,6 +39,37 @@ WIDTH_PX = np.array([2.5, 1.5])  # standard deviations of the spot
 BLUR_PX = 1.0  # of that, what is no image of a dome
 PLACE = np.array([20.3, 18.6])
 ONE = np.zeros(1, dtype=np.int64)
+
+
+@pytest.fixture(scope="session")
+def small(export_folder: Path) -> Small:
+    return small_run(export_folder, STOPS)
+
+
+@pytest.fixture(scope="session")
+def photographed(
+    small: Small, export_folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    folder = tmp_path_factory.mktemp("run") / "run"
+    write_run((small.run,), PHASES, export_folder, folder, lambda _: None)
+    return folder
+
+
+@pytest.fixture
+def copied(photographed: Path, tmp_path: Path) -> Path:
+    """A run that a test may damage."""
+    return Path(shutil.copytree(photographed, tmp_path / "run"))
+
+
+@pytest.fixture
+def write(export_folder: Path, tmp_path: Path) -> Callable[[Small], Path]:
+    """Photographs another run."""
+
+    def written(other: Small) -> Path:
+        write_run((other.run,), PHASES, export_folder, tmp_path / "run", lambda _: None)
+        return tmp_path / "run"
+
+    return written
 
 
 def detected(folder: Path, small: Small) -> Detection:

@@ -9,13 +9,19 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes, reflections
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.estimate.solve import estimate, outlier_limit
+from tbcad.rig.calibration.priors import shell_prior
+from tbcad.rig.machine.designed import designed_shell
 from tbcad.rig.machine.machine import Highlights
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import (
+    LEDS,
     NOISE_PX,
     drawn,
     every_highlight,
@@ -26,6 +32,7 @@ from tests.rig.calibration.machines import (
 BUILDS = 8
 PRIOR = small_prior(small_machine(stops=3))
 STEP = 1e-3  # of the prior standard deviations
+HIGHLIGHTS = 4
 
 
 @pytest.fixture(scope="module")
@@ -116,3 +123,14 @@ def test_slopes_are_those_of_finite_differences(seed: int) -> None:
         ends = [PRIOR.machine(values + sign * step).highlights(*picked) for sign in (-1, 1)]
         slope = (ends[1] - ends[0]).ravel() / (2 * STEP)
         assert dense[:, k] == pytest.approx(slope, rel=1e-6, abs=1e-5), k
+
+
+def test_errors_of_a_shell_are_as_large_as_the_covariance_says(small_design: MirrorDesign) -> None:
+    machine = designed_shell(reflectors(small_design)[0], LEDS)
+    prior = shell_prior(machine, process_errors(load_process("sla")))
+    values, true = drawn(prior, 2)
+    found = estimate(prior, every_highlight(true, 12))
+    off = found.values - values
+    low, high = chi2.ppf([0.001, 0.999], len(prior.free))
+    assert low < off @ (found.information @ off) < high
+    assert len(found.highlights) <= HIGHLIGHTS * len(prior.mean.radius)
