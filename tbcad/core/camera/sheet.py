@@ -158,12 +158,8 @@ def candidates(
     with more pixels; the others by the number of their faults.
     """
     lenses = list(lenses)
-    every = [
-        _candidate(needed, camera, lens)
-        for camera in cameras
-        for lens in lenses
-        if lens.fits(camera.mount)
-    ]
+    pairs = ((camera, lens) for camera in cameras for lens in lenses if lens.fits(camera.mount))
+    every = [_candidate(needed, camera, lens) for camera, lens in pairs]
     return sorted(
         every, key=lambda one: (len(one.faults), one.close_up_dpt > 0, -one.pixels_across)
     )
@@ -175,8 +171,10 @@ def _candidate(needed: CameraRequirements, camera: CameraBody, lens: Rectilinear
     longest = min(camera.width_mm / (2 * across), camera.height_mm / (2 * down))
     focal = 1 / (1 / longest + 1 / needed.focus_mm)
     focal = min(max(focal, lens.focal_min_mm), lens.focal_max_mm)
-    image = _image_distance(focal, needed.focus_mm)
+    within = focal < needed.focus_mm
+    image = 1 / (1 / focal - 1 / needed.focus_mm) if within else float("inf")
     f_number = min(max(focal / needed.pupil_mm, lens.f_number_min), lens.f_number_max)
+    design = lens_for(math.radians(needed.hfov_deg), needed.width_px, 1.0, WIDE_OPEN)
     one = Candidate(
         camera=camera,
         lens=lens,
@@ -185,20 +183,11 @@ def _candidate(needed: CameraRequirements, camera: CameraBody, lens: Rectilinear
         view=min(longest / image, 1.0),
         pixels_across=2 * across * image / camera.pixel_mm,
         f_number=f_number,
-        total_px=_blur(needed, focal / f_number),
+        total_px=aperture_stop(design, needed.depths, focal / f_number)["total_px"],
         close_up_dpt=_close_up(needed.focus_mm, focal, lens.min_focus_mm, image),
         faults=(),
     )
     return replace(one, faults=tuple(_faults(needed, one, image)))
-
-
-def _image_distance(focal: float, focus: float) -> float:
-    return 1 / (1 / focal - 1 / focus) if focal < focus else float("inf")
-
-
-def _blur(needed: CameraRequirements, pupil: float) -> float:
-    lens = lens_for(math.radians(needed.hfov_deg), needed.width_px, 1.0, WIDE_OPEN)
-    return aperture_stop(lens, needed.depths, pupil)["total_px"]
 
 
 def _close_up(focus: float, focal: float, min_focus: float, image: float) -> float:

@@ -238,12 +238,8 @@ def _walk(tried: Callable[[Settings], Trial], best: Trial, factor: float) -> Tri
 
 def weighted(settings: Settings, factor: float) -> Settings:
     """The same with all weights times a factor."""
-    return replace(
-        settings,
-        smooth_density=settings.smooth_density * factor,
-        smooth_colour=settings.smooth_colour * factor,
-        sparse=settings.sparse * factor,
-    )
+    names = ("smooth_density", "smooth_colour", "sparse")
+    return replace(settings, **{name: getattr(settings, name) * factor for name in names})
 
 
 def held_out_loss(rays: CapturedRays, inside: Bools, settings: Settings) -> float:

@@ -228,10 +228,7 @@ def write_checkpoint(file: Path, kept: Checkpoint) -> None:
         "asked": kept.asked,
         "settings": settings_record(kept.settings),
         "trials": kept.trials,
-        "level": state.level,
-        "epoch": state.epoch,
-        "step": state.step,
-        "loss": state.loss,
+        **{name: getattr(state, name) for name in ("level", "epoch", "step", "loss")},
         "nodes": state.grid.n,
         "width_mm": state.grid.width_mm,
     }
@@ -273,12 +270,9 @@ def check_same(file: Path, found: dict[str, Any], asked: dict[str, Any]) -> None
     was, now = _flat(found), _flat(asked)
     for name, value in now.items():
         if was.get(name) != value:
-            what = "another capture" if name == "light_field" else f"{name} {was.get(name)}"
-            raise InputError(f"{file} is of {what}, not {_asked_for(name, value)}: {ANEW}")
-
-
-def _asked_for(name: str, value: Any) -> str:
-    return "of this one" if name == "light_field" else str(value)
+            others = f"{name} {was.get(name)}, not {value}"
+            what = "another capture, not of this one" if name == "light_field" else others
+            raise InputError(f"{file} is of {what}: {ANEW}")
 
 
 def _flat(asked: dict[str, Any]) -> dict[str, Any]:

@@ -55,16 +55,13 @@ class Superseded(Exception):
 
 
 class ViewRenderer(ABC):
-    """Pictures of a light field or a field; one is made at a time, by all cores.
-
-    Attributes:
-        method: of views that do not move.
-        lens: the light field that the pictures of a lens are added up from; None: there are none.
-        capture_mm: diameter of the capture sphere.
-    """
+    """Pictures of a light field or a field; one is made at a time, by all cores."""
 
     def __init__(self, method: str, lens: MirrorTiles | None, capture_mm: float) -> None:
-        """Prepare for requests; arguments as the attributes."""
+        """Prepare for requests; the method is that of views that do not move.
+
+        A lens's pictures are added up from a light field; None: there are none.
+        """
         self.method, self.lens, self.capture_mm = method, lens, capture_mm
         self._lock = Lock()
         self._numbers = count(1)
