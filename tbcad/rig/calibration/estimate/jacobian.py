@@ -217,7 +217,7 @@ def sphere_slopes(
     angle, first = machine.angle[frame], prior.first
     arm = machine.centre[sphere] - machine.axis_point
     turned = rotated(arm, machine.axis, angle)
-    rotation = rotation_matrices(machine.axis, angle)
+    rotation = _matrices(machine.axis, angle)
     tilt = prior.tilt(values)
     on_base = rotation @ tilt.as_matrix()
     along = np.broadcast_to(prior.mean.axis, arm.shape)
@@ -275,7 +275,7 @@ def base_slopes(prior: Prior, values: Floats) -> Slopes:
     )
 
 
-def rotation_matrices(axis: Floats, angle: Floats) -> Floats:
+def _matrices(axis: Floats, angle: Floats) -> Floats:
     """Rotation matrices (n, 3, 3) about an axis (3,) by angles (n,)."""
     columns = [rotated(np.broadcast_to(one, (len(angle), 3)), axis, angle) for one in np.eye(3)]
     return np.stack(columns, axis=2)

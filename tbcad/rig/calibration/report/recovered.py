@@ -13,7 +13,7 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes, rotation_matrices
+from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.rig.calibration.estimate.parameters import Block, Covariance
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.record import angle_sigmas
@@ -138,7 +138,8 @@ def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
     frames = np.arange(len(angle))
-    turned = rotation_matrices(prior.mean.axis, angle) @ prior.across.T
+    ways = [np.broadcast_to(one, (len(angle), 3)) for one in prior.across]
+    turned = np.stack([rotated(one, prior.mean.axis, angle) for one in ways], axis=2)
     by_point = np.eye(2) - prior.across @ turned
     columns = (
         prior.first[Block.AXIS_POINT] + np.arange(2),
