@@ -92,14 +92,15 @@ def _program(lines: list[str]) -> Program:
     known = [float(match[1]) for line in angle if (match := _SET.match(line))]
     if not known:
         raise ValueError("it sets no angle")
+    pause = "pause with a message"
     return Program(
-        ready=_message(before[0]),
+        ready=_matched(_PAUSE, before[0], pause)[1],
         known_angle=tuple(angle),
         known_deg=known[0],
         homes=_HOME in angle,
         start=_move(before[-1]),
         stops=_stops(lines[:turn]),
-        turn=_message(lines[turn]),
+        turn=_matched(_PAUSE, lines[turn], pause)[1],
         end=_move([line for line in lines[turn:] if line.startswith("G1 ")][-1]),
     )
 
@@ -116,17 +117,13 @@ def _stops(lines: list[str]) -> dict[int, Move]:
 
 
 def _move(line: str) -> Move:
-    match = _MOVE.match(line)
-    if match is None:
-        raise ValueError(f"{line!r:.40} is no motion of the base")
-    return Move(line, float(match[2]))
+    return Move(line, float(_matched(_MOVE, line, "motion of the base")[2]))
 
 
-def _message(line: str) -> str:
-    match = _PAUSE.match(line)
-    if match is None:
-        raise ValueError(f"{line!r:.40} is no pause with a message")
-    return match[1]
+def _matched(form: re.Pattern[str], line: str, what: str) -> re.Match[str]:
+    if (match := form.match(line)) is None:
+        raise ValueError(f"{line!r:.40} is no {what}")
+    return match
 
 
 @dataclass(frozen=True)
@@ -175,7 +172,11 @@ def read_control_plan(folder: Path) -> ControlPlan:
 def read_settings(path: Path) -> dict[int, float]:
     """Settings of the controller by number, without the direction, which is found by trying."""
     settings: dict[int, float] = {}
-    for number, line in enumerate(_text(path).splitlines(), 1):
+    try:
+        lines = path.read_text(encoding="ascii").splitlines()
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+    for number, line in enumerate(lines, 1):
         if line.startswith("("):
             continue
         match = _SETTING.match(line)
@@ -197,13 +198,6 @@ def _angles(folder: Path, program: Program) -> dict[int, float]:
     if len(angles) != len(program.stops):
         raise InputError(f"{path} has another number of stops than {PROGRAM}: {REBUILD}")
     return angles
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="ascii")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
 
 
 def _sha256(path: Path) -> str:
