@@ -1,4 +1,5 @@
-"""Where a fit starts: in the hull of the object, on a coarser grid, or at the frame before.
+"""Where a fit starts: in the hull of the object, on a coarser grid, or at the frame before; and the
+checkpoint of a fit that is under way, to go on from.
 
 The hull is what rays that see the background do not pass through.
 """
