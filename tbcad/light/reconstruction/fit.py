@@ -1,5 +1,4 @@
-"""The fit of a field to rays: coarse to fine, by Adam on random batches; and how to choose among
-fits, by mirrors that are held out.
+"""The fit of a field to rays: coarse to fine, by Adam on random batches; and the choice of fits.
 
 Each batch is cut into a fixed number of parts, each with a gradient of its own, which are added in
 their order: the result is the same, to the last bit, on any number of threads.

@@ -1,5 +1,4 @@
-"""Where a fit starts: in the hull of the object, on a coarser grid, or at the frame before; and the
-checkpoint of a fit that is under way, to go on from.
+"""Where a fit starts: in the hull of the object, on a coarser grid, at another frame or checkpoint.
 
 The hull is what rays that see the background do not pass through.
 """
