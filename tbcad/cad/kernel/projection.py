@@ -98,11 +98,8 @@ def _of_shapes(shapes: Iterable[TopoDS_Shape | None]) -> Iterator[Curve | None]:
 
 def _unique(curves: Iterable[Curve | None]) -> tuple[Curve, ...]:
     """Each once, in an order that does not depend on the kernel's."""
-    return tuple(sorted({one for one in curves if one is not None}, key=_key))
-
-
-def _key(curve: Curve) -> tuple[str, str]:
-    return type(curve).__name__, repr(tuple(curve))
+    kept = {one for one in curves if one is not None}
+    return tuple(sorted(kept, key=lambda one: (type(one).__name__, repr(tuple(one)))))
 
 
 def _flat(edge: TopoDS_Edge, axes: Floats) -> Curve | None:

@@ -183,10 +183,7 @@ def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:
 
 
 def check_turntable_path(file: Path, force: bool) -> None:
-    """Refuse, before any work, a file that cannot be written or that exists.
-
-    InputError: as said.
-    """
+    """Refuse, before any work, a file that cannot be written or that exists."""
     if file.suffix.lower() != ".html" or not file.parent.is_dir() or file.is_dir():
         raise InputError(f"{file}: give a file that ends in .html, in a folder that exists")
     check_file(file, force)
