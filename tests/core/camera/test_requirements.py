@@ -26,6 +26,7 @@ from tbcad.core.camera.sheet import (
     LENS_COLUMNS,
     CameraBody,
     RectilinearLens,
+    best_lenses,
     candidates,
     load_cameras,
     load_lenses,
@@ -201,9 +202,13 @@ def test_a_close_up_lens_brings_the_nearest_focus_to_where_it_is_needed() -> Non
 def test_those_without_faults_come_first() -> None:
     poor = replace(BODY, name="poor", width_px=1000)
     close = replace(WIDE_LENS, name="close-up", min_focus_mm=200)
-    first, second, *_ = candidates(NEEDED, [poor, BODY], [close, WIDE_LENS])
+    lists = [poor, BODY], [close, WIDE_LENS]
+    first, second, *_ = candidates(NEEDED, *lists)
     assert (first.camera, first.lens) == (BODY, WIDE_LENS)
     assert (second.camera, second.lens) == (BODY, close)
+    best = best_lenses(NEEDED, *lists)
+    assert [one.camera for one in best] == [BODY, poor]
+    assert best[0] == first
 
 
 def test_built_in_lists_are_sound() -> None:
