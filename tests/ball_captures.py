@@ -9,7 +9,7 @@ import trimesh
 from tbcad.app.cli import run
 from tbcad.core.mirrors.record import write_record
 from tbcad.light.reconstruction import fitted
-from tbcad.light.reconstruction.choice import Trial
+from tbcad.light.reconstruction.fit import Trial
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import Settings
 from tbcad.types import Bools, Progress

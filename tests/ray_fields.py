@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.field import Grid
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.types import Bools, Floats
 

@@ -12,8 +12,7 @@ from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.priors import prototype_prior
-from tbcad.rig.machine.built import is_cap, random_build
-from tbcad.rig.machine.designed import designed_prototype
+from tbcad.rig.machine.designed import designed_prototype, is_cap, random_build
 from tbcad.rig.machine.machine import Machine
 from tbcad.rig.simulated_run.led_light import Occluders
 from tbcad.rig.simulated_run.photographs import ImagingChain, SimulatedRun, frames_of

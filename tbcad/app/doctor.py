@@ -12,7 +12,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -123,9 +123,13 @@ class Finding:
 def diagnose(folder: Path = Path()) -> list[Finding]:
     """Check everything that a build needs, and the free space of the exports' folder."""
     needs = _requirements()
-    attempts = [partial(_attempt_library, needs, *library) for library in _LIBRARIES]
+    attempts: list[Callable[[], Finding]] = [pictures]
+    for name, program, owners in reversed(_LIBRARIES):
+        first = f"{_INSTALL_X11}; if that is not it: " if program is _KERNEL else ""
+        remedy = first + _reinstall(owners, owners[0], needs)
+        attempts.insert(0, partial(attempt, name, program, remedy))
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        findings = list(pool.map(lambda check: check(), [*attempts, pictures]))
+        findings = list(pool.map(lambda check: check(), attempts))
     return [
         python_version(platform.python_version()),
         one_of("CAD kernel", _KERNELS, _installed(), needs),
@@ -136,14 +140,6 @@ def diagnose(folder: Path = Path()) -> list[Finding]:
         memory(available_memory_gb()),
         disk(folder),
     ]
-
-
-def _attempt_library(
-    needs: Sequence[Requirement], name: str, program: str, distributions: Sequence[str]
-) -> Finding:
-    reinstall = _reinstall(distributions, distributions[0], needs)
-    first = f"{_INSTALL_X11}; if that is not it: " if program is _KERNEL else ""
-    return attempt(name, program, first + reinstall)
 
 
 def python_version(version: str) -> Finding:
@@ -180,13 +176,15 @@ def one_of(
 def versions(needs: Sequence[Requirement], installed: Iterable[tuple[str, str]]) -> Finding:
     """Check that all that tbcad requires is installed in a version it allows."""
     present = dict(installed)
-    wrong = [need for need in needs if not _is_met(need, present)]
+    seen = {need: present.get(canonicalize_name(need.name), "") for need in needs}
+    allows = {n: n.specifier.contains(v, prereleases=True) for n, v in seen.items() if v}
+    wrong = [need for need in needs if not allows.get(need)]
     if not needs:
         return Finding("versions", False, "tbcad is not installed", f"{_pip('install')} .")
     if not wrong:
         return Finding("versions", True, f"{len(needs)} libraries as required")
-    seen = ", ".join(f"{n.name} {present.get(canonicalize_name(n.name), 'missing')}" for n in wrong)
-    return Finding("versions", False, seen, f"{_pip('install')} {_quoted(wrong)}")
+    told = ", ".join(f"{need.name} {seen[need] or 'missing'}" for need in wrong)
+    return Finding("versions", False, told, f"{_pip('install')} {_quoted(wrong)}")
 
 
 def machine_libraries(installed: Iterable[tuple[str, str]]) -> Finding:
@@ -200,20 +198,14 @@ def machine_libraries(installed: Iterable[tuple[str, str]]) -> Finding:
     return Finding("machine (optional)", True, detail, remedy if missing else "")
 
 
-def _is_met(need: Requirement, present: dict[str, str]) -> bool:
-    version = present.get(canonicalize_name(need.name))
-    return version is not None and need.specifier.contains(version, prereleases=True)
-
-
 def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) -> Finding:
     """Run a small Python program in a child process; what it prints last is the detail.
 
     It fails when what is tried does not work. `before` is a command in front of the interpreter.
     """
-    command = [*before, sys.executable, "-P", "-c", _NO_CORE_DUMP + program]
     try:
         run = subprocess.run(
-            command,
+            [*before, sys.executable, "-P", "-c", _NO_CORE_DUMP + program],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             encoding="utf-8",
@@ -225,12 +217,9 @@ def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) ->
         return Finding(name, False, f"no answer after {_TIMEOUT_S} s", remedy)
     if run.returncode == 0:
         return Finding(name, True, _last_line(run.stdout))
-    return Finding(name, False, _failure(run.returncode, run.stderr), remedy)
-
-
-def _failure(code: int, stderr: str) -> str:
-    crash = f"crashed ({signal.Signals(-code).name})" if code < 0 else ""
-    return ": ".join(filter(None, [crash, _last_line(stderr)])) or f"ended with {code}"
+    crash = f"crashed ({signal.Signals(-run.returncode).name})" if run.returncode < 0 else ""
+    told = ": ".join(filter(None, [crash, _last_line(run.stderr)]))
+    return Finding(name, False, told or f"ended with {run.returncode}", remedy)
 
 
 def _last_line(text: str) -> str:

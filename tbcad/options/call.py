@@ -41,16 +41,11 @@ def silent(_: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Call:
-    """What a public function is called with; its fields with a help text are a command's options.
+    """What a public function is called with; fields with a help text are a command's options."""
 
-    Attributes:
-        progress: called with the name of each stage.
-        detail: called with the state of a stage.
-        answer: called with a line that says how a file was taken, or what is found so far.
-    """
-
-    progress: Progress = silent
-    detail: Progress = silent
+    progress: Progress = silent  # called with the name of each stage
+    detail: Progress = silent  # called with the state of a stage
+    # called with a line that says how a file was taken, or what is found so far
     answer: Progress = silent
 
     def __post_init__(self) -> None:

@@ -75,8 +75,7 @@ class ExportOptions(Call):
     def check(self) -> Target:
         """Refuse what does not go together; the program.
 
-        Raises:
-            InputError: there is none, an option is not for it, or a number is out of range.
+        InputError: there is none, an option is not for it, or a number is out of range.
         """
         if self.to is None:
             allowed = ", ".join(get_args(Target))

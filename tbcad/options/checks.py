@@ -18,31 +18,25 @@ SHELL_CAMERAS = ("a", "b")  # folders of a shell's calibration
 
 
 def check_is_folder(folder: Path) -> None:
-    """Refuse what is no folder.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Refuse what is no folder; InputError: it is none."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give the folder that `tbcad build` wrote")
 
 
 def check_is_export(folder: Path) -> None:
-    """Refuse a folder without the record of a design.
+    """Refuse a folder without the record of a design; InputError: it has none."""
+    _check_has(folder, DESIGN_FILE, "build")
 
-    Raises:
-        InputError: it has none.
-    """
-    path = folder / DESIGN_FILE
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad build wrote")
+
+def _check_has(folder: Path, file: str, writer: str) -> None:
+    if not (folder / file).is_file():
+        raise InputError(f"{folder / file} is not there: name a folder that tbcad {writer} wrote")
 
 
 def check_is_object(path: Path | None, up: str | None, unit: str | None) -> None:
     """Refuse a mesh that is no file; without one the built-in object is taken.
 
-    Raises:
-        InputError: it is none, or its axis or unit is given without it.
+    InputError: it is none, or its axis or unit is given without it.
     """
     if path is None and (up or unit):
         raise InputError("--up and --unit are of a file: give --object too, or leave them out")
@@ -51,11 +45,7 @@ def check_is_object(path: Path | None, up: str | None, unit: str | None) -> None
 
 
 def check_are_printers(names: Sequence[str]) -> None:
-    """Refuse profiles that cannot be used.
-
-    Raises:
-        InputError: one is neither built in nor a good file.
-    """
+    """Refuse profiles that cannot be used; InputError: one is neither built in nor a good file."""
     if not names:
         return
     from tbcad_verify.errors import BadExport
@@ -69,11 +59,7 @@ def check_are_printers(names: Sequence[str]) -> None:
 
 
 def check_is_capture(path: Path) -> None:
-    """Refuse what holds no light field.
-
-    Raises:
-        InputError: it is neither a file nor a folder with one.
-    """
+    """Refuse what holds no light field; InputError: it is neither a file nor a folder with one."""
     file = path / LIGHT_FIELD_FILE if path.is_dir() else path
     if not file.is_file():
         raise InputError(
@@ -83,43 +69,26 @@ def check_is_capture(path: Path) -> None:
 
 
 def check_is_run(folder: Path) -> None:
-    """Refuse a folder without the record of a run.
-
-    Raises:
-        InputError: it has none.
-    """
-    path = folder / RUN_FILE
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad run or simulate-run wrote")
+    """Refuse a folder without the record of a run; InputError: it has none."""
+    _check_has(folder, RUN_FILE, "run or simulate-run")
 
 
 def check_is_calibration(folder: Path) -> None:
-    """Refuse a folder without a calibrated prototype.
-
-    Raises:
-        InputError: it has none.
-    """
-    if any((one / MACHINE_FILE).is_file() for one in _cameras(folder)) or _is_of_shell(folder):
+    """Refuse a folder without a calibrated prototype; InputError: it has none."""
+    if any((folder / one / MACHINE_FILE).is_file() for one in SHELL_CAMERAS) or _is_of_shell(
+        folder
+    ):
         raise InputError(
             f"{folder} is the calibration of a shell, which only tbcad merge takes: name that of a "
             "prototype"
         )
-    _check_has_machine(folder)
+    _check_has(folder, MACHINE_FILE, "calibrate")
 
 
 def check_is_any_calibration(folder: Path) -> None:
-    """Refuse a folder without a calibrated prototype or shell.
-
-    Raises:
-        InputError: it has neither.
-    """
-    if not any((one / MACHINE_FILE).is_file() for one in _cameras(folder)):
-        _check_has_machine(folder)
-
-
-def _cameras(folder: Path) -> list[Path]:
-    """Folders of a shell's calibration, in that of the run."""
-    return [folder / name for name in SHELL_CAMERAS]
+    """Refuse a folder without a calibrated prototype or shell; InputError: it has neither."""
+    if not any((folder / one / MACHINE_FILE).is_file() for one in SHELL_CAMERAS):
+        _check_has(folder, MACHINE_FILE, "calibrate")
 
 
 def _is_of_shell(folder: Path) -> bool:
@@ -132,9 +101,3 @@ def _is_of_shell(folder: Path) -> bool:
     except (OSError, ValueError):
         return False  # its readers say so
     return isinstance(record, dict) and record.get("geometry") == "shell"
-
-
-def _check_has_machine(folder: Path) -> None:
-    path = folder / MACHINE_FILE
-    if not path.is_file():
-        raise InputError(f"{path} is not there: name a folder that tbcad calibrate wrote")

@@ -101,8 +101,7 @@ class OptimizeOptions(Call):
     def files(self) -> tuple[Path, Path, Path]:
         """The design, the table of candidates and the plot.
 
-        Raises:
-            InputError: out is no name of a file.
+        InputError: out is no name of a file.
         """
         out = Path(self.out)
         if not out.name:

@@ -225,11 +225,7 @@ class SimulateRunOptions(Call):
     ] = False
 
     def stop_numbers(self) -> tuple[int, ...] | None:
-        """The stops; None for all.
-
-        Raises:
-            InputError: they are no list of numbers.
-        """
+        """The stops; None for all; InputError: they are no list of numbers."""
         return None if self.stops is None else numbers(self.stops)
 
     def phase_names(self) -> tuple[str, ...] | None:

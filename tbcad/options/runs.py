@@ -17,8 +17,7 @@ from tbcad.options.shared import AnyPath, Exports, ExposureLeds, ExposureLit
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})$")
 LEAST_PX = 16
 Preflight = Literal["first", "only", "off"]
-Ask = Callable[[str], bool]
-"""Asks the operator to do something; False: the operator will not."""
+Ask = Callable[[str], bool]  # asks the operator to do something; False: the operator will not
 Show = Callable[[Mapping[str, float]], AbstractContextManager[Stages]]
 """Shows stages with their expected seconds while a block runs."""
 
@@ -113,11 +112,7 @@ class RunOptions(Call):
     ] = None
 
     def size(self) -> tuple[int, int] | None:
-        """Columns and rows of a photograph.
-
-        Raises:
-            InputError: they are none.
-        """
+        """Columns and rows of a photograph; InputError: they are none."""
         if self.size_px is None or isinstance(self.size_px, tuple):
             return self.size_px
         match = _SIZE.match(self.size_px)

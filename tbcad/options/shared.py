@@ -170,8 +170,7 @@ def exposures(
 ) -> tuple[float | None, float | None]:
     """Exposure by LEDs and of the lit object, s, of numbers or fractions as cameras show them.
 
-    Raises:
-        InputError: one is neither, or no time of an exposure.
+    InputError: one is neither, or no time of an exposure.
     """
     return _seconds("--exposure-leds", leds), _seconds("--exposure-lit", lit)
 
@@ -194,11 +193,7 @@ def _seconds(option: str, given: str | float | None) -> float | None:
 
 
 def numbers(text: str) -> tuple[int, ...]:
-    """Whole numbers of a list as 1,5,20-30.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Whole numbers of a list as 1,5,20-30; InputError: it is none."""
     found: set[int] = set()
     for part in text.split(","):
         first, _, last = part.partition("-")

@@ -77,8 +77,7 @@ def write_page(
 ) -> Path:
     """Write the steps of an assembly as a page, with or without pictures; other files stay.
 
-    Raises:
-        InputError: the page exists, a file cannot be read or written, or drawing fails.
+    InputError: the page exists, a file cannot be read or written, or drawing fails.
     """
     check_file(out / NAME, force)
     drawn = _drawn(folder) if pictures else {}

@@ -5,6 +5,7 @@ Run as a program, as `shell_pictures`: `python -m tbcad.report.assembly_pictures
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
 from tbcad.report.exploded import Callout, draw_callouts, offsets, place_callouts
-from tbcad.report.prototype_pictures import Drawn, assembly_bodies, placed_mesh
+from tbcad.report.prototype_pictures import assembly_bodies, placed_mesh
 from tbcad.types import Bytes, Floats, Ints
 
 SIZE, SMALL = (1500, 950), (375, 238)
@@ -87,18 +88,12 @@ class _Scene:
 def draw(folder: Path, pictures: Path) -> None:
     """Draw a PNG file for each step that has bodies, named by its key, into a folder."""
     machine = read_machine(folder)
-    bodies = _meshes(folder, machine)
+    bodies = {body.name: body.mesh for body in assembly_bodies(folder, machine.record)}
+    for tool in machine.record.with_role("tool"):  # which are not in the assembly
+        bodies[tool.name] = placed_mesh(folder, tool)
     for step in assembly_steps(machine):
         if new := {name for use in step.parts for name in use.bodies} & bodies.keys():
             _picture(machine, step, bodies, frozenset(new)).save(pictures / f"{step.key}.png")
-
-
-def _meshes(folder: Path, machine: AssembledMachine) -> dict[str, pyvista.PolyData]:
-    """Bodies of the assembly, and the tools that are not in it."""
-    drawn: list[Drawn] = assembly_bodies(folder, machine.record)
-    meshes = {body.name: body.mesh for body in drawn}
-    tools = machine.record.with_role("tool")
-    return meshes | {part.name: placed_mesh(folder, part) for part in tools}
 
 
 def _picture(
@@ -108,14 +103,12 @@ def _picture(
     new: frozenset[str],
 ) -> Image.Image:
     moved = offsets(machine, new)
-    shown = [name for name in (*new, *step.near) if name in bodies]
-    scene = _Scene(
-        {
-            name: bodies[name].translate(moved.get(name, np.zeros(3)), inplace=False)
-            for name in shown
-        },
-        new,
-    )
+    shown = {
+        name: bodies[name].translate(moved.get(name, np.zeros(3)), inplace=False)
+        for name in (*new, *step.near)
+        if name in bodies
+    }
+    scene = _Scene(shown, new)
     eye = _best_eye(scene, step)
     fasteners = frozenset(one.name for one in machine.fasteners)
     picture = Image.fromarray(_screenshot(scene, scene.shaded(fasteners), eye))
@@ -143,8 +136,11 @@ def _numbers(pixels: Bytes) -> Ints:
 def _best_eye(scene: _Scene, step: Step) -> Floats:
     """The direction from which most kinds of new parts are seen."""
     plotter = scene.numbered(SMALL)
-    eyes = [_direction(azimuth, up) for up in ELEVATIONS for azimuth in AZIMUTHS]
-    seen = []
+    eyes, worth, seen = [], [], []
+    for (elevation, value), azimuth in product(ELEVATIONS.items(), AZIMUTHS):
+        turn, up = np.radians(azimuth), np.radians(elevation)
+        eyes.append(np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)]))
+        worth.append(value * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0))
     for eye in eyes:
         scene.look(plotter, eye)
         plotter.render()  # what was drawn before is shown otherwise
@@ -153,23 +149,7 @@ def _best_eye(scene: _Scene, step: Step) -> Floats:
     plotter.close()
     area = np.array(seen)
     scores = np.sqrt(area / np.maximum(area.max(axis=0), 1.0)).sum(axis=1)
-    return eyes[int(np.argmax(scores * _worth()))]
-
-
-def _worth() -> Floats:
-    """Of each direction, in their order."""
-    return np.array(
-        [
-            worth * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0)
-            for worth in ELEVATIONS.values()
-            for azimuth in AZIMUTHS
-        ]
-    )
-
-
-def _direction(azimuth: float, elevation: float) -> Floats:
-    turn, up = np.radians(azimuth), np.radians(elevation)
-    return np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    return eyes[int(np.argmax(scores * np.array(worth)))]
 
 
 def _seen(scene: _Scene, step: Step, numbers: Ints) -> list[int]:

@@ -19,12 +19,12 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.optics.windows import cut_images, seam_gaps
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
-from tbcad.report.section import EdgeSection, section_of
-from tbcad.report.shell_pictures import coloured
+from tbcad.report.shell_pictures import EdgeSection, coloured, section_of
 from tbcad.types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SAMPLES = 401
 INCHES = (13.0, 5.2)
@@ -49,13 +49,11 @@ def seam_mirror(export: ExportedDesign) -> int:
 def draw_fields(axes: "Sequence[Axes]", export: ExportedDesign, mirror: int) -> None:
     """Draw both fields: halves aimed at the object's centre, and as they are."""
     reflector = export.reflectors[0]
-    before, after = cells_aimed_at_origin(reflector), reflector.cells
-    for one, cells, title in zip(
-        axes,
-        (before, after),
-        ("aimed at the object's centre", "as built, aimed beyond the seam"),
-        strict=True,
-    ):
+    drawn = {
+        "aimed at the object's centre": cells_aimed_at_origin(reflector),
+        "as built, aimed beyond the seam": reflector.cells,
+    }
+    for one, (title, cells) in zip(axes, drawn.items(), strict=True):
         _draw(one, cells, reflector, mirror, export.capture_mm / 2)
         one.set_title(f"Halves {title}", fontsize=10)
 
@@ -79,23 +77,17 @@ def _draw(axes: "Axes", cells: Cells, reflector: Reflector, mirror: int, radius:
     left, right = np.maximum(-rim, np.minimum(edge, rim)), rim
     axes.fill_betweenx(along, left, right, color="C0", alpha=0.45, lw=0, label="half a")
     axes.fill_betweenx(along, -right, -left, color="C1", alpha=0.45, lw=0, label="half b")
-    axes.plot(radius * np.cos(_turn()), radius * np.sin(_turn()), color="k", lw=1)
+    turn = np.linspace(0, 2 * np.pi, SAMPLES)
+    axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="k", lw=1)
     inside = rim > 0
     widest, least = 2 * edge[inside].max(), -2 * edge[inside].max()
     said = (
         f"neither sees up to {widest:.2f} mm" if widest > 0 else f"both see {least:.2f} mm or more"
     )
     axes.text(0, -1.12 * radius, said, ha="center", va="top", fontsize=10)
-    axes.set_xlim(-1.15 * radius, 1.15 * radius)
-    axes.set_ylim(-1.35 * radius, 1.15 * radius)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x at the object, mm")
-    axes.set_ylabel("along the seam, mm")
+    limits = {"xlim": (-1.15 * radius, 1.15 * radius), "ylim": (-1.35 * radius, 1.15 * radius)}
+    axes.set(**limits, xlabel="x at the object, mm", ylabel="along the seam, mm", aspect="equal")
     axes.legend(loc="upper right", fontsize=8, frameon=False)
-
-
-def _turn() -> Floats:
-    return np.linspace(0, 2 * np.pi, SAMPLES)
 
 
 def edge_of_field(cells: Cells, reflector: Reflector, mirror: int, along: Floats) -> Floats:
@@ -107,11 +99,6 @@ def edge_of_field(cells: Cells, reflector: Reflector, mirror: int, along: Floats
     return np.asarray(np.interp(along, place[order], x[order]))
 
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
 def draw(folder: Path, subject: str, picture: Path) -> None:
     """Draw a subject of an export, "edges" or "seam", to a PNG file."""
     export = read_export(folder)
@@ -121,12 +108,16 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
 
 def _edges(export: ExportedDesign) -> "Callable[[Figure], None]":
     reflector = export.reflectors[0]
-    section = section_of(export, _shown_mirror(reflector))
+    ahead = np.sqrt(1 - ELEVATION_Z**2), 0, ELEVATION_Z
+    section = section_of(export, int((reflector.u @ ahead).argmax()))
     view = _shaded(export.folder, "a", reflector, section.mirrors[1])
+    title = "Valleys: spheres meet"
+    if export.spec.shell.edges != "valley":
+        title = f"Pedestals: grooves of {export.spec.shell.groove_mm:g} mm part the mirrors"
 
     def panels(figure: "Figure") -> None:
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.25))
-        _show(left, view, _edges_title(export))
+        _show(left, view, title)
         _draw_section(right, section, mirror_ids("a", len(reflector)))
 
     return panels
@@ -146,18 +137,6 @@ def _seam(export: ExportedDesign) -> "Callable[[Figure], None]":
         draw_fields(fields, export, mirror)
 
     return panels
-
-
-def _shown_mirror(reflector: Reflector) -> int:
-    """The mirror near the plane y = 0 at a middle elevation, (index)."""
-    x = np.sqrt(1 - ELEVATION_Z**2)
-    return int((reflector.u @ (x, 0, ELEVATION_Z)).argmax())
-
-
-def _edges_title(export: ExportedDesign) -> str:
-    if export.spec.shell.edges == "valley":
-        return "Valleys: spheres meet"
-    return f"Pedestals: grooves of {export.spec.shell.groove_mm:g} mm part the mirrors"
 
 
 def _show(axes: "Axes", view: Floats, title: str) -> None:
@@ -209,10 +188,8 @@ def _draw_section(axes: "Axes", section: EdgeSection, ids: list[str]) -> None:
             fontsize=9,
             arrowprops={"arrowstyle": "-", "lw": 0.7},
         )
-    axes.set_aspect(STRETCH)
-    axes.set_ylim(low - 1.1, section.points[:, 1].max() + 1.9)
-    axes.set_xlabel("along the section, mm")
-    axes.set_ylabel(f"height, mm ({STRETCH:g} times stretched)")
+    axes.set(xlabel="along the section, mm", ylabel=f"height, mm ({STRETCH:g} times stretched)")
+    axes.set(aspect=STRETCH, ylim=(low - 1.1, section.points[:, 1].max() + 1.9))
     axes.set_title("Section of three mirrors through the camera's pinhole", fontsize=10)
     _draw_inset(axes, section)
 
@@ -229,9 +206,7 @@ def _draw_inset(axes: "Axes", section: EdgeSection) -> None:
     x, y = section.edges[1].bottom
     inset = axes.inset_axes((0.3, 0.66, 0.4, 0.32))
     _draw_outline(inset, section.points, y - 2)
-    inset.set_xlim(x - INSET_MM, x + INSET_MM)
-    inset.set_ylim(y - 0.15, y + 0.85)
-    inset.set_aspect("equal")
+    inset.set(xlim=(x - INSET_MM, x + INSET_MM), ylim=(y - 0.15, y + 0.85), aspect="equal")
     inset.tick_params(labelsize=7)
     inset.set_title("the right edge, not stretched", fontsize=8)
 

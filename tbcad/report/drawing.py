@@ -23,9 +23,8 @@ MESH_SUFFIXES = (".stl", ".glb")
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
     """Draw one of SUBJECTS of an export to a PNG file, which is replaced as a whole.
 
-    Raises:
-        InputError: when the export or a screen is missing, a file of the export is not as it was
-            written, the picture exists, or drawing fails.
+    InputError: the export or a screen is missing, a file of the export is not as it was written,
+    the picture exists, or drawing fails.
     """
     if subject not in SUBJECTS:
         raise InputError(f"{subject!r} cannot be drawn: name one of {', '.join(SUBJECTS)}")
@@ -44,8 +43,7 @@ def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False)
 def draw_apart(module: str, *arguments: str) -> None:
     """Run a module of tbcad.report as a program in a process of its own.
 
-    Raises:
-        InputError: when there is no screen, or drawing fails.
+    InputError: there is no screen, or drawing fails.
     """
     _run(_on_screen([sys.executable, "-m", f"tbcad.report.{module}", *arguments]))
 
@@ -53,8 +51,7 @@ def draw_apart(module: str, *arguments: str) -> None:
 def check_prototype_files(folder: Path) -> None:
     """Refuse an export whose prototype is missing or not as it was written.
 
-    Raises:
-        InputError: it names the file.
+    InputError: it names the file.
     """
     _check_files(folder, PROTOTYPE[0])
 
@@ -70,11 +67,13 @@ def _run(command: list[str]) -> None:
 
 def _check_files(folder: Path, subject: str) -> None:
     """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
-    part = "prototype" if subject in PROTOTYPE else "shell"
     manifest = read_manifest(folder)
     listed = manifest.files if manifest else {}
-    required = PROTOTYPE_FILES if subject in PROTOTYPE else SHELL_FILES
-    needed = [*required, *(name for name in listed if part == "prototype" and _is_drawn(name))]
+    part, needed = "shell", [*SHELL_FILES]
+    if subject in PROTOTYPE:
+        meshes = (name for name in listed if name.endswith(MESH_SUFFIXES))
+        part = "prototype"
+        needed = [*PROTOTYPE_FILES, *(name for name in meshes if name not in SHELL_FILES)]
     for name in (MANIFEST, *needed):
         if not (folder / name).is_file():
             raise InputError(
@@ -88,16 +87,10 @@ def _check_files(folder: Path, subject: str) -> None:
         )
 
 
-def _is_drawn(name: str) -> bool:
-    """Whether a file may be a mesh of the prototype."""
-    return name.endswith(MESH_SUFFIXES) and name not in SHELL_FILES
-
-
 def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str]:
     """The command that draws in a process of its own, under a virtual screen where needed.
 
-    Raises:
-        InputError: when there is neither a screen nor a virtual one.
+    InputError: there is neither a screen nor a virtual one.
     """
     module, what = "shell_pictures", []
     if subject != SHELL:

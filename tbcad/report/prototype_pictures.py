@@ -32,17 +32,14 @@ SHELL_FRAME = 1e3 * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 SIZE = (1600, 800)
 ANGLE_DEG = 30.0
-COLOURS = {
-    "base": "#5b7394",
-    "cap": "#d9b366",
-    "ball": "#c7ccd4",
-}
+UP = (0.0, 0.0, 1.0)
+COLOURS = {"base": "#5b7394", "cap": "#d9b366", "ball": "#c7ccd4"}
 # Where it is seen from, and what points up in the picture. Camera a is toward +x.
 SIDES = (
-    ("from the camera's side (+x)", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    ("from the right (+y)", (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    ("from the left (-y)", (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
-    ("from above (+z)", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    ("from the camera's side (+x)", (1.0, 0.0, 0.0), UP),
+    ("from the right (+y)", (0.0, 1.0, 0.0), UP),
+    ("from the left (-y)", (0.0, -1.0, 0.0), UP),
+    ("from above (+z)", UP, (0.0, 1.0, 0.0)),
 )
 SIDES_BORDER = 1.15  # height and width of a picture, in the longest side of all that is drawn
 ROWS = {"sides": 2}  # of pictures; one where nothing is said
@@ -76,23 +73,18 @@ def _whole(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
 
 def _sides(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
     """The prototype without its shroud from four sides, all to one scale."""
-    bodies = [
-        body
-        for body in assembly_bodies(folder, record)
-        if body.group not in ("views", "shroud") and body.name != "camera_view"
-    ]
+    bodies = assembly_bodies(folder, record)
     for number, (title, eye, up) in enumerate(SIDES):
         plotter.subplot(*divmod(number, 2))
         for body in bodies:
-            _add(plotter, body, np.zeros(3))
+            if body.group not in ("views", "shroud") and body.name != "camera_view":
+                _add(plotter, body, np.zeros(3))
         plotter.set_background("white")
         plotter.add_text(title, position="upper_edge", color="black", font_size=12)
         plotter.enable_parallel_projection()
         plotter.view_vector(eye, viewup=up)
         plotter.reset_camera()
-    longest = max(
-        np.ptp(np.reshape(view.bounds, (3, 2)), axis=1).max() for view in plotter.renderers
-    )
+    longest = np.ptp([np.reshape(one.bounds, (3, 2)) for one in plotter.renderers], axis=2).max()
     for view in plotter.renderers:
         view.camera.parallel_scale = SIDES_BORDER * longest / 2  # half the height of a picture
 
@@ -125,7 +117,10 @@ def _seat(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
             plotter.add_mesh(mark, color="red")
         if column:
             _add_balls(plotter, folder, only=ball.number)
-        _look(plotter, eye, middle + 0.3 * radius * axis)
+        plotter.set_background("white")
+        plotter.camera_position = [tuple(eye), tuple(middle + 0.3 * radius * axis), UP]
+        plotter.camera.view_angle = ANGLE_DEG
+        plotter.reset_camera_clipping_range()
 
 
 def _exploded(plotter: pyvista.Plotter, folder: Path, record: Prototype) -> None:
@@ -211,16 +206,9 @@ def _add(plotter: pyvista.Plotter, body: Drawn, moved: Floats) -> None:
 def _show_all(plotter: pyvista.Plotter, eye: Sequence[float] | Floats) -> None:
     """Look from a direction at all that is drawn."""
     plotter.set_background("white")
-    plotter.view_vector(tuple(eye), viewup=(0.0, 0.0, 1.0))
+    plotter.view_vector(tuple(eye), viewup=UP)
     plotter.camera.view_angle = ANGLE_DEG
     plotter.reset_camera()
-
-
-def _look(plotter: pyvista.Plotter, eye: Floats, focus: Floats) -> None:
-    plotter.set_background("white")
-    plotter.camera_position = [tuple(eye), tuple(focus), (0.0, 0.0, 1.0)]
-    plotter.camera.view_angle = ANGLE_DEG
-    plotter.reset_camera_clipping_range()
 
 
 if __name__ == "__main__":

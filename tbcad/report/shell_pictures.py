@@ -1,10 +1,11 @@
-"""Pictures of the shells, drawn from an export's STL files and mirrors.csv.
+"""Pictures and sections of the shells, from an export's STL files and mirrors.csv.
 
 Run as a program, `python -m tbcad.report.shell_pictures DIR FILE`: drawing without a screen may
 crash the process, so the command starts it as a child.
 """
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,9 @@ import pyvista
 from scipy.spatial import cKDTree
 
 from tbcad.cad.formats.checked_files import columns
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.records.design import NAME, DesignRecord
 from tbcad.records.tables import MirrorRow
 from tbcad.types import Bools, Floats, Ints
@@ -31,6 +34,10 @@ STRUCTURE_GREY = 205
 CORNER_TOLERANCE_MM = 0.01
 FACING_COS = 0.9
 TRIED = 8
+ON_MIRROR_MM = 0.005  # facets are nearer than this to the spheres
+SAME_MM = 0.02  # rims nearer than this are one edge
+ROUNDS = 20
+BEYOND = 0.35  # shown beyond the outer apices, of the distance of apices
 
 
 class ModelledMirrors(NamedTuple):
@@ -64,27 +71,19 @@ def draw(folder: Path, picture: Path) -> None:
                 specular_power=20,
             )
         points = np.concatenate([np.asarray(array.points) for array in placed])
-        _show_all(plotter, points, np.array(direction))
+        eye, focus = camera_that_shows(points, np.array(direction))
+        plotter.camera_position = [tuple(eye), tuple(focus), UP]
+        plotter.camera.view_angle = ANGLE_DEG
+        plotter.reset_camera_clipping_range()
     plotter.screenshot(picture)
     plotter.close()
 
 
-def _show_all(plotter: pyvista.Plotter, points: Floats, direction: Floats) -> None:
-    eye, focus = camera_that_shows(points, direction)
-    plotter.camera_position = [tuple(eye), tuple(focus), UP]
-    plotter.camera.view_angle = ANGLE_DEG
-    plotter.reset_camera_clipping_range()
-
-
 def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats]:
-    """Pinhole and focus (3,) of a camera in whose square picture points (n, 3) just fit.
+    """Pinhole and focus (3,) of a camera in whose square picture points (n, 3), mm, just fit.
 
     A point is in the picture where |across - centre| <= slope (distance + depth), for both axes of
-    the picture: the distance follows from the outermost points on either side.
-
-    Args:
-        points: to show, mm.
-        direction: of the view, (3,).
+    the picture: the distance follows from the outermost points on either side of a direction (3,).
     """
     forward = unit(direction)
     right = unit(np.cross(forward, UP))
@@ -121,23 +120,15 @@ def mirror_of_facets(corners: Floats, mirrors: ModelledMirrors) -> tuple[Ints, B
     smallest = np.full(len(corners), np.inf)
     for tried in nearest.T:
         one = ModelledMirrors(*(values[tried] for values in mirrors))
-        distance = np.max([np.abs(_height(corners[:, k], one)) for k in range(3)], axis=0)
-        distance[dot(facing, _outward(middle, one)) < FACING_COS] = np.inf
+        # Heights to the first order, (|p - centre|^2 - r^2) / 2r: the plane's at no curvature.
+        offset = corners - one.apex[:, None]
+        curved = one.curvature[:, None] * dot(offset, offset) / 2
+        distance = np.abs(dot(offset, one.normal[:, None]) + curved).max(axis=1)
+        outward = unit(one.normal + one.curvature[:, None] * (middle - one.apex))
+        distance[dot(facing, outward) < FACING_COS] = np.inf
         better = distance < smallest
         best[better], smallest[better] = tried[better], distance[better]
     return best, smallest < CORNER_TOLERANCE_MM
-
-
-def _height(points: Floats, mirrors: ModelledMirrors) -> Floats:
-    """Height of points (f, 3) above the surface of a mirror each, mm, to the first order."""
-    offset, curved = points - mirrors.apex, mirrors.curvature
-    # (|p - centre|^2 - r^2) / 2r, which is the plane's height where the curvature is zero.
-    return np.asarray(dot(offset, mirrors.normal) + curved * dot(offset, offset) / 2)
-
-
-def _outward(points: Floats, mirrors: ModelledMirrors) -> Floats:
-    """Unit normals of mirrors at points (f, 3) near them, toward the object."""
-    return unit(mirrors.normal + mirrors.curvature[:, None] * (points - mirrors.apex))
 
 
 def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
@@ -148,6 +139,114 @@ def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
     radius = np.array([row.radius_mm or np.inf for row in rows])
     polar = columns(rows, "polar_deg")[:, 0]
     return ModelledMirrors(apex - coat * normal, normal, 1 / (radius - coat), polar)
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Where a section passes from one mirror to the next."""
+
+    bottom: Floats  # lowest point, mm, (2,)
+    depth: float  # of it below the line over the crests of both mirrors, mm
+    words: str  # its shape
+
+
+@dataclass(frozen=True)
+class EdgeSection:
+    """A section in its own plane: along it, and up toward the light."""
+
+    mirrors: tuple[int, int, int]  # numbers of the three, from 0
+    points: Floats  # of the outline, from one side to the other, mm, (p, 2)
+    apexes: Floats  # of the mirrors, mm, (3, 2)
+    edges: tuple[Edge, Edge]  # between them
+
+
+def section_of(export: ExportedDesign, middle: int) -> EdgeSection:
+    """The section of camera a's shell through a mirror and two opposite neighbours."""
+    reflector = export.reflectors[0]
+    first, last = _opposite_neighbours(reflector, middle)
+    mirrors = (first, middle, last)
+    apex, pinhole = reflector.mirrors.apex, reflector.camera.pinhole
+    along = unit(apex[last] - apex[first])
+    across = unit(np.cross(along, pinhole - apex[middle]))
+    frame = np.stack([along, np.cross(across, along)])
+    cut = pyvista.read(export.folder / "shell_a.stl").slice(across, origin=apex[middle])
+    place = np.asarray(cut.points, dtype=np.float64) - apex[middle]
+    apexes = (apex[list(mirrors)] - apex[middle]) @ frame.T
+    reach = (1 + BEYOND) * np.abs(apexes[:, 0]).max()
+    lines = np.asarray(cut.lines).reshape(-1, 3)[:, 1:]
+    start = int(np.linalg.norm(place, axis=1).argmin())
+    outline = _path(place @ frame.T, lines, start, reach)
+    spheres, outer = reflector.mirrors.subset(np.array(mirrors)), outline @ frame + apex[middle]
+    height = norm(outer[None] - spheres.centre[:, None]) - spheres.radius[:, None]
+    on = np.abs(height) < ON_MIRROR_MM
+    edges = [_edge(outline, apexes[k : k + 2], on[k], on[k + 1]) for k in (0, 1)]
+    return EdgeSection(mirrors, outline, apexes, (edges[0], edges[1]))
+
+
+def _path(points: Floats, lines: Ints, start: int, reach: float) -> Floats:
+    """Points (p, 2) along lines (e, 2) from one that is given, as far as they are within reach."""
+    near: dict[int, list[int]] = {}
+    for a, b in lines.tolist():
+        near.setdefault(a, []).append(b)
+        near.setdefault(b, []).append(a)
+    sides = []
+    for first in near[start]:
+        before, at, path = start, first, []
+        while abs(points[at, 0]) < reach and at != start:
+            path.append(at)
+            before, at = at, next(one for one in near[at] if one != before)
+        sides.append(path)
+    whole = [*sides[0][::-1], start, *sides[1]]
+    ordered = points[whole]
+    return ordered if ordered[0, 0] < ordered[-1, 0] else ordered[::-1]
+
+
+def _opposite_neighbours(reflector: Reflector, mirror: int) -> tuple[int, int]:
+    """The two neighbours of a mirror that are most opposite to each other."""
+    cells = reflector.cells
+    faces = cells.walls if isinstance(cells, PedestalCells) else cells.arcs.faces
+    pairs = faces[(faces == mirror).any(axis=1)]
+    near = np.setdiff1d(pairs[(pairs < len(reflector)).all(axis=1)], [mirror])
+    way = unit(reflector.mirrors.apex[near] - reflector.mirrors.apex[mirror])
+    first, last = np.unravel_index((way @ way.T).argmin(), (len(near), len(near)))
+    a, b = sorted((int(near[first]), int(near[last])))
+    return a, b
+
+
+def _edge(outline: Floats, apexes: Floats, on_left: Bools, on_right: Bools) -> Edge:
+    number = np.arange(len(outline))
+    ends = [np.linalg.norm(outline - apex, axis=1).argmin() for apex in apexes]
+    between = number[ends[0] : ends[1]]
+    lowest = int(between[outline[between, 1].argmin()])
+    left = outline[number[on_left & (number <= lowest)].max()]
+    right = outline[number[on_right & (number >= lowest)].min()]
+    bottom = outline[lowest]
+    return Edge(bottom, _depth(outline, apexes, lowest), _words(outline, left, right, lowest))
+
+
+def _depth(outline: Floats, apexes: Floats, lowest: int) -> float:
+    """Depth of a point below the line that touches both mirrors, mm."""
+    bottom, slope = outline[lowest], 0.0
+    near = [
+        side[np.abs(side[:, 0] - apex[0]) < np.ptp(apexes[:, 0]) / 2]
+        for side, apex in zip((outline[:lowest], outline[lowest + 1 :]), apexes, strict=True)
+    ]
+    for _ in range(ROUNDS):  # the line's slope follows from the points that it touches
+        left, right = (side[(side[:, 1] - slope * side[:, 0]).argmax()] for side in near)
+        slope = float((right[1] - left[1]) / (right[0] - left[0]))
+    line = left[1] + slope * (bottom[0] - left[0])
+    return float((line - bottom[1]) / np.hypot(1, slope))
+
+
+def _words(outline: Floats, left: Floats, right: Floats, lowest: int) -> str:
+    """Width and depth of a groove between two rims, or the opening of a valley."""
+    width, bottom = float(np.linalg.norm(right - left)), outline[lowest]
+    if width > SAME_MM:
+        depth = min(left[1], right[1]) - bottom[1]
+        return f"groove {width:.2f} mm wide,\n{depth:.2f} mm deep"
+    ways = outline[[lowest - 1, lowest + 1]] - bottom
+    steep = np.arctan2(ways[:, 1], np.abs(ways[:, 0]))
+    return f"opening {180 - np.degrees(steep.sum()):.0f}°"
 
 
 if __name__ == "__main__":

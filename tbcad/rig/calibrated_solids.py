@@ -15,6 +15,7 @@ from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.kernel.solids import common, one_solid, sphere
 from tbcad.common.results import Table
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.mirrors.array import mirror_ids
 from tbcad.core.optics.windows import cell_windows
 from tbcad.errors import InputError
 from tbcad.light.simulate.image_files import write_images
@@ -23,7 +24,7 @@ from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.records.tables import RayRow
 from tbcad.rig.machine.designed import machine_runs, stops_known
 from tbcad.rig.machine.machine import RECORD, Machine, read_machine
-from tbcad.types import Bools, Bytes, Floats
+from tbcad.types import Bytes, Floats
 
 SAME_MM = 1e-6  # centres and radii of a ball's front and body; a cap's are apart
 UM_PER_MM = 1000.0
@@ -93,15 +94,15 @@ def ball_group(machine: Machine, plan: Plan, found: Deviations) -> SolidGroup:
     """All balls at base angle zero; a cap is what its reflecting sphere and its body share."""
     shades = colours(found.distance_um / found.scale_um).tolist()
     bodies = []
-    for number, (red, green, blue) in enumerate(shades, 1):
-        k = number - 1
+    for k, (red, green, blue) in enumerate(shades):
+        name = f"ball_{k + 1}"
         shape = sphere(machine.centre[k], float(machine.radius[k]))
         apart = abs(plan.centre[k] - plan.body_centre[k]).max()
         if max(apart, abs(plan.radius[k] - plan.body_radius[k])) > SAME_MM:
             body = machine.centre[k] + plan.body_centre[k] - plan.centre[k]
             cap = common(shape, sphere(body, float(plan.body_radius[k])))
-            shape = one_solid(f"ball_{number}", cap)
-        bodies.append(ColouredSolid(f"ball_{number}", shape, (red, green, blue, 1.0)))
+            shape = one_solid(name, cap)
+        bodies.append(ColouredSolid(name, shape, (red, green, blue, 1.0)))
     return SolidGroup("balls", tuple(bodies))
 
 
@@ -124,10 +125,7 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
         "exports": str(exports),
         "balls": len(plan),
         "scale_um": [0.0, found.scale_um],
-        "base": {
-            "shift_mm": found.shift.tolist(),
-            "turn_deg": np.degrees(found.turn).tolist(),
-        },
+        "base": {"shift_mm": found.shift.tolist(), "turn_deg": np.degrees(found.turn).tolist()},
         "largest_um": float(found.distance_um.max()),
         "median_um": float(np.median(found.distance_um)),
         "files": {"solids": STEP, "table": TABLE, "legend": LEGEND},
@@ -156,23 +154,13 @@ def legend(scale_um: float) -> Bytes:
 def _rows(machine: Machine, found: Deviations) -> list[Row]:
     """Measured centre at base angle zero, radius, and what they are off by."""
     shades = np.rint(255 * colours(found.distance_um / found.scale_um)).astype(int)
-    table = np.column_stack(
-        [
-            machine.centre,
-            machine.radius,
-            UM_PER_MM * found.offset,
-            found.distance_um,
-            UM_PER_MM * found.radius,
-        ]
+    off_um = [UM_PER_MM * found.offset, found.distance_um, UM_PER_MM * found.radius]
+    table = np.column_stack([machine.centre, machine.radius, *off_um]).tolist()
+    cells = (
+        (number, *values, "#{:02x}{:02x}{:02x}".format(*shade))
+        for number, (values, shade) in enumerate(zip(table, shades, strict=True), 1)
     )
-    return [
-        {
-            "ball": number,
-            **dict(zip(COLUMNS[1:-1], values, strict=True)),
-            "colour": "#{:02x}{:02x}{:02x}".format(*shade),
-        }
-        for number, (values, shade) in enumerate(zip(table.tolist(), shades, strict=True), 1)
-    ]
+    return [dict(zip(COLUMNS, row, strict=True)) for row in cells]
 
 
 @dataclass(frozen=True)
@@ -208,18 +196,20 @@ def as_built_tolerance(
     export = read_export(exports)
     plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)
     runs, known = machine_runs(export, plan, machine, frames), stops_known(plan, frames)
-    names = [_names(run) for run in runs]
+    names = [mirror_ids(run.reflector.camera_id, len(run.reflector)) for run in runs]
     rays = {ray.mirror: ray for ray in RayRow.read(calibration)}
     covered = np.concatenate([*map(_coverage, runs)])
     coverage = dict(zip(chain(*names), covered.tolist(), strict=True))
-    ids = [name for half in range(len(runs)) for name in _known(plan, known, half, names[half])]
-    ids = [name for name in ids if name in rays]
+    seen = np.concatenate([known[half, plan.stop[half]] for half in range(len(runs))])
+    every = zip(chain(*names), seen.tolist(), strict=True)
+    ids = [name for name, calibrated in every if calibrated and name in rays]
     if not ids:
         raise InputError(f"{calibration / RayRow.FILE} names no mirror of {exports}: {CALIBRATE}")
     shown = np.array([coverage[name] for name in ids])
     place = np.array([rays[name].sigma_mm for name in ids])
-    random = np.random.default_rng(seed)
-    worst = np.array([(shown - 2 * _drawn(random, place)).min() for _ in range(builds)])
+    random, size = np.random.default_rng(seed), (len(place), AXES)
+    lost = (2 * norm(random.standard_normal(size)) * place / np.sqrt(AXES) for _ in range(builds))
+    worst = np.array([(shown - one).min() for one in lost])
     return AsBuiltTolerance(
         target=export.capture_mm,
         ids=tuple(ids),
@@ -280,17 +270,6 @@ def summary(found: AsBuiltTolerance) -> str:
     )
 
 
-def _names(run: PrototypeRun) -> list[str]:
-    count = len(run.reflector)
-    return [f"{run.reflector.camera_id}{number:04d}" for number in range(1, count + 1)]
-
-
-def _known(plan: Plan, known: Bools, half: int, names: list[str]) -> list[str]:
-    """Mirrors of one run whose stops are calibrated."""
-    seen = known[half, plan.stop[half]].tolist()
-    return [name for name, one in zip(names, seen, strict=True) if one]
-
-
 def _coverage(run: PrototypeRun) -> Floats:
     """Coverage of the mirrors of a run, with windows where the balls are, mm, (m,)."""
     turn = Rotation.from_matrix(np.swapaxes(run.window_rotation, 1, 2)).as_rotvec()
@@ -299,8 +278,3 @@ def _coverage(run: PrototypeRun) -> Floats:
     surfaces = run.ball_surfaces
     windows = cell_windows(run.reflector.cells, run.reflector.camera.pinhole)
     return windows.coverage(surfaces.centre, surfaces.radius, axis, angle, run.camera.pinhole)
-
-
-def _drawn(random: np.random.Generator, place: Floats) -> Floats:
-    """Lengths (m,) of errors in a plane with root mean squares (m,)."""
-    return np.asarray(norm(random.standard_normal((len(place), AXES))) * place / np.sqrt(AXES))

@@ -172,15 +172,10 @@ def _best(table: Table, subject: Subject) -> list[Record]:
 
 def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> PlotPanel:
     styles = ("C0o-", "C0s--", "C1o-", "C1s--")
-    series = tuple(
-        Series(
-            subject.name,
-            _rows(table, subject).numbers("virtual_cameras")
-            / _rows(table, subject).numbers("pixels"),
-            _rows(table, subject).numbers("ssim_on_object"),
-            style,
-        )
-        for subject, style in zip(seen, styles, strict=True)
-    )
-    x_label = "virtual cameras per pixel of a virtual camera"
-    return PlotPanel(f"Views by method {method}", x_label, "SSIM on the object", series, "x")
+    series = []
+    for subject, style in zip(seen, styles, strict=True):
+        rows = _rows(table, subject)
+        ratio = rows.numbers("virtual_cameras") / rows.numbers("pixels")
+        series.append(Series(subject.name, ratio, rows.numbers("ssim_on_object"), style))
+    label = "virtual cameras per pixel of a virtual camera"
+    return PlotPanel(f"Views by method {method}", label, "SSIM on the object", tuple(series), "x")

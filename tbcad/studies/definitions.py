@@ -7,10 +7,9 @@ import numpy as np
 from tbcad.common.results import Record, Table
 from tbcad.common.schedule import run_units
 from tbcad.core.geometry.conics import Ellipsoid
-from tbcad.core.mirrors.array import MirrorArray, numbered_directions
+from tbcad.core.mirrors.array import numbered_directions
 from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.capture.photograph import (
-    PixelCounts,
     Sensor,
     count_pixels,
     virtual_cameras,
@@ -84,18 +83,8 @@ def definitions(
 def _record(
     row: BalancedSensor, name: str, radii: str, value: float | None, reason: str = ""
 ) -> Record:
-    number, resolution = row.printed
-    return {
-        "definition": name,
-        "radii": radii,
-        "width_px": row.width_px,
-        "height_px": row.height_px,
-        "n": row.n,
-        "value": value,
-        f"paper_{NUMBER}": number,
-        f"paper_{RESOLUTION}": resolution,
-        "reason": reason,
-    }
+    cells = (name, radii, row.width_px, row.height_px, row.n, value, *row.printed, reason)
+    return dict(zip(COLUMNS, cells, strict=True))
 
 
 def _mirror_records(spec: Spec, row: BalancedSensor, pitch: float) -> list[Record]:
@@ -119,10 +108,14 @@ def _pixel_records(spec: Spec, pitch: float, row: BalancedSensor, radii: str) ->
     sensor = Sensor(row.width_px, row.height_px)
     radius = spec.optics.capture_diameter_mm / 2
     counts = count_pixels(attempt.array, (sensor,), radius)[0]
-    values = _pixels(attempt.array, counts)
-    values["pixels of both frames / virtual cameras"] = (
-        2 * sensor.width_px * sensor.height_px / virtual_cameras(attempt.array)
-    )
+    cameras, values = virtual_cameras(attempt.array), dict[str, float]()
+    kinds = {"seeing": counts.seen, "disc": counts.disc, "on mirrors": counts.on}
+    for name, pixels in kinds.items():
+        values[f"{name} pixels / virtual cameras"] = 2 * float(pixels.sum()) / cameras
+        values[f"{name} pixels / mirrors"] = float(pixels.mean())
+        values[f"{name} pixels of a mirror, median"] = float(np.median(pixels))
+    whole = 2 * sensor.width_px * sensor.height_px
+    values["pixels of both frames / virtual cameras"] = whole / cameras
     if radii == PITCHED_RADII:
         turned = count_pixels(attempt.array, (sensor,), radius, axes=axes_at_pitch(pitch))[0]
         values[f"{DISC}, {_at(pitch)}"] = float(turned.disc.mean())
@@ -131,18 +124,6 @@ def _pixel_records(spec: Spec, pitch: float, row: BalancedSensor, radii: str) ->
 
 def _at(pitch: float) -> str:
     return f"camera pitched by {np.degrees(pitch):.1f} deg"
-
-
-def _pixels(array: MirrorArray, counts: PixelCounts) -> dict[str, float]:
-    kinds = {"seeing": counts.seen, "disc": counts.disc, "on mirrors": counts.on}
-    figures: dict[str, float] = {}
-    for name, pixels in kinds.items():
-        figures[f"{name} pixels / virtual cameras"] = (
-            2 * float(pixels.sum()) / virtual_cameras(array)
-        )
-        figures[f"{name} pixels / mirrors"] = float(pixels.mean())
-        figures[f"{name} pixels of a mirror, median"] = float(np.median(pixels))
-    return figures
 
 
 def _fits(table: Table, *, known: bool) -> list[Record]:

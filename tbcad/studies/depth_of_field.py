@@ -124,28 +124,17 @@ def _by_rule(spec: Spec, progress: Progress) -> tuple[dict[str, VirtualImages], 
 
 
 def _mirror_table(by_rule: dict[str, VirtualImages], notes: tuple[str, ...]) -> Table:
-    numbers = np.vstack([np.empty((0, len(NUMBERS))), *map(_numbers, by_rule.values())])
+    numbers = [np.empty((0, len(NUMBERS)))]
+    for one in by_rule.values():
+        mirrors = np.degrees(one.array.polar), one.array.mirrors.radius, np.degrees(one.incidence)
+        images = (places.reshape(len(one.array), -1) for places in (one.distance, one.depth))
+        numbers.append(np.column_stack([*mirrors, one.to_mirror, *images]))
     columns = {
         "id": [name for images in by_rule.values() for name in images.array.ids],
         "radii": [rule for rule, images in by_rule.items() for _ in images.array.ids],
-        **dict(zip(NUMBERS, numbers.T, strict=True)),
+        **dict(zip(NUMBERS, np.vstack(numbers).T, strict=True)),
     }
     return Table.of_columns("depth-of-field", columns, notes)
-
-
-def _numbers(images: VirtualImages) -> Floats:
-    """The columns NUMBERS of some mirrors, (m, 16)."""
-    array = images.array
-    return np.column_stack(
-        [
-            np.degrees(array.polar),
-            array.mirrors.radius,
-            np.degrees(images.incidence),
-            images.to_mirror,
-            images.distance.reshape(len(array), -1),
-            images.depth.reshape(len(array), -1),
-        ]
-    )
 
 
 def _range(values: Floats) -> DepthRange:
@@ -178,21 +167,14 @@ def _stop_records(ranges: dict[str, DepthRange], lens: Lens, blur_px: float) -> 
 
 
 def _image_figures(by_rule: dict[str, VirtualImages]) -> list[Figure]:
-    ends = (
-        ("nearest", np.min, claims()["depth_near"]),
-        ("farthest", np.max, claims()["depth_far"]),
-    )
-    return [
-        Figure(
-            f"camera to {which} image, {rule} radii",
-            "mm",
-            float(end(images.distance)),
-            claim.value,
-            claim.where,
-        )
-        for rule, images in by_rule.items()
-        for which, end, claim in ends
-    ]
+    near, far = claims()["depth_near"], claims()["depth_far"]
+    figures = []
+    for rule, images in by_rule.items():
+        over = _range(images.distance)
+        for which, ours, paper in (("nearest", over.near, near), ("farthest", over.far, far)):
+            name = f"camera to {which} image, {rule} radii"
+            figures.append(Figure(name, "mm", ours, paper.value, paper.where))
+    return figures
 
 
 def _flat_figures(by_rule: dict[str, VirtualImages], ranges: dict[str, DepthRange]) -> list[Figure]:

@@ -134,8 +134,7 @@ def _area_figures(record: Record) -> list[Figure]:
 def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
     """The study: radii of every mirror by both rules, its pixels, and how they follow the angles.
 
-    Raises:
-        SpecError: the mirrors cannot be made.
+    SpecError: the mirrors cannot be made.
     """
     spec, arrays = with_lens_of_table_i(spec), {}
     for rule in CURVES:

@@ -200,16 +200,10 @@ def _figures(means: Table) -> tuple[Figure, ...]:
         for record in means.records()
         for key, (name, unit) in units.items()
     ]
-    contrast = [
-        Figure(
-            f"{_name(record)}: contrast of the photographs",
-            "",
-            record["photograph_contrast"],
-            where=WHERE,
-        )
-        for record in means.where(view="pinhole").records()
-    ]
-    return (*figures, *contrast)
+    for record in means.where(view="pinhole").records():
+        name = f"{_name(record)}: contrast of the photographs"
+        figures.append(Figure(name, "", record["photograph_contrast"], where=WHERE))
+    return tuple(figures)
 
 
 def _panels(means: Table) -> tuple[PlotPanel, ...]:
@@ -223,17 +217,14 @@ def _panels(means: Table) -> tuple[PlotPanel, ...]:
         ("pinhole", "pinhole at --distance", "C0o"),
         ("aperture", "aperture of 80 mm at 160 mm", "C1s"),
     )
-    bars = {
-        column: tuple(
+    panels = []
+    for column, (title, unit) in labels.items():
+        bars = (
             Series(label, means.where(view=view).numbers(column), place, style)
             for view, label, style in kinds
         )
-        for column in labels
-    }
-    return tuple(
-        PlotPanel(title, unit, "", bars[column], names=names)
-        for column, (title, unit) in labels.items()
-    )
+        panels.append(PlotPanel(title, unit, "", tuple(bars), names=names))
+    return tuple(panels)
 
 
 def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:

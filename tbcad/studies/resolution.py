@@ -9,7 +9,6 @@ from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import (
-    PixelCounts,
     Sensor,
     allowed,
     count_pixels,
@@ -129,9 +128,12 @@ def resolution(
     progress("definitions")
     rows = tuple(r for r in balanced_sensors() if Sensor(r.width_px, r.height_px) in sensors)
     defined, fits = definitions(spec, rows, progress)
-    figures = (*_definition_figures(defined), *map(_balance_figure, balances))
+    figures = _definition_figures(defined)
+    name = "balanced n at {ratio}, {width_px}x{height_px}, {pixels_counted}"
+    for row in balances:
+        figures.append(Figure(name.format(**row), "", row["balanced_n"], row["paper_n"], TABLE_II))
     panels = (_count_panel(counts, sensors), _balance_panel(balanced, ratios))
-    return Study("resolution", figures, (counts, balanced, defined, fits), panels)
+    return Study("resolution", tuple(figures), (counts, balanced, defined, fits), panels)
 
 
 def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
@@ -142,17 +144,13 @@ def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
         return [{**head, **dict.fromkeys(COUNTED), "reason": attempt.reason} for head in heads]
     cameras = virtual_cameras(attempt.array)
     counts = count_pixels(attempt.array, sensors, radius)
-    return [
-        {**head, **_counted(cameras, one), "reason": ""}
-        for head, one in zip(heads, counts, strict=True)
-    ]
-
-
-def _counted(cameras: int, counts: PixelCounts) -> Record:
-    # Both cameras' pictures are mirror images, pixel by pixel.
-    seeing, on = 2 * float(counts.seen.sum()), 2 * float(counts.on.sum())
-    figures = (cameras, seeing, on, seeing / cameras, on / cameras, counts.fill, counts.rays)
-    return dict(zip(COUNTED, figures, strict=True))
+    rows: list[Record] = []
+    for head, one in zip(heads, counts, strict=True):
+        # Both cameras' pictures are mirror images, pixel by pixel.
+        seeing, on = 2 * float(one.seen.sum()), 2 * float(one.on.sum())
+        figures = (cameras, seeing, on, seeing / cameras, on / cameras, one.fill, one.rays)
+        rows.append({**head, **dict(zip(COUNTED, figures, strict=True)), "reason": ""})
+    return rows
 
 
 def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
@@ -177,24 +175,14 @@ def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
 
 def _definition_figures(defined: Table) -> list[Figure]:
     """The definitions that agree with the columns of Table II, beside them."""
-    name = "{width_px}x{height_px}, n = {n}: {definition}"
-    return [
-        Figure(
-            name.format(**record),
-            "",
-            record["value"],
-            record[f"paper_{column}"],
-            f"{TABLE_II}, '{HEADINGS[column]}'",
-        )
-        for prefix, column in AGREEING
-        for record in defined.records()
-        if str(record["definition"]).startswith(prefix)
-    ]
-
-
-def _balance_figure(record: Record) -> Figure:
-    names = "balanced n at {ratio}, {width_px}x{height_px}, {pixels_counted}"
-    return Figure(names.format(**record), "", record["balanced_n"], record["paper_n"], TABLE_II)
+    figures = []
+    for prefix, column in AGREEING:
+        paper, where = f"paper_{column}", f"{TABLE_II}, '{HEADINGS[column]}'"
+        for record in defined.records():
+            if str(record["definition"]).startswith(prefix):
+                name = "{width_px}x{height_px}, n = {n}: {definition}".format(**record)
+                figures.append(Figure(name, "", record["value"], record[paper], where))
+    return figures
 
 
 def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> PlotPanel:

@@ -156,16 +156,10 @@ def _fits(means: Table) -> list[Record]:
         if len(np.unique(x)) < 2:
             continue
         fit = linregress(x, rows.numbers("ssim"))
-        fits.append(
-            {
-                "elevation_deg": elevation,
-                "sensors": len(x),
-                "slope": float(fit.slope),
-                "intercept": float(fit.intercept),
-                # Through two points there is always a line.
-                "r2": float(fit.rvalue**2) if len(x) > 2 else None,
-            }
-        )
+        line = (float(fit.slope), float(fit.intercept))
+        # Through two points there is always a line.
+        r2 = float(fit.rvalue**2) if len(x) > 2 else None
+        fits.append(dict(zip(FITS, (elevation, len(x), *line, r2), strict=True)))
     return fits
 
 
@@ -220,21 +214,16 @@ def _ssim_panel(means: Table, fits: Table) -> PlotPanel:
     return PlotPanel(title, "sensor, megapixels", "SSIM", tuple(series), logarithmic="x")
 
 
-def _elevation_panels(means: Table) -> tuple[PlotPanel, PlotPanel]:
+def _elevation_panels(means: Table) -> list[PlotPanel]:
     labels = {
         "blur_mm": ("Blur of views", "standard deviation at the object, mm"),
         "ssim_on_object": ("Similarity where the object is", "SSIM"),
     }
-    blur, on_object = (
-        PlotPanel(
-            title,
-            "elevation, degrees",
-            unit,
-            tuple(
-                Series(size, rows.numbers("elevation_deg"), rows.numbers(column), f"C{k}.-")
-                for k, (size, rows) in enumerate(_by_sensor(means).items())
-            ),
+    panels = []
+    for column, (title, unit) in labels.items():
+        curves = (
+            Series(size, rows.numbers("elevation_deg"), rows.numbers(column), f"C{k}.-")
+            for k, (size, rows) in enumerate(_by_sensor(means).items())
         )
-        for column, (title, unit) in labels.items()
-    )
-    return blur, on_object
+        panels.append(PlotPanel(title, "elevation, degrees", unit, tuple(curves)))
+    return panels

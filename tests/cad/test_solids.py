@@ -9,18 +9,39 @@ import cadquery
 import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.Geom import Geom_Circle
+from OCP.GeomAbs import GeomAbs_Circle
+from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 import tbcad
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.cad.kernel.checks import volume
+from tbcad.cad.kernel.checks import (
+    face_integrals,
+    plane_faces,
+    properties,
+    volume,
+    without_slack,
+)
+from tbcad.cad.kernel.meshing import (
+    SIDES,
+    as_manifold,
+    meshed,
+    primitive_mesh,
+    volume_by_cut_mesh,
+    volume_by_meshes,
+)
 from tbcad.cad.kernel.solids import (
     common,
     cut,
     cylinder,
+    edges,
     faces,
     from_bytes,
     fused,
+    moved,
     one_solid,
     polygon,
     polyhedron,
@@ -31,11 +52,35 @@ from tbcad.cad.kernel.solids import (
     to_bytes,
     without_cavities,
 )
-from tbcad.core.geometry.primitives import rectangle
+from tbcad.core.geometry.primitives import (
+    Cylinder,
+    Primitive,
+    Prism,
+    Revolved,
+    rectangle,
+    revolved_along,
+)
+from tbcad.core.geometry.primitives import (
+    volume as closed_volume,
+)
+from tbcad.core.geometry.vectors import norm, unit
+from tests.step_read_back import check_read_back
 
 BASE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 ORIGIN, UP, AWAY = np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([20.0, 0.0, 0.0])
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to.md"
+START, TILTED = np.array([1.0, -2.0, 3.0]), unit(np.array([0.3, -0.5, 0.8]))
+TRIANGLE = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0]])
+PRIMITIVES = {
+    "rod": Cylinder(START, TILTED, 2.0, 7.0),
+    "ring": Revolved(rectangle((1.0, 3.0), (5.0, 4.0))),
+    "cone, tilted": revolved_along(np.array([[0.0, 0], [6, 0], [0, 2]]), START, TILTED),
+    "prism": Prism(TRIANGLE, np.array([0.0, 0, 5])),
+    "prism, downward": Prism(TRIANGLE, np.array([0.0, 0, -5])),
+    "prism, oblique": Prism(TRIANGLE + START, np.array([1.0, 2.0, 5.0])),
+}
+SLACK_MM = 1e-3
+PLACE = np.array([1.0, 2.0, 3.0])
 
 
 def box(width: float, height: float) -> TopoDS_Shape:
@@ -133,3 +178,119 @@ def test_without_cadquery_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, "cadquery", None)
     with pytest.raises(tbcad.InputError, match=r"pip install 'tbcad\[cadquery\]'"):
         tbcad.to_cadquery(design.shell("a"))
+
+
+@pytest.mark.parametrize("body", PRIMITIVES.values(), ids=PRIMITIVES)
+def test_volumes_are_those_of_closed_forms(body: Primitive) -> None:
+    assert primitive_mesh(body).volume() == pytest.approx(
+        closed_volume(body), rel=1e-8
+    )  # sections are rounded to 1e-8 mm
+
+
+@pytest.fixture(scope="module")
+def pin() -> TopoDS_Shape:
+    return cylinder(ORIGIN, UP, 3.0, 10.0)
+
+
+@pytest.mark.parametrize("tolerance", [0.1, 0.01])
+def test_facets_are_as_near_to_a_sphere_as_asked(tolerance: float) -> None:
+    mesh = meshed(sphere(ORIGIN, 5.0), tolerance)
+    assert norm(mesh.vertices) == pytest.approx(5.0, abs=1e-6)
+    middle = mesh.vertices[mesh.triangles].mean(axis=1)
+    assert 5.0 - norm(middle).min() <= tolerance
+
+
+def test_volume_of_a_union_less_tools_agrees_with_the_kernel(pin: TopoDS_Shape) -> None:
+    bodies, tools = [pin, sphere(10 * UP, 5.0)], [cylinder(-UP, UP, 1.0, 20.0)]
+    by_meshes = volume_by_meshes(
+        *([as_manifold(one, 0.002) for one in some] for some in (bodies, tools))
+    )
+    assert by_meshes == pytest.approx(volume(cut(fused(bodies), tools)), rel=2e-3)
+
+
+def test_volume_below_a_plane(pin: TopoDS_Shape) -> None:
+    planes = np.array([[0.0, 0.0, 1.0, 4.0]])
+    below = volume_by_cut_mesh(pin, planes, [], 0.001)
+    assert below == pytest.approx(36 * np.pi, rel=1e-3)
+
+
+def test_a_rod_is_in_its_place() -> None:
+    corners = primitive_mesh(PRIMITIVES["rod"]).to_mesh64().vert_properties[:, :3] - START
+    along = corners @ TILTED
+    assert np.sort(along) == pytest.approx(np.repeat([0.0, 7.0], SIDES))
+    radii = np.linalg.norm(corners - along[:, None] * TILTED, axis=1)
+    assert radii == pytest.approx(2.0, rel=2e-3)
+
+
+def rod_with_gap(gap: float) -> TopoDS_Solid:
+    """A rod whose round edges are off its faces, mm, and whose tolerances are SLACK_MM."""
+    rod = one_solid("rod", cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 5.0, 20.0))
+    for edge in edges(rod):
+        curve = BRepAdaptor_Curve(edge)
+        if curve.GetType() == GeomAbs_Circle:
+            circle = curve.Circle()
+            circle.SetRadius(circle.Radius() + gap)
+            BRep_Builder().UpdateEdge(edge, Geom_Circle(circle), SLACK_MM)
+    ShapeFix_ShapeTolerance().SetTolerance(rod, SLACK_MM)
+    assert BRepCheck_Analyzer(rod).IsValid()
+    return rod
+
+
+@pytest.mark.parametrize("gap", [0.0, 5e-6])
+def test_what_meets_stays_valid(gap: float) -> None:
+    rod = one_solid("rod", without_slack(rod_with_gap(gap)))
+    check_read_back("rod", rod, properties(rod))
+
+
+@pytest.mark.parametrize("gap", [2e-5, 5e-4])
+def test_gaps_are_found_as_a_reader_of_the_file_finds_them(gap: float) -> None:
+    rod = rod_with_gap(gap)
+    with pytest.raises(InvalidSolidError, match=r"rod: its edges are up to .* mm off its faces"):
+        check_read_back("rod", rod, properties(rod))
+    with pytest.raises(InvalidSolidError, match="rod: the kernel's check finds the solid invalid"):
+        one_solid("rod", without_slack(rod))
+
+
+def test_a_cylinder() -> None:
+    found = properties(cylinder(PLACE, UP, 2.0, 5.0))
+    assert found.volume == pytest.approx(20 * np.pi, rel=1e-12)
+    assert found.area == pytest.approx(28 * np.pi, rel=1e-12)
+    assert found.centroid == pytest.approx((1.0, 2.0, 5.5), abs=1e-12)
+
+
+def test_a_sphere() -> None:
+    ball = sphere(PLACE, 7.0)
+    assert volume(ball) == pytest.approx(4 / 3 * np.pi * 7**3, rel=1e-9)
+    assert properties(ball).area == pytest.approx(4 * np.pi * 49, rel=1e-9)
+
+
+def test_a_rotated_solid_has_its_centroid_where_the_kernel_finds_it() -> None:
+    solid, axes = cylinder(PLACE, UP, 2.0, 5.0), np.roll(np.eye(3), 1, axis=1)
+    found, expected = properties(solid).rotated(axes), properties(moved(solid, axes, np.zeros(3)))
+    assert found.centroid == pytest.approx((5.5, 1.0, 2.0), abs=1e-12)
+    assert found.centroid == pytest.approx(expected.centroid, abs=1e-12)
+    assert (found.volume, found.area) == pytest.approx((expected.volume, expected.area))
+
+
+@pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (10.0, -4.0, 2.0)])
+def test_faces_add_up_to_their_solid(origin: tuple[float, float, float]) -> None:
+    solid = cylinder(PLACE, UP, 2.0, 5.0)
+    first, *others = (face_integrals(face, np.array(origin)) for face in faces(solid))
+    total = first
+    for one in others:
+        total = total + one
+    found, expected = total.properties, properties(solid)
+    assert found.volume == pytest.approx(expected.volume, rel=1e-9)
+    assert found.area == pytest.approx(expected.area, rel=1e-9)
+    assert found.centroid == pytest.approx(expected.centroid, abs=1e-8)
+
+
+def test_plane_faces_through_points() -> None:
+    base = np.column_stack([rectangle([0.0, 0.0], [4.0, 2.0]), np.zeros(4)])
+    box = prism(polygon(base), 3.0 * UP)
+    points = np.array([[9.0, 9.0, 3.01], [4.2, 1.0, 1.0]])
+    centre, area = plane_faces(box, points, 0.1)
+    assert centre == pytest.approx(np.array([[2.0, 1.0, 3.0]]))
+    assert area == pytest.approx([8.0])
+    assert len(plane_faces(box, points, 0.3)[1]) == 2
+    assert not len(plane_faces(box, points[:0], 0.3)[1])

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from tbcad.light.reconstruction.field import Field, density_of
-from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.field import Field, Grid, density_of
 from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tests.ray_fields import RADIUS

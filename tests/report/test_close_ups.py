@@ -1,20 +1,45 @@
 """What close-ups show: a section of the facets, and fields of both halves of a seam mirror."""
 
+import itertools
+import os
+import shutil
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from tbcad.app.cli import run
+from tbcad.core.mirrors.array import design
+from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.windows import seam_gaps
+from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.prototype.assembly_steps.machine import read_machine
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
-from tbcad.report.section import section_of
+from tbcad.report.exploded import RADIUS as CALLOUT_RADIUS
+from tbcad.report.exploded import Callout, cross, offsets, place_callouts
+from tbcad.report.shell_pictures import (
+    mirror_of_facets,
+    read_modelled,
+    section_of,
+)
+from tbcad.shell.facets import mirror_facets
+from tbcad.shell.files import camera_a_mesh
+from tests.exported_files import contents
 from tests.mirror_arrays import mirror_design
+from tests.prototype.assembly_steps.test_steps import LOOSE, belt_design, write
 from tests.shell_meshes import export_with_meshes
 
 GROOVE = 0.3
 RADIUS = 30.0
 FACETS_MM = 0.02  # that facets and a crest between two of their corners may be off
+SIZE = (1500, 950)
+ROOT = Path(__file__).parents[2]
+AFTERNOON = ROOT / "designs" / "afternoon-print.toml"
+SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
 
 
 def shells(folder: Path, edges: str) -> ExportedDesign:
@@ -80,3 +105,130 @@ def test_halves_aimed_at_the_origin_leave_a_gap_and_built_ones_none(
     for cells, expected in ((before, gap[mirror]), (reflector.cells, 0.0)):
         edge = edge_of_field(cells, reflector, mirror, along)
         assert max(0, 2 * edge.max()) == pytest.approx(expected, abs=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_lines_do_not_cross_and_circles_do_not_overlap(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    anchors = random.uniform((200, 50), (1300, 900), (random.integers(1, 20), 2)).tolist()
+    placed = place_callouts([Callout(k, 1, (x, y)) for k, (x, y) in enumerate(anchors)], SIZE)
+    assert sorted(one.callout.number for one in placed) == [*range(len(anchors))]
+    for a, b in itertools.combinations(placed, 2):
+        assert np.hypot(*np.subtract(a.middle, b.middle)) > 2 * CALLOUT_RADIUS
+        assert not cross(a.middle, a.callout.anchor, b.middle, b.callout.anchor)
+    assert all(0 < one.middle[1] < SIZE[1] for one in placed)
+
+
+def test_bodies_are_moved_against_their_screws(tmp_path: Path) -> None:
+    machine = read_machine(write(tmp_path, belt_design(), LOOSE))
+    moved = offsets(machine, frozenset({"wheel", "zero_disc", "M3x16_1"}))
+    along = [moved[name][2] for name in ("M3x16_1", "wheel", "zero_disc")]
+    assert along == sorted(along)
+    assert along[-1] < 0
+    assert all(np.all(offset[:2] == 0) for offset in moved.values())
+
+
+def test_what_a_screw_ends_in_is_moved_away_from_what_is_there(tmp_path: Path) -> None:
+    machine = read_machine(write(tmp_path, belt_design(), LOOSE))
+    moved = offsets(machine, frozenset({"motor", "M3x12_1"}))
+    assert moved["M3x12_1"][2] < 0 < moved["motor"][2]
+
+
+@pytest.mark.parametrize(
+    ("file", "options"),
+    [
+        (None, ["n=3"]),
+        (None, ["n=4", "radius_rule=flat"]),
+        (None, ["n=5", "coating_um=400"]),
+        (AFTERNOON, []),
+    ],
+    ids=["n = 3", "flat", "coat", "afternoon-print"],
+)
+def test_facets_belong_to_the_mirrors_that_they_were_made_for(
+    file: Path | None, options: list[str], tmp_path: Path
+) -> None:
+    """All facets of the casing are grey, also where three corners lie on the edge of a mirror."""
+    mirrors = design(load_spec(file, options))
+    write_record(tmp_path, mirrors, shells=False)
+    mesh, array = camera_a_mesh(mirrors), mirrors.arrays[0]
+    made = mirror_facets(mirrors.spec, array.modelled_cells, array.apex_distance).mirror
+    corners = mesh.vertices.astype(np.float32).astype(np.float64)[mesh.triangles]
+    mirror, found = mirror_of_facets(corners, read_modelled(tmp_path, "a"))
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    front = np.arange(len(mesh.triangles)) < len(made)
+    assert area[found != front].sum() < 1e-4 * area[front].sum()
+    other = mirror[: len(made)] != made  # slivers along an edge lie on both of its mirrors
+    assert area[: len(made)][other].sum() < 1e-4 * area[front].sum()
+    assert not found[~front].any()
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Path:
+    folder = tmp_path / "exports"
+    shutil.copytree(SAMPLE, folder)
+    return folder
+
+
+def cut_off(file: Path) -> None:
+    with file.open("r+b") as stream:
+        stream.truncate(file.stat().st_size - 500)
+
+
+def changed(file: Path) -> None:
+    """One bit in the middle: the size is right."""
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil", "words"),
+    [
+        ("shell_b.stl", cut_off, "is not as tbcad wrote it"),
+        ("mirrors.csv", changed, "is not as tbcad wrote it"),
+        ("design.json", Path.unlink, "is missing"),
+    ],
+)
+def test_a_file_that_is_not_as_it_was_written_is_refused(
+    export: Path,
+    name: str,
+    spoil: Callable[[Path], None],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    spoil(export / name)
+    out = export.parent / "shell.png"
+    assert run(["picture", str(export), "--out", str(out)]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1
+    assert f"{name} {words}" in shown.err
+    assert [path.name for path in export.parent.iterdir()] == ["exports"]
+
+
+def test_a_picture_that_exists_is_kept(export: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = export.parent / "shell.png"
+    out.write_text("mine")
+    assert run(["picture", str(export), "--out", str(out)]) == 2
+    assert "exists" in (line := capsys.readouterr().err)
+    assert "--force" in line
+    assert out.read_text() == "mine"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform == "linux" and not (shutil.which("xvfb-run") or os.environ.get("DISPLAY")),
+    reason="no screen, and no xvfb-run",
+)
+def test_the_shells_are_drawn_whole(export: Path) -> None:
+    """The same bytes each time, and both halves."""
+    before, out = contents(export), export.parent / "shell.png"
+    assert run(["picture", str(export), "--out", str(out)]) == 0
+    first = out.read_bytes()
+    assert run(["picture", str(export), "--out", str(out), "--force"]) == 0
+    assert out.read_bytes() == first
+    assert contents(export) == before
+    picture = np.asarray(Image.open(out).convert("L"))
+    assert all((half < 255).mean() > 0.2 for half in np.split(picture, 2, axis=1))

@@ -10,12 +10,19 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.vectors import unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.optics.reflection import reflect
 from tbcad.core.spec.load import load_spec
+from tbcad.light.simulate.scene.reflector import Reflector, reflectors
+from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
+from tbcad.tolerancing.montecarlo.draws import draw
+from tbcad.tolerancing.montecarlo.edge_model import edge_model, edge_models
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 
 # Fixed-point steps of the point of reflection.
 STEPS = 60
+DIRECTIONS, HALVINGS = 360, 30
 
 
 def reflection_points(
@@ -80,3 +87,74 @@ def test_halves_that_are_not_aimed_leave_a_gap() -> None:
     assert sum(len(points) > 0 for points in missing) > 6
     widest = max(np.ptp(points[:, 0]) for points in missing if len(points))
     assert widest < 4  # a wedge along the seam, nothing else
+
+
+def reached(at: Reflector, points: np.ndarray, mirror: int, ball: float) -> np.ndarray:
+    """Whether a ball that touches a mirror at points (p, 3) enters no other mirror, (p,)."""
+    surfaces, m = at.cells.surfaces, len(at)
+    centres = surfaces.apex[:m] - surfaces.normal[:m] / surfaces.curvature[:m, None]
+    radii = 1 / surfaces.curvature[:m]
+    middle = points + ball * unit(points - centres[mirror])
+    others = np.arange(m) != mirror
+    free = norm(middle[:, None] - centres[others]) >= radii[others] + ball
+    planes = surfaces.subset(slice(m, m + 2))
+    beyond = np.einsum("pkx,kx->pk", points[:, None] - planes.apex, planes.normal) >= 0
+    return np.asarray(free.all(axis=1) & beyond.all(axis=1))
+
+
+def swept(at: Reflector, mirror: int, ball: float) -> tuple[float, float]:
+    """Coverage, mm, and pixels, by the rays at the outline of what the ball reaches."""
+    surfaces = at.cells.surfaces
+    apex, normal = surfaces.apex[mirror], surfaces.normal[mirror]
+    radius = 1 / surfaces.curvature[mirror]
+    first = unit(np.cross(normal, [1.0, 2.0, 3.0]))
+    turn = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)[:, None]
+    across = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
+    low, high = np.zeros(DIRECTIONS), np.full(DIRECTIONS, 0.6)
+
+    def point(angle: np.ndarray) -> np.ndarray:
+        tilt = angle[:, None]
+        return np.asarray(apex + radius * (np.sin(tilt) * across + (np.cos(tilt) - 1) * normal))
+
+    for _ in range(HALVINGS):
+        angle = (low + high) / 2
+        good = reached(at, point(angle), mirror, ball)
+        low, high = np.where(good, angle, low), np.where(good, high, angle)
+    points = point(low)
+    rays = unit(reflect(points - at.camera.pinhole, unit(points - apex + radius * normal)))
+    right, down, depth = ((points - at.camera.pinhole) @ at.camera.axes.T).T
+    x, y = right / depth, down / depth
+    area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 / at.camera.pixel_pitch**2
+    return float(2 * norm(np.cross(points, rays)).min()), float(area)
+
+
+@pytest.mark.parametrize("ball", [0.25, 1.0])
+def test_coverage_is_that_of_a_ball_moved_over_twenty_mirrors(ball: float) -> None:
+    """The sweep's outline is sampled, so its minimum is above the exact one, by little."""
+    made = design(load_spec(None, ["n=6"]))
+    at = reflectors(made)[0]
+    half = edge_model(at)
+    found = mirror_coverage(
+        half, draw(Errors(cutter_radius=Error(0.0, ball)), 1, range(1), len(half))[0]
+    )
+    whole = np.flatnonzero(~half.halved)
+    for mirror in whole[:: len(whole) // 20]:
+        coverage_mm, pixels = swept(at, int(mirror), ball)
+        assert -1e-6 < coverage_mm - found.diameter[0, mirror] < 0.02, mirror
+        assert pixels == pytest.approx(found.pixels[0, mirror], rel=2e-3), mirror
+        assert found.crossings[0, mirror] % 2 == 1
+
+
+def test_small_fillets_cost_in_proportion_and_none_is_sharp() -> None:
+    """Coverage and pixels go to those of sharp valleys as the radius goes to 0."""
+    models = edge_models(reflectors(design(load_spec(None, ["n=4"]))))
+
+    def of(radius: float) -> tuple[np.ndarray, np.ndarray]:
+        errors = Errors(ridge_rounding=Error(0.0, radius))
+        return coverage(models, draw(errors, 1, range(1), len(models[0])))
+
+    sharp, fine, coarse = of(0.0), of(1e-4), of(1e-3)
+    for k in (0, 1):
+        slopes = (sharp[k] - fine[k]) / 1e-4, (sharp[k] - coarse[k]) / 1e-3
+        assert (slopes[0] > 0).sum() > 0.9 * slopes[0].size
+        assert slopes[0] == pytest.approx(slopes[1], rel=0.02, abs=0.02 * np.abs(slopes[1]).max())

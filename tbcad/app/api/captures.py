@@ -187,10 +187,8 @@ def relight(
     from tbcad.light.reflectance.transport import open_reflectance, relit
     from tbcad.light.simulate.capture.light_field import LightField
 
-    folder, environment = (
-        Path(capture_folder),
-        read_environment(Path(light), radians(turn_deg), light_format),
-    )
+    folder = Path(capture_folder)
+    environment = read_environment(Path(light), radians(turn_deg), light_format)
     with open_reflectance(folder) as reflectance:
         return relit(LightField.read(folder), reflectance, environment).field
 

@@ -103,7 +103,7 @@ def field_of(options: ReconstructOptions, number: int | None) -> Path:
 
 def part_of(options: ReconstructOptions, number: int | None) -> Path:
     """The checkpoint of that field."""
-    from tbcad.light.reconstruction.checkpoint import part_file
+    from tbcad.light.reconstruction.start import part_file
 
     return part_file(field_of(options, number))
 
@@ -122,11 +122,11 @@ def _reconstructed(
     source: LightField, options: ReconstructOptions, number: int | None, last: Field | None
 ) -> Reconstructed:
     from tbcad.common.atomic_files import replace_files
-    from tbcad.light.reconstruction.checkpoint import check_same
     from tbcad.light.reconstruction.field import read_field, write_field
     from tbcad.light.reconstruction.files import volume_file
     from tbcad.light.reconstruction.fitted import asked_for, reconstruction
     from tbcad.light.reconstruction.picture import write_preview
+    from tbcad.light.reconstruction.start import check_same
 
     file, part = field_of(options, number), part_of(options, number)
     kept = options.resume and file.exists()
@@ -273,7 +273,7 @@ def _meshes(
 
 def _distances(surface: Trimesh, source: LightField, folder: Path) -> dict[str, Any]:
     """How far a surface is from the true one, if the capture has it as it stood."""
-    from tbcad.light.reconstruction.mesh_distance import mesh_distance
+    from tbcad.light.reconstruction.files import mesh_distance
     from tbcad.light.reconstruction.rays import captured_rays
     from tbcad.light.simulate.capture.files import OBJECT, read_object
 

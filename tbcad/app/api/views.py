@@ -211,10 +211,8 @@ def refocus(
     from tbcad.light.simulate.views.refocus import ThinLens
 
     views = Views(source)
-    angles, capture_mm = (
-        (radians(azimuth_deg), radians(elevation_deg)),
-        views.light_field.capture_mm,
-    )
+    angles = (radians(azimuth_deg), radians(elevation_deg))
+    capture_mm = views.light_field.capture_mm
     at = camera_around_object(*angles, distance_mm, capture_mm, size)
     lens = ThinLens(aperture_mm, focus_mm)
     lens.check(at, capture_mm)

@@ -16,12 +16,9 @@ from tbcad.app.cli.commands import captures as _captures  # noqa: F401 - adds it
 from tbcad.app.cli.commands import designs as _designs  # noqa: F401 - adds its commands
 from tbcad.app.cli.commands import explain as _explain  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import machines as _machines  # noqa: F401 - adds its commands
-from tbcad.app.cli.commands import reconstruct as _reconstruct  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import refocus as _refocus  # noqa: F401 - adds its command
-from tbcad.app.cli.commands import run_command as _run_command  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import show as _show_command  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import study as _study  # noqa: F401 - adds its commands
-from tbcad.app.cli.commands import tolerance as _tolerance  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import view as _view  # noqa: F401 - adds its command
 from tbcad.app.cli.commands import workshop as _workshop  # noqa: F401 - adds its commands
 from tbcad.app.cli.app import app

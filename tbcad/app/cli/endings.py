@@ -97,11 +97,7 @@ def check_is_not_renamed(arguments: Sequence[str]) -> None:
 
 
 def usage_error_text(error: typer.TyperException) -> str:
-    """Return the line for the screen, in place of typer's and pydantic's own sentences.
-
-    Args:
-        error: what typer found wrong with a command line.
-    """
+    """The line for the screen about a wrong command line, in place of typer's and pydantic's."""
     from pydantic import ValidationError
 
     parameter = getattr(error, _PARAMETER, None)

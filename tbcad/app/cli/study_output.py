@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import typer
 
-from tbcad.app.cli.output_mode import print_json
+from tbcad.app.cli.app import print_json
 from tbcad.common.screen import paragraph, report_console, stages
 from tbcad.options.checks import check_is_export
 from tbcad.options.shared import Design, Exports, JsonResult, Out, PlotFormatOption, Settings

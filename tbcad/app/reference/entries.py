@@ -79,16 +79,12 @@ def glossary_page() -> str:
 
 
 def _table(section: TermSection) -> str:
-    columns = {"term": _name, "symbol, unit": _symbol, "meaning": _meaning}
+    columns = {"term": lambda term: term.name, "symbol, unit": _symbol, "meaning": _meaning}
     if not any(map(_symbol, section.terms)):
         del columns["symbol, unit"]
     rows = [list(columns), *([cell(term) for cell in columns.values()] for term in section.terms)]
     head, *lines = (f"| {' | '.join(row)} |".replace("|  |", "| |") for row in rows)
     return "\n".join([head, "|---" * len(columns) + "|", *lines])
-
-
-def _name(term: Term) -> str:
-    return term.name
 
 
 def _symbol(term: Term) -> str:
@@ -141,11 +137,7 @@ def terms_and_keys() -> Iterator[ReferenceEntry]:
 
 
 def explained(word: str, entries: Iterable[ReferenceEntry]) -> list[ReferenceEntry]:
-    """All entries of one name.
-
-    Raises:
-        InputError: there is none; it names those that are alike.
-    """
+    """All entries of one name; InputError: there is none; it names those that are alike."""
     by_name: dict[str, list[ReferenceEntry]] = {}
     shown: dict[str, str] = {}
     for entry in entries:

@@ -152,11 +152,7 @@ class Remarks:
 
 
 def design_template(name: str = PAPER) -> str:
-    """A TOML file that gives the design of a name, with every key of a design.
-
-    Args:
-        name: of a design that comes with tbcad.
-    """
+    """A TOML file with every key of a design of tbcad, by its name."""
     file = shipped_designs()[name]
     values = _dotted(read_toml(file, name, "design"))
     remarks = _remarks(read_text(file, name, "design"))

@@ -135,7 +135,8 @@ def labels(
 
     Nor does it lie on lines, given by their ends.
     """
-    boxes = [*map(_round, circles), *taken]
+    rims = ((circle.centre, circle.radius + CROSS_MM / 2) for circle in circles)
+    boxes = [*((x - r, y - r, x + r, y + r) for (x, y), r in rims), *taken]
     ends = np.array(lines).reshape(-1, 2, 2)
     for circle, text in zip(circles, texts, strict=True):
         places = [*_beside(circle, text)]
@@ -157,11 +158,6 @@ def _crossings(box: Box, ends: Floats) -> int:
     enter = np.minimum(near, far).max(axis=1)
     leave = np.maximum(near, far).min(axis=1)
     return int(np.sum((enter <= leave) & (leave >= 0) & (enter <= 1)))
-
-
-def _round(circle: Circle) -> Box:
-    (x, y), reach = circle.centre, circle.radius + CROSS_MM / 2
-    return x - reach, y - reach, x + reach, y + reach
 
 
 def _beside(circle: Circle, text: str) -> Iterator[Box]:

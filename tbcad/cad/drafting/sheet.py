@@ -32,8 +32,7 @@ LINE_MM = 5.5  # from note to note
 BESIDE_MM = 4.0  # of notes and tables from a border
 TOLERANCES = "ISO 2768-m"
 FIRST_ANGLE = "first angle (ISO 5456-2)"
-Box: TypeAlias = tuple[float, float, float, float]
-"""Left, bottom, right, top, mm."""
+Box: TypeAlias = tuple[float, float, float, float]  # left, bottom, right, top, mm
 TABLE_ROW_MM, TEXT_MM, CELL_MM = 5.0, 2.5, 1.5  # height of rows and texts, room before a text
 LEAST_MM = 1.6  # height of a text that is read without a lens
 

@@ -77,8 +77,7 @@ class Text:
     turn_deg: float = 0.0  # counterclockwise from the x axis
 
 
-Simple: TypeAlias = Line | Circle | Arc | Polyline | Text
-"""What is drawn as it is."""
+Simple: TypeAlias = Line | Circle | Arc | Polyline | Text  # what is drawn as it is
 
 
 class Measured(StrEnum):
@@ -113,8 +112,7 @@ class Dimension:
         return abs(x * math.cos(turn) + y * math.sin(turn))
 
 
-Entity: TypeAlias = Simple | Dimension
-"""Whatever a drawing consists of."""
+Entity: TypeAlias = Simple | Dimension  # whatever a drawing consists of
 
 
 def simple(entities: Iterable[Entity]) -> Iterator[Simple]:

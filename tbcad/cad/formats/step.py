@@ -44,8 +44,7 @@ SURFACE_CURVES = "write.surfacecurve.mode"
 _SETTINGS = RLock()
 END = b"END-ISO-10303-21;"  # of every STEP file
 TIME_STAMP = "2022-11-01T00:00:00"  # fixed: the file's bytes depend on the design alone
-Place: TypeAlias = tuple[float, ...]
-"""Kind, location (mm) and axis of a surface."""
+Place: TypeAlias = tuple[float, ...]  # kind, location (mm) and axis of a surface
 PLANE, SPHERE = 1.0, 2.0
 OTHER: Place = (0.0,) * 7
 # Below any distance of surfaces, above what is left of a direction that is made a unit vector.

@@ -88,7 +88,8 @@ def _document(solid: Solid, given: FaceTolerances) -> TDocStd_Document:
     part = shapes.AddShape(solid.shape, False)
     TDataStd_Name.Set_s(part, TCollection_ExtendedString(solid.name))
     label = {name: shapes.AddSubShape(part, face) for name, face in solid.faces}
-    datums = [_datum(tool, name, label[face], k) for k, (name, face) in _order(given.datums)]
+    ordered = enumerate(given.datums.items(), 1)
+    datums = [_datum(tool, name, label[face], k) for k, (name, face) in ordered]
     for face, width in given.flatness.items():
         _tolerance(tool, FLATNESS, width, [label[face]], ())
     for face, width in given.profile.items():
@@ -98,10 +99,6 @@ def _document(solid: Solid, given: FaceTolerances) -> TDocStd_Document:
     for face, (radius, limit) in given.radius.items():
         _radius(tool, radius, limit, label[face])
     return document
-
-
-def _order(datums: Mapping[str, str]) -> "enumerate[tuple[str, str]]":
-    return enumerate(datums.items(), 1)
 
 
 def _datum(tool: XCAFDoc_DimTolTool, name: str, face: TDF_Label, place: int) -> TDF_Label:

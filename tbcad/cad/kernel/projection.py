@@ -24,8 +24,7 @@ from tbcad.cad.kernel.solids import edges
 from tbcad.types import Floats
 
 Place: TypeAlias = tuple[float, float]
-Shape: TypeAlias = TopoDS_Shape
-"""Any shape of the kernel."""
+Shape: TypeAlias = TopoDS_Shape  # any shape of the kernel
 FIRST = np.eye(3)
 ANGLE, CHORD_MM = 0.1, 0.01  # of chains of points: turn from one to the next, rad, and deviation
 DIGITS = 5  # of mm; equal edges are drawn once
@@ -99,11 +98,8 @@ def _of_shapes(shapes: Iterable[TopoDS_Shape | None]) -> Iterator[Curve | None]:
 
 def _unique(curves: Iterable[Curve | None]) -> tuple[Curve, ...]:
     """Each once, in an order that does not depend on the kernel's."""
-    return tuple(sorted({one for one in curves if one is not None}, key=_key))
-
-
-def _key(curve: Curve) -> tuple[str, str]:
-    return type(curve).__name__, repr(tuple(curve))
+    kept = {one for one in curves if one is not None}
+    return tuple(sorted(kept, key=lambda one: (type(one).__name__, repr(tuple(one)))))
 
 
 def _flat(edge: TopoDS_Edge, axes: Floats) -> Curve | None:

@@ -4,10 +4,11 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from tbcad.core.camera.catalogue import CameraBody, RectilinearLens, load_cameras, load_lenses
 from tbcad.core.camera.requirements import (
     WIDE_OPEN,
     CameraRequirements,
@@ -17,7 +18,25 @@ from tbcad.core.camera.requirements import (
     lens_for,
 )
 from tbcad.core.mirrors.array import MirrorArray
+from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
+from tbcad.core.spec.errors import SpecError
 
+CAMERA_SIZES = ("sensor_width_mm", "sensor_height_mm", "width_px", "height_px")
+CAMERA_COLUMNS = ("name", "mount", *CAMERA_SIZES, "control", "source")
+LENS_SIZES = (
+    *("focal_min_mm", "focal_max_mm", "f_number_min", "f_number_max"),
+    *("min_focus_m", "image_circle_mm"),
+)
+LENS_COLUMNS = ("name", "mounts", *LENS_SIZES, "source")
+MAX_VALUE = 1e5  # of any figure
+_MIRRORLESS = ("Canon RF", "Nikon Z", "Sony E", "Fujifilm G")
+# Mounts on which lenses of another mount sit by a plain ring, which keeps the lens's distance.
+ADAPTERS = {
+    "Canon EF": _MIRRORLESS,
+    "Canon EF-S": ("Canon RF", "Sony E"),
+    "Nikon F": (*_MIRRORLESS, "Canon EF"),
+    "C": ("CS",),
+}
 ENOUGH = 0.999  # of an angle or of pixels: figures of makers are rounded
 MAX_CLOSE_UP_DPT = 10.0  # the strongest close-up lens on sale
 MAX_BLUR = 1.5  # times the least blur that a stop can reach
@@ -26,6 +45,92 @@ CAMERA_FILE = "camera.json"
 LUX, ISO = 10_000.0, 400.0  # of the exposure that the sheet states
 DIGITS = 9
 SHOWN = 6  # candidates that the lines list
+
+
+@dataclass(frozen=True)
+class CameraBody:
+    """A camera with square pixels."""
+
+    name: str  # maker and model
+    mount: str  # of lenses
+    width_mm: float  # of the sensor's picture
+    height_mm: float  # of it
+    width_px: float  # its columns
+    height_px: float  # its rows
+    control: str  # by which a computer triggers it
+    source: str  # of the figures
+
+    @property
+    def pixel_mm(self) -> float:
+        """Width of a pixel."""
+        return self.width_mm / self.width_px
+
+
+@dataclass(frozen=True)
+class RectilinearLens:
+    """A lens that keeps straight lines straight."""
+
+    name: str  # maker and model
+    mounts: tuple[str, ...]  # in which it is sold
+    focal_min_mm: float  # shortest focal length, for a distant object
+    focal_max_mm: float  # longest; the same where it does not zoom
+    f_number_min: float  # fully open at the shortest focal length
+    f_number_max: float  # fully stopped down
+    min_focus_mm: float  # smallest distance from the sensor to what is in focus
+    image_circle_mm: float  # diagonal of the sensor that it covers
+    source: str  # of the figures
+
+    def fits(self, mount: str) -> bool:
+        """Whether it sits on a mount, by itself or by an adapter without optics."""
+        return any(mount == own or mount in ADAPTERS.get(own, ()) for own in self.mounts)
+
+
+def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
+    """Cameras of the built-in list, then of a user's; InputError names the line and column."""
+    return [_camera(*one) for one in _rows("cameras.csv", user_list, CAMERA_COLUMNS, CAMERA_SIZES)]
+
+
+def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
+    """Lenses of the built-in list, then of a user's; errors as of `load_cameras`."""
+    return [_lens(*one) for one in _rows("lenses.csv", user_list, LENS_COLUMNS, LENS_SIZES)]
+
+
+def _camera(where: str, row: Row) -> CameraBody:
+    mount, source = (required_text(where, row, column) for column in ("mount", "source"))
+    width, height, columns, rows = (
+        positive_number(where, row, size, MAX_VALUE) for size in CAMERA_SIZES
+    )
+    return CameraBody(row["name"], mount, width, height, columns, rows, row["control"], source)
+
+
+def _lens(where: str, row: Row) -> RectilinearLens:
+    short, long, wide_open, stopped, metres, circle = (
+        positive_number(where, row, size, MAX_VALUE) for size in LENS_SIZES
+    )
+    for low, high, name in ((short, long, "focal_max_mm"), (wide_open, stopped, "f_number_max")):
+        if high < low:
+            raise SpecError(
+                f"{where}, column {name}: {high:g}, allowed is {low:g} or more: correct it"
+            )
+    mounts = tuple(required_text(where, row, "mounts").split("|"))
+    source = required_text(where, row, "source")
+    return RectilinearLens(
+        row["name"], mounts, short, long, wide_open, stopped, 1000 * metres, circle, source
+    )
+
+
+def _rows(
+    name: str, user_list: Path | None, columns: tuple[str, ...], sizes: tuple[str, ...]
+) -> list[tuple[str, Row]]:
+    lists: list[tuple[Path | Traversable, str]] = [(files("tbcad.core.camera") / name, name)]
+    if user_list is not None:
+        lists.append((user_list, str(user_list)))
+    names: set[str] = set()
+    rows = [row for file, shown in lists for row in read_rows(file, shown, columns, sizes)]
+    for where, row in rows:
+        required_text(where, row, "name")
+        check_unique(where, row, "name", names)
+    return rows
 
 
 @dataclass(frozen=True)
@@ -53,12 +158,8 @@ def candidates(
     with more pixels; the others by the number of their faults.
     """
     lenses = list(lenses)
-    every = [
-        _candidate(needed, camera, lens)
-        for camera in cameras
-        for lens in lenses
-        if lens.fits(camera.mount)
-    ]
+    pairs = ((camera, lens) for camera in cameras for lens in lenses if lens.fits(camera.mount))
+    every = [_candidate(needed, camera, lens) for camera, lens in pairs]
     return sorted(
         every, key=lambda one: (len(one.faults), one.close_up_dpt > 0, -one.pixels_across)
     )
@@ -70,8 +171,10 @@ def _candidate(needed: CameraRequirements, camera: CameraBody, lens: Rectilinear
     longest = min(camera.width_mm / (2 * across), camera.height_mm / (2 * down))
     focal = 1 / (1 / longest + 1 / needed.focus_mm)
     focal = min(max(focal, lens.focal_min_mm), lens.focal_max_mm)
-    image = _image_distance(focal, needed.focus_mm)
+    within = focal < needed.focus_mm
+    image = 1 / (1 / focal - 1 / needed.focus_mm) if within else float("inf")
     f_number = min(max(focal / needed.pupil_mm, lens.f_number_min), lens.f_number_max)
+    design = lens_for(math.radians(needed.hfov_deg), needed.width_px, 1.0, WIDE_OPEN)
     one = Candidate(
         camera=camera,
         lens=lens,
@@ -80,20 +183,11 @@ def _candidate(needed: CameraRequirements, camera: CameraBody, lens: Rectilinear
         view=min(longest / image, 1.0),
         pixels_across=2 * across * image / camera.pixel_mm,
         f_number=f_number,
-        total_px=_blur(needed, focal / f_number),
+        total_px=aperture_stop(design, needed.depths, focal / f_number)["total_px"],
         close_up_dpt=_close_up(needed.focus_mm, focal, lens.min_focus_mm, image),
         faults=(),
     )
     return replace(one, faults=tuple(_faults(needed, one, image)))
-
-
-def _image_distance(focal: float, focus: float) -> float:
-    return 1 / (1 / focal - 1 / focus) if focal < focus else float("inf")
-
-
-def _blur(needed: CameraRequirements, pupil: float) -> float:
-    lens = lens_for(math.radians(needed.hfov_deg), needed.width_px, 1.0, WIDE_OPEN)
-    return aperture_stop(lens, needed.depths, pupil)["total_px"]
 
 
 def _close_up(focus: float, focal: float, min_focus: float, image: float) -> float:

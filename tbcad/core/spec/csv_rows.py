@@ -33,8 +33,7 @@ DOTTED = re.compile(
 )
 
 Table: TypeAlias = dict[str, Any]
-Row = dict[str, str]
-"""Cells by column."""
+Row = dict[str, str]  # cells by column
 Record = tuple[str, list[str]]
 """File and line that a row begins in, for error messages, and its cells."""
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}

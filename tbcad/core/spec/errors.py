@@ -70,20 +70,18 @@ def _allowed_value(kind: Any, limits: Iterable[object]) -> str:
 
 def _allowed_list(items: tuple[Any, ...]) -> str:
     """A list whose entries are of one kind: "two numbers in brackets, each from 0.5 to 2"."""
-    entries = [_entries(*_kind_and_limits(item)) for item in items if item is not Ellipsis]
+    entries = []  # plural of each, and what each must be
+    for kind, limits in (_kind_and_limits(item) for item in items if item is not Ellipsis):
+        if get_origin(kind) is tuple:
+            entries.append(("lists", f"with {_allowed_list(get_args(kind))}"))
+        else:
+            entries.append((_PLURALS[kind], " ".join(_limits(limits))))
     name, rule = entries[0]
     count = "" if Ellipsis in items else f"{_COUNTS[len(entries)]} "
     head = f"{count}{name} in brackets"
     if len(set(entries)) > 1:
         return f"{head}: {', '.join(rule for _, rule in entries)}"
     return f"{head}, each {rule}" if rule else head
-
-
-def _entries(kind: Any, limits: list[object]) -> tuple[str, str]:
-    """Plural of an entry of a list, and what each must be."""
-    if get_origin(kind) is tuple:
-        return "lists", f"with {_allowed_list(get_args(kind))}"
-    return _PLURALS[kind], " ".join(_limits(limits))
 
 
 def _kind_and_limits(item: Any) -> tuple[Any, list[object]]:

@@ -51,8 +51,7 @@ class Reason:
     text: str
 
 
-AUTO: Final[Any] = "auto"
-"""Value of a key whose value tbcad chooses."""
+AUTO: Final[Any] = "auto"  # value of a key whose value tbcad chooses
 OR_AUTO = OrWord(AUTO)
 
 

@@ -69,20 +69,14 @@ def write_dataset(
     virtual = virtual_cameras(source, mirrors, options.detail)
     if not len(virtual):
         raise InputError("no mirror of the capture gives a virtual camera: choose other --cameras")
-    record = {
-        "schema": SCHEMA,
-        "target": options.to,
-        "capture": source.facts,
-        "capture_mm": source.capture_mm,
+    figures = {
         "virtual_cameras": len(virtual),
         "left_out": virtual.left_out,
         **_written(folder, source, virtual, scene, options),
         "fit": _fit(virtual),
     }
     write_table(folder / TABLE, COLUMNS, _rows(virtual))
-    text = json.dumps(record, indent=1, sort_keys=False, allow_nan=False) + "\n"
-    (folder / RECORD).write_text(text, encoding="utf-8")
-    return record
+    return _record(folder, source, options.to, figures)
 
 
 def write_scene(
@@ -97,12 +91,19 @@ def write_scene(
         raise InputError("the capture names no object, so there is none in the scene: capture one")
     export = read_export(exports)
     _check_same_cameras(source, export)
+    return _record(folder, source, "mitsuba", write_machine_scene(folder, export, scene, progress))
+
+
+def _record(
+    folder: Path, source: LightField, target: str | None, figures: dict[str, Any]
+) -> dict[str, Any]:
+    """Write dataset.json, and return what it says."""
     record = {
         "schema": SCHEMA,
-        "target": "mitsuba",
+        "target": target,
         "capture": source.facts,
         "capture_mm": source.capture_mm,
-        **write_machine_scene(folder, export, scene, progress),
+        **figures,
     }
     text = json.dumps(record, indent=1, allow_nan=False) + "\n"
     (folder / RECORD).write_text(text, encoding="utf-8")
@@ -221,11 +222,7 @@ def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> Spa
 def write_ray_table(
     folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
 ) -> int:
-    """Write origin, direction, colour and virtual camera of each ray that meets the sphere.
-
-    Returns:
-        The number of rays.
-    """
+    """Write origin, direction, colour and virtual camera of the n rays that meet the sphere; n."""
     total = int(virtual.rays.sum())
     with zipfile.ZipFile(folder / RAYS, "w") as packed:
         for name, (kind, last) in RAY_COLUMNS.items():

@@ -74,10 +74,8 @@ class Pinhole:
 
     def intrinsics(self) -> dict[str, Any]:
         """Focal lengths, principal point and size by their names in transforms.json."""
-        fl_x, fl_y = self.focal_px.tolist()
-        cx, cy = self.principal_px.tolist()
-        width, height = self.size_px
-        return {"fl_x": fl_x, "fl_y": fl_y, "cx": cx, "cy": cy, "w": width, "h": height}
+        numbers = *self.focal_px.tolist(), *self.principal_px.tolist(), *self.size_px
+        return dict(zip(("fl_x", "fl_y", "cx", "cy", "w", "h"), numbers, strict=True))
 
 
 def pinhole_of(camera: Camera) -> Pinhole:
@@ -243,13 +241,9 @@ def seed_points(
     """
     points = _candidates(capture_mm / 2)
     step = -(-len(cameras) // MOST_CAMERAS)
-    seen = [
-        _colours(camera, picture, mask, points)
-        for camera, picture, mask in zip(
-            cameras[::step], pictures[::step], masks[::step], strict=True
-        )
-    ]
-    colours, known = np.stack([one[0] for one in seen]), np.stack([one[1] for one in seen])
+    some = zip(cameras[::step], pictures[::step], masks[::step], strict=True)
+    seen = [_colours(camera, picture, mask, points) for camera, picture, mask in some]
+    colours, known = map(np.stack, zip(*seen, strict=True))
     dark = known & (colours.max(axis=2) < DARK)
     seen_at_all = known.any(axis=0)
     hull = seen_at_all & (dark.sum(axis=0) <= DARK_SHARE * known.sum(axis=0))

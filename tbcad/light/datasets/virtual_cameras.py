@@ -8,7 +8,7 @@ off by the ray's distance from the centre times depth over distance.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -61,13 +61,7 @@ class Crop:
 
     def flipped(self) -> "Crop":
         """The crop with its columns reversed: a mirror shows everything the wrong way round."""
-        return Crop(
-            self.colour[:, ::-1],
-            self.origin[:, ::-1],
-            self.direction[:, ::-1],
-            self.valid[:, ::-1],
-            self.meets[:, ::-1],
-        )
+        return Crop(*(getattr(self, one.name)[:, ::-1] for one in fields(self)))
 
 
 def read_crop(source: LightField, mirror: MirrorId) -> Crop | None:

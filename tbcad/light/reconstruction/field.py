@@ -16,24 +16,28 @@ import json
 import warnings
 import zipfile
 from dataclasses import dataclass, field
+from functools import cached_property
 from hashlib import sha256
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.common.atomic_files import replace_files
 from tbcad.errors import InputError, PlausibilityWarning
-from tbcad.light.reconstruction.grid import Grid
 from tbcad.light.reconstruction.marching import GLOSSY, MATT, SOFTNESS, Singles
 from tbcad.light.simulate.capture.light_field import NAME as LIGHT_FIELD
 from tbcad.light.simulate.capture.light_field import SCHEMA as LIGHT_FIELD_SCHEMA
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
-from tbcad.types import Floats
+from tbcad.types import Bools, Floats, Ints
 
+SIDES = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+LONGEST_LEAP = 255  # cells, that fit into a byte
 SCHEMA = "tbcad-field/1"
 SUFFIX = ".npz"
 NAME = "field.npz"  # beside a light field, which it then shows
@@ -42,6 +46,104 @@ MOST_BYTES = 4 << 30
 MOST_NUMBER = 1e6
 FACT = "light_field"  # of a field: the fingerprint of what it was fitted to
 ROWS_APART = 64  # of those whose rays are part of a fingerprint
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Nodes of a cubic lattice about the origin; v of its n^3 nodes are there.
+
+    Between them values are interpolated linearly, in cells that have all eight corners.
+    """
+
+    n: int  # nodes along each edge of the cube
+    width_mm: float  # of the cube
+    place: NDArray[np.uint16]  # of the nodes in the lattice, in ascending order, (v, 3)
+
+    @staticmethod
+    def about(wanted: Bools, width_mm: float) -> "Grid":
+        """The nodes of all cells that have a wanted node (n, n, n)."""
+        nodes = np.zeros_like(wanted)
+        cells = _cells(wanted, np.logical_or)
+        for corner in _corners(nodes):
+            np.logical_or(corner, cells, out=corner)
+        return Grid(len(wanted), width_mm, np.argwhere(nodes).astype(np.uint16))
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    @property
+    def pitch_mm(self) -> float:
+        """Distance of neighbouring nodes."""
+        return self.width_mm / (self.n - 1)
+
+    @cached_property
+    def row(self) -> NDArray[np.int32]:
+        """Number of each node of the lattice, -1 where it is not there, (n, n, n)."""
+        rows = np.full((self.n,) * 3, -1, dtype=np.int32)
+        rows[tuple(self.place.T)] = np.arange(len(self), dtype=np.int32)
+        return rows
+
+    @cached_property
+    def leap(self) -> NDArray[np.uint8]:
+        """Cells (n-1, n-1, n-1) from each to the nearest with all corners, along all axes at once.
+
+        0 where it has them itself.
+        """
+        whole = _cells(self.row >= 0, np.logical_and)
+        if not whole.any():
+            return np.full(whole.shape, LONGEST_LEAP, dtype=np.uint8)
+        away = ndimage.distance_transform_cdt(~whole, "chessboard")
+        return np.asarray(np.minimum(away, LONGEST_LEAP), dtype=np.uint8)
+
+    @cached_property
+    def neighbours(self) -> NDArray[np.int32]:
+        """Numbers of the nodes on the six sides of each node, -1 where there is none, (v, 6)."""
+        padded = np.pad(self.row, 1, constant_values=-1)
+        at = self.place.astype(np.int64) + 1
+        return np.stack([padded[tuple((at + side).T)] for side in SIDES], axis=1)
+
+    @property
+    def points(self) -> Floats:
+        """Places of the nodes, mm, (v, 3)."""
+        return np.asarray(self.place * self.pitch_mm - self.width_mm / 2, dtype=np.float64)
+
+    def dense(self, values: NDArray[np.float32], missing: float = 0.0) -> NDArray[np.float32]:
+        """Values of the nodes (v,) on the whole lattice, (n, n, n)."""
+        result = np.full((self.n,) * 3, missing, dtype=np.float32)
+        result[tuple(self.place.T)] = values
+        return result
+
+    def sampled(self, lattice: NDArray[np.float32]) -> NDArray[np.float32]:
+        """A lattice (k, k, k) over the same cube at the nodes, linearly, (v,)."""
+        at = self.place.T * ((len(lattice) - 1) / (self.n - 1))
+        return np.asarray(ndimage.map_coordinates(lattice, at, order=1, mode="nearest"))
+
+
+def resampled(lattice: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+    """A lattice (k, k, k) with n nodes along the same edges, linearly, (n, n, n)."""
+    for axis in range(3):
+        lattice = _along(lattice, n, axis)
+    return lattice
+
+
+def _along(lattice: NDArray[np.float32], n: int, axis: int) -> NDArray[np.float32]:
+    at = np.linspace(0, lattice.shape[axis] - 1, n)
+    first: Ints = np.minimum(at.astype(np.int64), lattice.shape[axis] - 2)
+    shape = [1, 1, 1]
+    shape[axis] = n
+    share = (at - first).astype(np.float32).reshape(shape)
+    return (1 - share) * lattice.take(first, axis) + share * lattice.take(first + 1, axis)
+
+
+def _corners(nodes: Bools) -> list[Bools]:
+    """Eight views of a lattice (n, n, n): a corner of each cell, (n-1, n-1, n-1)."""
+    ends = (slice(None, -1), slice(1, None))
+    return [nodes[corner] for corner in product(ends, repeat=3)]
+
+
+def _cells(nodes: Bools, together: np.ufunc) -> Bools:
+    """The eight corners of each cell, together, (n-1, n-1, n-1)."""
+    return np.asarray(together.reduce(_corners(nodes)))
 
 
 @dataclass(frozen=True)
@@ -94,11 +196,7 @@ def field_bytes(made: Field) -> bytes:
 
 
 def read_field(path: Path) -> Field:
-    """Read a field.
-
-    Raises:
-        InputError: there is none, or it is damaged.
-    """
+    """Read a field; InputError: there is none, or it is damaged."""
     if not path.is_file():
         raise InputError(f"{path}: no such file; write it with `tbcad reconstruct`")
     try:
@@ -171,8 +269,7 @@ def field_file(folder: Path, frame: int | None = None) -> Path:
 def field_of(file: Path, source: LightField) -> Field:
     """Read the field of a light field.
 
-    Raises:
-        InputError: there is none, it is damaged, or it is of another light field.
+    InputError: there is none, it is damaged, or it is of another light field.
     """
     made = read_field(file)
     again = "write it again with `tbcad reconstruct`"
@@ -188,16 +285,9 @@ def wanted_field(
 ) -> Field | None:
     """The field that views are made from; None: the light field itself.
 
-    Args:
-        method: "field", None for the default, or another one.
-        capture: folder of the capture, or its light field's file.
-        source: the light field, or a frame of it.
-        frame: its number; None: there is one only.
-
-    By default a field that lies beside the light field; one that is of no use is told in a warning.
-
-    Raises:
-        InputError: as `field_of`, when a field is asked for.
+    By default (method None) it is a field that lies beside the light field of a capture's folder or
+    file; one that is of no use is told in a warning. InputError: as `field_of`, if method is
+    "field".
     """
     file = field_file(capture if capture.is_dir() else capture.parent, frame)
     if method == "field":

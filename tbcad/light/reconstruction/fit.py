@@ -1,15 +1,16 @@
-"""The fit of a field to rays: coarse to fine, by Adam on random batches.
+"""The fit of a field to rays: coarse to fine, by Adam on random batches; and the choice of fits.
 
 Each batch is cut into a fixed number of parts, each with a gradient of its own, which are added in
 their order: the result is the same, to the last bit, on any number of threads.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from math import ceil, cos, pi
 
 import numpy as np
 
-from tbcad.light.reconstruction.field import Field
+from tbcad.light.reconstruction.field import LONGEST_LEAP, Field, Grid
 from tbcad.light.reconstruction.gradient import (
     ColumnSteps,
     Pixels,
@@ -17,12 +18,12 @@ from tbcad.light.reconstruction.gradient import (
     add_gradient,
     unbiased_size,
 )
-from tbcad.light.reconstruction.grid import LONGEST_LEAP, Grid
 from tbcad.light.reconstruction.marching import Medium, Singles, spans
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import (
     CENTRAL,
     NUMBERS,
+    Level,
     Settings,
     State,
     finer,
@@ -30,12 +31,18 @@ from tbcad.light.reconstruction.start import (
     hull,
 )
 from tbcad.light.simulate.parallel import chunks, in_threads
-from tbcad.types import Bools, Ints
+from tbcad.types import Bools, Ints, Progress
 
 PARTS = 8  # of a batch and of the nodes
 FEWEST_STEPS = 40  # of an epoch
 COLOURS = (-0.1, 1.1)
 SLOPES = (-0.5, 0.5)
+EVERY = 20  # one mirror of so many is held out
+LEVELS = (Level(48, 1), Level(72, 2))  # of a trial
+FACTOR = 4.0  # between weights that are tried
+MOST_STEPS = 3  # of a walk
+LEAST_GAIN = 0.01  # of the loss, that a step must bring
+ORDER_GAIN = 0.05  # likewise, and view dependence, which also costs twice the time
 
 
 def fit(
@@ -43,11 +50,7 @@ def fit(
 ) -> Iterator[State]:
     """Fit a field; each epoch's state is given before the next, which changes it.
 
-    Args:
-        rays: what was captured.
-        settings: how.
-        used: which rays it is fitted to, (n,); None: all.
-        state: to go on from; None: from the hull.
+    It is fitted to used rays (n,), None: all, and goes on from a state, None: from the hull.
     """
     state = state or first_state(hull(rays), rays.capture_mm, settings)
     while state.level < len(settings.levels):
@@ -118,14 +121,9 @@ def _gradient(pixels: Pixels, medium: Medium, batch: Ints, seed: int, parts: Sin
 
 
 def _step(settings: Settings, state: State, progress: float, share: float, parts: Singles) -> None:
-    """One step of Adam on the gradient in `parts`, which is empty afterwards.
+    """One step of Adam on the gradient in `parts`, which is empty afterwards; the state is changed.
 
-    Args:
-        settings: of the fit.
-        state: changed.
-        progress: share of the level's steps that are done.
-        share: rays of the batch for each node.
-        parts: of the gradient of the batch.
+    Progress is the share of the level's steps that are done, share the rays of a batch for a node.
     """
     state.step += 1
     columns = _columns(settings, state, progress, share)
@@ -181,3 +179,71 @@ def squared_error(rays: CapturedRays, which: Bools, made: Field, settings: Setti
     add_gradient(ray[:0], pixels, 0, medium, parts[0])  # compile
     total = _gradient(pixels, medium, ray, 0, parts)
     return total / len(ray) if len(ray) else float("nan")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A fit that was tried."""
+
+    settings: Settings  # its settings
+    loss: float  # mean squared error of held-out rays, summed over the colours
+
+
+def held_out(rays: CapturedRays) -> Bools:
+    """Rays (n,) of every 20th mirror."""
+    return np.asarray(rays.mirror % EVERY == EVERY // 2)
+
+
+def chosen(
+    rays: CapturedRays,
+    inside: Bools,
+    settings: Settings,
+    orders: tuple[int, ...],
+    progress: Progress,
+) -> tuple[Settings, list[Trial]]:
+    """Choose the weights of smoothness and sparsity, and the order of view dependence, by trials.
+
+    All weights are changed by one factor, as long as held-out rays are predicted better by a coarse
+    fit in the rays' hull; then orders are compared, of which the first is begun with.
+    """
+    trials: list[Trial] = []
+
+    def tried(wanted: Settings) -> Trial:
+        progress(f"trial {len(trials) + 1}: weights and view dependence by held-out mirrors")
+        trials.append(Trial(wanted, held_out_loss(rays, inside, replace(wanted, levels=LEVELS))))
+        return trials[-1]
+
+    best = _best_weight(tried, replace(settings, order=orders[0]))
+    for order in orders[1:]:
+        other = tried(replace(best.settings, order=order))
+        best = other if other.loss < (1 - ORDER_GAIN) * best.loss else best
+    return replace(best.settings, levels=settings.levels), trials
+
+
+def _best_weight(tried: Callable[[Settings], Trial], settings: Settings) -> Trial:
+    """Walk to smaller weights while that helps; if it never does, to larger ones likewise."""
+    begun = tried(settings)
+    best = _walk(tried, begun, 1 / FACTOR)
+    return best if best is not begun else _walk(tried, begun, FACTOR)
+
+
+def _walk(tried: Callable[[Settings], Trial], best: Trial, factor: float) -> Trial:
+    for _ in range(MOST_STEPS):
+        other = tried(weighted(best.settings, factor))
+        if other.loss > (1 - LEAST_GAIN) * best.loss:
+            break
+        best = other
+    return best
+
+
+def weighted(settings: Settings, factor: float) -> Settings:
+    """The same with all weights times a factor."""
+    names = ("smooth_density", "smooth_colour", "sparse")
+    return replace(settings, **{name: getattr(settings, name) * factor for name in names})
+
+
+def held_out_loss(rays: CapturedRays, inside: Bools, settings: Settings) -> float:
+    """Mean squared error, summed over the colours, of held-out rays by a fit to all others."""
+    held = held_out(rays)
+    *_, last = fit(rays, settings, ~held, first_state(inside, rays.capture_mm, settings))
+    return squared_error(rays, held, last.field(), settings)

@@ -9,16 +9,8 @@ from typing import Any
 import numpy as np
 
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.checkpoint import (
-    Checkpoint,
-    read_checkpoint,
-    settings_of,
-    settings_record,
-    write_checkpoint,
-)
-from tbcad.light.reconstruction.choice import chosen
 from tbcad.light.reconstruction.field import FACT, Field, light_field_fingerprint
-from tbcad.light.reconstruction.fit import all_spans, fit, squared_error
+from tbcad.light.reconstruction.fit import all_spans, chosen, fit, squared_error
 from tbcad.light.reconstruction.marching import Singles
 from tbcad.light.reconstruction.rays import (
     NO_FOOTPRINT,
@@ -29,12 +21,17 @@ from tbcad.light.reconstruction.rays import (
 )
 from tbcad.light.reconstruction.start import (
     CENTRAL,
+    Checkpoint,
     Level,
     Settings,
     State,
     first_state,
     hull,
+    read_checkpoint,
+    settings_of,
+    settings_record,
     start,
+    write_checkpoint,
 )
 from tbcad.light.reconstruction.surface import best_level, resolved_mm
 from tbcad.light.simulate.capture.light_field import RAY_SIGMAS, LightField
@@ -53,13 +50,7 @@ FIT = ("nodes", "epochs", "order", "rays", "blur_px", "seed")  # options that a 
 def asked_for(
     source: LightField, options: ReconstructOptions, last: Field | None = None
 ) -> dict[str, Any]:
-    """All that a field follows from.
-
-    Args:
-        source: the light field.
-        options: how it is reconstructed.
-        last: the field that the fit starts from.
-    """
+    """All that a field follows from; the fit starts from the last field."""
     return {
         "tbcad": __version__,
         "options": {name: getattr(options, name) for name in FIT},
@@ -77,16 +68,9 @@ def reconstruction(
 ) -> Field:
     """Fit a field to the rays of a light field; its facts say how it was made.
 
-    Args:
-        source: the light field.
-        options: how, and who is told of progress.
-        part: where the checkpoint is written after each epoch, and from which an interrupted fit
-            goes on; None: there is none.
-        last: field of the frame before, to start from.
-        show: called with the field as it is after each epoch.
-
-    Raises:
-        InputError: no ray shows anything, or the checkpoint is of another fit.
+    The fit starts from the last frame's field. After each epoch the field is shown, and a
+    checkpoint is written to `part`, from which an interrupted fit goes on. InputError: no ray shows
+    anything, or the checkpoint is of another fit.
     """
     options.progress(READING)
     asked = asked_for(source, options, last)
@@ -145,11 +129,7 @@ def _settings(source: LightField, options: ReconstructOptions) -> Settings:
 
 
 def _places(source: LightField, options: ReconstructOptions) -> Singles:
-    """Of the rays of a pixel.
-
-    Raises:
-        InputError: its pixels are single rays.
-    """
+    """Of the rays of a pixel; InputError: its pixels are single rays."""
     blur = source.facts.get("blur_px", 0) if options.blur_px is None else options.blur_px
     area = source.facts.get("samples") != 1
     if not area and not blur:

@@ -89,17 +89,9 @@ def _back(
     medium: Medium,
     gradient: Singles,
 ) -> None:
-    """Add the gradient of one followed ray.
+    """Add the gradient of a ray that `march` followed: its light, and the loss's derivative by it.
 
-    Args:
-        at: as `march` leaves it.
-        slot: likewise.
-        count: of samples.
-        light: of the ray.
-        off: derivative of the loss by that light.
-        direction: of the ray.
-        medium: the field.
-        gradient: by nodes, as their values, (v, 4 or 13).
+    The gradient is by nodes, as their values, (v, 4 or 13).
     """
     one = np.float32(1)
     through, (behind_r, behind_g, behind_b) = one, light
@@ -121,21 +113,14 @@ def _back(
 def add_gradient(
     ray: NDArray[np.int64], pixels: Pixels, seed: int, medium: Medium, gradient: Singles
 ) -> tuple[float, int]:
-    """Add half the gradient of the weighted squared errors of pixels.
+    """Add half the gradient of the weighted squared errors of pixels with numbers (b,).
 
-    A pixel's light is the mean of the rays at its places, always the same ones: by other places
-    in each step the variance inside of pixels would be noise in the gradient, which does not
-    fade, or, with the error of the same rays, an error that smooths.
+    A pixel's light is the mean of the rays at its places, always the same ones: by other places in
+    each step the variance inside of pixels would be noise in the gradient, which does not fade, or,
+    with the error of the same rays, an error that smooths.
 
-    Args:
-        ray: numbers of the pixels, (b,).
-        pixels: all of them.
-        seed: of each ray's first sample.
-        medium: the field.
-        gradient: what is added to, (v, 4 or 13).
-
-    Returns:
-        Sum of the weighted squared errors, and number of samples.
+    The seed is of each ray's first sample; the gradient (v, 4 or 13) is added to. Returns the sum
+    of the weighted squared errors, and the number of samples.
     """
     entry, direction, first, last, colour, weight, footprint, places = pixels
     kinds, k = places.shape[0], places.shape[1]
@@ -216,17 +201,11 @@ def adam(
     columns: ColumnSteps,
     sparse: float,
 ) -> None:
-    """Change some nodes, and empty their gradients.
+    """Change some nodes, from the first to the one before the last, and empty their gradients.
 
-    Args:
-        nodes: the first, and the one after the last.
-        values: before the step, (v, c).
-        changed: after it, (v, c).
-        parts: of the gradient, added in their order, (p, v, c).
-        moments: changed likewise.
-        neighbours: of each node, (v, 6).
-        columns: what holds for each.
-        sparse: weight of the logarithm of the density.
+    Values (v, c) are those before the step, changed (v, c) those after it; parts (p, v, c) of the
+    gradient are added in their order. Each node has neighbours (v, 6); sparse is the weight of the
+    logarithm of the density.
     """
     one = np.float32(1)
     b1, b2 = np.float32(MEMORY[0]), np.float32(MEMORY[1])

@@ -46,13 +46,9 @@ def spans(
 ) -> tuple[Singles, Singles]:
     """Where rays come near cells with all corners first and last, mm from their entry; -1: never.
 
-    Args:
-        entry: where rays enter the capture sphere, mm, (n, 3).
-        direction: unit vectors, (n, 3).
-        length: of the rays in the sphere, mm, (n,).
-        leap: of a grid, (k, k, k).
-        width: of its cube, mm.
-        near: how many cells away from them is near; 1 or more, so that no part of them is left out.
+    Rays enter the capture sphere at (n, 3), mm, along unit directions, for lengths (n,). The leap
+    (k, k, k) is that of a grid whose cube is so wide, mm. So many cells away is near: 1 or more, so
+    that no part of them is left out.
     """
     first = np.full(len(entry), np.float32(-1))
     last = np.full(len(entry), np.float32(-1))
@@ -95,17 +91,11 @@ def march(
 ) -> tuple[int, Any, Any, Any, Any]:
     """Follow one ray; the samples that hold something are left in `at` and `slot`.
 
-    Args:
-        entry: where it enters the capture sphere, mm, (3,).
-        direction: unit vector, (3,).
-        span: where it may meet something, mm from there.
-        jitter: of the first sample, in steps.
-        medium: the field.
-        at: places of the samples in units of nodes, and in mm from the entry, (k, 4).
-        slot: of each sample: opacity, weight, slope of density against x, and colour, (k, 6).
-
-    Returns:
-        Number of samples, light that is let through, red, green, blue.
+    From its entry into the capture sphere, mm, (3,), along a unit direction; span: where it may
+    meet something, mm from there; jitter of the first sample in steps. `at` are places of samples
+    in units of nodes, and in mm from the entry, (k, 4); `slot` is opacity, weight, slope of density
+    against x, and colour of each, (k, 6). Returns their number, light that is let through, red,
+    green, blue.
     """
     one, zero = np.float32(1), np.float32(0)
     width, step, rows, leap, values = medium
@@ -174,12 +164,9 @@ def composited(
     length: Singles,
     medium: Medium,
 ) -> Singles:
-    """Red, green, blue, opacity of rays, and where they become half opaque, mm from the entry.
+    """Red, green, blue, opacity of rays, and where they become half opaque, mm from entry, (n, 5).
 
-    Arguments as of `spans` and `march`.
-
-    Returns:
-        These five, (n, 5); NaN for the place on rays that are less than half opaque.
+    The place is NaN on rays that are less than half opaque. Arguments as of `spans` and `march`.
     """
     result = np.zeros((len(entry), 5), dtype=np.float32)
     most = most_samples(medium)

@@ -54,12 +54,9 @@ class FieldPicture:
 
 
 def field_picture(made: Field, view: Camera, stride: float = STRIDE) -> FieldPicture:
-    """The picture that a pinhole camera would see.
+    """The picture that a pinhole camera outside of the capture sphere would see.
 
-    Args:
-        made: the field.
-        view: the camera, outside of the capture sphere.
-        stride: between samples, in distances of nodes.
+    The stride between samples is in distances of nodes.
     """
     direction = view_directions(view).reshape(-1, 3)
     origin = np.broadcast_to(view.pinhole, direction.shape)
@@ -88,16 +85,11 @@ def _in_threads(entry: Singles, direction: Singles, length: Singles, medium: Med
 
 
 def field_normals(made: Field, view: Camera, picture: FieldPicture) -> Floats:
-    """Unit normals where the rays of a picture become half opaque, toward the view, (h, w, 3).
+    """Unit normals where the rays of a view's picture are half opaque, toward the view, (h, w, 3).
 
-    In the frame of the object, NaN where rays do not. They are the gradient of the nodes' opacity,
-    smoothed, a little in front: within a surface, which is a node or two thick, it has no side.
-    In front is first toward the view, then along the normal that this gives.
-
-    Args:
-        made: the field.
-        view: the camera of the picture.
-        picture: `field_picture` of both.
+    In the frame of the object, NaN where rays do not become so. They are the gradient of the nodes'
+    opacity, smoothed, a little in front: within a surface, which is a node or two thick, it has no
+    side. In front is first toward the view, then along the normal that this gives.
     """
     known = np.isfinite(picture.distance)
     direction = view_directions(view)[known]
@@ -149,8 +141,7 @@ def write_preview(file: Path, made: Field) -> None:
 def quick_field(source: LightField) -> Field:
     """Fit a coarse field to all rays of a light field.
 
-    Raises:
-        InputError: none of them meets the capture sphere.
+    InputError: none of them meets the capture sphere.
     """
     with _one_at_a_time:
         *_, last = fit(captured_rays(source), QUICK)

@@ -57,15 +57,9 @@ class CapturedRays:
 def captured_rays(source: LightField, footprint: bool = False) -> CapturedRays:
     """The rays of a light field; what is as dark as the background's noise is black.
 
-    Noise is cut off at black in a photograph, so its mean is not zero there and a fit would show
-    it as haze.
-
-    Args:
-        source: the light field.
-        footprint: whether a pixel is more than its central ray.
-
-    Raises:
-        InputError: no ray meets the capture sphere.
+    Noise is cut off at black in a photograph, so its mean is not zero there and a fit would show it
+    as haze. With a footprint a pixel is more than its central ray. InputError: no ray meets the
+    capture sphere.
     """
     before, parts, past = 0, [], []
     for frame in source.frames.values():
@@ -165,15 +159,10 @@ def _neighbours(values: NDArray[Any], axis: int) -> tuple[NDArray[Any], NDArray[
 def pixel_places(count: int, blur_px: float = 0.0, *, area: bool = True) -> Singles:
     """Places of a pixel's rays from its centre in each of p patterns, pixels, (p, count, 2).
 
-    On Vogel's spiral, with the density of a Gaussian of the variance that the pixel's square and
-    the lens' spread have together; their mean is zero and their variance exact in each pattern's
-    sum of both ways. Few rays are worse than one: a step of light inside of a pixel is then a
-    stair (docs/reconstruct.md).
-
-    Args:
-        count: of rays.
-        blur_px: standard deviation of the lens' spread.
-        area: whether a pixel is the mean of its square, and not a single ray.
+    On Vogel's spiral, with the density of a Gaussian of the variance that the pixel's square (area;
+    else it is a single ray) and the lens' spread (blur_px, one standard deviation) have together;
+    their mean is zero and their variance exact in each pattern's sum of both ways. Few rays are
+    worse than one: a step of light inside of a pixel is then a stair (docs/reconstruct.md).
     """
     k = np.arange(count)
     radius = np.sqrt(-2 * np.log(1 - (k + 0.5) / count))
@@ -185,15 +174,10 @@ def pixel_places(count: int, blur_px: float = 0.0, *, area: bool = True) -> Sing
 
 
 def with_weights(rays: CapturedRays, source: LightField) -> CapturedRays:
-    """The rays with the weights that follow from what a calibration knows of their mirrors.
+    """The rays, with footprints, and weights by what a calibration knows of their mirrors.
 
-    Args:
-        rays: with footprints.
-        source: their light field; without that fact all rays keep their weights. Mirrors of which
-            it says nothing count as the worst of the others.
-
-    Raises:
-        InputError: its fact does not fit its mirrors.
+    Without that fact of the light field all rays keep their weights. Mirrors of which it says
+    nothing count as the worst of the others. InputError: it does not fit the mirrors.
     """
     sigmas = _sigmas(source)
     if np.isnan(sigmas).all() or not rays.footprint.any():

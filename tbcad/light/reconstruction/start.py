@@ -1,19 +1,23 @@
-"""Where a fit starts: in the hull of the object, on a coarser grid, or at the frame before.
+"""Where a fit starts: in the hull of the object, on a coarser grid, at another frame or checkpoint.
 
 The hull is what rays that see the background do not pass through.
 """
 
-from dataclasses import dataclass, field
+import json
+from dataclasses import asdict, dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tbcad.common.atomic_files import replace_files
 from tbcad.common.compiled import compiled_sum
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.field import Field
+from tbcad.light.reconstruction.field import Field, Grid, resampled
 from tbcad.light.reconstruction.gradient import Moments
-from tbcad.light.reconstruction.grid import Grid, resampled
 from tbcad.light.reconstruction.marching import GLOSSY, MATT, Singles
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.simulate.parallel import chunks, in_threads
@@ -32,6 +36,8 @@ RAYS_OF_NODE = 5  # at least, in the mean
 MOST_DARK = 0.3  # share of a voxel's rays that may see the background, past its edges
 HULL_PARTS = 8  # of the rays, whatever the number of threads
 LIGHT = 0.25  # of white: no dark background is lighter
+SCHEMA = "tbcad-field-part/1"
+ANEW = "begin anew with --force"
 
 
 @dataclass(frozen=True)
@@ -110,13 +116,9 @@ def _begun(level: int, grid: Grid, values: Singles) -> State:
 
 
 def start(inside: Bools, last: Field | None, capture_mm: float, settings: Settings) -> State:
-    """An even fog in a hull (k, k, k), or what the last field has there on a finer grid.
+    """An even fog in the hull (k, k, k), where the object may be now, or the last frame's field.
 
-    Args:
-        inside: where the object may be now.
-        last: field of the frame before.
-        capture_mm: diameter of the capture sphere.
-        settings: of the fit.
+    What the last field has there is taken on a finer grid.
     """
     if last is None or len(settings.levels) <= SKIPPED:
         return first_state(inside, capture_mm, settings)
@@ -133,8 +135,7 @@ def start(inside: Bools, last: Field | None, capture_mm: float, settings: Settin
 def hull(rays: CapturedRays) -> Bools:
     """Nodes of a lattice (k, k, k) over the capture sphere's cube where the object may be.
 
-    Raises:
-        InputError: the photographs show nothing, or no background.
+    InputError: the photographs show nothing, or no background.
     """
     level = rays.dark_level()
     dark = rays.colour.max(axis=1) < level
@@ -188,3 +189,101 @@ def _vote(
             votes[0, x, y, z] += 1
             if dark[i]:
                 votes[1, x, y, z] += 1
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A fit under way."""
+
+    asked: dict[str, Any]  # all that the result follows from: options, light field, version
+    settings: Settings  # that were chosen
+    trials: list[dict[str, Any]]  # by which
+    state: State  # after its last epoch
+
+
+def part_file(out: Path) -> Path:
+    """Where the checkpoint of a field lies."""
+    return out.with_name(f".{out.name}.part")
+
+
+def settings_record(settings: Settings) -> dict[str, Any]:
+    """Settings as facts, but for the places of rays, which follow from the blur."""
+    record = asdict(settings)
+    del record["places"]
+    return record
+
+
+def settings_of(record: dict[str, Any], places: Singles) -> Settings:
+    """Settings from their facts."""
+    levels = tuple(Level(**one) for one in record["levels"])
+    pairs = {name: tuple(record[name]) for name in ("steps", "last_steps")}
+    return Settings(**{**record, **pairs, "levels": levels, "places": places})
+
+
+def write_checkpoint(file: Path, kept: Checkpoint) -> None:
+    """Write a checkpoint, replacing the file as a whole."""
+    state = kept.state
+    record = {
+        "schema": SCHEMA,
+        "asked": kept.asked,
+        "settings": settings_record(kept.settings),
+        "trials": kept.trials,
+        **{name: getattr(state, name) for name in ("level", "epoch", "step", "loss")},
+        "nodes": state.grid.n,
+        "width_mm": state.grid.width_mm,
+    }
+    with BytesIO() as buffer:
+        np.savez(
+            buffer,
+            allow_pickle=False,
+            record=np.array(json.dumps(record)),
+            place=state.grid.place,
+            values=state.values,
+            mean=state.moments.mean,
+            square=state.moments.square,
+        )
+        replace_files(file.parent, {file.name: buffer.getvalue()})
+
+
+def read_checkpoint(file: Path, asked: dict[str, Any], places: Singles) -> Checkpoint:
+    """Read a checkpoint of the same options and light field.
+
+    InputError: it is of others, or damaged.
+    """
+    try:
+        with np.load(file, allow_pickle=False) as store:
+            arrays = {name: store[name] for name in store.files}
+        record = json.loads(str(arrays["record"]))
+        if record["schema"] != SCHEMA:
+            raise ValueError(f"its schema is not {SCHEMA}")
+        check_same(file, record["asked"], asked)
+        settings = settings_of(record["settings"], places)
+        return Checkpoint(asked, settings, record["trials"], _state(record, arrays))
+    except InputError:
+        raise
+    except Exception as fault:  # zip, numpy and JSON raise many kinds
+        raise InputError(f"{file} is damaged ({fault}): {ANEW}") from None
+
+
+def check_same(file: Path, found: dict[str, Any], asked: dict[str, Any]) -> None:
+    """Refuse to go on with what was begun otherwise; InputError: it was, by what is named."""
+    was, now = _flat(found), _flat(asked)
+    for name, value in now.items():
+        if was.get(name) != value:
+            others = f"{name} {was.get(name)}, not {value}"
+            what = "another capture, not of this one" if name == "light_field" else others
+            raise InputError(f"{file} is of {what}: {ANEW}")
+
+
+def _flat(asked: dict[str, Any]) -> dict[str, Any]:
+    return {**asked, **asked.get("options", {}), "options": None}
+
+
+def _state(record: dict[str, Any], arrays: dict[str, Any]) -> State:
+    grid = Grid(record["nodes"], record["width_mm"], arrays["place"])
+    values, moments = arrays["values"], Moments(arrays["mean"], arrays["square"])
+    if {one.shape for one in (values, *moments)} != {(len(grid), values.shape[1])}:
+        raise ValueError("its arrays do not belong together")
+    state = State(record["level"], record["epoch"], grid, values, moments)
+    state.step, state.loss = record["step"], record["loss"]
+    return state

@@ -49,19 +49,12 @@ POINTS_PER_CHUNK = 1 << 14
 
 
 def best_level(made: Field, rays: CapturedRays, held: Bools) -> float:
-    """The density, 1/mm, whose surface has the silhouettes of rays that were held out.
+    """The density, 1/mm, whose surface has the silhouettes of rays that were held out, (n,).
 
     Of all levels it is the one where fewest rays see the background though they meet the surface,
-    or something though they miss it. Rays that do so at any level, as those of black things, do
-    not matter. The place where rays become half opaque is no measure: it lies behind the surface.
-
-    Args:
-        made: the field.
-        rays: of the capture.
-        held: which of them the field was not fitted to, (n,).
-
-    Raises:
-        InputError: no ray is held out, or the field is empty.
+    or something though they miss it. Rays that do so at any level, as those of black things, do not
+    matter. The place where rays become half opaque is no measure: it lies behind the surface.
+    InputError: no ray is held out, or the field is empty.
     """
     which = np.flatnonzero(held)
     if len(which) == 0:
@@ -91,17 +84,11 @@ def resolved_mm(rays: CapturedRays) -> float:
 
 
 def field_mesh(made: Field, level: float, least_mm: float | None = None) -> trimesh.Trimesh:
-    """The surface as a closed mesh with colours (sRGB) at its points, mm.
+    """The surface of a level, 1/mm, as a closed mesh with colours (sRGB) at its points, mm.
 
-    Args:
-        made: the field.
-        level: density, 1/mm: `best_level`.
-        least_mm: size of the smallest body that is kept. One that is smaller than what a mirror
-            resolves (`resolved_mm`) lies within one pixel of each view and may be noise as well.
-            None: three distances of nodes, about that.
-
-    Raises:
-        InputError: there is no such level, or nothing is as dense.
+    Bodies below a size of least_mm go; None: three distances of nodes, about what a mirror resolves
+    (`resolved_mm`): what lies within one pixel of each view may be noise as well. InputError: there
+    is no such level, or nothing is as dense.
     """
     if not LEVELS[0] <= level <= LEVELS[1]:
         raise InputError(

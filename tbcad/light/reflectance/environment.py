@@ -40,18 +40,12 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of red, green, blue: ITU-R BT.
 
 
 class LightPixels(NamedTuple):
-    """Pixels that show a part of the surroundings.
+    """Pixels that show a part of the surroundings."""
 
-    Attributes:
-        row, column: of each, (p,).
-        direction: unit vectors toward what they show, (p, 3).
-        solid_angle: of it, sr, (p,); all together 4 pi.
-    """
-
-    row: Ints
-    column: Ints
-    direction: Floats
-    solid_angle: Floats
+    row: Ints  # (p,)
+    column: Ints  # (p,)
+    direction: Floats  # unit vectors toward what they show, (p, 3)
+    solid_angle: Floats  # of it, sr, (p,); all together 4 pi
 
 
 def light_pixels(picture: Floats, kind: LightFormat | None, name: str) -> LightPixels:

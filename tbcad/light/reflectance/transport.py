@@ -16,6 +16,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +46,7 @@ EXPOSED = 99.5
 # Directions of the sky that the ground truth is lit from.
 TRUE_LIGHTS = 512
 BYTES_PER_VALUE = 2
-Light = Callable[[int, Spots], Floats]
-"""Light (k,) of a lamp by its number on spots (k,)."""
+Light = Callable[[int, Spots], Floats]  # light (k,) of a lamp by its number on spots (k,)
 
 
 @dataclass(frozen=True)
@@ -207,13 +207,9 @@ def seen_spots(frame: CameraFrame, scene: Scene) -> SeenSpots:
         return SeenSpots(pixel[hits.rows], hits.spots(subject), hits.albedo(subject))
 
     parts = in_threads(band, row_bands(frame.camera.height_px))
-    names = ("place", "normal", "facet_normal")
-    places = (np.concatenate([getattr(part.spots, name) for part in parts]) for name in names)
-    return SeenSpots(
-        np.concatenate([part.pixel for part in parts]),
-        Spots(*places),
-        np.concatenate([part.albedo for part in parts]),
-    )
+    names = ("pixel", "spots.place", "spots.normal", "spots.facet_normal", "albedo")
+    pixel, *places, albedo = (np.concatenate(list(map(attrgetter(one), parts))) for one in names)
+    return SeenSpots(pixel, Spots(*places), albedo)
 
 
 def transport(seen: SeenSpots, light: Light, lamp: int, rays: slice) -> Colours:

@@ -55,16 +55,13 @@ class Superseded(Exception):
 
 
 class ViewRenderer(ABC):
-    """Pictures of a light field or a field; one is made at a time, by all cores.
-
-    Attributes:
-        method: of views that do not move.
-        lens: the light field that the pictures of a lens are added up from; None: there are none.
-        capture_mm: diameter of the capture sphere.
-    """
+    """Pictures of a light field or a field; one is made at a time, by all cores."""
 
     def __init__(self, method: str, lens: MirrorTiles | None, capture_mm: float) -> None:
-        """Prepare for requests; arguments as the attributes."""
+        """Prepare for requests; the method is that of views that do not move.
+
+        A lens's pictures are added up from a light field; None: there are none.
+        """
         self.method, self.lens, self.capture_mm = method, lens, capture_mm
         self._lock = Lock()
         self._numbers = count(1)
@@ -73,8 +70,7 @@ class ViewRenderer(ABC):
     def jpeg(self, query: Query) -> bytes:
         """The picture of a query, as a JPEG file.
 
-        Raises:
-            Superseded: another one was asked for while the lens's pinholes were being added up.
+        Superseded: another one was asked for while the lens's pinholes were being added up.
         """
         number = self._latest = next(self._numbers)
 
@@ -187,10 +183,7 @@ def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:
 
 
 def check_turntable_path(file: Path, force: bool) -> None:
-    """Refuse, before any work, a file that cannot be written or that exists.
-
-    InputError: as said.
-    """
+    """Refuse, before any work, a file that cannot be written or that exists."""
     if file.suffix.lower() != ".html" or not file.parent.is_dir() or file.is_dir():
         raise InputError(f"{file}: give a file that ends in .html, in a folder that exists")
     check_file(file, force)

@@ -48,34 +48,32 @@ class Body(NamedTuple):
     turns: bool = False  # whether it turns with the base
 
 
-def packed_body(body: Body, arrays: PackedArrays) -> Record:
-    """A body for the page; its positions are rounded to STEPS along its longest side."""
+def packed_body(body: Body, arrays: PackedArrays, *, whole: bool = False) -> Record:
+    """A body for the page; its positions are rounded to STEPS along its longest side.
+
+    Of a whole one all triangles stay, since what they are of is told in their order.
+    """
     low = body.vertices.min(axis=0)
     step = float(np.ptp(body.vertices, axis=0).max()) / STEPS or 1.0
     places = np.round((body.vertices - low) / step).astype(np.int64)
-    # One number for a place, which is sorted far faster than three.
-    number = places @ [1 << 32, 1 << 16, 1]
-    _, first, index = np.unique(number, return_index=True, return_inverse=True)
-    triangles = index[body.triangles]
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return _record(body, (low, step), places[first], triangles[whole], arrays) | {
-        "turns": body.turns
-    }
-
-
-def _record(
-    body: Body, scale: tuple[Floats, float], places: Ints, triangles: Ints, arrays: PackedArrays
-) -> Record:
-    return {
+    triangles = body.triangles
+    if not whole:
+        # One number for a place, which is sorted far faster than three.
+        number = places @ [1 << 32, 1 << 16, 1]
+        _, first, index = np.unique(number, return_index=True, return_inverse=True)
+        places, triangles = places[first], index[triangles]
+        triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+    record = {
         "name": body.name,
         "group": body.group,
-        "low": _short(scale[0]),
-        "step": scale[1],
+        "low": _short(low),
+        "step": step,
         "vertices": arrays.add(places.T, "Uint16Array"),
         "triangles": arrays.add(triangles, "Uint32Array"),
         "colour": [round(float(value), 3) for value in body.colour],
         "apart": _short(body.apart),
     }
+    return record if whole else record | {"turns": body.turns}
 
 
 def coarse_facets(export: ExportedDesign) -> Facets:
@@ -100,7 +98,7 @@ def packed_shells(export: ExportedDesign, facets: Facets, arrays: PackedArrays) 
     shell = Body("shell_a", "shell_a", vertices, triangles, SHELL_COLOUR, width)
     owner = np.zeros(len(triangles), dtype=np.int64)
     owner[: len(facets.outlines.cell)] = facets.outlines.cell + 1
-    record = _exact(shell, arrays) | {"owner": arrays.add(owner, "Uint16Array")}
+    record = packed_body(shell, arrays, whole=True) | {"owner": arrays.add(owner, "Uint16Array")}
     image = {"name": "shell_b", "group": "shell_b", "mirrored": "shell_a", "apart": _short(-width)}
     return [record, image]
 
@@ -146,7 +144,10 @@ def prototype_bodies(folder: Path) -> Iterator[Body]:
     """All bodies of prototype.glb, in millimetres and z up."""
     record = Prototype.read(folder / NAME)
     drawn = list(_drawn(folder / record.assembly.glb))
-    turning = _turning(record)
+    turning = {part.name for part in record.with_role("base", "cap")}
+    turning |= {f"ball_{seat.ball}" for seat in record.seats}
+    turning |= {one.name for one in record.bought if one.turns}
+    turning |= {one.name for one in record.fasteners if one.turns}
     apart = _apart(record, drawn)
     for name, group, points, faces, colour in drawn:
         yield Body(name, group, points, faces, colour, apart[name], name in turning)
@@ -154,14 +155,6 @@ def prototype_bodies(folder: Path) -> Iterator[Body]:
 
 def _coarse(spec: Spec) -> Spec:
     return spec.model_copy(update={"mesh": COARSE})
-
-
-def _exact(body: Body, arrays: PackedArrays) -> Record:
-    """A body whose triangles all stay, since what they are of is told in their order."""
-    low = body.vertices.min(axis=0)
-    step = float(np.ptp(body.vertices, axis=0).max()) / STEPS
-    places = np.round((body.vertices - low) / step).astype(np.int64)
-    return _record(body, (low, step), places, body.triangles, arrays)
 
 
 def _short(vector: Floats) -> list[float]:
@@ -182,14 +175,6 @@ def _drawn(
         colour = shown_colour(mesh.visual.material.baseColorFactor)
         group = str(scene.graph.transforms.parents[name])
         yield name, group, np.asarray(points), np.asarray(mesh.faces), colour
-
-
-def _turning(record: Prototype) -> set[str]:
-    """Names of the bodies that turn with the base."""
-    parts = {part.name for part in record.with_role("base", "cap")}
-    balls = {f"ball_{seat.ball}" for seat in record.seats}
-    bought = {one.name for one in record.bought if one.turns}
-    return parts | balls | bought | {one.name for one in record.fasteners if one.turns}
 
 
 def _apart(record: Prototype, drawn: list[Any]) -> Mapping[str, Floats]:

@@ -2,7 +2,7 @@
 
 import base64
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,8 +20,7 @@ ALIGNED = 4  # bytes: typed arrays of a browser begin at multiples of their item
 # Kinds of numbers by the names of JavaScript's typed arrays.
 KINDS = {"Int16Array": "<i2", "Uint16Array": "<u2", "Uint32Array": "<u4", "Float32Array": "<f4"}
 
-Place = list[int | str]
-"""Where an array lies: first byte, number of items, kind."""
+Place = list[int | str]  # where an array lies: first byte, number of items, kind
 
 
 @dataclass
@@ -46,6 +45,14 @@ class PackedArrays:
 
 
 UM_PER_MM = 1000.0
+# Key, label, unit, digits, and field of a mirror in verify.json.
+MEASURED = (
+    ("covered", "Coverage, on the spheres in the files", "mm", 2, "coverage_fitted_mm"),
+    ("facets", "Coverage, on the facets in the files", "mm", 2, "coverage_facet_mm"),
+    ("pixels", "Pixels", "", 0, "pixels"),
+    ("centre", "Centre in the files, off by", "µm", 3, "centre_error_mm"),
+    ("radius_error", "Radius in the files, off by", "µm", 3, "radius_error_mm"),
+)
 
 
 class Quantity(NamedTuple):
@@ -63,8 +70,17 @@ class Quantity(NamedTuple):
 def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) -> dict[str, Any]:
     """All mirrors of both cameras for the page, with the prototype's balls if there are any."""
     rows = MirrorRow.read(folder)
-    plan = _plan(folder)
-    quantities = [*_verified(rows, verdict), *_designed(rows), *_pointing(rows, plan)]
+    there = (folder / PictureRow.FILE).is_file()  # not without a prototype
+    plan = {row.mirror: row for row in PictureRow.read(folder)} if there else {}
+    shown = [plan.get(row.id) for row in rows]
+    off = np.array([one.error_deg if one else np.nan for one in shown])
+    pointing = Quantity("pointing", "Prototype: direction off by", "°", 2, off)
+    quantities = [*_verified(rows, verdict), *_designed(rows), pointing]
+    # Ball, stop, angle of the base and turn of the object, degrees.
+    photographs = [
+        one and [one.ball, one.stop, round(one.base_angle_deg, 4), one.object_turn_deg]
+        for one in shown
+    ]
     known = [one for one in quantities if np.isfinite(one.values).any()]
     return {
         "ids": [row.id for row in rows],
@@ -72,7 +88,7 @@ def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) 
         "radius": arrays.add(np.array([row.radius_mm or np.inf for row in rows]), "Float32Array"),
         "size": arrays.add(columns(rows, "size_mm")[:, 0], "Float32Array"),
         "quantities": [_packed(one, arrays) for one in known],
-        "plan": [_photograph(plan.get(row.id)) for row in rows] if plan else [],
+        "plan": photographs if plan else [],
         "balls": _balls(folder) if plan else [],
     }
 
@@ -81,28 +97,11 @@ def _verified(rows: Sequence[MirrorRow], verdict: Verdict | None) -> Iterator[Qu
     if verdict is None:
         return
     measured = {one.id: one for one in verdict.mirrors}
-
-    def column(name: str, factor: float = 1.0) -> Floats:
+    for key, label, unit, digits, name in MEASURED:
         found = (getattr(measured.get(row.id), name, None) for row in rows)
-        return np.array([np.nan if value is None else factor * value for value in found])
-
-    yield Quantity(
-        "covered", "Coverage, on the spheres in the files", "mm", 2, column("coverage_fitted_mm")
-    )
-    yield Quantity(
-        "facets", "Coverage, on the facets in the files", "mm", 2, column("coverage_facet_mm")
-    )
-    yield Quantity("pixels", "Pixels", "", 0, column("pixels"), added=True)
-    yield Quantity(
-        "centre", "Centre in the files, off by", "µm", 3, column("centre_error_mm", UM_PER_MM)
-    )
-    yield Quantity(
-        "radius_error",
-        "Radius in the files, off by",
-        "µm",
-        3,
-        column("radius_error_mm", UM_PER_MM),
-    )
+        factor = UM_PER_MM if unit == "µm" else 1.0
+        values = np.array([np.nan if value is None else factor * value for value in found])
+        yield Quantity(key, label, unit, digits, values, added=key == "pixels")
 
 
 def _designed(rows: Sequence[MirrorRow]) -> Iterator[Quantity]:
@@ -116,12 +115,6 @@ def _designed(rows: Sequence[MirrorRow]) -> Iterator[Quantity]:
     yield Quantity("azimuth", "Azimuth about the axis", "°", 2, column("azimuth_deg"), False)
 
 
-def _pointing(rows: Sequence[MirrorRow], plan: Mapping[str, PictureRow]) -> Iterator[Quantity]:
-    found = (plan.get(row.id) for row in rows)
-    values = np.array([np.nan if one is None else one.error_deg for one in found])
-    yield Quantity("pointing", "Prototype: direction off by", "°", 2, values)
-
-
 def _packed(quantity: Quantity, arrays: PackedArrays) -> dict[str, Any]:
     return {
         "key": quantity.key,
@@ -132,20 +125,6 @@ def _packed(quantity: Quantity, arrays: PackedArrays) -> dict[str, Any]:
         "added": quantity.added,
         "values": arrays.add(quantity.values, "Float32Array"),
     }
-
-
-def _plan(folder: Path) -> dict[str, PictureRow]:
-    """The photograph of each mirror by its ball; none without a prototype."""
-    if not (folder / PictureRow.FILE).is_file():
-        return {}
-    return {row.mirror: row for row in PictureRow.read(folder)}
-
-
-def _photograph(row: PictureRow | None) -> list[float] | None:
-    """Ball, stop, angle of the base and turn of the object, degrees."""
-    if row is None:
-        return None
-    return [row.ball, row.stop, round(row.base_angle_deg, 4), row.object_turn_deg]
 
 
 def _balls(folder: Path) -> list[dict[str, Any]]:

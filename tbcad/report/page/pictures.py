@@ -57,18 +57,11 @@ def pictures_html(pictures: list[Picture]) -> Iterator[str]:
 
 
 def photographs(capture: Path, ids: list[str]) -> dict[str, Any]:
-    """Both photographs of a capture for the page, and where each mirror is in them.
+    """Both photographs of a capture for the page, and where each mirror is in them, by camera.
 
-    Args:
-        capture: folder or file that `tbcad capture` or `tbcad merge` wrote.
-        ids: of all mirrors of the export, camera a's first.
-
-    Returns:
-        By camera: address of the picture, factor from its pixels to those of the boxes, and boxes
-        x0, y0, x1, y1 in pixels of the photograph.
-
-    Raises:
-        InputError: the capture cannot be read, or is of another design.
+    Of each the picture's address, the factor from its pixels to those of the boxes, and boxes of
+    all mirrors by their ids, camera a's first: x0, y0, x1, y1 in pixels of the photograph.
+    InputError: the capture cannot be read, or is of another design.
     """
     from tbcad.light.simulate.capture.light_field import LightField
 

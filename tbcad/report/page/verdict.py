@@ -63,8 +63,7 @@ class Verdict(Record):
 def read_verdict(folder: Path) -> Verdict | None:
     """The verification of an export; None if it was not verified.
 
-    Raises:
-        InputError: verify.json is damaged.
+    InputError: verify.json is damaged.
     """
     path = folder / VERDICT
     if not path.is_file():

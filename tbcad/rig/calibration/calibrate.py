@@ -18,8 +18,7 @@ from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.intrinsics.lens import CalibratedLens
 from tbcad.rig.calibration.priors import Measured, prototype_prior, shell_prior
 from tbcad.rig.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
-from tbcad.rig.machine.built import is_cap
-from tbcad.rig.machine.designed import designed_prototype
+from tbcad.rig.machine.designed import designed_prototype, is_cap
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors

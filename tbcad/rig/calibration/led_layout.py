@@ -114,24 +114,20 @@ class LedRoom:
     def places(self) -> Floats:
         """Places that are tried: one of each pair, mm, (p, 3)."""
         azimuth = np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-        ring = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+        ring = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.ones(AZIMUTHS)])
         highest = np.sqrt(self.outer**2 - (self.inner + self.pillar) ** 2)
         rows = []
         for z in np.linspace(self.lowest, highest, HEIGHTS):
             farthest = np.sqrt(self.outer**2 - z**2) - self.pillar
             for radius in np.unique(np.linspace(self.inner, max(farthest, self.inner), RINGS)):
-                rows.append(np.column_stack([radius * ring, np.full(AZIMUTHS, z)]))
+                rows.append(ring * [radius, radius, z])
         return np.round(np.concatenate(rows), DIGITS) + 0.0
 
     def fits(self, places: Floats, chosen: list[int], new: int) -> bool:
         """Whether a pair's pillars are clear of each other and of the chosen ones."""
-        pair = _pair(places[new])[:, :2]
-        others = [_pair(places[one])[:, :2] for one in chosen]
-        for other in [pair[1:], *others]:
-            gaps = np.linalg.norm(pair[:1, None] - other[None], axis=2)
-            if gaps.min() < self.apart:
-                return False
-        return True
+        here, opposite = places[new] * np.stack([np.ones(3), HALF_TURN])
+        others = np.concatenate([opposite[None], with_partners(places[chosen])])
+        return bool(norm((others - here)[:, :2]).min() >= self.apart)
 
 
 def with_partners(places: Floats) -> Floats:
@@ -167,10 +163,6 @@ def best_layout(
         if pairs == before:
             break
     return [*pairs, *(one + p for one in pairs)]
-
-
-def _pair(place: Floats) -> Floats:
-    return np.stack([place, place * HALF_TURN])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.parameters import Block, Prior
-from tbcad.rig.machine.built import LED_MM
+from tbcad.rig.machine.designed import LED_MM
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats, Ints
@@ -21,11 +21,10 @@ from tbcad.types import Bools, Floats, Ints
 PRINCIPAL_SHARE = 0.01
 """Of the width, by which the principal point is off: a sensor placed to 0.25 mm is 72 px of 3.45 um
 off at 2,080 px (Allied Vision Prosilica GT), lenses are centred better; judgement between both."""
-OBLONG = 1e-3
-"""By which pixels are not square: mask-made sensors are square to better; judgement."""
+OBLONG = 1e-3  # by which pixels are not square: mask-made sensors are square to better; judgement
 DISTORTIONS = (0.05, 0.02, 1e-3, 1e-3, 0.0)
 """k1, k2, p1, p2, k3: a wide lens may bend by 5 % (data sheets of lenses for machine vision: 0.5 to
-15); judgement, wider than tbcad.rig.machine.built, because highlights tell it well. k3 is fixed:
+15); judgement, wider than tbcad.rig.machine.designed, because highlights tell it well. k3 is fixed:
 those of a few balls do not tell it from k2."""
 MEASURED_MM = 0.01
 """Standard deviation of a radius that is measured without saying how well: by a micrometer screw
@@ -55,15 +54,14 @@ def prototype_prior(
     tilted = np.where(is_cap, arm * errors.cap_tilt.sigma, 0.0)
     centres = np.hypot(errors.seat.sigma, tilted)
     growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
-    frames, offset = len(machine.angle), zero_error / math.sqrt(3)
+    frames = len(machine.angle)
+    offset = math.hypot(zero_error / math.sqrt(3), errors.rotation_angle.sigma)
     sigma = _camera(machine, errors, lens_known) | {
         Block.TILT: np.full(2, errors.axis_tilt.sigma),
         Block.AXIS_POINT: np.full(2, errors.shell_shift.sigma),
-        Block.OFFSET: np.full(
-            int(series.max()) + 1, math.hypot(offset, errors.rotation_angle.sigma)
-        ),
+        Block.OFFSET: np.full(int(series.max()) + 1, offset),
         Block.CARRIER: np.array([growth, errors.shell_shift.sigma]),
-        Block.LEDS: np.full(machine.leds.shape, _led(errors)),
+        Block.LEDS: np.full(machine.leds.shape, math.hypot(errors.shell_shift.sigma, LED_MM)),
         Block.CENTRES: np.repeat(centres[:, None], 3, axis=1),
         Block.RADII: radii,
         Block.ANGLES: np.full(frames, errors.rotation_angle.sigma),
@@ -87,7 +85,7 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
         Block.AXIS_POINT: np.zeros(2),
         Block.OFFSET: np.zeros(1),
         Block.CARRIER: np.array([growth, 0.0]),
-        Block.LEDS: np.full(machine.leds.shape, math.hypot(_led(errors), shift)),
+        Block.LEDS: np.full(machine.leds.shape, math.hypot(math.hypot(shift, LED_MM), shift)),
         Block.CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
         Block.RADII: np.full(spheres, errors.whole_radius.sigma),
         Block.ANGLES: np.zeros(1),
@@ -121,11 +119,6 @@ def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Flo
     }
 
 
-def _led(errors: Errors) -> float:
-    """Of an LED's light along each axis: the whole stage's, and its own."""
-    return math.hypot(errors.shell_shift.sigma, LED_MM)
-
-
 def _radii(
     machine: Machine, errors: Errors, is_cap: Bools, measured: Measured
 ) -> tuple[Floats, Floats]:
@@ -139,22 +132,21 @@ def _radii(
 
 def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
     """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm."""
-    return tuple(_measured(text, balls) for text in texts)
-
-
-def _measured(text: str, balls: int) -> tuple[int, float, float]:
-    found = PATTERN.fullmatch(text.replace(" ", ""))
-    try:
-        ball, radius, sigma = found.groups() if found else ("", "", "")
-        values = int(ball) - 1, float(radius), float(sigma or MEASURED_MM)
-    except ValueError:
-        raise InputError(
-            f"--measured {text!r:.60} is not BALL=RADIUS_MM or BALL=RADIUS_MM:SIGMA_MM: write for "
-            "instance 1=43.21:0.01"
-        ) from None
-    if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
-        raise InputError(
-            f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation above "
-            "0 mm: change it"
-        )
-    return values
+    measured = []
+    for text in texts:
+        found = PATTERN.fullmatch(text.replace(" ", ""))
+        try:
+            ball, radius, sigma = found.groups() if found else ("", "", "")
+            values = int(ball) - 1, float(radius), float(sigma or MEASURED_MM)
+        except ValueError:
+            raise InputError(
+                f"--measured {text!r:.60} is not BALL=RADIUS_MM or BALL=RADIUS_MM:SIGMA_MM: write "
+                "for instance 1=43.21:0.01"
+            ) from None
+        if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
+            raise InputError(
+                f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation "
+                "above 0 mm: change it"
+            )
+        measured.append(values)
+    return tuple(measured)

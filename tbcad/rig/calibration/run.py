@@ -1,38 +1,63 @@
 """`tbcad calibrate`: from a run's folder to the folder of its calibration."""
 
-import math
-from collections.abc import Iterable
+import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tbcad.common.atomic_files import InFolder
+from tbcad.common.figure_files import PlotFormat, figure_file
+from tbcad.common.results import csv_text
+from tbcad.common.screen import WIDTH
+from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.options.machines import CalibrateOptions
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.single_files import Source, files_named
+from tbcad.output.manifest import write_manifest
+from tbcad.output.single_files import files_named
+from tbcad.records.calibration import NAME as RECORD
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detect import detect
-from tbcad.rig.calibration.detection.matching import Room
+from tbcad.rig.calibration.detection.matching import object_room
+from tbcad.rig.calibration.estimate.parameters import covariance
 from tbcad.rig.calibration.intrinsics.files import read_lens
 from tbcad.rig.calibration.priors import parse_measured
-from tbcad.rig.calibration.report.files import write_calibration, write_recovered
+from tbcad.rig.calibration.report.plots import INCHES, draw_recovered, plots
+from tbcad.rig.calibration.report.record import (
+    angles_table,
+    calibration_record,
+    covariance_bytes,
+    rays_table,
+    residuals_table,
+    sphere_covariances,
+    spheres_table,
+)
+from tbcad.rig.calibration.report.recovered import (
+    BESIDES,
+    Kind,
+    place_mm,
+    ray_errors,
+    recovered_errors,
+    recovered_table,
+    turn_mrad,
+)
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, verdict, verdict_text
 from tbcad.rig.machine.designed import dome_radius
-from tbcad.rig.machine.machine import TRUTH, Machine, read_machine
+from tbcad.rig.machine.machine import RECORD as MACHINE
+from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
 from tbcad.rig.runs import Run, check_same_export, read_run
 from tbcad.tolerancing.process.process import Process, load_process, process_errors
 
-DEFAULT_PROCESS = "fdm"
-"""A prototype is printed; its design does not say how."""
+DEFAULT_PROCESS = "fdm"  # a prototype is printed; its design does not say how
 SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
-READING, DETECTING, ESTIMATING, WRITING = (
-    "run and export",
-    "highlights in photographs",
-    "machine and its uncertainty",
-    "files",
-)
+READING = "run and export"
+DETECTING = "highlights in photographs"
+ESTIMATING = "machine and its uncertainty"
+WRITING = "files"
+COVARIANCE = "covariance.npz"
 
 
 @dataclass(frozen=True)
@@ -74,52 +99,33 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     for name in machines:
         check_replaceable(out / name, "calibration", options.force, inputs)
     export = read_export(exports)
-    setups = [_setup(one, export, options) for one in machines.values()]
+    lens = None if options.intrinsics is None else read_lens(Path(options.intrinsics))
+    size = run.record.width_px, run.record.height_px
+    setups = [
+        prepared_setup(export, one.record.frames, size, lens, run.record.geometry)
+        for one in machines.values()
+    ]
     truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
     found = []
     for one, setup in zip(machines.values(), setups, strict=True):
         progress(DETECTING)
         measured = parse_measured(tuple(options.measured), len(setup.plan))
         prior = setup.prior(process_errors(process), measured)
-        detection = detect(one, prior, _room(setup), dome_radius(export), detail)
+        detection = detect(one, prior, object_room(export), dome_radius(export), detail)
         progress(ESTIMATING)
         found.append(calibrate(setup, detection, prior, detail))
     progress(WRITING)
-    first, *others = (
-        _written(
-            result,
-            truth,
-            out / name,
-            _basis(one, result.setup, options, process),
-            inputs,
-            options,
-        )
-        for (name, one), result, truth in zip(machines.items(), found, truths, strict=True)
-    )
+    written = []
+    for (name, one), result, truth in zip(machines.items(), found, truths, strict=True):
+        judged, basis = verdict(result), _basis(one, result.setup, options, process)
+        with replacing(out / name, "calibration", options.force, inputs) as new:
+            record = write_calibration(new, result, judged, basis, options.plot)
+            text = verdict_text(result, judged)
+            if truth is not None:
+                text += "\n" + write_recovered(new, result, truth, options.plot)
+        written.append(WrittenCalibration(out / name, result, judged, text, record))
+    first, *others = written
     return replace(first, others=tuple(others))
-
-
-def _setup(run: Run, export: ExportedDesign, options: CalibrateOptions) -> Setup:
-    record = run.record
-    lens = None if options.intrinsics is None else read_lens(Path(options.intrinsics))
-    size = record.width_px, record.height_px
-    return prepared_setup(export, record.frames, size, lens, record.geometry)
-
-
-def _written(
-    result: MachineCalibration,
-    truth: Machine | None,
-    out: Path,
-    basis: dict[str, Any],
-    inputs: Iterable[Source],
-    options: CalibrateOptions,
-) -> WrittenCalibration:
-    judged = verdict(result)
-    with replacing(out, "calibration", options.force, inputs) as new:
-        record = write_calibration(new, result, judged, basis, options.plot)
-        texts = [] if truth is None else [write_recovered(new, result, truth, options.plot)]
-    text = "\n".join([verdict_text(result, judged), *texts])
-    return WrittenCalibration(out, result, judged, text, record)
 
 
 def _truth(run: Run, setup: Setup) -> Machine | None:
@@ -139,16 +145,8 @@ def _truth(run: Run, setup: Setup) -> Machine | None:
     return truth
 
 
-def _room(setup: Setup) -> Room:
-    """What the design lets an object fill: a cylinder on the disc within the capture sphere."""
-    stage = setup.export.spec.prototype.stage
-    radius = stage.object_diameter_mm / 2
-    return Room(radius, stage.top_mm, math.sqrt((setup.export.capture_mm / 2) ** 2 - radius**2))
-
-
 def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) -> dict[str, Any]:
     """What the calibration is based on, for its record."""
-    lens = "estimated" if options.intrinsics is None else str(options.intrinsics)
     return {
         "run": str(run.folder.resolve()),
         "exports": str(setup.export.folder.resolve()),
@@ -166,6 +164,74 @@ def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) 
             "given": options.process is not None,
             "settings": list(options.settings),
         },
-        "lens": lens,
+        "lens": str(options.intrinsics or "estimated"),
         "measured_radii": list(options.measured),
     }
+
+
+def write_calibration(
+    folder: Path,
+    result: MachineCalibration,
+    judged: CalibrationVerdict,
+    basis: dict[str, Any],
+    plot: PlotFormat = "png",
+) -> dict[str, Any]:
+    """Write all files of a calibration into the caller's folder, and return its record."""
+    known = covariance(result.found.prior, result.found.information)
+    record = calibration_record(result, judged, known, basis)
+    write_machine(folder / MACHINE, result.found.machine, result.setup.frames)
+    record.write(folder / RECORD)
+    tables = (
+        spheres_table(result, known),
+        angles_table(result, known),
+        rays_table(result),
+        residuals_table(result),
+    )
+    for table in tables:
+        (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
+    (folder / COVARIANCE).write_bytes(covariance_bytes(result, known))
+    for name, data in plots(result, sphere_covariances(result, known), plot).items():
+        (folder / name).write_bytes(data)
+    write_manifest(folder, "calibration")
+    return record.document()
+
+
+def write_recovered(
+    folder: Path, result: MachineCalibration, truth: Machine, plot: PlotFormat = "png"
+) -> str:
+    """Write recovered.csv and its plot of a simulated run, and return what they say."""
+    kinds = recovered_errors(
+        result, covariance(result.found.prior, result.found.information), truth
+    )
+    table = recovered_table(kinds)
+    (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
+    drawn = figure_file(lambda figure: draw_recovered(figure, kinds), INCHES, plot)
+    (folder / f"recovered.{plot}").write_bytes(drawn)
+    write_manifest(folder, "calibration")
+    return _recovered_text(result, truth, kinds, plot)
+
+
+def _recovered_text(
+    result: MachineCalibration, truth: Machine, kinds: tuple[Kind, ...], plot: PlotFormat
+) -> str:
+    figures = sum(len(kind.sigma) for kind in kinds)
+    within = sum(kind.within * len(kind.sigma) for kind in kinds) / figures
+    known = result.rays.known
+    errors = ray_errors(result.found, truth, known.frame, known.sphere)
+    found = [
+        f"{np.median(place_mm(one)):.3f} mm, {np.median(turn_mrad(one)):.2f} mrad"
+        for one in (errors.relative, errors.in_run)
+    ]
+    lines = [
+        f"of {figures} errors that were simulated, {within:.0%} are recovered to two standard "
+        f"deviations or better: recovered.csv, recovered.{plot}",
+        f"true errors of the rays: {found[0]} (median); among those of one run {found[1]}",
+    ]
+    for kind in kinds:
+        if kind.name == BESIDES:
+            off = norm((kind.recovered - kind.injected).reshape(-1, 3))
+            lines.append(
+                f"true errors of the centres, besides a motion and growth of all: "
+                f"{np.median(off):.1f} um (median), {off.max():.1f} um (largest)"
+            )
+    return "\n".join(textwrap.fill(line, WIDTH, subsequent_indent="  ") for line in lines)

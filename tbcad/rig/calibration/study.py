@@ -228,26 +228,18 @@ def panels(whole: Table, process: str) -> tuple[PlotPanel, ...]:
     records = whole.records()
     noise = [r for r in records if r["layout"] == "design" and r["process"] == process]
     leds = [r for r in records if r["layout"] == "best"]
-    return tuple(
-        PlotPanel(
-            title,
-            label,
-            "mm at the object's centre",
-            tuple(
-                Series(name, _values(rows, x), _values(rows, f"mm_{share}"), style)
-                for name, share, style in (("median", 50, "C0o-"), ("95 %", 95, "C1o-"))
-            ),
-        )
-        for title, label, x, rows in (
-            (
-                "Rays after a run, fdm, LEDs of the design",
-                "noise of highlights, px",
-                "noise_px",
-                noise,
-            ),
-            ("Rays after a run, fdm, best LEDs", "number of LEDs", "leds", leds),
-        )
+    drawn = (
+        ("Rays after a run, fdm, LEDs of the design", "noise of highlights, px", "noise_px", noise),
+        ("Rays after a run, fdm, best LEDs", "number of LEDs", "leds", leds),
     )
+    found = []
+    for title, label, x, rows in drawn:
+        curves = (
+            Series(name, _values(rows, x), _values(rows, f"mm_{share}"), style)
+            for name, share, style in (("median", 50, "C0o-"), ("95 %", 95, "C1o-"))
+        )
+        found.append(PlotPanel(title, label, "mm at the object's centre", tuple(curves)))
+    return tuple(found)
 
 
 def _values(records: list[Record], name: str) -> Floats:

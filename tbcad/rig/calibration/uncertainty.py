@@ -27,8 +27,7 @@ from tbcad.types import Floats, Ints
 SPHERE_MM = 30.0
 """Radius within which rays are to be known: there a rotation counts as much as a shift."""
 FIGURES = 4  # of a ray: two of its place, two of its direction
-APART_MM = 10.0
-"""Of both planes: lines are straight, so any distance gives the same."""
+APART_MM = 10.0  # of both planes: lines are straight, so any distance gives the same
 
 
 @dataclass(frozen=True)

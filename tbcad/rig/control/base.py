@@ -5,9 +5,8 @@ from time import sleep
 
 from tbcad.errors import InputError
 from tbcad.rig.control.grbl import HOME, SYNC, Grbl
-from tbcad.rig.control.machine import PIN_FIRST, MachineFault
 from tbcad.rig.control.messages import Status
-from tbcad.rig.control.plan import SETTINGS, ControlPlan, Move
+from tbcad.rig.control.plan import PIN_FIRST, SETTINGS, ControlPlan, MachineFault, Move
 from tbcad.types import Progress
 
 SEEK_SETTING, TRAVEL_SETTING = 25, (130, 131, 132, 133)

@@ -18,7 +18,7 @@ from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, RAW_SUFFIXES
 from tbcad.cad.formats.pixels import TIFF_SIGNATURES
 from tbcad.errors import InputError
 from tbcad.records.exposure import Setting
-from tbcad.rig.control.machine import CameraFault
+from tbcad.rig.control.plan import CameraFault
 from tbcad.rig.runs import decoded_image
 
 NEAR = 1.5  # factor of exposure times: the coarsest cameras have steps of 2

@@ -13,7 +13,7 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import PhaseTimes
 from tbcad.rig.control.camera import RunCamera, Shot, image_facts, suffix_of
 from tbcad.rig.control.gphoto import GphotoCamera
-from tbcad.rig.control.machine import CameraFault
+from tbcad.rig.control.plan import CameraFault
 
 PLACE = "{output}"
 EXPOSURES = ("{exposure_s}", "{exposure_ms}", "{exposure_us}")

@@ -11,8 +11,8 @@ from typing import Any
 from tbcad.errors import InputError
 from tbcad.records.exposure import Setting
 from tbcad.rig.control.camera import RunCamera, Shot, are_near, shutter_seconds, suffix_of
-from tbcad.rig.control.machine import CameraFault
 from tbcad.rig.control.messages import INSTALL
+from tbcad.rig.control.plan import CameraFault
 
 # What must not change in a run; a camera has some of them.
 LOCKED = (

@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable
 from time import monotonic
 
-from tbcad.rig.control.machine import ControllerReset, MachineFault
 from tbcad.rig.control.messages import (
     RESTING,
     STATES,
@@ -26,6 +25,7 @@ from tbcad.rig.control.messages import (
     meaning,
     parse,
 )
+from tbcad.rig.control.plan import ControllerReset, MachineFault
 from tbcad.types import Progress
 
 RESET, HOLD, QUERY = b"\x18", b"!", b"?"

@@ -16,8 +16,8 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from tbcad.rig.control.machine import ControllerReset, MachineFault
 from tbcad.rig.control.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
+from tbcad.rig.control.plan import ControllerReset, MachineFault
 from tbcad.types import Progress
 
 MOTOR = "manual_stepper base"

@@ -17,8 +17,7 @@ from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
 from tbcad.rig.control.base import travel_s
 from tbcad.rig.control.klipper import HOLD_FIRST, MOTOR, READY, Klipper
-from tbcad.rig.control.machine import ControllerReset, MachineFault
-from tbcad.rig.control.plan import ControlPlan, Move
+from tbcad.rig.control.plan import ControllerReset, ControlPlan, MachineFault, Move
 from tbcad.types import Progress
 
 PROGRAM, CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
 
 from tbcad.errors import InputError
-from tbcad.rig.control.machine import MachineFault
+from tbcad.rig.control.plan import MachineFault
 
 if TYPE_CHECKING:
     from serial import Serial

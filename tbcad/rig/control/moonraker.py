@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from tbcad.errors import InputError
-from tbcad.rig.control.machine import MachineFault
+from tbcad.rig.control.plan import MachineFault
 
 PREFIX = "moonraker:"
 KEY = "MOONRAKER_API_KEY"

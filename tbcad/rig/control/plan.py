@@ -8,11 +8,11 @@ import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.errors import InputError
+from tbcad.errors import InputError, one_line
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import DesignRecord
 from tbcad.records.exposure import Frame
@@ -20,6 +20,7 @@ from tbcad.records.prototype import NAME as RECORD
 from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
+from tbcad.types import Progress
 
 PROGRAM = "rotation_plan.nc"
 _MOVE = re.compile(r"G1 ([XA])(-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$")
@@ -44,6 +45,10 @@ TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
 DIRECTION = 3  # the setting that is changed where the base turns against its arrow
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
+PIN_FIRST = (
+    "leave the supply on, for only the motor holds the base: zero pin in first, or the base falls"
+)
+"""What is safe when a machine does not do what it is told."""
 
 
 @dataclass(frozen=True)
@@ -87,14 +92,15 @@ def _program(lines: list[str]) -> Program:
     known = [float(match[1]) for line in angle if (match := _SET.match(line))]
     if not known:
         raise ValueError("it sets no angle")
+    pause = "pause with a message"
     return Program(
-        ready=_message(before[0]),
+        ready=_matched(_PAUSE, before[0], pause)[1],
         known_angle=tuple(angle),
         known_deg=known[0],
         homes=_HOME in angle,
         start=_move(before[-1]),
         stops=_stops(lines[:turn]),
-        turn=_message(lines[turn]),
+        turn=_matched(_PAUSE, lines[turn], pause)[1],
         end=_move([line for line in lines[turn:] if line.startswith("G1 ")][-1]),
     )
 
@@ -111,17 +117,13 @@ def _stops(lines: list[str]) -> dict[int, Move]:
 
 
 def _move(line: str) -> Move:
-    match = _MOVE.match(line)
-    if match is None:
-        raise ValueError(f"{line!r:.40} is no motion of the base")
-    return Move(line, float(match[2]))
+    return Move(line, float(_matched(_MOVE, line, "motion of the base")[2]))
 
 
-def _message(line: str) -> str:
-    match = _PAUSE.match(line)
-    if match is None:
-        raise ValueError(f"{line!r:.40} is no pause with a message")
-    return match[1]
+def _matched(form: re.Pattern[str], line: str, what: str) -> re.Match[str]:
+    if (match := form.match(line)) is None:
+        raise ValueError(f"{line!r:.40} is no {what}")
+    return match
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,11 @@ def read_control_plan(folder: Path) -> ControlPlan:
 def read_settings(path: Path) -> dict[int, float]:
     """Settings of the controller by number, without the direction, which is found by trying."""
     settings: dict[int, float] = {}
-    for number, line in enumerate(_text(path).splitlines(), 1):
+    try:
+        lines = path.read_text(encoding="ascii").splitlines()
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
+    for number, line in enumerate(lines, 1):
         if line.startswith("("):
             continue
         match = _SETTING.match(line)
@@ -194,13 +200,6 @@ def _angles(folder: Path, program: Program) -> dict[int, float]:
     return angles
 
 
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="ascii")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {error}: {REBUILD}") from None
-
-
 def _sha256(path: Path) -> str:
     try:
         with path.open("rb") as file:
@@ -209,3 +208,51 @@ def _sha256(path: Path) -> str:
         raise InputError(f"{path} is not there: {Prototype.MISSING}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}: {REBUILD}") from None
+
+
+class _Fault(Exception):
+    def __init__(self, text: str) -> None:
+        """Keep the text as one line: parts of it come from a controller or a camera."""
+        super().__init__(one_line(text))
+
+
+class MachineFault(_Fault):
+    """The base cannot go on: the run stops here, and can be resumed."""
+
+
+class ControllerReset(MachineFault):
+    """The controller began anew in mid-run: it has forgotten its angle."""
+
+
+class CameraFault(_Fault):
+    """A photograph that was not taken, or cannot be used: the run goes on with the next."""
+
+
+class DrivenMachine(Protocol):
+    """Motions and lights of one machine; all but `secure` raise MachineFault when it fails."""
+
+    switch_s: float  # that it needs for the lights of a photograph
+
+    def connect(self) -> None:
+        """Wait until the controller answers."""
+
+    def check_settings(self, note: Progress, *, send: bool) -> None:
+        """Refuse settings that are not the build's by an InputError, or send and tell them."""
+
+    def home(self) -> None:
+        """Bring the base to a known angle, all lights off."""
+
+    def drive(self, move: Move, settle_s: float = 0.0) -> None:
+        """Drive to a place and rest there."""
+
+    def light(self, output: int, *, on: bool) -> None:
+        """Switch a light; the base is at rest then."""
+
+    def wait(self, seconds: float) -> None:
+        """Let lights that were switched settle."""
+
+    def release(self) -> None:
+        """Close the camera's relay for as long as it needs."""
+
+    def secure(self) -> str:
+        """Hold the base and switch all lights off; return what could not be done, if anything."""

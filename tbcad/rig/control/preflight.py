@@ -16,7 +16,7 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import DARK, DARK_LIT, LIT
 from tbcad.rig.control.camera import Shot
 from tbcad.rig.runs import Image16, decoded_image
-from tbcad.types import Bools, Floats, Progress
+from tbcad.types import Floats, Progress
 
 THRESHOLD = 0.02  # of the largest number: less is no light, as of spots in a calibration
 FULL = 0.99  # likewise: more is saturated, also in a JPEG file
@@ -82,12 +82,11 @@ def preflight(times: dict[str, float | None], shoot: Shoot, where: str, note: Pr
     dark: dict[str, Image16] = {}
     seen: dict[str, Seen] = {}
     for phase, seconds in times.items():
-        image = _image(phase, shoot(phase, seconds))
+        image = _photographed(phase, seconds, shoot)
         if phase in (DARK, DARK_LIT):
             dark[phase] = image
-        seen[phase] = look(
-            phase, image, dark.get(DARK_LIT, dark.get(DARK)) if phase == LIT else dark.get(DARK)
-        )
+        empty = dark.get(DARK)
+        seen[phase] = look(phase, image, dark.get(DARK_LIT, empty) if phase == LIT else empty)
     seen = _leds_together(seen)
     for phase, one in seen.items():
         exposure = "" if times[phase] is None else f" at {times[phase]:g} s"
@@ -106,19 +105,19 @@ def look(phase: str, image: Image16, dark: Image16 | None) -> Seen:
     level = _level(image)
     if phase in (DARK, DARK_LIT):
         peak = float(np.quantile(level, 0.99))
-        return Seen(
-            LightState.STRAY if peak > MOST_STRAY else LightState.GOOD,
-            peak,
-            float((level >= FULL).mean()),
-        )
+        state = LightState.STRAY if peak > MOST_STRAY else LightState.GOOD
+        return Seen(state, peak, float((level >= FULL).mean()))
     bright = (level if dark is None else level - _level(dark)) > THRESHOLD
     if phase == LIT:
         enough = bright.mean() >= LEAST_LIT
         return _judged(level[bright] if enough else np.zeros(0), LIT)
-    return _judged(_peaks(level, bright), "leds")
+    spots, _ = label(bright, np.ones((3, 3)))
+    large = 1 + np.flatnonzero(np.bincount(spots.ravel())[1:] >= LEAST_PIXELS)
+    return _judged(np.asarray(maximum(level, spots, large), dtype=np.float64), "leds")
 
 
-def _image(phase: str, shot: Shot) -> Image16:
+def _photographed(phase: str, seconds: float | None, shoot: Shoot) -> Image16:
+    shot = shoot(phase, seconds)
     return decoded_image(shot.data, f"{phase}{shot.suffix}")
 
 
@@ -127,35 +126,22 @@ def _level(image: Image16) -> Floats:
     return np.asarray(image.max(axis=2) / np.iinfo(image.dtype).max)
 
 
-def _peaks(level: Floats, bright: Bools) -> Floats:
-    """Largest level of each highlight, (n,)."""
-    spots, _ = label(bright, np.ones((3, 3)))
-    sizes = np.bincount(spots.ravel())
-    large = 1 + np.flatnonzero(sizes[1:] >= LEAST_PIXELS)
-    return np.asarray(maximum(level, spots, large), dtype=np.float64)
-
-
 def _judged(levels: Floats, kind: str) -> Seen:
     number = None if kind == LIT else len(levels)
     if not len(levels):
         return Seen(LightState.TOO_DARK, 0.0, 0.0, number)
     peak, saturated = float(np.quantile(levels, BRIGHTEST[kind])), float((levels >= FULL).mean())
-    if saturated > MOST_SATURATED[kind]:
-        return Seen(LightState.SATURATED, peak, saturated, number)
-    return Seen(
-        LightState.GOOD if peak >= LEAST_PEAK else LightState.TOO_DARK, peak, saturated, number
-    )
+    state = LightState.GOOD if peak >= LEAST_PEAK else LightState.TOO_DARK
+    state = LightState.SATURATED if saturated > MOST_SATURATED[kind] else state
+    return Seen(state, peak, saturated, number)
 
 
 def _leds_together(seen: dict[str, Seen]) -> dict[str, Seen]:
     """LEDs share one exposure: one that shows less is good where another shows enough."""
-    enough = any(one.highlights and one.state != LightState.TOO_DARK for one in seen.values())
-    return {
-        phase: replace(one, state=LightState.GOOD)
-        if enough and one.highlights and one.state == LightState.TOO_DARK
-        else one
-        for phase, one in seen.items()
-    }
+    dark = {phase for phase, one in seen.items() if one.state == LightState.TOO_DARK}
+    some = {phase for phase, one in seen.items() if one.highlights}
+    good = dark & some if some - dark else set()
+    return seen | {phase: replace(seen[phase], state=LightState.GOOD) for phase in good}
 
 
 def _worst(seen: dict[str, Seen]) -> list[str]:
@@ -178,7 +164,7 @@ def _right(phase: str, seconds: float | None, seen: Seen, shoot: Shoot) -> float
         if seconds > LONGEST_S:
             return None
         try:
-            seen = look(phase, _image(phase, shoot(phase, seconds)), None)
+            seen = look(phase, _photographed(phase, seconds, shoot), None)
         except InputError:  # the camera has no such exposure
             return None
         if seen.state == LightState.GOOD:

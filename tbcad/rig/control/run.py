@@ -23,10 +23,9 @@ from tbcad.rig.control.chosen_camera import (
 from tbcad.rig.control.grbl import Grbl
 from tbcad.rig.control.klipper import Klipper
 from tbcad.rig.control.klipper_base import KlipperBase, read_klipper_files
-from tbcad.rig.control.machine import DrivenMachine, MachineFault
 from tbcad.rig.control.messages import SerialPort
 from tbcad.rig.control.moonraker import PREFIX, Moonraker, read_address
-from tbcad.rig.control.plan import ControlPlan, read_control_plan
+from tbcad.rig.control.plan import ControlPlan, DrivenMachine, MachineFault, read_control_plan
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,

@@ -16,7 +16,6 @@ from tbcad.rig.control.plan import ControlPlan
 
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?$")
 RUNS = {"a": (0,), "b": (180,), "ab": (0, 180)}
-"""Whether one stop is looked at before a run, and whether the run follows."""
 SIDECAR_BYTES = 8_192  # with the journal's line, as a disk's blocks count them
 SPARE = 1.1  # of disk: a lit object takes more bytes than the dark
 LEAST_BYTES_PER_PX = 0.3  # of a lit object as a JPEG: the first photograph may be a dark one
@@ -118,19 +117,15 @@ def expected_seconds(
 ) -> dict[str, float]:
     """Expected duration of each position, s, by its title."""
     each = plan.motion.light_s + capture_s + WRITE_S
-    return {
-        shots.title: travel + plan.motion.settle_s + len(shots.phases) * each
-        for shots, travel in _with_travel(plan, remaining)
-    }
-
-
-def _with_travel(plan: ControlPlan, remaining: Iterable[Shots]) -> Iterator[tuple[Shots, float]]:
+    seconds = {}
     for _, run in groupby(remaining, lambda shots: shots.frame.object_turn_deg):
         at = plan.program.start.angle_deg
         for shots in run:
-            angle = shots.frame.base_angle_deg
-            yield shots, travel_s(abs(angle - at), plan)
-            at = angle
+            there = shots.frame.base_angle_deg
+            still = plan.motion.settle_s + len(shots.phases) * each
+            seconds[shots.title] = travel_s(abs(there - at), plan) + still
+            at = there
+    return seconds
 
 
 def count(remaining: Iterable[Shots]) -> int:

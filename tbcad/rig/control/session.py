@@ -1,6 +1,5 @@
 """A run from its start, or from where it stopped, to its end."""
 
-from collections.abc import Iterator
 from contextlib import AbstractContextManager, suppress
 from functools import partial
 from itertools import groupby
@@ -10,8 +9,7 @@ from tbcad.errors import InputError
 from tbcad.options.runs import Ask, Preflight, Show
 from tbcad.records.exposure import Frame, exposure_name
 from tbcad.rig.control.camera import RunCamera, Shot
-from tbcad.rig.control.machine import CameraFault, DrivenMachine, MachineFault
-from tbcad.rig.control.plan import ControlPlan
+from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault
 from tbcad.rig.control.selection import (
     Outcome,
     RunSelection,
@@ -84,7 +82,9 @@ class Session:
             self._get_known_angle(_turned(remaining), ask)
         trials = self._trials()
         if resume:
-            self._check_same_run(folder, trials)
+            with faults_refused(str(folder), ": set the camera as it was"):
+                for phase, trial in trials.items():
+                    check_like_record(self._writer.record, phase, trial)
         trial = max(trials.values(), key=lambda one: len(one.shot.data))
         if look != "off" and not resume:
             self._preflight(trial, remaining, ask)
@@ -133,30 +133,28 @@ class Session:
         shots = first[len(first) // 2]
         self._base.drive(self._plan.program.start)
         self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
-        where = f"{trial.model}, {shots.title}"
-        preflight(self._options.capture_times, self._looked_at, where, self._note)
 
-    def _looked_at(self, phase: str, seconds: float | None) -> Shot:
-        with faults_refused(), self._light(phase):
-            return taken_twice(self._camera, self._base, seconds, lambda _: None).shot
+        def look(phase: str, seconds: float | None) -> Shot:
+            with faults_refused(), self._light(phase):
+                return taken_twice(self._camera, self._base, seconds, lambda _: None).shot
+
+        where = f"{trial.model}, {shots.title}"
+        preflight(self._options.capture_times, look, where, self._note)
 
     def _light(self, phase: str) -> AbstractContextManager[None]:
         lights = {one.name: one for one in self._options.phases}
         return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
-    def _check_same_run(self, folder: Path, trials: dict[str, Photograph]) -> None:
-        with faults_refused(str(folder), ": set the camera as it was"):
-            for phase, trial in trials.items():
-                check_like_record(self._writer.record, phase, trial)
-
     def photograph(self, ask: Ask, show: Show) -> None:
         """Home, and photograph what remains; MachineFault or DiskFault: it cannot go on."""
-        for number, (turned, run) in enumerate(self._runs()):
+        left = self._options.left(self._writer.taken)
+        runs = [list(run) for _, run in groupby(left, lambda one: one.frame.object_turn_deg)]
+        for number, run in enumerate(runs):
             if number:
                 self._base.drive(self._plan.program.start)
                 _have_done(ask, self._plan.program.turn)
             elif not self._homed:
-                self._get_known_angle(turned, ask)
+                self._get_known_angle(_turned(run), ask)
             with show({one.title: self._expected[one.title] for one in run}) as screen:
                 self._base.drive(self._plan.program.start)
                 for shots in run:
@@ -164,12 +162,6 @@ class Session:
                     self._position(shots, screen.note)
         if self._expected:
             self._base.drive(self._plan.program.end)
-
-    def _runs(self) -> Iterator[tuple[bool, list[Shots]]]:
-        for turn, run in groupby(
-            self._options.left(self._writer.taken), lambda one: one.frame.object_turn_deg
-        ):
-            yield bool(turn), list(run)
 
     def _get_known_angle(self, turned: bool, ask: Ask) -> None:
         """Have the operator prepare the machine, and home."""

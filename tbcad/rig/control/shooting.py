@@ -19,8 +19,7 @@ from tbcad.rig.control.camera import (
     image_facts,
     shutter_seconds,
 )
-from tbcad.rig.control.machine import CameraFault, DrivenMachine
-from tbcad.rig.control.plan import ControlPlan
+from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine
 from tbcad.rig.control.selection import RunSelection
 
 SHUTTER = "shutterspeed"

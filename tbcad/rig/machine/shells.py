@@ -18,10 +18,15 @@ from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.calibration import NAME, CalibrationRecord
 from tbcad.records.exposure import Frame
 from tbcad.records.run import Geometry
-from tbcad.rig.machine.built import BuiltPrototype, built_camera, draw_other_errors
-from tbcad.rig.machine.designed import TURNS, designed_shell
+from tbcad.rig.machine.designed import (
+    TURNS,
+    BuiltPrototype,
+    built_camera,
+    designed_shell,
+    draw_other_errors,
+)
 from tbcad.rig.machine.machine import Machine
-from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_models, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.sharpness import built_walls
@@ -120,7 +125,8 @@ def random_half(export: ExportedDesign, half: int, errors: Errors, seed: int) ->
     designed, grooves = designed_half(export, half), export.reflectors[half].walls
     maps = warp_maps_of(edge_models(export.reflectors), errors)
     drawn = draw(errors, seed, [0], len(designed.radius), maps, len(grooves))
-    draws = _turned(drawn[half], _flip(half))
+    turned = {name: getattr(drawn[half], name) * _flip(half) for name in VECTORS}
+    draws = replace(drawn[half], **turned)
     leds = draw_other_errors(len(designed.leds), seed).leds * _flip(half)
     other = replace(draw_other_errors(len(designed.leds), seed, half), leds=leds)
     scale, tilt = float(draws.scale.mean()), Rotation.from_rotvec(draws.shell_tilt[0])
@@ -153,10 +159,6 @@ def _seam_and_foot(export: ExportedDesign, half: int) -> GrooveWalls:
     return GrooveWalls.of_planes(
         mirror, np.tile(point, (len(reflector), 1)), np.tile(normal, (len(reflector), 1))
     )
-
-
-def _turned(draws: ShellDraws, flip: Floats) -> ShellDraws:
-    return replace(draws, **{name: getattr(draws, name) * flip for name in VECTORS})
 
 
 def _flip(half: int) -> Floats:

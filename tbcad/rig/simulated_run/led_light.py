@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
-from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.types import Bools, Floats, Ints
 
 NEAR_MM = 0.05  # of the LED: its dome stands in its pocket
@@ -77,8 +77,7 @@ def _placed(folder: Path, part: PrintedPartRecord) -> Floats:
     return np.asarray((corners - part.origin_mm) @ np.array(part.axes).T)
 
 
-@dataclass(frozen=True)
-class LightPoints:
+class LightPoints(NamedTuple):
     """Points of light in a picture, over n of them."""
 
     led: Ints  # that each is of, from 0, (n,)
@@ -91,14 +90,6 @@ class LightPoints:
         """Pixels and areas of one LED."""
         own = self.led == led
         return self.pixel[own], self.area[own]
-
-    def joined(self, other: "LightPoints") -> "LightPoints":
-        """These and others."""
-        return LightPoints(
-            np.concatenate([self.led, other.led]),
-            np.concatenate([self.pixel, other.pixel]),
-            np.concatenate([self.area, other.area]),
-        )
 
 
 def balls_of_frame(built: BuiltPrototype, frame: int) -> Floats:
@@ -127,11 +118,8 @@ def led_light(
     """
     balls = balls_of_frame(built, frame)
     once = _reflected_once(built, balls, turned, occluders, dome)
-    return once.joined(_reflected_twice(built, balls, turned, occluders, (dome, faint)))
-
-
-def _pairs(*counts: int) -> list[Ints]:
-    return [index.ravel() for index in np.indices(counts)]
+    twice = _reflected_twice(built, balls, turned, occluders, (dome, faint))
+    return LightPoints(*(np.concatenate(pair) for pair in zip(once, twice, strict=True)))
 
 
 def _reflected_once(
@@ -139,7 +127,7 @@ def _reflected_once(
 ) -> LightPoints:
     machine = built.machine
     camera = machine.camera
-    ball, led = _pairs(len(balls), len(machine.leds))
+    ball, led = np.indices((len(balls), len(machine.leds))).reshape(2, -1)
     centre, radius, place = balls[ball, :3], balls[ball, 3], machine.leds[led]
     disc = disc_images(camera, centre, radius, place, dome)
     from_place, share = dome_samples(disc.axes)
@@ -179,14 +167,16 @@ def _reflected_twice(
     """Images of images, each a point with the area that it has at normal incidence."""
     dome, faint = dome_and_faint
     camera = built.machine.camera
-    first, last, led = _pairs(len(balls), len(balls), len(built.machine.leds))
+    first, last, led = np.indices((len(balls), len(balls), len(built.machine.leds))).reshape(3, -1)
     place = built.machine.leds[led]
     bright = (first != last) & (_largest_area(camera, balls, first, last, dome) > faint)
     first, last, led, place = first[bright], last[bright], led[bright], place[bright]
     one, two = _path(balls, first, last, place, camera.pinhole)
     area = _area_twice(camera, balls, (first, last), (place, one, two), dome)
     walls = built.walls.of_mirrors(len(balls))
-    shown = (area > faint) & _on_front(balls, first, one, place, two)
+    normal = one - balls[first, :3]
+    shown = (area > faint) & (dot(normal, place - one) > 0) & (dot(normal, two - one) > 0)
+    shown &= norm(one - balls[first, 4:7]) <= balls[first, 7] + ON_BALL_MM  # on its mirror
     shown &= points_within_walls(one, first, walls)
     shown &= _seen(camera, balls, built.walls, two, last)
     shown &= ~balls_between(one, place, balls, walls) & ~balls_between(two, one, balls, walls)
@@ -236,11 +226,3 @@ def _area_twice(
         radius = balls[ball, 3]
         size *= radius / (radius + 2 * norm(end - start))
     return np.asarray(np.pi * (size * camera.focal.mean() / norm(way[2] - camera.pinhole)) ** 2)
-
-
-def _on_front(balls: Floats, ball: Ints, point: Floats, before: Floats, after: Floats) -> Bools:
-    """Which points (n, 3) are on the mirror of their ball, with both ways outside of it."""
-    normal = point - balls[ball, :3]
-    outside = (dot(normal, before - point) > 0) & (dot(normal, after - point) > 0)
-    in_body = norm(point - balls[ball, 4:7]) <= balls[ball, 7] + ON_BALL_MM
-    return np.asarray(outside & in_body)

@@ -29,8 +29,13 @@ from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
 from tbcad.records.run import RECORD, Geometry, RunRecord
-from tbcad.rig.machine.built import BuiltPrototype, designed_build, random_build
-from tbcad.rig.machine.designed import designed_prototype, dome_radius
+from tbcad.rig.machine.designed import (
+    BuiltPrototype,
+    designed_build,
+    designed_prototype,
+    dome_radius,
+    random_build,
+)
 from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene

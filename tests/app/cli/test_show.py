@@ -1,7 +1,9 @@
 """tbcad show from the command line."""
 
+import csv
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,10 +11,13 @@ import webbrowser
 from http.client import HTTPConnection
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import tbcad
 from tbcad.app.cli import run
 from tbcad.output.manifest import REPORT_BEGIN
+from tests.exported_files import contents
 
 
 @pytest.fixture
@@ -96,3 +101,97 @@ def test_a_light_field_is_served_until_ctrl_c(captured: Path) -> None:
         out, error = process.communicate(timeout=60)
     assert (process.returncode, out) == (0, "")
     assert error.splitlines()[1:] == ["ended"]  # after the one stage
+
+
+@pytest.mark.parametrize("target", ["nerfstudio", "colmap", "ngp-rays", "rays"])
+def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str) -> None:
+    export = ["export", str(captured), "--to", target, "--every", "20", "--out"]
+    assert run([*export, str(tmp_path / "one")]) == 0
+    assert run([*export, str(tmp_path / "other")]) == 0
+    assert contents(tmp_path / "one") == contents(tmp_path / "other")
+    assert run([*export, str(tmp_path / "one")]) == 0  # replaced, folders and all
+    assert contents(tmp_path / "one") == contents(tmp_path / "other")
+    listed = json.loads((tmp_path / "one" / "manifest.json").read_text())["files"]
+    assert listed.keys() | {"manifest.json"} == contents(tmp_path / "one").keys()
+
+
+def test_prints_what_is_in_the_record(
+    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export = ["export", str(captured), "--to", "colmap", "--every", "9", "--size", "48"]
+    assert run([*export, "--out", str(tmp_path / "data"), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    record = json.loads((tmp_path / "data" / "dataset.json").read_text())
+    assert printed == record
+    assert record["size_px"] == 48
+    with (tmp_path / "data" / "cameras.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == record["virtual_cameras"]
+    for column, name in (
+        ("rms_mm", "rms_distance_from_common_point_mm"),
+        ("worst_mm", "worst_distance_from_common_point_mm"),
+        ("central_error_mm", "central_error_at_capture_radius_mm"),
+        ("pitch_mm", "pixel_pitch_mm"),
+    ):
+        values = np.array([float(row[column]) for row in rows])
+        figures = record["fit"][name]
+        assert [np.median(values), values.max()] == pytest.approx([*figures.values()], abs=1e-5)
+    assert run([*export, "--out", str(tmp_path / "data")]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{len(rows)} virtual cameras, 48 x 48 pixels each\n")
+    assert f"{record['reprojection_error_px']['median']:.3f} pixels off" in said
+
+
+def test_reprojection_falls_with_the_error_of_the_pinhole(captured: Path, tmp_path: Path) -> None:
+    """A point in the sphere is off by at most the central error, in pixels of the picture."""
+    figures = tbcad.export(captured, "nerfstudio", out=tmp_path / "data", every=5, size=60)
+    most = figures["fit"]["central_error_at_capture_radius_mm"]["max"]
+    errors = figures["reprojection_error_px"]
+    assert 0 < errors["median"] < errors["percentile_95"] < 2 * most  # pixels are 1 mm or so
+    fine = tbcad.export(captured, "nerfstudio", out=tmp_path / "fine", every=5, size=120)
+    ratio = fine["reprojection_error_px"]["median"] / errors["median"]
+    assert ratio == pytest.approx(2, rel=1e-3)
+
+
+def test_real_captures_come_without_the_object(captured: Path, tmp_path: Path) -> None:
+    real = tmp_path / "real"
+    shutil.copytree(captured, real)
+    (real / "object.npz").unlink()
+    figures = tbcad.export(real, "nerfstudio", out=tmp_path / "data", cameras="a", every=10)
+    assert "reprojection_error_px" not in figures
+    names = [path.stem for path in (tmp_path / "data" / "images").iterdir()]
+    assert names
+    assert all(name.startswith("a") for name in names)
+    by_file = tbcad.export(
+        real / "lightfield.h5", "nerfstudio", out=tmp_path / "file", cameras="a", every=10
+    )
+    assert by_file == figures
+
+
+def test_a_capture_is_not_replaced_by_its_export(
+    captured: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(captured.parent)
+    before = contents(captured)
+    for name in (str(captured), "knot/lightfield.h5"):
+        assert run(["export", name, "--to", "rays", "--out", "knot"]) == 2
+        assert "is read by this command" in capsys.readouterr().err
+    assert contents(captured) == before
+
+
+def test_captures_by_the_prototype(export_folder: Path, tmp_path: Path) -> None:
+    """Both write the same kind of light field, in which a mirror may have no pixels."""
+    capture = ["capture", str(export_folder), "--out"]
+    assert run([*capture, str(tmp_path / "balls"), "--prototype"]) == 0
+    assert run([*capture, str(tmp_path / "shell")]) == 0
+    balls, shell = (
+        tbcad.export(tmp_path / name, "colmap", out=tmp_path / f"{name}-data", cameras="a")
+        for name in ("balls", "shell")
+    )
+    assert balls["capture"]["geometry"] == "prototype"
+    expected = shell["virtual_cameras"]
+    assert balls["virtual_cameras"] + len(balls["left_out"]) == expected
+    assert balls["virtual_cameras"] > 0.8 * expected
+    errors, others = (one["fit"]["central_error_at_capture_radius_mm"] for one in (balls, shell))
+    assert 0 < errors["median"] < 2 * others["median"]
+    assert balls["reprojection_error_px"]["median"] < 1

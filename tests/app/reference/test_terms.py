@@ -2,17 +2,24 @@
 
 import csv
 import pkgutil
+import re
 import runpy
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from tbcad.app.reference.entries import glossary
-from tbcad.app.reference.keys import key_sections
+from tbcad.app.reference.keys import ELSEWHERE, design_template, key_sections, unit_of
+from tbcad.core.spec.design import Spec
+from tbcad.core.spec.errors import dotted_fields, section_of
+from tbcad.core.spec.load import PAPER, load_spec, shipped_designs
 
 ROOT = Path(__file__).parents[3]
 TERMS = glossary().terms
 KEYS = {key.name for section in key_sections() for key in section.keys}
+NAMES = list(shipped_designs())
+DESIGN_KEYS = [key for section in key_sections() for key in section.keys]
 
 
 def test_there_are_terms_of_every_subject() -> None:
@@ -55,3 +62,81 @@ def test_pages_are_written_from_the_records(page: str) -> None:
     """If not: python docs/reference.py."""
     pages = runpy.run_path(str(ROOT / "docs" / "reference.py"))["pages"]()
     assert (ROOT / page).read_text(encoding="utf-8") == pages[ROOT / page]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "design.toml"
+
+
+@pytest.mark.parametrize("name", NAMES[:2])
+class TestTemplate:
+    def test_gives_the_design_that_it_begins_from(self, name: str, file: Path) -> None:
+        file.write_text(design_template(name), encoding="utf-8")
+        assert load_spec(file) == load_spec(Path(name))
+
+    def test_gives_the_same_with_every_key_set(self, name: str, file: Path) -> None:
+        """What is a comment is a key and its default."""
+        text = re.sub(r"^# (\w+ = )", r"\1", design_template(name), flags=re.MULTILINE)
+        file.write_text(text, encoding="utf-8")
+        assert load_spec(file) == load_spec(Path(name))
+        assert sum(text.count(f"\n{key.name.rpartition('.')[2]} = ") for key in DESIGN_KEYS) >= len(
+            DESIGN_KEYS
+        )
+
+    def test_tells_all_about_every_key(self, name: str, file: Path) -> None:
+        text = " ".join(re.sub(r"^# ?", "", design_template(name), flags=re.MULTILINE).split())
+        for key in DESIGN_KEYS:
+            assert key.description in text
+            assert f"Allowed: {key.allowed}" in text
+
+    def test_keeps_what_the_design_says(self, name: str, file: Path) -> None:
+        """Every comment, but for where the keys are that it leaves out: here they are all."""
+        template = design_template(name)
+        lines = shipped_designs()[name].read_text(encoding="utf-8").splitlines()
+        assert f"# {ELSEWHERE}" in lines
+        assert ELSEWHERE not in template
+        for line in lines:
+            assert not line.startswith("# ") or line == f"# {ELSEWHERE}" or line in template
+
+
+def test_the_main_keys_are_set() -> None:
+    table = tomllib.loads(design_template())
+    assert table["optics"]["n"] == 18
+    assert set(table["mirrors"]) == {"radius_rule", "margin_mm"}
+    assert load_spec(None) == Spec()
+
+
+def test_names_of_designs_are_those_of_their_files() -> None:
+    assert NAMES[0] == PAPER
+    assert {"afternoon-print", "mukaigawa-flat", "sensor-10mp"} <= set(NAMES)
+
+
+def test_are_all_keys_of_the_models() -> None:
+    known = {name for name, field in dotted_fields(Spec) if section_of(field) is None}
+    assert {key.name for key in DESIGN_KEYS} == known
+
+
+def test_every_section_is_described() -> None:
+    assert all(section.description for section in key_sections())
+
+
+def test_every_key_is_described_and_its_default_is_toml() -> None:
+    for key in DESIGN_KEYS:
+        assert key.description.endswith("."), key
+        assert key.allowed, key
+        assert "a table" not in key.allowed, key
+        assert tomllib.loads(f"x = {key.default}"), key
+
+
+def test_every_key_has_the_unit_of_its_name() -> None:
+    for key in DESIGN_KEYS:
+        last = key.name.rpartition(".")[2].rpartition("_")[2]
+        named = last in {"mm", "deg", "um", "px", "percent", "s", "ma", "v"}
+        assert bool(key.unit) == (named or key.name.endswith(("widths", "g_cm3", "_min", "_s2")))
+
+
+def test_units() -> None:
+    assert unit_of("mirrors.margin_mm") == "mm"
+    assert unit_of("prototype.motion.feed_deg_min") == "degrees per minute"
+    assert unit_of("optics.n") == unit_of("prototype.motion.safety") == ""

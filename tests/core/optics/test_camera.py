@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.rotations import rotated
-from tbcad.core.geometry.vectors import unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics.camera import (
     Camera,
@@ -12,6 +12,10 @@ from tbcad.core.optics.camera import (
     vignetting_slope,
     without_distortion,
 )
+from tbcad.core.optics.led_dome import disc_images, dome_images, dome_samples, sight_axes
+from tbcad.core.optics.reflection import miss_distances, reflected_rays, reflection_points
+from tests.rig.machine.test_machine import MACHINE
+from tests.sphere_misses import sphere_miss_distances
 
 AXIS = unit(np.array([0.3, -0.5, 0.8]))
 CAMERA = LensCamera(
@@ -23,6 +27,10 @@ CAMERA = LensCamera(
     width_px=1280,
     height_px=960,
 )
+ELEVATIONS = np.radians([-50.0, -10.0, 0.0, 20.0, 60.0, 90.0])
+GRID, FINE = 100, 1e-3  # of places across a disc; step of differences
+GRID_PX = 1e-3
+TOWARD = np.stack([np.cos(ELEVATIONS), 0 * ELEVATIONS, np.sin(ELEVATIONS)], axis=1)
 
 
 def test_all_mirrors_of_the_paper_are_in_the_frame(paper_array: MirrorArray) -> None:
@@ -95,3 +103,89 @@ def test_mirrored_camera_sees_the_mirrored_array_alike(paper_array: MirrorArray)
     assert np.linalg.det(
         [camera.right, np.cross(camera.forward, camera.right), camera.forward]
     ) == pytest.approx(1)
+
+
+def test_ray_over_the_apex_passes_the_origin(paper_array: MirrorArray) -> None:
+    """On the seam, where a half is aimed beyond it, the x axis at camera b's side instead."""
+    mirrors, halved = paper_array.mirrors, paper_array.cells.halved
+    pinhole = paper_array.camera.pinhole
+    whole = mirrors.subset(np.flatnonzero(~halved))
+    assert miss_distances(pinhole, whole.apex, whole.normal).max() < 1e-9
+    seam = mirrors.subset(np.flatnonzero(halved))
+    ray = reflected_rays(pinhole, seam.apex, seam.normal)
+    across = unit(np.cross(ray, [1.0, 0.0, 0.0]))
+    assert np.abs(np.einsum("md,md->m", across, seam.apex)).max() < 1e-9
+    away = np.linalg.norm(seam.apex[:, 1:], axis=1) / np.linalg.norm(ray[:, 1:], axis=1)
+    assert (seam.apex[:, 0] + away * ray[:, 0]).max() < 1e-9
+
+
+def test_rays_find_their_points_on_the_spheres(paper_array: MirrorArray) -> None:
+    """Points beside the apices, given and found again by the intersection with the sphere."""
+    mirrors, pinhole = paper_array.mirrors, paper_array.camera.pinhole
+    normal = unit(mirrors.normal + 0.01 * unit(np.random.default_rng(1).normal(size=(847, 3))))
+    point = mirrors.centre + mirrors.radius[:, None] * normal
+    ray = unit(point - pinhole)
+    found = sphere_miss_distances(pinhole, ray, mirrors.centre, mirrors.radius)
+    assert found == pytest.approx(miss_distances(pinhole, point, normal), abs=1e-9)
+
+
+@pytest.mark.parametrize("radius", [1.0, 20.0, 300.0, 5000.0])
+def test_light_of_the_led_is_reflected_to_the_pinhole(radius: float) -> None:
+    """Angles of incidence and of reflection are equal, also on spheres much larger than the rig."""
+    rng = np.random.default_rng(1)
+    pinhole, place = np.array([100.0, 0.0, -100.0]), np.array([5.0, 20.0, -3.0])
+    apex = unit(rng.normal(loc=(0, 0, 1.5), size=(200, 3))) * 150
+    normal = unit(unit(place - apex) + unit(pinhole - apex) + 0.05 * rng.normal(size=(200, 3)))
+    centre = apex - radius * normal
+    point = reflection_points(centre, np.full(200, radius), place, pinhole)
+    assert norm(point - centre) == pytest.approx(np.full(200, radius))
+    to_led, to_pinhole = unit(place - point), unit(pinhole - point)
+    assert norm(np.cross(unit(to_led + to_pinhole), unit(point - centre))).max() < 1e-9
+
+
+def test_samples_have_the_area_and_the_centroid_of_the_lit_half() -> None:
+    axes = sight_axes(TOWARD)
+    points, share = dome_samples(axes)
+    rise = np.sin(ELEVATIONS)
+    assert share.sum(axis=1) == pytest.approx((1 + rise) / 2)
+    centroid = np.einsum("ns,nsx,nax->na", share, points, axes[:, :2]) / share.sum(axis=1)[:, None]
+    assert centroid[:, 0] == pytest.approx(0, abs=1e-12)
+    # Half a disc above half an ellipse: first moments 2/3 and -2/3 sin^2 of areas pi/2 and
+    # pi/2 sin. From below the edge is curved, which samples follow to a hundredth.
+    assert centroid[:, 1] == pytest.approx(4 / (3 * np.pi) * (1 - rise), abs=0.01)
+
+
+def _lit(rise: float) -> np.ndarray:
+    """Places (s, 2) of a fine grid in the lit part of a unit disc."""
+    line = (np.arange(GRID) + 0.5) * 2 / GRID - 1
+    level, above = (one.ravel() for one in np.meshgrid(line, line))
+    lit = (level**2 + above**2 < 1) & (above > -rise * np.sqrt(np.maximum(1 - level**2, 0)))
+    return np.stack([level, above], axis=1)[lit]
+
+
+def test_images_are_those_of_fine_grids() -> None:
+    """Each point with the area of its own image, by differences about it."""
+    frame, sphere, led = (index.ravel() for index in np.indices((2, 3, 2)))
+    centre, radius = MACHINE.centres(frame, sphere), MACHINE.radius[sphere]
+    place, dome = MACHINE.leds[led], 1.5
+    found = dome_images(MACHINE.camera, centre, radius, place, dome)
+    assert found.place == pytest.approx(MACHINE.highlights(frame, sphere, led))
+    discs = disc_images(MACHINE.camera, centre, radius, place, dome)
+    for k, axes in enumerate(discs.axes):
+
+        def image(at: np.ndarray, k: int = k, axes: np.ndarray = axes) -> np.ndarray:
+            light = place[k] + dome * at @ axes[:2]
+            many = np.ones((len(light), 1))
+            point = reflection_points(
+                many * centre[k], radius[k] * many[:, 0], light, MACHINE.camera.pinhole
+            )
+            return MACHINE.camera.project(point) - found.place[k]
+
+        at = _lit(axes[2, 2])
+        slopes = [(image(at + d) - image(at - d)) / (2 * FINE) for d in FINE * np.eye(2)]
+        area = np.abs(np.linalg.det(np.stack(slopes, axis=1)))
+        centroid = area @ image(at) / area.sum()
+        bent = norm(found.centroid[k] - 4 / (3 * np.pi) * (1 - axes[2, 2]) * discs.slope[k, 1])
+        # To second order: an order better than what the second order adds, or than the grid.
+        assert norm(centroid - found.centroid[k]) < 0.1 * bent + GRID_PX
+        assert area.sum() * (2 / GRID) ** 2 == pytest.approx(found.area[k], rel=5e-3)

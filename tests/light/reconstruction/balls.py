@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tbcad.core.optics.geodesic import geodesic
-from tbcad.light.reconstruction.field import Field
-from tbcad.light.reconstruction.grid import Grid
+from tbcad.light.reconstruction.field import Field, Grid
 from tbcad.light.reconstruction.marching import MATT
 from tbcad.light.reconstruction.rays import CapturedRays, entries
 from tbcad.types import Bools, Floats
@@ -38,13 +37,7 @@ def nothing() -> Field:
 def parallel_rays(
     bright: Callable[[Floats], Bools], across: int = 61, capture_mm: float = WIDTH_MM
 ) -> CapturedRays:
-    """Rays of beams from the upper hemisphere, a mirror each.
-
-    Args:
-        bright: whether rays at such distances from the origin, mm, see something.
-        across: rays in a beam's width.
-        capture_mm: diameter of the capture sphere.
-    """
+    """Rays of beams from the upper hemisphere, a mirror each, some bright by their distance."""
     u = geodesic(3)[0]
     u = u[u[:, 2] > 0]
     x, y = (k.ravel() for k in np.meshgrid(*[np.linspace(-1, 1, across) * capture_mm / 2] * 2))

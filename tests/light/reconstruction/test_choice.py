@@ -1,28 +1,50 @@
 """The hull of balls in closed form, and settings that held-out mirrors choose."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import log
 
 import numpy as np
 import pytest
 
+from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
-from tbcad.light.reconstruction import choice
-from tbcad.light.reconstruction.choice import (
+from tbcad.light.reconstruction import fit as choice
+from tbcad.light.reconstruction import fit as fitting
+from tbcad.light.reconstruction import start as starting
+from tbcad.light.reconstruction.field import Field, field_bytes
+from tbcad.light.reconstruction.fit import (
     FACTOR,
     LEVELS,
     chosen,
+    fit,
     held_out,
     held_out_loss,
+    medium_of,
     weighted,
 )
-from tbcad.light.reconstruction.rays import CapturedRays, noise_level
+from tbcad.light.reconstruction.marching import composited
+from tbcad.light.reconstruction.rays import (
+    CapturedRays,
+    captured_rays,
+    noise_level,
+    pixel_areas,
+    pixel_places,
+    with_weights,
+)
 from tbcad.light.reconstruction.start import MOST_DARK, Level, Settings, hull
+from tbcad.light.simulate.capture.light_field import RAY_SIGMAS, CameraFrame, LightField
 from tests.ray_fields import RADIUS, Ball, rays_of
 
 RED = (0.8, 0.2, 0.1)
 RAYS = rays_of([Ball((1, 0, 0), 5, (0.8, 0.4, 0.2))], 2_000)
 BEGUN, HULL = Settings(), hull(RAYS)
+PIXEL_MM = 0.5
+BALL = Ball((1.0, 0.5, -0.5), 5.0, (0.8, 0.4, 0.2))
+TWO = [Ball((-4.0, 0, 0), 2.5, (0.9, 0.1, 0.1)), Ball((4.0, 1, 0), 3.0, (0.1, 0.2, 0.9))]
+SMALL = Settings(levels=(Level(14, 3), Level(28, 5)), batch=400)
+TINY = Settings(levels=(Level(8, 2), Level(12, 2)), batch=500)
 
 
 def hull_of(rays: CapturedRays) -> tuple[np.ndarray, np.ndarray, float]:
@@ -125,3 +147,132 @@ def test_held_out_rays_have_no_part_in_the_trial(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(choice, "fit", watched)
     assert held_out_loss(RAYS, HULL, small) == before
     assert np.array_equal(seen[0], ~held)
+
+
+@pytest.mark.parametrize("area", [False, True])
+@pytest.mark.parametrize("blur_px", [0.45, 2.0])
+@pytest.mark.parametrize("count", [3, 12, 40])
+def test_mean_and_variance(count: int, blur_px: float, area: bool) -> None:
+    places = pixel_places(count, blur_px, area=area).astype(np.float64)
+    assert np.mean(pixel_places(count).astype(np.float64) ** 2) == pytest.approx(1 / 12)
+    assert places.shape[1:] == (count, 2)
+    assert np.abs(places.mean(axis=1)).max() < 1e-6
+    both = (places**2).sum(axis=2).mean(axis=1)
+    assert both == pytest.approx(np.full(len(both), 2 * (area / 12 + blur_px**2)), rel=1e-5)
+    of_both_ways = (places**2).mean(axis=(0, 1))
+    assert of_both_ways[0] == pytest.approx(of_both_ways[1], rel=1e-5)
+
+
+@pytest.fixture
+def parallel() -> LightField:
+    """Rays down, 0.5 mm apart, by three mirrors side by side, each of 4 x 8 pixels."""
+    column, row = np.meshgrid(np.arange(12), np.arange(8))
+    x, y = PIXEL_MM * (column - 5.5), PIXEL_MM * (row - 3.5)
+    planes = {
+        "colour": np.full((8, 12, 3), 100, dtype=np.uint8),
+        "mirror": (column // 4 + 1).astype(np.uint16),
+        "origin": np.stack([x, y, 0 * x + 50], axis=2).astype(np.float32),
+        "direction": np.broadcast_to(np.float32([0, 0, -1]), (8, 12, 3)),
+    }
+    up = np.tile([0.0, 0.0, 1.0], (3, 1))
+    camera = Camera(np.array([0.0, 0, 90]), np.array([0.0, 0, -1]), np.array([1.0, 0, 0]), 12, 8, 1)
+    boxes = np.array([[4 * k, 4 * k + 4, 0, 8] for k in range(3)])
+    frame = CameraFrame(camera, up, Surfaces(50 * up, up, np.zeros(3)), boxes, planes)
+    return LightField({"a": frame}, 60.0, {})
+
+
+def weights(source: LightField, *sigmas: float | None) -> list[float]:
+    """Of one ray of each mirror."""
+    told = replace(source, facts={RAY_SIGMAS: {"a": list(sigmas)}})
+    rays = with_weights(captured_rays(told, footprint=True), told)
+    return [float(rays.weight[rays.mirror == k].mean()) for k in range(3)]
+
+
+def test_the_formula(parallel: LightField) -> None:
+    rays = captured_rays(parallel, footprint=True)
+    assert pixel_areas(rays) == pytest.approx(np.full(len(rays), PIXEL_MM**2), rel=1e-3)
+    found = weights(parallel, 0.0, PIXEL_MM / 12, PIXEL_MM / 2)
+    assert found == pytest.approx([1, 1 / (1 + 6 / 144), 0.4], rel=1e-3)
+    found = weights(parallel, 0.1, None, 0.3)  # what is unknown counts as the worst
+    assert found[1] == pytest.approx(found[2], rel=1e-4)
+
+
+def test_a_pixel_without_neighbours_counts_as_the_others(parallel: LightField) -> None:
+    parallel.frames["a"].planes["mirror"][1:, 4:8] = 0  # leaves a row of the second mirror
+    parallel.frames["a"].planes["mirror"][0, 5:8] = 0
+    found = weights(parallel, PIXEL_MM / 2, PIXEL_MM / 2, PIXEL_MM / 2)
+    assert found == pytest.approx([0.4, 0.4, 0.4], rel=1e-3)
+
+
+def test_nothing_known_changes_nothing(parallel: LightField) -> None:
+    assert weights(parallel, None, None, None) == [1, 1, 1]
+    rays = captured_rays(parallel, footprint=True)
+    assert with_weights(rays, parallel) is rays
+
+
+@pytest.mark.parametrize("sigmas", [[0.1, 0.2], [0.1, 0.2, -1], [0.1, "x", 0.2], 3])
+def test_what_does_not_fit_is_refused(parallel: LightField, sigmas: object) -> None:
+    told = replace(parallel, facts={RAY_SIGMAS: {"a": sigmas}})
+    with pytest.raises(InputError, match="does not fit its mirrors"):
+        with_weights(captured_rays(told, footprint=True), told)
+
+
+def fitted(rays: CapturedRays, settings: Settings = SMALL) -> Field:
+    *_, last = fit(rays, settings)
+    return last.field()
+
+
+def toward(centre: tuple[float, float, float], made: Field, count: int = 200) -> np.ndarray:
+    """Colour, opacity, and distance from a point to where rays toward it end, (n, 5)."""
+    ways = np.random.default_rng(7).normal(size=(count, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    length = 2 * (RADIUS - np.linalg.norm(centre))
+    entry = np.array(centre) - length / 2 * ways
+    single = [a.astype(np.float32) for a in (entry, ways, np.full(count, length))]
+    found = composited(*single, medium_of(made, 0.2))
+    found[:, 4] = length / 2 - found[:, 4]
+    return found
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_ball_is_found_with_its_radius_and_colour(order: int) -> None:
+    made = fitted(rays_of([BALL], 30_000), replace(SMALL, order=order))
+    assert made.order == order
+    found = toward(BALL.centre, made)
+    assert found[:, 3].min() > 0.9
+    assert np.abs(found[:, 4] - BALL.radius).mean() < 0.7 * made.grid.pitch_mm
+    assert np.abs(found[:, :3] - BALL.colour).mean() < 0.02
+
+
+def test_two_balls_are_found_with_nothing_between() -> None:
+    made = fitted(rays_of(TWO, 40_000))
+    for ball in TWO:
+        found = toward(ball.centre, made)
+        assert np.abs(found[:, 4] - ball.radius).mean() < 0.7 * made.grid.pitch_mm
+        assert np.abs(found[:, :3] - ball.colour).mean() < 0.03
+    between = [np.float32([a]) for a in ([0.3, -9, 0], [0, 1, 0], 18)]
+    assert composited(*between, medium_of(made, 0.2))[0, 3] < 0.02
+
+
+def backward(work: Callable[..., object], items: Iterable[object]) -> list[object]:
+    """As `in_threads`, in one thread that does the last item first."""
+    return [work(item) for item in reversed(list(items))][::-1]
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_threads_and_the_order_of_their_work_change_no_bit(
+    monkeypatch: pytest.MonkeyPatch, order: int
+) -> None:
+    settings, found = replace(TINY, order=order), set()
+    for threads in (1, 3):
+        monkeypatch.setattr("tbcad.light.simulate.parallel.THREADS", threads)
+        found.add(field_bytes(fitted(rays_of(TWO, 6_000), settings)))
+    for module in (fitting, starting):
+        monkeypatch.setattr(module, "in_threads", backward)
+    assert found == {field_bytes(fitted(rays_of(TWO, 6_000), settings))}
+
+
+def test_another_seed_is_another_field() -> None:
+    rays = rays_of([BALL], 3_000)
+    seeds = [replace(TINY, seed=seed) for seed in (0, 1)]
+    assert len({field_bytes(fitted(rays, settings)) for settings in seeds}) == 2

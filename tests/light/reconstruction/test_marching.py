@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from tbcad.light.reconstruction.field import Field
+from tbcad.light.reconstruction.field import Field, Grid
 from tbcad.light.reconstruction.fit import medium_of
 from tbcad.light.reconstruction.gradient import (
     CORNER,
@@ -21,7 +21,6 @@ from tbcad.light.reconstruction.gradient import (
     add_gradient,
     unbiased_size,
 )
-from tbcad.light.reconstruction.grid import Grid
 from tbcad.light.reconstruction.marching import (
     GLOSSY,
     LEAST_LIGHT,

@@ -1,5 +1,6 @@
 """Pictures as files, whole or not at all, and how like they are."""
 
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from tbcad.light.simulate.image_files import (
     write_animation,
     write_images,
 )
+from tbcad.light.simulate.parallel import first_then_threads
 from tbcad.light.simulate.views.viewpoints import (
     equivalent_blur_px,
     image_quality,
@@ -115,3 +117,16 @@ def test_equivalent_blur_is_that_of_the_picture(sigma: float) -> None:
     for picture, tolerance in ((blurred, 0.03), (noisy, 0.05)):
         found = equivalent_blur_px(sharp.astype(np.uint8), picture.astype(np.uint8))
         assert found == pytest.approx(sigma, rel=tolerance)
+
+
+def test_the_first_item_is_done_alone_and_results_are_in_order() -> None:
+    done = list[tuple[int, bool]]()
+
+    def work(item: int) -> int:
+        done.append((item, threading.current_thread() is threading.main_thread()))
+        return item**2
+
+    assert first_then_threads(work, range(20)) == [item**2 for item in range(20)]
+    assert first_then_threads(work, []) == []
+    assert done[0] == (0, True)
+    assert not any(on_main for _, on_main in done[1:])

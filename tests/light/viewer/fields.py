@@ -9,11 +9,11 @@ import numpy as np
 from tbcad.light.reconstruction.field import (
     FACT,
     Field,
+    Grid,
     field_file,
     light_field_fingerprint,
     write_field,
 )
-from tbcad.light.reconstruction.grid import Grid
 from tbcad.light.simulate.capture.light_field import LightField
 
 NODES, CAPTURE_MM = 25, 60.0

@@ -1,5 +1,6 @@
 """A calibrated machine as solids: where they are, how large, and what their colours say."""
 
+import csv
 import json
 import re
 import subprocess
@@ -16,7 +17,16 @@ from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.rig.calibrated_solids import colours, deviations, round_up
+from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.rig.calibrated_solids import (
+    as_built_tolerance,
+    colours,
+    deviations,
+    round_up,
+    summary,
+    tolerance_record,
+    tolerance_table,
+)
 from tbcad.rig.machine.machine import Machine, write_machine
 from tests.exported_files import read_csv
 from tests.machine_states import frames_of, machine_of, perturbed
@@ -132,3 +142,58 @@ def test_another_number_of_balls_is_refused(
     with pytest.raises(InputError, match=r"has 4 balls, .* has 5"):
         as_built(known(tmp_path / "known", few, plan), export.folder, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def calibrated(
+    folder: Path, machine: Machine, plan: Plan, export: ExportedDesign, sigma_mm: float
+) -> Path:
+    folder.mkdir()
+    write_machine(folder / "machine.json", machine, frames_of(plan))
+    with (folder / "rays.csv").open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["mirror", "sigma_mm", "sigma_mrad", "pixel_mm"])
+        for reflector in export.reflectors:
+            for number in range(1, len(reflector) + 1):
+                table.writerow([f"{reflector.camera_id}{number:04d}", sigma_mm, 0.3, 0.1])
+    return folder
+
+
+def test_a_designed_machine_covers_what_its_layout_says(
+    export: ExportedDesign, plan: Plan, layout: PrototypeLayout, tmp_path: Path
+) -> None:
+    machine = machine_of(export, plan)
+    calibration = calibrated(tmp_path / "known", machine, plan, export, 0.0)
+    found = as_built_tolerance(calibration, export.folder, builds=3, seed=1)
+    both = np.concatenate([layout.fit.coverage, layout.fit.coverage[np.argsort(layout.twin)]])
+    assert found.coverage == pytest.approx(both, abs=2e-3)
+    assert found.worst == pytest.approx(found.coverage.min())
+    assert not found.absent
+
+
+def test_unknown_rays_cost_coverage(export: ExportedDesign, plan: Plan, tmp_path: Path) -> None:
+    """Twice the largest of m errors in a plane: its median in closed form (J. W. Rayleigh)."""
+    sigma = 1e4  # mm: beside it all mirrors cover alike
+    folder = calibrated(tmp_path / "c", machine_of(export, plan), plan, export, sigma)
+    found, again = (as_built_tolerance(folder, export.folder, builds=200, seed=1) for _ in "ab")
+    assert (found.worst == again.worst).all()
+    largest = sigma * np.sqrt(-np.log(1 - 0.5 ** (1 / len(found.ids))))
+    assert np.median(-found.worst) == pytest.approx(2 * largest, rel=0.05)
+
+
+def test_table_record_and_words(export: ExportedDesign, plan: Plan, tmp_path: Path) -> None:
+    calibration = calibrated(tmp_path / "c", machine_of(export, plan), plan, export, 0.02)
+    found = as_built_tolerance(calibration, export.folder, builds=50, seed=4)
+    assert len(tolerance_table(found).rows) == len(found.ids)
+    record = tolerance_record(found, 50, 4)
+    assert record["share_good"] == found.share
+    assert record["place_mm_median"] == pytest.approx(0.02)
+    assert f"{found.coverage.min():.2f} mm" in summary(found)
+    rays = calibration / "rays.csv"
+    lines = rays.read_text(encoding="utf-8").splitlines()
+    rays.write_text("\n".join([lines[0], *lines[2:]]) + "\n", encoding="utf-8")
+    few = as_built_tolerance(calibration, export.folder, builds=5, seed=1)
+    assert few.absent == ("a0001",)
+    assert "1 mirrors are not calibrated" in summary(few)
+    rays.unlink()
+    with pytest.raises(InputError, match=r"rays\.csv is not there"):
+        as_built_tolerance(calibration, export.folder, builds=5, seed=1)

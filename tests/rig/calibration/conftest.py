@@ -7,7 +7,7 @@ from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.study import designed_setup
-from tbcad.rig.machine.built import BuiltPrototype, random_build
+from tbcad.rig.machine.designed import BuiltPrototype, random_build
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import every_highlight
 

@@ -2,36 +2,62 @@
 
 import json
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array, diags_array
 from scipy.stats import chi2
 
 import tbcad.rig.calibration.run
 from tbcad.app.cli import run as command
 from tbcad.common.screen import WIDTH
 from tbcad.errors import InputError
+from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.prototype.stage.leds import MIN_SEEN
 from tbcad.records.exposure import DARK, exposure_name
-from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
+from tbcad.rig.calibration.calibrate import (
+    Halves,
+    MachineCalibration,
+    Setup,
+    calibrate,
+    cross_validation,
+    prepared_setup,
+)
 from tbcad.rig.calibration.detection.detection import Detection
-from tbcad.rig.calibration.estimate.jacobian import base_slopes
-from tbcad.rig.calibration.estimate.solve import Estimate
-from tbcad.rig.calibration.report.files import write_calibration
+from tbcad.rig.calibration.estimate.jacobian import base_slopes, highlights_with_slopes
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, covariance
+from tbcad.rig.calibration.estimate.solve import Estimate, estimate
+from tbcad.rig.calibration.led_layout import (
+    best_layout,
+    layout_cost,
+    led_room,
+    ray_errors,
+    shell_information,
+    sphere_information,
+    with_partners,
+)
+from tbcad.rig.calibration.priors import shell_prior
 from tbcad.rig.calibration.report.record import rays_table, residuals_table
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
-from tbcad.rig.machine.built import BuiltPrototype
-from tbcad.rig.machine.machine import TRUTH, Machine, read_machine, write_machine
+from tbcad.rig.calibration.run import write_calibration
+from tbcad.rig.calibration.study import whole_errors
+from tbcad.rig.calibration.uncertainty import known_rays
+from tbcad.rig.machine.designed import BuiltPrototype, designed_shell, read_leds
+from tbcad.rig.machine.machine import TRUTH, Highlights, Machine, read_machine, write_machine
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
-from tests.rig.calibration.machines import every_highlight
+from tests.rig.calibration.machines import drawn, every_highlight, small_machine, small_prior
 
 BASIS = (
     *("run", "exports", "export_sha256", "source", "geometry", "camera"),
     *("photographs", "process", "lens", "measured_radii"),
 )
+NOISE_PX, SIGMA_MM = 0.05, 0.025
+BUILDS = 3
 
 
 def _off(found: Estimate, true: Machine) -> np.ndarray:
@@ -206,3 +232,85 @@ def test_refused(
     assert message in error
     assert error.count("\n") == 1
     assert not out.exists()
+
+
+def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: ExportedDesign) -> None:
+    leds = read_leds(export.folder)
+    machine = designed_shell(export.reflectors[0], leds)
+    count = len(machine.radius)
+    every = np.ones((count, len(leds)), dtype=bool)
+    information = sphere_information(machine.camera, machine.centre, machine.radius, leds, every)
+    mm, mrad = ray_errors(information, [*range(len(leds))], NOISE_PX, (SIGMA_MM, SIGMA_MM))
+    prior = shell_prior(machine, process_errors(load_process("sla")))
+    for block, sigma in prior.sigma.items():
+        sigma[:] = SIGMA_MM if block in (Block.CENTRES, Block.RADII) else 0
+    seen = [one.ravel() for one in np.indices((1, count, len(leds)))]
+    values = np.zeros(len(prior.free))
+    _, slopes = highlights_with_slopes(prior, values, *seen)
+    identity = diags_array(np.ones(len(values)))
+    known = covariance(prior, csc_array(slopes.T @ slopes / NOISE_PX**2 + identity))
+    rays = known_rays(prior, values, known, np.zeros(count, dtype=np.int64), np.arange(count))
+    assert mm == pytest.approx(rays.whole.place_mm, rel=1e-6)
+    assert mrad == pytest.approx(rays.whole.turn_mrad, rel=1e-6)
+
+
+def test_best_layout_beats_others_and_keeps_to_the_room(export: ExportedDesign) -> None:
+    room = led_room(export)
+    places = room.places()
+    information = shell_information(export, with_partners(places))
+    best = best_layout(room, places, 4, lambda leds: layout_cost(information, leds))
+    leds = with_partners(places)[best]
+    assert np.sort(leds, axis=0) == pytest.approx(np.sort(leds * [-1, -1, 1], axis=0), abs=1e-9)
+    assert (np.linalg.norm(leds, axis=1) <= room.outer).all()
+    assert (np.hypot(leds[:, 0], leds[:, 1]) >= room.inner - 0.01).all()
+    apart = np.linalg.norm(leds[:, None, :2] - leds[None, :, :2], axis=2)
+    assert apart[np.triu_indices(4, 1)].min() >= room.apart
+    cost = layout_cost(information, best)
+    rng, p = np.random.default_rng(1), len(places)
+    tried = [rng.choice(p, 2, replace=False) for _ in range(30)]
+    fitting = [[*pair, *(pair + p)] for pair in tried if room.fits(places, [pair[0]], pair[1])]
+    assert len(fitting) >= MIN_SEEN
+    assert all(cost <= layout_cost(information, other) for other in fitting)
+
+
+def test_less_noise_and_a_better_process_bound_rays_closer(setup: Setup) -> None:
+    leds = setup.designed.leds
+    usual = np.median(whole_errors(setup, leds, "fdm", 0.1).relative.place_mm)
+    assert np.median(whole_errors(setup, leds, "fdm", 0.05).relative.place_mm) < usual
+    assert np.median(whole_errors(setup, leds, "cnc", 0.1).relative.place_mm) < usual
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return small_prior(small_machine(stops=6))
+
+
+def _halves(prior: Prior, highlights: Highlights) -> tuple[Halves, ...]:
+    frame, sphere = np.zeros(len(prior.mean.radius), dtype=np.int64), np.arange(5)
+    return cross_validation(estimate(prior, highlights), frame, sphere, lambda _: None)
+
+
+def test_halves_differ_by_what_their_covariances_say(prior: Prior) -> None:
+    """Mean squares over several machines: a handful of shared errors make each one vary."""
+    ratios: dict[str, list[float]] = {}
+    for seed in range(BUILDS):
+        for half in _halves(prior, every_highlight(drawn(prior, seed)[1], 50 + seed)):
+            ratios.setdefault(half.by, []).append(half.ratio**2)
+    assert set(ratios) == {"angles", "LEDs"}
+    assert all(0.2 < np.mean(squares) < 3 for squares in ratios.values())
+
+
+def test_halves_that_contradict_each_other_are_seen(prior: Prior) -> None:
+    highlights = every_highlight(drawn(prior, 1)[1], 2)
+    aside = np.where((highlights.frame % 2 == 0)[:, None], [0.0, 0.5], 0.0)
+    wrong = replace(highlights, pixel=highlights.pixel + aside * (highlights.sphere[:, None] % 3))
+    right, found = (_halves(prior, one)[0] for one in (highlights, wrong))
+    assert found.by == "angles"
+    assert found.found_mm > 2 * right.found_mm
+
+
+def test_halves_of_too_few_highlights_are_left_out(prior: Prior) -> None:
+    highlights = every_highlight(drawn(prior, 1)[1], 2)
+    kept = np.flatnonzero(highlights.led == 0)
+    few = Highlights(*(getattr(highlights, one.name)[kept] for one in fields(highlights)))
+    assert [half.by for half in _halves(prior, few)] == ["angles"]

@@ -20,7 +20,7 @@ from tbcad.rig.calibration.report.recovered import (
     recovered_errors,
     turn_mrad,
 )
-from tbcad.rig.machine.built import BuiltPrototype
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import Machine
 from tests.rig.calibration.machines import drawn, every_highlight
 

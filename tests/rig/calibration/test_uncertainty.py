@@ -1,26 +1,54 @@
 """Uncertainties against finite differences, dense algebra, and machines solved again and again."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from tbcad.common.results import study_files
 from tbcad.core.geometry.vectors import dot, perpendicular_axes
+from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.estimate.jacobian import base_slopes
-from tbcad.rig.calibration.estimate.parameters import Prior, covariance
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, covariance
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
+from tbcad.rig.calibration.led_layout import NUMBERS
+from tbcad.rig.calibration.priors import (
+    MEASURED_MM,
+    parse_measured,
+    prototype_prior,
+    shell_prior,
+)
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
+from tbcad.rig.calibration.study import (
+    NOISES_PX,
+    ONE_BALL,
+    PROCESSES,
+    SHARES,
+    calibration_study,
+)
 from tbcad.rig.calibration.uncertainty import (
     SPHERE_MM,
     ray_slopes,
     ray_uncertainty,
     rigid_motions,
 )
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import drawn, every_highlight, small_machine, small_prior
 
 STEP = 1e-3
 FEW, MANY = 10, 100
 MARGIN_PX = 100
+MACHINE = small_machine()
+BALLS = len(MACHINE.radius)
+ERRORS = process_errors(load_process("fdm"))
+CAP, ARM = 2, 9.0
+BODY = MACHINE.centre + np.where(np.arange(BALLS)[:, None] == CAP, [ARM, 0, 0], 0.0)
+SERIES = np.repeat([0, 1], len(MACHINE.angle) // 2)
+UNIFORM = np.sqrt(3)
 
 
 @pytest.fixture(scope="module")
@@ -131,3 +159,76 @@ def test_rays_are_off_by_what_the_covariance_says(prior: Prior) -> None:
     mean = _errors_over_sigmas(prior, FEW).mean()
     low, high = chi2.ppf([0.001, 0.999], 2 * FEW) / (2 * FEW)
     assert low < mean < high
+
+
+@pytest.mark.slow
+def test_every_case_has_figures(export: ExportedDesign) -> None:
+    """More of the best LEDs and less noise bring rays closer."""
+    found = calibration_study(export, lambda _: None)
+    alone, whole, places = found.tables
+    layouts = len(NUMBERS) + 1
+    assert len(alone.rows) == 3 * layouts + 1
+    assert len(whole.rows) == len(NOISES_PX) + len(PROCESSES) - 1 + len(NUMBERS)
+    assert len(places.rows) == sum(NUMBERS) + 4
+    for table in (alone, whole):
+        for unit in ("mm", "mrad"):
+            low, high = (
+                np.array(table.column(f"{unit}_{share}"), dtype=np.float64) for share in SHARES
+            )
+            assert (low > 0).all()
+            assert (low <= high).all()
+    assert ONE_BALL in alone.column("centre and radius")
+    files = study_files(found)
+    assert files["calibration.png"].startswith(b"\x89PNG")
+    records = whole.records()
+    leds = [row["mm_50"] for row in records if row["layout"] == "best"]
+    noises = [row["mm_50"] for row in records if row["layout"] == "design"][: len(NOISES_PX)]
+    assert leds == sorted(leds, reverse=True)
+    assert noises == sorted(noises)
+
+
+def prior_of(**known: Any) -> Prior:
+    return prototype_prior(MACHINE, ERRORS, BODY, np.arange(BALLS) == CAP, SERIES, 0.01, **known)
+
+
+def test_figures_are_those_of_the_process() -> None:
+    sigma = prior_of().sigma
+    assert sigma[Block.CENTRES][0] == pytest.approx(np.full(3, ERRORS.seat.spread))
+    tilted = np.hypot(ERRORS.seat.spread, ARM * ERRORS.cap_tilt.spread / UNIFORM)
+    assert sigma[Block.CENTRES][CAP] == pytest.approx(np.full(3, tilted))
+    assert sigma[Block.RADII][CAP] == pytest.approx(ERRORS.whole_radius.spread)
+    assert sigma[Block.RADII][0] == pytest.approx(ERRORS.ball_radius.spread / UNIFORM)
+    assert sigma[Block.ANGLES] == pytest.approx(
+        np.full(len(MACHINE.angle), ERRORS.rotation_angle.spread)
+    )
+    assert sigma[Block.RUNOUT].shape == (len(MACHINE.angle), 2)
+    expected = np.hypot(0.01 / UNIFORM, ERRORS.rotation_angle.spread)
+    assert sigma[Block.OFFSET] == pytest.approx(np.full(2, expected))
+
+
+def test_a_measured_radius_replaces_the_drawing() -> None:
+    parsed = parse_measured(("1=43.2", "2 = 34.61:0.005"), 5)
+    assert parsed == ((0, 43.2, MEASURED_MM), (1, 34.61, 0.005))
+    prior = prior_of(measured=((CAP, 17.61, 0.004),))
+    assert (prior.mean.radius[CAP], prior.sigma[Block.RADII][CAP]) == (17.61, 0.004)
+    assert np.delete(prior.mean.radius, CAP) == pytest.approx(np.delete(MACHINE.radius, CAP))
+    assert MACHINE.radius[CAP] != 17.61
+
+
+@pytest.mark.parametrize("of_shell", [False, True])
+def test_a_known_lens_is_fixed(of_shell: bool) -> None:
+    still = replace(MACHINE, angle=np.zeros(1))
+    known = shell_prior(still, ERRORS, lens_known=True) if of_shell else prior_of(lens_known=True)
+    for block in (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION):
+        assert not known.sigma[block].any()
+
+
+FORM = ("", "1", "1=", "1=-4", "a=4", "1=4:", "1=4.3.2", "1=nan")
+VALUE = ("0=4", "6=4", "1=0", "1=4:0")
+
+
+@pytest.mark.parametrize("text", [*FORM, *VALUE])
+def test_wrong_texts_are_refused(text: str) -> None:
+    says = "is not BALL=RADIUS_MM" if text in FORM else "allowed is ball 1 to 5"
+    with pytest.raises(InputError, match=says):
+        parse_measured((text,), 5)

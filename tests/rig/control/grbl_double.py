@@ -47,19 +47,12 @@ Fault = Callable[[int, str], str | None]
 
 @dataclass
 class Machine:
-    """What the controller moves and switches.
+    """What the controller moves and switches."""
 
-    Attributes:
-        angle: of the base, degrees, as it truly is.
-        lights: outputs that are on.
-        relay: whether the camera's release is closed.
-        let_go: how often the motor let go of the base.
-    """
-
-    angle: float
-    lights: set[int] = field(default_factory=set)
-    relay: bool = False
-    let_go: int = 0
+    angle: float  # of the base, degrees, as it truly is
+    lights: set[int] = field(default_factory=set)  # outputs that are on
+    relay: bool = False  # whether the camera's release is closed
+    let_go: int = 0  # how often the motor let go of the base
 
 
 class Double:
@@ -71,12 +64,9 @@ class Double:
         angle: float = 3.7,
         see: Callable[[Machine], None] = lambda _: None,
     ) -> None:
-        """Control a machine whose switch is at an angle.
+        """Control a machine whose home switch and base are at angles, degrees.
 
-        Args:
-            switch_deg: angle at which the home switch is pressed.
-            angle: of the base at the start, degrees.
-            see: shown the machine whenever it rests and a line is done.
+        It is shown to `see` whenever it rests and a line is done.
         """
         self.speed, self._since, self._until_then = SPEED, monotonic(), 0.0
         self.switch_deg, self.see = switch_deg, see

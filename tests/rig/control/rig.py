@@ -52,17 +52,11 @@ def put(path: Path, data: bytes) -> None:
 
 @dataclass
 class Rig:
-    """A controller, and a picture of what it shows.
+    """A controller, and a picture of what it shows."""
 
-    Attributes:
-        controller: on a pseudo-terminal; or a port of loopback.
-        export: that describes the machine.
-        folder: for pictures and runs.
-    """
-
-    controller: Any
-    export: Path
-    folder: Path
+    controller: Any  # on a pseudo-terminal; or a port of loopback
+    export: Path  # that describes the machine
+    folder: Path  # for pictures and runs
 
     @property
     def picture(self) -> Path:

@@ -6,8 +6,8 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.rig.control.grbl import SYNC, Grbl
-from tbcad.rig.control.machine import MachineFault
 from tbcad.rig.control.messages import SerialPort, Status, parse
+from tbcad.rig.control.plan import MachineFault
 from tests.rig.control.grbl_double import PLANNER, GrblDouble
 from tests.rig.control.rig import until
 

@@ -15,7 +15,7 @@ from tbcad.errors import InputError
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.camera import EXIF, EXPOSURE, ImageFacts, Shot
 from tbcad.rig.control.chosen_camera import CommandCamera
-from tbcad.rig.control.machine import CameraFault
+from tbcad.rig.control.plan import CameraFault
 from tbcad.rig.control.preflight import look, preflight
 from tbcad.rig.control.shooting import Photograph, common_settings, take
 from tbcad.rig.runs import read_run

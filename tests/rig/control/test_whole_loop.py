@@ -106,10 +106,8 @@ def test_the_camera_gives_what_was_before_it(loop: Loop) -> None:
     assert not given.faults
     assert given.exposures.keys() == seen.exposures.keys()
     for name, exposure in given.exposures.items():
-        before, after = (
-            read_photograph(seen, seen.exposures[name]),
-            read_photograph(given, exposure),
-        )
+        before = read_photograph(seen, seen.exposures[name])
+        after = read_photograph(given, exposure)
         assert np.abs(after.astype(int) - before).max() <= ROUNDING, name
 
 

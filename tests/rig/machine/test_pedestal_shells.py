@@ -13,8 +13,7 @@ from tbcad.light.simulate.prototype.merge import merge_plan, merged_pixels
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
-from tbcad.rig.machine.built import BuiltPrototype
-from tbcad.rig.machine.designed import machine_run
+from tbcad.rig.machine.designed import BuiltPrototype, machine_run
 from tbcad.rig.machine.shells import (
     designed_half,
     perfect_half,

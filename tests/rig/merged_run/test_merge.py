@@ -79,11 +79,9 @@ class Setting:
 
 @pytest.fixture(scope="module")
 def whole(export: ExportedDesign, plan: Plan) -> Setting:
-    scene, frames, machine = (
-        prepared_scene(built_in_object(CAPTURE_MM)),
-        frames_of(plan),
-        machine_of(export, plan),
-    )
+    scene = prepared_scene(built_in_object(CAPTURE_MM))
+    frames = frames_of(plan)
+    machine = machine_of(export, plan)
     perfect = photographs_of(export, plan, machine, frames, scene)
     runs = prototype_runs(export.reflectors, plan)
     bands = ((ball_reflector(run), merge_run(run, scene)) for run in runs)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command
-from tbcad.app.cli.output_mode import Full, Json, Quiet, output_mode, print_json
+from tbcad.app.cli.app import Full, Json, Quiet, app, command, output_mode, print_json
 from tbcad.common.screen import report_console, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import BuildOptions, ReportOptions, VerificationOptions

@@ -3,18 +3,20 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command
-from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.app.cli.app import command, print_json, print_result
+from tbcad.app.cli.endings import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
-from tbcad.options.captures import CaptureOptions, ExportOptions, Geometry
+from tbcad.options.captures import CaptureOptions, ExportOptions, Geometry, ReconstructOptions
 from tbcad.options.shared import JsonResult
 
 CAPTURES, BUILT_IN = Path("captures"), "knot"
+if TYPE_CHECKING:
+    from tbcad.app.api.reconstructions import Reconstructed
 
 
 @command()
@@ -75,7 +77,6 @@ WRITTEN = {
     "rays": "rays.npz and rays.h5 with origin, direction, colour and camera of every ray",
     "mitsuba": "camera_a.xml, camera_b.xml and blender.py with their meshes",
 }
-
 NOTES = {
     "rms_distance_from_common_point_mm": " RMS",
     "central_error_at_capture_radius_mm": " at the ends of the capture sphere",
@@ -96,14 +97,11 @@ def export(options: ExportOptions, json: JsonResult = False) -> int:
         record = exported(options.on(screen))
     figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
     files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
-    lines = _scene_lines(record) if to == "mitsuba" else _lines(record)
+    facets = record.get("facets", {})  # of a scene
+    scene = [f"{part}: {count} facets" for part, count in facets.items()]
+    lines = scene if to == "mitsuba" else _lines(record)
     print_result(record, [*lines, files], json)
     return 0
-
-
-def _scene_lines(record: dict[str, Any]) -> Iterator[str]:
-    for part, count in record["facets"].items():
-        yield f"{part}: {count} facets"
 
 
 def _lines(record: dict[str, Any]) -> Iterator[str]:
@@ -126,3 +124,71 @@ def _lines(record: dict[str, Any]) -> Iterator[str]:
             f"points of the object appear {errors['median']:.3f} pixels off (median), "
             f"{errors['percentile_95']:.3f} (95 %)"
         )
+
+
+@command()
+def reconstruct(
+    options: ReconstructOptions,
+    all_frames: Annotated[
+        bool,
+        typer.Option(
+            "--all-frames",
+            help="All frames, one after the other, each started from the one before; the number of "
+            "the frame is added to the names of files.",
+        ),
+    ] = False,
+    json: JsonResult = False,
+) -> int:
+    """Reconstruct one object from all rays of a light field, as a field of density and colour.
+
+    The field is fitted to all photographed rays, from a coarse grid to a fine one. Views of it are
+    sharper than those of the light field alone; they are the default where it lies beside it.
+    """
+    if options.frame is not None and all_frames:
+        raise InputError("--frame and --all-frames exclude each other: leave one out")
+    from tbcad.app.api.reconstructions import checked_frames, expected_seconds, part_of
+    from tbcad.app.api.reconstructions import reconstruct_files as reconstructed
+
+    asked = replace(options, frame="all") if all_frames else options
+    numbers = checked_frames(asked)
+    try:
+        with stages(expected_seconds(asked, numbers)) as screen:
+            done = reconstructed(asked.on(screen))
+    except KeyboardInterrupt:
+        parts = [str(part) for n in numbers if (part := part_of(asked, n)).exists()]
+        if not parts:
+            raise
+        kept = f"{parts[0]} keeps what is done: go on with the same options and --resume"
+        raise Stopped(kept) from None
+    record = {"schema": "tbcad-reconstruct/1", "fields": [one.record() for one in done]}
+    print_result(record, (line for one in done for line in _reconstruction_lines(one)), json)
+    return 0
+
+
+def _reconstruction_lines(one: "Reconstructed") -> Iterator[str]:
+    """The verdict first."""
+    facts: dict[str, Any] = one.field.facts
+    chosen = facts["chosen"]
+    out = facts["mirrors_left_out"]
+    verdict = "no mirror was left out to judge the field by"
+    if out:
+        verdict = f"PSNR {facts['psnr_left_out_db']:.2f} dB on {out} mirrors that were left out"
+    yield f"{verdict}, of {facts['rays']} rays"
+    several = "1 ray" if facts["rays_a_pixel"] == 1 else f"{facts['rays_a_pixel']} rays"
+    yield (
+        f"view dependence of order {chosen['order']}, total variation "
+        f"{chosen['smooth_density']:g}, smoothness of colours {chosen['smooth_colour']:g}, "
+        f"sparsity {chosen['sparse']:g}; {several} a pixel"
+    )
+    yield f"{100 * facts['unexplained_light']:.2g} % of the light is outside of the hull"
+    grids = ", ".join(str(level["nodes"]) for level in chosen["levels"])
+    word = "was there already" if one.kept else "written"
+    yield f"{one.file}: {word}, {facts['node_count']} nodes on grids of {grids} along an edge"
+    for file, known in one.meshes.items():
+        yield f"{file}: {known['triangles']} triangles"
+        if "mean_mm" in known:
+            yield (
+                f"  from the true object: mean {known['mean_mm']:.3f} mm, 95 % within "
+                f"{known['percentile_95_mm']:.3f} mm, at most {known['hausdorff_mm']:.2f} mm, "
+                "where rays see it"
+            )

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import app
-from tbcad.app.cli.output_mode import print_result
+from tbcad.app.cli.app import app, print_result
 from tbcad.common.screen import WIDTH
 
 if TYPE_CHECKING:

@@ -1,13 +1,17 @@
 """The built machine: simulated, calibrated, merged, drawn."""
 
+import shlex
+import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command
-from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.app.cli.app import command, print_json, print_result
 from tbcad.common.screen import paragraph, stages
+from tbcad.errors import InputError
 from tbcad.options.machines import (
     AsBuiltOptions,
     CalibrateOptions,
@@ -15,13 +19,18 @@ from tbcad.options.machines import (
     MergeOptions,
     SimulateRunOptions,
 )
-from tbcad.options.shared import JsonResult
+from tbcad.options.runs import Preflight, RunOptions
+from tbcad.options.shared import JsonResult, exposures
 
 if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
-
 FAILED = 1  # exit code of a calibration that is not good enough
 FEW_NAMES = 6  # of missing mirrors in a line
+NOT_WHOLE = {
+    "photographs_not_used": "photographs not used",
+    "without_dark": "without a dark photograph of their exposure",
+    "dark_scaled": "whose dark photograph was exposed otherwise, and is scaled",
+}
 
 
 @command("simulate-run")
@@ -151,20 +160,11 @@ def _merge_lines(record: dict[str, Any]) -> list[str]:
         )
         for reason, names in half["mirrors_missing"].items():
             lines.append(f"  {len(names)} missing ({_few(names)}): {reason}")
-        unused = half["photographs_not_used"]
-        if unused:
-            lines.append(f"  {len(unused)} photographs not used: {_few(list(unused))}")
-        if half["without_dark"]:
-            names = half["without_dark"]
-            lines.append(
-                f"  {len(names)} without a dark photograph of their exposure: {_few(names)}"
-            )
-        if half["dark_scaled"]:
-            names = half["dark_scaled"]
-            lines.append(
-                f"  {len(names)} whose dark photograph was exposed otherwise, and is scaled: "
-                f"{_few(names)}"
-            )
+        lines += [
+            f"  {len(names)} {what}: {_few(list(names))}"
+            for key, what in NOT_WHOLE.items()
+            if (names := half[key])
+        ]
     return lines
 
 
@@ -184,12 +184,95 @@ def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
 
     with stages(1) as screen:
         record = written(options.on(screen))
-    if json:
-        print_json(record)
-        return 0
-    typer.echo(
+    lines = (
         f"{record['balls']} balls: centres off by {record['median_um']:.0f} micrometres (median), "
-        f"{record['largest_um']:.0f} at most"
+        f"{record['largest_um']:.0f} at most",
+        f"{options.out}: as_built.step, deviations.csv, legend.png, as_built.json",
     )
-    typer.echo(f"{options.out}: as_built.step, deviations.csv, legend.png, as_built.json")
+    print_result(record, lines, json)
     return 0
+
+
+@command()
+def run(
+    options: RunOptions,
+    no_preflight: Annotated[
+        bool,
+        typer.Option(
+            "--no-preflight",
+            help="Begin at once, without a look at one stop under each light for saturated and "
+            "dark photographs.",
+        ),
+    ] = False,
+    preflight_only: Annotated[
+        bool, typer.Option("--preflight-only", help="That look alone; nothing is kept.")
+    ] = False,
+    yes: Annotated[
+        bool,
+        typer.Option(
+            "--yes", "-y", help="Ask nothing: pin out and object turned are taken for granted."
+        ),
+    ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="Print what would be done, without controller and camera."),
+    ] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="With --dry-run: print it as JSON, all positions.")
+    ] = False,
+) -> int:
+    """Drive the prototype through its stops, switch its lights, and photograph it.
+
+    At each stop: one photograph in the dark, one by each LED, one of the lit object. Exit code 0:
+    all photographs are there. 1: some are missing, or the run stopped; --resume goes on. 2: bad
+    input, or the preflight finds an exposure that will not do.
+    """
+    options.size(), exposures(options.exposure_leds_s, options.exposure_lit_s)  # refused first
+    if preflight_only and (no_preflight or options.resume):
+        other = "--resume" if options.resume else "--no-preflight"
+        raise InputError(f"--preflight-only goes without {other}: leave one of both out")
+    if dry_run:
+        from tbcad.rig.control.run import dry_run as planned
+        from tbcad.rig.control.selection import dry_run_lines, dry_run_record
+
+        found = planned(options)
+        if json:
+            print_json(dry_run_record(found))
+        for line in dry_run_lines(found) if not json else ():
+            typer.echo(line)
+        return 0
+    if json:
+        raise InputError("--json is about --dry-run: leave it out, or add --dry-run")
+    if options.port and not yes and not sys.stdin.isatty():
+        raise InputError(
+            "nobody can be asked to turn the object, for the input is no terminal: say --yes if "
+            "the machine is ready"
+        )
+    from tbcad.app.api import run as photograph
+    from tbcad.rig.control.selection import outcome_lines, preflight_lines
+
+    look: Preflight = "only" if preflight_only else "off" if no_preflight else "first"
+    outcome = photograph(
+        replace(options, preflight=look, ask=partial(_asked, yes), show=stages, progress=_note)
+    )
+    words = ["tbcad", "run", options.exports, "--port", options.port, "--camera", options.camera]
+    resuming = shlex.join(map(str, [*words, "--out", options.out, "--resume"]))
+    lines = preflight_lines(outcome) if preflight_only else outcome_lines(outcome, resuming)
+    for line in lines:
+        typer.echo(line)
+    return 0 if outcome.complete else 1
+
+
+def _asked(yes: bool, question: str) -> bool:
+    """Ask the operator, unless all is taken for granted; end of input is a no."""
+    if yes:
+        _note(f"{question}: taken for granted")
+        return True
+    try:
+        return typer.confirm(f"{question}: done?", default=True, err=True)
+    except typer.Abort:
+        return False
+
+
+def _note(text: str) -> None:
+    typer.echo(text, err=True)

@@ -50,8 +50,7 @@ def viewpoint_of(
 ) -> "Camera":
     """The camera of a view: azimuth and elevation in degrees, distance in mm; columns and rows.
 
-    Raises:
-        InputError: no light field shows what it would see, or its angle of view cannot be.
+    InputError: no light field shows what it would see, or its angle of view cannot be.
     """
     from math import radians
 

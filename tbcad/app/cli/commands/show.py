@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
-from tbcad.app.cli.app import app
-from tbcad.app.cli.output_mode import print_json
+from tbcad.app.cli.app import app, print_json
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.checks import DESIGN_FILE, FIELD_FILE, LIGHT_FIELD_FILE

@@ -229,8 +229,7 @@ def _check_light(
 def _choice(method: str | None, surface: Surface | None) -> _Choice:
     """What is wanted: a blend at the depth that is found, if nothing is said and found.
 
-    Raises:
-        InputError: method and surface exclude each other.
+    InputError: method and surface exclude each other.
     """
     if method in ("nearest", "field") and surface is not None:
         raise InputError(f"--method {method} asks for no surface: leave out --surface {surface}")

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command
-from tbcad.app.cli.output_mode import print_json, print_result
+from tbcad.app.cli.app import app, command, print_json, print_result
 from tbcad.common.screen import stages
 from tbcad.options.builds import OrderOptions
 from tbcad.options.checks import check_is_export, check_is_folder
@@ -42,7 +41,7 @@ def camera(
 
     Exit code 0: some camera of the lists does. 1: none does. 2: bad input.
     """
-    from tbcad.core.camera.catalogue import load_cameras, load_lenses
+    from tbcad.core.camera.sheet import load_cameras, load_lenses
     from tbcad.core.spec.load import load_spec
 
     options = list(settings or []) + ([f"optics.n={n}"] if n is not None else [])

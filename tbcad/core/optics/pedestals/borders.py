@@ -128,10 +128,8 @@ def _sag(flat: Cells, mirrors: Surfaces, corner: Ints, point: Floats, down: Floa
     """Distance (c,) from planar mirrors' corners down to the lowest mirror; or not finite."""
     triangle, column = np.nonzero(flat.triangles < flat.mirrors)
     mirror, at = flat.triangles[triangle, column], corner[triangle]
-    value, slope = (
-        mirrors.value(mirror, point[at]),
-        dot(down[at], mirrors.gradient(mirror, point[at])),
-    )
+    value = mirrors.value(mirror, point[at])
+    slope = dot(down[at], mirrors.gradient(mirror, point[at]))
     lowest = np.zeros(len(point))
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(slope**2 - 2 * mirrors.curvature[mirror] * value)

@@ -47,9 +47,8 @@ def write_camera(
 ) -> tuple[Bytes, dict[str, int]]:
     """Write one camera's bands as they come, each a row of chunks.
 
-    Returns:
-        Its picture (h, w, 3), and how many of its pixels are on mirrors, and of those how many
-        rays meet the capture sphere.
+    Returns its picture (h, w, 3), and how many of its pixels are on mirrors, and of those how many
+    rays meet the capture sphere.
     """
     camera, group = reflector.camera, store.create_group(reflector.camera_id)
     group.attrs["pinhole_mm"] = camera.pinhole

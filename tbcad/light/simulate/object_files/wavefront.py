@@ -163,20 +163,18 @@ def _coloured(
 def _materials(path: Path, libraries: list[str], notes: list[str]) -> dict[str, _Material] | None:
     """Materials by name; None where the file names no file of them that is there."""
     found = dict[str, _Material]()
-    files = 0
+    files = list[Path]()
     for names in libraries:
         try:
-            files_named = [file_beside(path, names)]
+            files.append(file_beside(path, names))
         except InputError:
-            files_named = []
             for name in names.split():
                 try:
-                    files_named.append(file_beside(path, name))
+                    files.append(file_beside(path, name))
                 except InputError as error:
                     notes.append(f"its materials {error}")
-        for file in files_named:
-            files += 1
-            _read_materials(file, found, notes)
+    for file in files:
+        _read_materials(file, found, notes)
     return found if files else None
 
 

@@ -26,8 +26,7 @@ ON_BALL_MM = 1e-6
 # What lies beyond the outermost pixels' centres by no more than rounding is on them.
 EDGE_PX = 1e-6
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-WallTable: TypeAlias = tuple[Ints, Floats]
-"""Of `GrooveWalls.of_mirrors`."""
+WallTable: TypeAlias = tuple[Ints, Floats]  # of `GrooveWalls.of_mirrors`
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,7 @@ from tbcad.light.simulate.scene.rays import Shift, TracedRays, exact_tracer, pix
 from tbcad.light.simulate.scene.reflector import MARGIN_PX
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
-NO_BALL = -1
-"""In place of a ball's number: what is on no mirror is shown by no ball."""
+NO_BALL = -1  # in place of a ball's number: what is on no mirror is shown by no ball
 
 
 class StopPhotographs(Protocol):
@@ -122,10 +121,9 @@ def merged_pixels(
 ) -> tuple[Ints, BallHits, Bools, Floats]:
     """The n pixels of a band, each rotated with its mirror's window.
 
-    Returns:
-        The mirror that each belongs to, from 1, 0 for none, (n,); what it meets, where only the
-        ball in place of its mirror is a ball; whether the object itself is in front of that, (n,);
-        and the rotated unit directions, (n, 3).
+    Returns the mirror that each belongs to, from 1, 0 for none, (n,); what it meets, where only the
+    ball in place of its mirror is a ball; whether the object itself is in front of that, (n,); and
+    the rotated unit directions, (n, 3).
     """
     run = plan.run
     mirror = plan.trace_shell(rows, shift).mirror.ravel().astype(np.int64)

@@ -96,10 +96,8 @@ class RectangularLamps:
 
     def tiles(self) -> tuple[Floats, Floats]:
         """Middles (t, 3) of the tiles of all faces, and the directions that they face, (t, 3)."""
-        across, along = (
-            ((np.arange(count) + 0.5) / count - 0.5) * size
-            for count, size in zip(TILES, (self.width, self.length), strict=True)
-        )
+        sides = zip(TILES, (self.width, self.length), strict=True)
+        across, along = (((np.arange(n) + 0.5) / n - 0.5) * size for n, size in sides)
         x, z = (values.ravel() for values in np.meshgrid(across, along, indexing="ij"))
         side = np.cross(UP, self.inward)
         middles = self.places[:, None] + x[:, None] * side[:, None] + z[:, None] * UP

@@ -124,21 +124,14 @@ def load_object(
 
 @dataclass(frozen=True)
 class _Mesh:
-    """All parts as one mesh that can be shaded: facets have area, corners a normal.
+    """All parts as one mesh that can be shaded: facets have area, corners a normal."""
 
-    Attributes:
-        points, faces, normals: as of SceneObject.
-        part: of each facet, (f,).
-        kept: number of each facet in its part, (f,).
-        turned: whether its corners go the other way than in its part, (f,).
-    """
-
-    points: Floats
+    points: Floats  # as of SceneObject
     faces: Ints
     normals: Floats
-    part: Ints
-    kept: Ints
-    turned: Any
+    part: Ints  # of each facet, (f,)
+    kept: Ints  # number of each facet in its part, (f,)
+    turned: Any  # whether its corners go the other way than in its part, (f,)
 
     @classmethod
     def of(cls, path: Path, parts: Sequence[ObjectPart]) -> "_Mesh":

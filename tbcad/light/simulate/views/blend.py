@@ -33,8 +33,7 @@ LEAST_EXPONENT = 12.0
 
 Point = tuple[float, float, float]
 """Across, across, mm, and along the direction of the view, over s."""
-Sum = tuple[float, float, float, float]
-"""Red, green, blue, each by its weight, and the weights."""
+Sum = tuple[float, float, float, float]  # red, green, blue, each by its weight, and the weights
 NOTHING = (0.0, 0.0, 0.0, 0.0)
 # docs/decisions/0006: of 3 to 10 the best in PSNR and SSIM for the time they take.
 CAMERAS = 6

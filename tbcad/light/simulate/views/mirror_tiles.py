@@ -91,8 +91,7 @@ def _widths(apex: Floats) -> Floats:
 def mirror_pixels(frame: CameraFrame, index: int) -> tuple[Bools, list[NDArray[Any]]] | None:
     """The smallest rectangle with all pixels of a mirror; None where it has none.
 
-    Returns:
-        Which are of the mirror, (h, w); and colours, origins and directions, (h, w, 3) each.
+    Which are of the mirror, (h, w); and colours, origins and directions, (h, w, 3) each.
     """
     x0, x1, y0, y1 = frame.boxes[index].tolist()
     pixels = frame.read(slice(y0, y1), slice(x0, x1))

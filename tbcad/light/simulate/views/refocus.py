@@ -200,9 +200,8 @@ def lens_picture(
     Each of a pixel's rays is through another point of the lens and of the pixel.
     """
     total = np.zeros((view.height_px, view.width_px, 3), dtype=np.float32)
-    for k, (point, shift) in enumerate(
-        zip(disc_points(samples), pixel_points(samples), strict=True)
-    ):
+    points = zip(disc_points(samples), pixel_points(samples), strict=True)
+    for k, (point, shift) in enumerate(points):
         progress(f"ray {k + 1} of {samples}")
         rays = lens_rays(view, focus, point * focus.aperture_mm / 2, shift)
         colours = colours_along(scene, *(part.reshape(-1, 3) for part in rays))

@@ -31,8 +31,7 @@ BLOCK_PX = 8
 RAYS_PER_BOX = 1024
 
 Method = Literal["nearest", "blend"]
-Rays = tuple[Floats, Floats]
-"""Origins and unit directions, (n, 3) each."""
+Rays = tuple[Floats, Floats]  # origins and unit directions, (n, 3) each
 DepthFunction = Callable[[Floats, Floats], Floats]
 """Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
 

@@ -39,7 +39,6 @@ from tbcad.rig.calibration.detection.spots import (
     reading_variance,
 )
 from tbcad.rig.calibration.estimate.parameters import Prior
-from tbcad.rig.machine.machine import Machine
 from tbcad.rig.runs import Image16, Run, read_photograph
 from tbcad.types import Bools, Floats, Progress
 
@@ -122,22 +121,26 @@ def detect(
         expected, partner, found = match(prior, spots, dome, progress)
         faults.append(_move_line(frames, move, shift_of(expected, left_out)))
     exposure = _exposures(run, spots, faults)
-    hidden = (
-        np.zeros(len(partner), dtype=bool)
-        if room is None
-        else maybe_hidden(found.machine, expected, room)
-    )
+    hidden = maybe_hidden(found.machine, expected, room)
     share = relative_light(expected, partner, spots, exposure)
     reasons = verdicts(expected, partner, spots, share, hidden)
-    _overrule(reasons, expected, photographed, move)
-    faults += _dead_leds(machine, expected, reasons)
+    overruled = [(~photographed[expected.frame, expected.led], Rejection.NO_PHOTOGRAPH)]
+    if move is not None:
+        overruled.append((~move.kept[expected.frame], Rejection.MOVED))
+    for which, reason in overruled:
+        for number in np.flatnonzero(which & expected.inside).tolist():
+            reasons[number] = reason
+    faults += _dead_leds(len(machine.leds), expected, reasons)
     used = np.array([reason is None for reason in reasons])
     if not used.any():
         raise nothing(spots, reasons=reasons)
     paired = np.where(used, partner, -1)
     sigma = _sigmas(spots.only(np.unique(paired[used])), spots, read)
     highlights = highlights_of(expected, paired, spots, sigma[np.maximum(partner, 0)])
-    return Detection(highlights, _rejected(expected, reasons), tuple(faults))
+    keys = (one.tolist() for one in (expected.frame, expected.sphere, expected.led))
+    every = zip(*keys, reasons, strict=True)
+    rejected = (Rejected(f, s, led, why) for f, s, led, why in every if why is not None)
+    return Detection(highlights, tuple(rejected), tuple(faults))
 
 
 def _read_frames(run: Run, leds: int, progress: Progress) -> list[_Read]:
@@ -222,21 +225,6 @@ def _exposures(run: Run, spots: BrightSpots, faults: list[str]) -> Floats:
     return np.array([times.get(key, usual) / usual for key in keys])
 
 
-def _overrule(
-    reasons: list[Rejection | None],
-    expected: Expected,
-    photographed: Bools,
-    move: CameraMove | None,
-) -> None:
-    """Name what no highlight says itself: photographs that are not there, or not kept."""
-    absent = ~photographed[expected.frame, expected.led] & expected.inside
-    for number in np.flatnonzero(absent).tolist():
-        reasons[number] = Rejection.NO_PHOTOGRAPH
-    if move is not None:
-        for number in np.flatnonzero(~move.kept[expected.frame] & expected.inside).tolist():
-            reasons[number] = Rejection.MOVED
-
-
 def _move_line(frames: tuple[Frame, ...], move: CameraMove, shift: Floats) -> str:
     before, after = (exposure_name(frames[move.first - k], "")[:-1] for k in (1, 0))
     far = np.hypot(*shift)
@@ -248,19 +236,17 @@ def _move_line(frames: tuple[Frame, ...], move: CameraMove, shift: Floats) -> st
     )
 
 
-def _dead_leds(machine: Machine, expected: Expected, reasons: list[Rejection | None]) -> list[str]:
+def _dead_leds(leds: int, expected: Expected, reasons: list[Rejection | None]) -> list[str]:
     """Lines on LEDs that do not shine, of those that are photographed."""
-    lines = []
     passed_over = (Rejection.OUTSIDE, Rejection.NO_PHOTOGRAPH, Rejection.MOVED)
     counted = np.array([reason not in passed_over for reason in reasons])
     absent = np.array([reason in (Rejection.MISSING, Rejection.HIDDEN) for reason in reasons])
-    for led in range(len(machine.leds)):
-        mine = counted & (expected.led == led)
-        if mine.any() and absent[mine].mean() > 1 - DEAD:
-            lines.append(
-                f"LED {led + 1} shines in no photograph: the others are used; see to its wires"
-            )
-    return lines
+    of = partial(np.bincount, minlength=leds)
+    every, dark = of(expected.led[counted]), of(expected.led[counted & absent])
+    return [
+        f"LED {led + 1} shines in no photograph: the others are used; see to its wires"
+        for led in np.flatnonzero(dark > (1 - DEAD) * every).tolist()
+    ]
 
 
 def _sigmas(good: BrightSpots, spots: BrightSpots, read: list[_Read]) -> Floats:
@@ -269,14 +255,3 @@ def _sigmas(good: BrightSpots, spots: BrightSpots, read: list[_Read]) -> Floats:
     reading = reading_variance(*darks[:2]) if len(darks) > 1 else ROUNDING
     largest = float(np.iinfo(darks[0].dtype).max) if darks else LARGEST_8_BIT
     return centroid_sigmas(spots, reading, gain(good, reading, largest))
-
-
-def _rejected(expected: Expected, reasons: list[Rejection | None]) -> tuple[Rejected, ...]:
-    keys = zip(
-        expected.frame.tolist(), expected.sphere.tolist(), expected.led.tolist(), strict=True
-    )
-    return tuple(
-        Rejected(*key, reason)
-        for key, reason in zip(keys, reasons, strict=True)
-        if reason is not None
-    )

@@ -6,6 +6,7 @@ expected places agree on is taken. Then the machine is estimated from the neares
 again.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.spatial import cKDTree
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import vignetting, vignetting_slope
 from tbcad.core.optics.led_dome import dome_images
+from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.detection.spots import BrightSpots, stacked
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
@@ -41,6 +43,13 @@ class Room:
     radius: float  # mm
     bottom: float  # height z of the disc that it stands on, mm
     top: float  # height z, mm
+
+
+def object_room(export: ExportedDesign) -> Room:
+    """What the design lets an object fill: on the disc, within the capture sphere."""
+    stage = export.spec.prototype.stage
+    radius = stage.object_diameter_mm / 2
+    return Room(radius, stage.top_mm, math.sqrt((export.capture_mm / 2) ** 2 - radius**2))
 
 
 @dataclass(frozen=True)
@@ -82,11 +91,13 @@ def expected_highlights(machine: Machine, dome: float) -> Expected:
     )
 
 
-def maybe_hidden(machine: Machine, expected: Expected, room: Room) -> Bools:
+def maybe_hidden(machine: Machine, expected: Expected, room: Room | None) -> Bools:
     """Which highlights (n,) an object in its room may hide, by the straight way from LED to sphere.
 
     The way is crossed with the infinite cylinder, and its heights there with the room's.
     """
+    if room is None:
+        return np.zeros(len(expected.led), dtype=bool)
     centre = machine.centres(expected.frame, expected.sphere)
     start = machine.leds[expected.led]
     way = unit(centre - start)
@@ -135,7 +146,7 @@ def _places(expected: Expected) -> Floats:
 
 def _common_shift(expected: Expected, spots: BrightSpots) -> Floats:
     """Shift (2,) from expected places to spots on which most pairs agree."""
-    mine, theirs = _tree(expected.frame, expected.led, _places(expected), expected.inside)
+    mine, theirs = _tree(expected, _places(expected))
     others = cKDTree(stacked(spots.frame, spots.led, spots.pixel))
     pairs = others.sparse_distance_matrix(theirs, SHIFT_PX, output_type="ndarray")
     spot, highlight = pairs["i"], mine[pairs["j"]]
@@ -162,24 +173,22 @@ def shift_of(expected: Expected, spots: BrightSpots) -> Floats:
 def paired(expected: Expected, places: Floats, spots: BrightSpots, radius: float) -> Ints:
     """The spot of each highlight, or -1, (n,): each is the other's nearest within a radius."""
     partner = np.full(len(places), -1)
-    mine, tree = _tree(expected.frame, expected.led, places, expected.inside)
+    mine, tree = _tree(expected, places)
     places_of_spots = stacked(spots.frame, spots.led, spots.pixel)
     if not len(mine) or not len(spots):
         return partner
-    distance, nearest = np.array(
-        cKDTree(places_of_spots).query(tree.data, distance_upper_bound=radius)
-    )
-    nearest, back = nearest.astype(np.int64), np.array(tree.query(places_of_spots)[1])
-    near = np.isfinite(distance)
-    mutual = near & (back[np.where(near, nearest, 0)] == np.arange(len(mine)))
+    nearest = np.array(cKDTree(places_of_spots).query(tree.data, distance_upper_bound=radius)[1])
+    back = np.array(tree.query(places_of_spots)[1])
+    near = np.flatnonzero(nearest < len(spots))  # others have no neighbour within the radius
+    mutual = near[back[nearest[near]] == near]
     partner[mine[mutual]] = nearest[mutual]
     return partner
 
 
-def _tree(frame: Ints, led: Ints, pixel: Floats, inside: Bools) -> tuple[Ints, cKDTree]:
-    """Numbers of the places that are in the picture, and a tree of them."""
-    which = np.flatnonzero(inside)
-    return which, cKDTree(stacked(frame[which], led[which], pixel[which]))
+def _tree(expected: Expected, places: Floats) -> tuple[Ints, cKDTree]:
+    """Numbers of the highlights that are in the picture, and a tree of their places (n, 2)."""
+    which = np.flatnonzero(expected.inside)
+    return which, cKDTree(stacked(expected.frame[which], expected.led[which], places[which]))
 
 
 def highlights_of(
@@ -226,8 +235,7 @@ def find_move(estimate: Estimate, frames: int, spots: Floats) -> CameraMove | No
     lost = (count < FEW_PAIRS * np.median(count[count > 0])) & (spots > 0)
     # All that is lost comes before or after one frame.
     if lost.sum() >= MIN_FRAMES and np.count_nonzero(np.diff(lost.astype(int))) == 1:
-        first = int(np.flatnonzero(lost)[0]) if not lost[0] else int(np.flatnonzero(~lost)[0])
-        return CameraMove(first, ~lost)
+        return CameraMove(int(np.flatnonzero(lost != lost[0])[0]), ~lost)
     return _step(estimate, count)
 
 

@@ -12,8 +12,7 @@ from tbcad.rig.calibration.intrinsics.lens import cv
 
 MIN_SQUARES, MAX_SQUARES = 4, 60
 MIN_ROWS = 3
-MIN_CORNERS = MIN_ROWS**2
-"""Of a board that is partly out of the picture: three rows of three."""
+MIN_CORNERS = MIN_ROWS**2  # of a board that is partly out of the picture: three rows of three
 SIZE_MM = (0.1, 1000.0)
 STEPS, REFINED_PX = 100, 1e-3
 WINDOW_SHARE, MAX_WINDOW = 0.4, 11

@@ -13,8 +13,7 @@ from tbcad.types import Floats
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str"
 Node = dict[str, Tree]
 
-SIDE = r"(?P<side>_?(\d|left|right|l|r))?"
-"""Which of several cameras a key is of."""
+SIDE = r"(?P<side>_?(\d|left|right|l|r))?"  # which of several cameras a key is of
 MATRIX = re.compile(
     rf"(camera_?(matrix|mat)|(camera_?)?intrinsics?_?matrix|intrinsics?|mtx|k|m){SIDE}", re.I
 )

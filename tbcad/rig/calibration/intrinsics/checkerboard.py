@@ -136,10 +136,8 @@ def solve_corners(
         width_px=size[0],
         height_px=size[1],
     ).checked("the solved lens")
-    pixels, off = (
-        np.concatenate([board.pixels for board in boards]),
-        np.concatenate(solution.distances(boards)),
-    )
+    pixels = np.concatenate([board.pixels for board in boards])
+    off = np.concatenate(solution.distances(boards))
     half = np.array(size) / 2
     return SolvedLens(
         lens=lens,

@@ -134,13 +134,9 @@ def _rays(figure: "Figure", result: MachineCalibration) -> None:
     way = -known.direction * np.where(turned[:, None], [-1.0, -1.0, 1.0], 1.0)
     from_zenith = np.degrees(np.arccos(np.clip(way[:, 2], -1, 1)))
     level = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-12)
+    x, y = (from_zenith[:, None] * way[:, :2] / level[:, None]).T
     axes: Axes = figure.add_subplot()
-    points = axes.scatter(
-        from_zenith * way[:, 0] / level,
-        from_zenith * way[:, 1] / level,
-        c=known.relative.place_mm,
-        s=14,
-    )
+    points = axes.scatter(x, y, c=known.relative.place_mm, s=14)
     figure.colorbar(points, ax=axes, label="standard deviation at the object's centre, mm")
     axes.set_aspect("equal")
     axes.set(

@@ -21,7 +21,7 @@ from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
-from tbcad.rig.machine.built import is_cap
+from tbcad.rig.machine.designed import is_cap
 from tbcad.types import Floats, Ints
 
 AXES = ("x", "y", "z")

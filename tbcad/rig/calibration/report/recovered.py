@@ -18,7 +18,7 @@ from tbcad.rig.calibration.estimate.parameters import Block, Covariance
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
-from tbcad.rig.machine.built import is_cap
+from tbcad.rig.machine.designed import is_cap
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 
@@ -58,7 +58,7 @@ def recovered_errors(
     spheres, besides = _sphere_sigmas(result, known, rest)
     width = np.concatenate([prior.sigma[block] for block in LENS])
     width = np.where(width > 0, width, 1.0)
-    of = partial(_sigma, result, known)
+    of, axes = partial(_sigma, result, known), designed.camera.axes
     rows: tuple[tuple[str, str, float, Callable[[Machine], Floats], Floats], ...] = (
         ("centres", "um", MICROMETRES, lambda one: one.centre, spheres[:, :3]),
         (BESIDES, "um", MICROMETRES, lambda one: rest @ one.centre.ravel(), besides),
@@ -78,18 +78,20 @@ def recovered_errors(
         ("camera's place", "um", MICROMETRES, lambda one: one.camera.pinhole, of(Block.PINHOLE)),
         (
             *("camera's direction", "mrad", MILLI),
-            lambda one: _turn(designed, one),
+            lambda one: Rotation.from_matrix(one.camera.axes @ axes.T).as_rotvec(),
             of(Block.CAMERA_TURN),
         ),
         ("lens", "deviations of the prior", 1.0, lambda one: _lens(one) / width, of(*LENS) / width),
         ("LEDs", "um", MICROMETRES, lambda one: one.leds, of(Block.LEDS)),
     )
     machines = designed, truth, result.found.machine
-    return tuple(
-        _kind(name, unit, factor, (*map(figure, machines), sigma))
-        for name, unit, factor, figure, sigma in rows
-        if sigma.any()
-    )
+    kinds = []
+    for name, measure, factor, figure, sigma in rows:
+        every = [factor * np.ravel(one) for one in (*map(figure, machines), sigma)]
+        before, true, found, known_to = (one[every[-1] > 0] for one in every)
+        if len(known_to):
+            kinds.append(Kind(name, measure, true - before, found - before, known_to))
+    return tuple(kinds)
 
 
 def recovered_table(kinds: tuple[Kind, ...]) -> Table:
@@ -101,13 +103,6 @@ def recovered_table(kinds: tuple[Kind, ...]) -> Table:
     for name in ("injected", "recovered", "sigma", "sigmas_off"):
         columns[name] = np.concatenate([getattr(kind, name) for kind in kinds])
     return Table.of_columns("recovered", columns)
-
-
-def _kind(name: str, unit: str, factor: float, values: tuple[Floats, ...]) -> Kind:
-    """Of values designed, true, estimated, and their deviations, in a unit by its factor."""
-    every = [factor * np.asarray(one).ravel() for one in values]
-    designed, true, found, sigma = (one[every[-1] > 0] for one in every)
-    return Kind(name, unit, true - designed, found - designed, sigma)
 
 
 def _sphere_sigmas(
@@ -143,13 +138,8 @@ def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
     frames = np.arange(len(angle))
-    turned = np.stack(
-        [
-            rotated(np.broadcast_to(one, (len(angle), 3)), prior.mean.axis, angle)
-            for one in prior.across
-        ],
-        axis=2,
-    )
+    ways = [np.broadcast_to(one, (len(angle), 3)) for one in prior.across]
+    turned = np.stack([rotated(one, prior.mean.axis, angle) for one in ways], axis=2)
     by_point = np.eye(2) - prior.across @ turned
     columns = (
         prior.first[Block.AXIS_POINT] + np.arange(2),
@@ -158,12 +148,6 @@ def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
     values = (by_point, np.broadcast_to(np.eye(2), by_point.shape))
     covariance = known.of(Slopes(columns, values).matrix(prior), 2)
     return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
-
-
-def _turn(designed: Machine, machine: Machine) -> Floats:
-    """By which a camera is rotated about its own axes, radians, (3,)."""
-    turn = machine.camera.axes @ designed.camera.axes.T
-    return np.asarray(Rotation.from_matrix(turn).as_rotvec())
 
 
 def _lens(machine: Machine) -> Floats:

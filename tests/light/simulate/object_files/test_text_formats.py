@@ -148,7 +148,7 @@ def test_links_do_not_lead_out(tmp_path: Path, write: Write) -> None:
     (inside / "a.obj").write_text(obj("mtllib a.mtl", "usemtl m", "f 1 2 3"))
     found = read_object_file(inside / "a.obj")
     assert only(found).colours is None
-    assert "a.mtl is not in the folder" in found.notes[0]
+    assert found.notes == ["its materials a.mtl is not in the folder of the mesh"]
 
 
 def test_materials_of_several_files(write: Write) -> None:

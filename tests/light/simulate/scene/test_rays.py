@@ -1,7 +1,10 @@
 """Pixels' rays off the exact mirrors, also on pedestals, against a search over all of them."""
 
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,14 +14,16 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances
+from tbcad.errors import InputError
 from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
-from tbcad.light.simulate.scene.reflector import Reflector, reflectors
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export, reflectors
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sharpness import built_reflector
+from tests.exported_files import Rows, edit_csv, edit_json
 from tests.mirror_arrays import mirror_design
 from tests.pedestal_designs import pedestal_design
 from tests.shell_meshes import export_with_meshes
@@ -27,6 +32,7 @@ Cameras = tuple[Reflector, Reflector]
 SETTINGS = ("n=6", "width_px=416", "height_px=310", "shell.groove_mm=0.4")
 CENTRE = (0.0, 0.0)
 SOME = 7  # a pixel of so many is searched
+RECORD, MIRRORS = "design.json", "mirrors.csv"
 
 
 def every_row(at: Reflector) -> TracedRays:
@@ -209,3 +215,51 @@ def test_pixels_of_builds_are_those_of_the_fast_model(on_pedestals: Cameras) -> 
     assert np.abs(area - pixels)[inside] == pytest.approx(0, abs=0.6 * np.sqrt(pixels.max()))
     # Walls of the design would give other pictures.
     assert np.abs(area - counted(built_reflector(at, one, 0)))[inside].max() > 30
+
+
+def test_the_record_gives_the_designs_rays(
+    exported: ExportedDesign, cameras: tuple[Reflector, Reflector]
+) -> None:
+    assert exported.capture_mm == 60
+    assert exported.spec.optics.n == 6
+    for read, made in zip(exported.reflectors, cameras, strict=True):
+        rows = range(150, 200)
+        one, other = (exact_tracer(at)(rows, (0.0, 0.0)) for at in (read, made))
+        assert np.array_equal(one.mirror, other.mirror)
+        assert one.direction == pytest.approx(other.direction, abs=1e-12)
+
+
+def cell(key: str, value: str) -> Callable[[Rows], object]:
+    """Change a cell of the fourth row."""
+    return lambda rows: rows[3].update({key: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "wrong"),
+    [
+        (RECORD, lambda d: d.update(schema="tbcad-design/1"), "reads 'tbcad-design/2'"),
+        (RECORD, lambda d: d.update(mirrors="../mirrors.csv"), "mirrors: input should be"),
+        (RECORD, lambda d: d.pop("foot_z_mm"), "foot_z_mm"),
+        (RECORD, lambda d: d["cameras"].reverse(), "not a and b"),
+        (RECORD, lambda d: d["cameras"][0].update(forward=[0, 0, 2]), "axes"),
+        (RECORD, lambda d: d["spec"]["optics"].update(n=99), r"spec\.optics\.n"),
+        (MIRRORS, lambda rows: rows.pop(), "has 102 mirrors, allowed is 103"),
+        (MIRRORS, lambda rows: [row.pop("px") for row in rows], "row 1 px: field required"),
+        (MIRRORS, cell("camera", "c"), "row 4 camera: "),
+        (MIRRORS, cell("ux", "5.0"), "u of another length"),
+        (MIRRORS, cell("px", "1000.0"), "bound no cells"),
+    ],
+)
+def test_refused(
+    record: Path, tmp_path: Path, name: str, change: Callable[[Any], object], wrong: str
+) -> None:
+    shutil.copytree(record, tmp_path, dirs_exist_ok=True)
+    edit = edit_json if name == RECORD else edit_csv
+    edit(tmp_path / name, change)
+    with pytest.raises(InputError, match=wrong) as error:
+        read_export(tmp_path)
+    assert name == RECORD or str(tmp_path / name) in str(error.value)
+    assert "\n" not in str(error.value)
+    (tmp_path / name).unlink()
+    with pytest.raises(InputError, match=f"{name} is not there: name a folder that tbcad build"):
+        read_export(tmp_path)

@@ -1,5 +1,6 @@
 """Highlights of simulated photographs are found where they are; what is wrong is named."""
 
+import shutil
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,19 +14,62 @@ from tbcad.errors import InputError
 from tbcad.records.exposure import exposure_name
 from tbcad.rig.calibration.detection.detect import detect
 from tbcad.rig.calibration.detection.detection import Detection, Rejection, no_highlights
-from tbcad.rig.calibration.detection.matching import Room, expected_highlights
+from tbcad.rig.calibration.detection.matching import (
+    Expected,
+    Room,
+    expected_highlights,
+    highlights_of,
+)
 from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
 from tbcad.rig.machine.machine import Highlights
 from tbcad.rig.runs import read_image, read_run
 from tbcad.rig.simulated_run.photographs import ImagingChain
+from tbcad.rig.simulated_run.simulate import write_run
 from tbcad.types import Floats
 from tests.exported_files import edit_json
 from tests.photographed_runs import digest
 from tests.simulated_runs import BRIGHT, Small, small_run
 
+PHASES = ("dark", "led_1", "led_2", "led_3", "led_4")
 TARGET_PX = 0.05
 STOPS = range(8, 48, 6)
 FEW = (8, 26, 44)  # stops
+SLOPE = np.array([-0.02, 0.01])  # of the light for a pixel: larger than lenses have
+WIDTH_PX = np.array([2.5, 1.5])  # standard deviations of the spot
+BLUR_PX = 1.0  # of that, what is no image of a dome
+PLACE = np.array([20.3, 18.6])
+ONE = np.zeros(1, dtype=np.int64)
+
+
+@pytest.fixture(scope="session")
+def small(export_folder: Path) -> Small:
+    return small_run(export_folder, STOPS)
+
+
+@pytest.fixture(scope="session")
+def photographed(
+    small: Small, export_folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    folder = tmp_path_factory.mktemp("run") / "run"
+    write_run((small.run,), PHASES, export_folder, folder, lambda _: None)
+    return folder
+
+
+@pytest.fixture
+def copied(photographed: Path, tmp_path: Path) -> Path:
+    """A run that a test may damage."""
+    return Path(shutil.copytree(photographed, tmp_path / "run"))
+
+
+@pytest.fixture
+def write(export_folder: Path, tmp_path: Path) -> Callable[[Small], Path]:
+    """Photographs another run."""
+
+    def written(other: Small) -> Path:
+        write_run((other.run,), PHASES, export_folder, tmp_path / "run", lambda _: None)
+        return tmp_path / "run"
+
+    return written
 
 
 def detected(folder: Path, small: Small) -> Detection:
@@ -254,3 +298,18 @@ def test_a_run_without_leds(copied: Path, small: Small) -> None:
     edit_json(copied / "run.json", lambda record: record.update(phases=["dark", "lit"]))
     with pytest.raises(InputError, match="has no photographs of single LEDs"):
         detected(copied, small)
+
+
+def test_a_lens_that_darkens_one_side_does_not_shift_a_highlight() -> None:
+    places = np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1) - PLACE
+    spot = np.exp(-(places**2 / (2 * WIDTH_PX**2)).sum(axis=-1)) * np.exp(places @ SLOPE)
+    image = np.rint(60_000 * spot / spot.max()).astype(np.uint16)
+    found, _ = find_spots(np.dstack([image] * 3), None, 0, 0)
+    zero = np.zeros((1, 2))
+    dome = np.diag(WIDTH_PX**2 - BLUR_PX**2)[None]
+    sure = np.ones(1, dtype=bool)
+    expected = Expected(ONE, ONE, ONE, zero, zero, dome, zero, np.ones(1), sure)
+    darker = replace(expected, brighter=SLOPE[None])
+    plain, right = (highlights_of(one, ONE, found, 0.01).pixel[0] for one in (expected, darker))
+    assert plain - PLACE == pytest.approx(WIDTH_PX**2 * SLOPE, rel=0.05)
+    assert right == pytest.approx(PLACE, abs=0.05 * np.abs(WIDTH_PX**2 * SLOPE).max())

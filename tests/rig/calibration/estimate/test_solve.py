@@ -4,13 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from scipy.stats import chi2
 
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
+from tbcad.light.simulate.scene.reflector import reflectors
+from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes, reflections
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.estimate.solve import estimate, outlier_limit
+from tbcad.rig.calibration.priors import shell_prior
+from tbcad.rig.machine.designed import designed_shell
 from tbcad.rig.machine.machine import Highlights
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import (
+    LEDS,
     NOISE_PX,
     drawn,
     every_highlight,
@@ -19,6 +30,9 @@ from tests.rig.calibration.machines import (
 )
 
 BUILDS = 8
+PRIOR = small_prior(small_machine(stops=3))
+STEP = 1e-3  # of the prior standard deviations
+HIGHLIGHTS = 4
 
 
 @pytest.fixture(scope="module")
@@ -78,3 +92,45 @@ def test_nothing_to_calibrate_from(prior: Prior) -> None:
     empty = Highlights(none, none, none, np.zeros((0, 2)), np.zeros(0))
     with pytest.raises(InputError, match="no highlights"):
         estimate(prior, empty)
+
+
+def _case(seed: int, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    pinhole, light = np.array([100.0, 0.0, -100.0]), rng.uniform(-25, 25, size=(5, 3))
+    apex = unit(rng.normal(loc=(0, 0, 1.5), size=(5, 3))) * 150
+    normal = unit(unit(light - apex) + unit(pinhole - apex) + 0.05 * rng.normal(size=(5, 3)))
+    return apex - radius * normal, np.full(5, radius), light, pinhole
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1, 2000))
+@example(3008991829, 246.0)  # Newton's steps from the bisector at the centre go astray
+@settings(max_examples=40)
+def test_the_point_is_that_of_the_law_of_reflection(seed: int, radius: float) -> None:
+    case = _case(seed, radius)
+    assert reflections(*case).point == pytest.approx(reflection_points(*case), abs=1e-8)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=2)
+def test_slopes_are_those_of_finite_differences(seed: int) -> None:
+    values, machine = drawn(PRIOR, seed)
+    shape = (len(machine.angle), len(machine.radius), len(machine.leds))
+    picked = [one.ravel()[::7] for one in np.indices(shape)]
+    pixel, slopes = highlights_with_slopes(PRIOR, values, *picked)
+    assert pixel == pytest.approx(machine.highlights(*picked), abs=1e-8)
+    dense = slopes.toarray()
+    for k, step in enumerate(STEP * np.eye(len(values))):
+        ends = [PRIOR.machine(values + sign * step).highlights(*picked) for sign in (-1, 1)]
+        slope = (ends[1] - ends[0]).ravel() / (2 * STEP)
+        assert dense[:, k] == pytest.approx(slope, rel=1e-6, abs=1e-5), k
+
+
+def test_errors_of_a_shell_are_as_large_as_the_covariance_says(small_design: MirrorDesign) -> None:
+    machine = designed_shell(reflectors(small_design)[0], LEDS)
+    prior = shell_prior(machine, process_errors(load_process("sla")))
+    values, true = drawn(prior, 2)
+    found = estimate(prior, every_highlight(true, 12))
+    off = found.values - values
+    low, high = chi2.ppf([0.001, 0.999], len(prior.free))
+    assert low < off @ (found.information @ off) < high
+    assert len(found.highlights) <= HIGHLIGHTS * len(prior.mean.radius)

@@ -31,6 +31,9 @@ INNER = np.stack(np.meshgrid(*(np.arange(1, n) for n in SQUARES)), axis=-1).resh
 INNER_MM = (INNER - np.array(SQUARES) / 2) * SIZE_MM
 SIGMAS, BOARDS = 4.0, 7
 SQUARE_PX, MARKERS = 60, cv2.aruco.DICT_4X4_50
+PHOTOGRAPHS = Path("/usr/share/doc/opencv-doc/examples/data")
+WINDOW = (5, 5)  # which no other corner of these boards comes into
+INNER_CORNERS = (9, 6)
 
 
 def _camera(turn: tuple[float, float, float], place: tuple[float, float, float]) -> LensCamera:
@@ -214,3 +217,30 @@ def test_no_board_is_found(boards: Path, tmp_path: Path) -> None:
     (tmp_path / "empty.png").write_bytes((boards / "empty.png").read_bytes())
     with pytest.raises(InputError, match=r"9 x 6 squares was found in 0 of 1 photographs"):
         intrinsics(tmp_path, size=SIZE_MM, out=tmp_path / "camera.yml")
+
+
+def opencv_focal(files: list[Path]) -> np.ndarray:
+    """Focal lengths by the classic detector, which shares no code with the one that is used."""
+    places = np.pad(np.mgrid[0:9, 0:6].T.reshape(-1, 2), ((0, 0), (0, 1))).astype(np.float32)
+    seen = []
+    for file in files:
+        grey = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+        found, corners = cv2.findChessboardCorners(grey, INNER_CORNERS)
+        assert found
+        seen.append(cv2.cornerSubPix(grey, corners, WINDOW, (-1, -1), (3, 30, 1e-3)))
+    _, matrix, *_ = cv2.calibrateCamera([places] * len(seen), seen, grey.shape[::-1], None, None)
+    return np.diag(matrix)[:2]
+
+
+@pytest.mark.clients
+@pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="opencv-doc is not installed")
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_opencv_finds_the_same_lens(side: str, tmp_path: Path) -> None:
+    files = sorted(PHOTOGRAPHS.glob(f"{side}[01][0-9].jpg"))
+    for file in files:
+        (tmp_path / file.name).symlink_to(file)
+    solved = intrinsics(tmp_path, squares="10x7", size=25.0, out=tmp_path / "camera.yml")
+    assert solved.boards >= len(files) - 1
+    assert (np.abs(solved.lens.focal - opencv_focal(files)) < 3 * solved.sigma[:2]).all()
+    assert solved.rms_px < 0.2
+    assert (solved.sigma[:2] < 1.5).all()
