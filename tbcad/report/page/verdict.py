@@ -138,14 +138,13 @@ def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
         f"{enough_bad(as_made.builds)} failed, whose every virtual camera sees {target_mm:g} mm, "
         f"and the median of their minimum coverage:</p>"
     )
-    yield "<table class=made><thead><tr><th>Process<th>Yield<th><th>Builds<th>Coverage</tr></thead>"
-    yield "<tbody>"
+    yield "<table class=made><thead><tr><th>Process<th>Yield<th><th>Coverage</tr></thead><tbody>"
     for one in as_made.processes:
         yield (
-            f"<tr><th>{escape(one.process)}<td class=n>{one.share:.0%}"
+            f"<tr><th>{escape(one.process)}<td class=n>{one.share:.0%} of {one.builds}"
             f"<td class=bar><meter min=0 max=1 value={one.share:.3f} "
             f"aria-label='yield of {escape(one.process, quote=True)}'>{one.share:.0%}</meter>"
-            f"<td class=n>{one.builds}<td class=n>{one.coverage_mm:.2f} mm</tr>"
+            f"<td class=n>{one.coverage_mm:.2f} mm</tr>"
         )
     yield "</tbody></table>"
     yield (

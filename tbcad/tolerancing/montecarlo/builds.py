@@ -216,6 +216,5 @@ def _process_yield(
             worst = np.append(worst, simulate(case, AT_ONCE, first=len(worst)).worst)
     except InputError:  # errors larger than the radius of a mirror
         return ProcessYield(name, 0.0, 0.0, len(worst))
-    return ProcessYield(
-        name, float((worst >= capture_mm).mean()), float(np.median(worst)), len(worst)
-    )
+    share = float((worst >= capture_mm).mean())
+    return ProcessYield(name, share, float(np.median(worst)), len(worst))

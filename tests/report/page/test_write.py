@@ -101,7 +101,7 @@ def test_verdict_is_on_top(export: Path) -> None:
     made = AsMade(50, yields)
     text = page(export, made)
     assert text.index("PASS") < text.index('id="model"')
-    assert "74%" in text
+    assert "74% of 50" in text
     assert "&lt;fdm&gt;" in text
     assert "<fdm>" not in text
     changed_verdict(export, **{"pass": False})

@@ -83,6 +83,7 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
+    assert "50 simulated builds, or until 3 fail:" in lines[-8]  # 47 of 50 are 94 %
     assert lines[-7] == "  by: diamond 98% 60"
     assert lines[-6] == "  not by: cnc 7/10 60, sla 0/5 51.4; more: --for-process"
     assert "9 questions to other programs skipped" in lines[-4]
