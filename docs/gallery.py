@@ -3,8 +3,9 @@
     python docs/gallery.py                    # all of them: minutes
     python docs/gallery.py afternoon-print    # renews one
 
-Nothing is built: figures are those of `tbcad build NAME --dry-run`, and the pictures are simulated
-photographs off the mirrors as designed. Figures are kept in docs/gallery.json.
+Nothing is built: figures are those of `tbcad build NAME --dry-run`, yields those that `tbcad
+tolerance` finds for its shells, and the pictures are simulated photographs off the mirrors as
+designed. Figures are kept in docs/gallery.json.
 """
 
 import json
@@ -17,6 +18,8 @@ import numpy as np
 from PIL import Image
 
 import tbcad
+from tbcad.core.mirrors.array import design as mirror_design
+from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import shipped_designs
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import photograph
@@ -25,12 +28,20 @@ from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.overview import Overview, overview
+from tbcad.tolerancing.margin import seeing_pixels
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, simulate
+from tbcad.tolerancing.montecarlo.edge_model import edge_models
+from tbcad.tolerancing.montecarlo.sharpness import view_ssims
+from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 
 DOCS = Path(__file__).parent
 RESULTS, PAGE, PICTURES = DOCS / "gallery.json", DOCS / "gallery.md", DOCS / "pictures"
 EVERY_N = json.loads((DOCS / "every-n.json").read_text(encoding="utf-8"))
 PHOTOGRAPH_PX = (640, 480)
 VIEW_DEG = (30.0, 30.0)  # azimuth and elevation
+# Simulated by a chain; where fewer than half of the few are good, only these.
+BUILDS, FEW = 1000, 50
+CAN_BE_MADE = 0.95  # yield
 PAPER_SENSORS = {12: "1040 x 776", 18: "2080 x 1552", 26: "4160 x 3104", 36: "8320 x 6208"}
 HEAD = """\
 # Gallery of designs
@@ -40,15 +51,49 @@ of a knot that fills the capture sphere. Right: a view from azimuth 30, elevatio
 blended from the photographs of both cameras at the depth that they show, as `tbcad view` does;
 with few virtual cameras some of that depth is wrong (specks).
 
-`python docs/gallery.py` writes this page.
+`python docs/gallery.py` writes this page, with a design's name that design's figures.
 
 Begin from one of them: `tbcad init my.toml --from afternoon-print`. With other numbers of mirrors:
 [every subdivision n](every-n.md).
 """
 
+MADE_COLUMNS = ["design", "made by", "yield", "worst camera"]
+MADE_COLUMNS += ["pixels of a virtual camera", "SSIM of views"]
+MADE = """\
+## What can be made
 
-def figures(found: Overview) -> dict[str, str]:
-    """What the table of a design shows."""
+Each design as it is, those first that most chains make ([what chains are](tolerance.md#chains)):
+by which 95 % or more of 1,000 simulated builds show the whole object with every virtual camera.
+Yield and the median of the worst cameras are those of the best chain. A row's figures:
+`python docs/gallery.py turtleback-nickel`, or `tbcad build turtleback-nickel --out exports/` and
+`tbcad tolerance exports/ --process nickel-diamond`.
+
+{}
+By every chain: yield, and the median of the worst cameras in mm; of 50 builds where fewer than half
+of them are good. With margins for a chain: `tbcad build NAME --for-process CHAIN`.
+
+{}"""
+
+
+def chains(spec: Spec) -> dict[str, list[float]]:
+    """Yield, median of the worst cameras, mm, and number of simulated builds by each chain."""
+    if spec.mirrors.radius_rule == "flat":
+        return {}
+    models, target = edge_models(reflectors(mirror_design(spec))), spec.optics.capture_diameter_mm
+    found = {}
+    for name in BUILT_IN:
+        errors = process_errors(load_process(name), spec.mirrors.coating_um)
+        case = CoverageCase(models, errors, 1, worst_only=True)
+        worst = simulate(case, FEW).worst
+        if np.median(worst) >= target:
+            worst = np.append(worst, simulate(case, BUILDS - FEW, first=FEW).worst)
+        share, median = float((worst >= target).mean()), float(np.median(worst))
+        found[name] = [round(share, 4), round(median, 2), len(worst)]
+    return dict(sorted(found.items(), key=lambda item: [-figure for figure in item[1]]))
+
+
+def figures(found: Overview) -> dict[str, Any]:
+    """What the tables show of a design: texts, and the figures of each chain."""
     spec, shells, prototype = found.spec, found.shell_prints, found.prototype
     assert shells is not None
     radius = found.radius_mm
@@ -61,6 +106,8 @@ def figures(found: Overview) -> dict[str, str]:
         f"{found.view_angle_deg:g} degrees",
         "both shells, by FDM": f"{shells.volume_cm3:.0f} cm3, about {shells.mass_g:.0f} g, "
         f"{shells.hours:.0f} h",
+        "pixels of a virtual camera": str(seeing_pixels(spec)),
+        "SSIM of views": f"{view_ssims({'': spec})['']:.3f}",
         "prototype": found.note.replace("no prototype", "none").rpartition(":")[0],
     }
     if prototype is not None:
@@ -68,7 +115,7 @@ def figures(found: Overview) -> dict[str, str]:
             f"{prototype.balls} balls and {prototype.caps} caps, {prototype.stops} stops; "
             f"{prototype.kept_share:.0%} of the shell's pixels"
         )
-    return {name: value for name, value in rows.items() if value}
+    return {name: value for name, value in rows.items() if value} | {"chains": chains(spec)}
 
 
 def light_field(design: tbcad.Design) -> LightField:
@@ -97,9 +144,58 @@ def purpose(name: str) -> str:
     return " ".join(first.split())
 
 
-def section(name: str, row: dict[str, str]) -> str:
+def good_chains(row: dict[str, Any]) -> list[str]:
+    """Chains that make a design, the best first."""
+    return [chain for chain, (share, *_) in row["chains"].items() if share >= CAN_BE_MADE]
+
+
+def order(results: dict[str, Any]) -> list[str]:
+    """Names of designs: first those that most chains make, then by the yield of the best chain."""
+
+    def made(name: str) -> tuple[int, float]:
+        shares = [share for share, *_ in results[name]["chains"].values()]
+        return -len(good_chains(results[name])), -max(shares, default=0)
+
+    return sorted(results, key=made)
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown."""
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in [head, ["---"] * len(head), *rows])
+
+
+def design_row(name: str, row: dict[str, Any]) -> list[str]:
+    """A design as it is, with the chains that make it and the figures of the best of these."""
+    best, (share, covered, _) = next(iter(row["chains"].items()), ("planar mirrors", (0.0, 0.0, 0)))
+    return [
+        f"[{name}](#{name})",
+        ", ".join(good_chains(row)) or f"none ({best})",
+        *([f"{100 * share:.3g} %", f"{covered:.2f} of {row['object']}"] if share else ["", ""]),
+        row["pixels of a virtual camera"],
+        row["SSIM of views"],
+    ]
+
+
+def can_be_made(results: dict[str, Any]) -> str:
+    """Which chain makes which design."""
+    curved = [name for name in order(results) if results[name]["chains"]]
+    of_chains = [
+        [chain]
+        + [
+            f"{100 * share:.3g} %, {covered:.2f}"
+            for share, covered, _ in (results[name]["chains"][chain] for name in curved)
+        ]
+        for chain in results[curved[0]]["chains"]
+    ]
+    return MADE.format(
+        table(MADE_COLUMNS, [design_row(name, results[name]) for name in order(results)]),
+        table(["chain", *curved], of_chains),
+    )
+
+
+def section(name: str, row: dict[str, Any]) -> str:
     """A design's part of the page."""
-    table = "\n".join(f"| {key} | {value} |" for key, value in row.items())
+    table = "\n".join(f"| {key} | {value} |" for key, value in row.items() if key != "chains")
     return (
         f"## {name}\n\n{purpose(name)} [{name}.toml](../designs/{name}.toml)\n\n"
         f"![Photograph of camera a, and a view](pictures/gallery-{name}.png)\n\n"
@@ -128,8 +224,8 @@ def paper_sensors() -> str:
 
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
-    parts = [section(name, results[name]) for name in shipped_designs() if name in results]
-    return "\n".join([HEAD, *parts, paper_sensors()])
+    parts = [section(name, results[name]) for name in order(results)]
+    return "\n".join([HEAD, can_be_made(results), *parts, paper_sensors()])
 
 
 def main(names: list[str]) -> None:

@@ -9,7 +9,11 @@ from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import dotted_fields, section_of
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.capture.photograph import virtual_cameras
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.optimizing.candidate import figures_of, mean_ssim, size_of
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, simulate
+from tbcad.tolerancing.montecarlo.edge_model import edge_models
+from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.mirror_arrays import designed
 
 DESIGNS = Path(__file__).parents[1] / "designs"
@@ -83,6 +87,16 @@ def test_better_designs_share_out_the_papers_sensor_more_evenly(
     assert virtual_cameras(mirrors.arrays[0]) == 1657
     assert figures.minimum_px == pytest.approx(fewest, abs=1)
     assert figures.variation == pytest.approx(variation, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("name", "chain"), [("nickel", "nickel-diamond"), ("milled", "cnc"), ("even", "cnc")]
+)
+def test_chains_make_the_designs_that_are_for_them(name: str, chain: str) -> None:
+    models = edge_models(reflectors(designed(load_spec(DESIGNS / f"turtleback-{name}.toml"))))
+    case = CoverageCase(models, process_errors(load_process(chain)), 1, worst_only=True)
+    good = simulate(case, 40).worst >= 60
+    assert good.mean() >= 0.95 if name != "even" else not good.any()
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 from pathlib import Path
 from types import ModuleType
 
@@ -28,6 +29,20 @@ def test_page_has_every_design_and_the_figures_that_were_found(gallery: ModuleTy
     results = json.loads(gallery.RESULTS.read_text(encoding="utf-8"))
     assert set(results) == set(shipped_designs())
     assert gallery.PAGE.read_text(encoding="utf-8") == gallery.page(results)
+
+
+def test_designs_that_more_chains_make_come_first(gallery: ModuleType) -> None:
+    """As the page's table says, and as its sections follow; planar mirrors are last."""
+    text = gallery.PAGE.read_text(encoding="utf-8")
+    rows = re.findall(r"(?m)^\| \[(.+?)\]\(#.+?\) \| (.*?) \| (.*?) \|", text)
+    ranks = [
+        (0 if by.startswith("none") else -len(by.split(", ")), -float(share.strip(" %") or 0))
+        for _, by, share in rows
+    ]
+    assert ranks == sorted(ranks)
+    assert ranks[0] < ranks[-1] == (0, 0)
+    assert [name for name, *_ in rows] == re.findall(r"(?m)^## ([a-z0-9-]+)$", text)
+    assert {name for name, *_ in rows} == set(shipped_designs())
 
 
 @pytest.mark.slow

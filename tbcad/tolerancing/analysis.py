@@ -77,10 +77,8 @@ class Analysis:
     prototype: PrototypeResult | None  # None where the export has none
 
     def __repr__(self) -> str:
-        builds = len(self.result.worst)
-        return (
-            f"<Analysis of {self.process.name}: yield {self.estimate.share:.1%} of {builds} builds>"
-        )
+        made = f"yield {self.estimate.share:.1%} of {len(self.result)} builds"
+        return f"<Analysis of {self.process.name}: {made}>"
 
     @property
     def estimate(self) -> YieldEstimate:
@@ -191,25 +189,22 @@ def _margins(
     simulator: _Simulator, process: Process, compared: Sequence[ProcessOption]
 ) -> tuple[tuple[ProcessOption, ...], Margin]:
     """The same processes with the margins that they need, and the margin of the one asked for."""
-    designs = solved_designs()
-    if simulator.options.process is not None:
-        chosen = _margin(simulator, process, designs)
-        return tuple(replace(option, margin=chosen) for option in compared), chosen
-    options = tuple(
-        replace(option, margin=_margin(simulator, load_process(option.name), designs))
-        for option in compared
-    )
-    known = [option.margin for option in options if load_process(option.name) == process]
-    return options, next(filter(None, known), None) or _margin(simulator, process, designs)
+    asked, designs = simulator.options.process is not None, solved_designs()
+    own = _margin(simulator, process, designs)
+
+    def margin_of(name: str) -> Margin:
+        one = process if asked else load_process(name)
+        return own if one == process else _margin(simulator, one, designs)
+
+    return tuple(replace(option, margin=margin_of(option.name)) for option in compared), own
 
 
 def _margin(simulator: _Simulator, process: Process, designs: SolvedDesigns) -> Margin:
     spec, wanted = simulator.export.spec, simulator.options.wanted_yield
     errors = process_errors(process, spec.mirrors.coating_um)
-    detail = simulator.options.detail
     return margin(
         spec, errors, wanted, simulator.worst_coverage,
-        lambda text: detail(f"{process.name}: {text}"), designs,
+        lambda text: simulator.options.detail(f"{process.name}: {text}"), designs,
     )  # fmt: skip
 
 

@@ -26,19 +26,12 @@ from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Bools, Floats, Ints, Progress
 
-WorstCoverageOfDesign = Callable[[Errors, EdgeModels], Floats]
-"""Minimum coverage, mm, (s,), of builds of a design with some errors."""
-
 MAX_TRIES = 6
 STEP_MM = 0.01  # margins are rounded up to a multiple of it
 SolvedDesigns: TypeAlias = Callable[[Spec], EdgeModels]
 """The fast model of a design, or a SpecError; each is solved once."""
 CoverageOfDesign = Callable[[Errors, EdgeModels], Floats]
-"""Coverage of the v virtual cameras in builds of a design with some errors, mm, (s, v).
-
-Of s builds the first half is judged; means and deviations are those of the other half. Builds that
-had set both would seem to be good more often than others are.
-"""
+"""Minimum coverage of s builds of a design with some errors, or that of its v cameras, mm."""
 MAX_ROUNDS = 5
 KNOWN_MM = 1e-6  # deviation below which a loss counts as known, mm: rounding
 FREE_MM = 1e-3  # a mirror that covers so much beyond its target has the largest radius allowed
@@ -63,7 +56,7 @@ def margin(
     spec: Spec,
     errors: Errors,
     wanted_yield: float,
-    worst: WorstCoverageOfDesign,
+    worst: CoverageOfDesign,
     progress: Progress = lambda _: None,
     designs: SolvedDesigns | None = None,
 ) -> Margin:
@@ -164,7 +157,9 @@ def own_margins(
     """Margins with which the wanted share of builds is good, none below the spec's margin_mm.
 
     One margin for all mirrors, even (mm), is tried first; the spec's radii must follow rule traced.
-    None where no try was enough: margins too large, or mirrors that cannot be made.
+    The first half of the builds is judged, the other sets means and deviations: builds that did
+    both would seem good more often than others are. None where no try was enough: margins too
+    large, or mirrors that cannot be made.
     """
     designs = designs or solved_designs()
     target, best = spec.optics.capture_diameter_mm, None

@@ -122,9 +122,8 @@ def ssim_text(costs: dict[str, float]) -> str:
 
 
 def _worst_coverage(errors: Errors, models: EdgeModels) -> Floats:
-    return simulate(
-        CoverageCase(models, errors, SEED, worst_only=True), BUILDS, schedule.run_units
-    ).worst
+    case = CoverageCase(models, errors, SEED, worst_only=True)
+    return simulate(case, BUILDS, schedule.run_units).worst
 
 
 def _coverage(errors: Errors, models: EdgeModels) -> Floats:

@@ -18,7 +18,7 @@ from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sensitivity import scaled
 from tbcad.tolerancing.montecarlo.warp import pivots, smooth_field
-from tbcad.tolerancing.process.process import BUILT_IN
+from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 from tests.pedestal_designs import pedestal_design
 from tests.tolerancing.exact_builds import (
     displaced_coverage,
@@ -189,6 +189,15 @@ def test_errors_of_neighbours_cost_less_than_where_spheres_meet(
 
 
 def test_every_build_says_how_it_would_be_made(small: MirrorDesign) -> None:
-    found = as_made(reflectors(small), 60.0, 0.0)
+    """Good processes by all builds, others by the first ones of which three failed."""
+    cameras = reflectors(small)
+    found = as_made(cameras, 60.0, 0.0)
     assert found.reason == ""
     assert {one.process for one in found.processes} == set(BUILT_IN)
+    assert {one.builds for one in found.processes} >= {5, 50}
+    for one in found.processes:
+        errors = process_errors(load_process(one.process))
+        every = simulate(CoverageCase(edge_models(cameras), errors, 1, worst_only=True), 50).worst
+        bad = np.append(0, (every < 60).cumsum())  # of the first k
+        assert bad[50] < 3 if one.share >= 0.95 else bad[one.builds] >= 3 > bad[one.builds - 5]
+        assert round(one.share * one.builds) == one.builds - bad[one.builds]

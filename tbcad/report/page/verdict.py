@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from pydantic import Field
-from tbcad_verify.report.as_made import NOT_MODELLED, AsMade
+from tbcad_verify.report.as_made import NOT_MODELLED, AsMade, enough_bad
 from tbcad_verify.report.methods import KEY_FIGURES
 
 from tbcad.cad.formats.checked_files import Finite, Record, read_json
@@ -133,13 +133,14 @@ def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
         yield f"<p>Not simulated: {escape(reason)}.</p></div>"
         return
     yield (
-        f"<p>Share of {as_made.builds} simulated builds whose every virtual camera sees "
-        f"{target_mm:g} mm, and the median of their minimum coverage:</p>"
+        f"<p>Share of {as_made.builds} simulated builds, or fewer where "
+        f"{enough_bad(as_made.builds)} failed, whose every virtual camera sees {target_mm:g} mm, "
+        f"and the median of their minimum coverage:</p>"
     )
     yield "<table class=made><thead><tr><th>Process<th>Yield<th><th>Coverage</tr></thead><tbody>"
     for one in as_made.processes:
         yield (
-            f"<tr><th>{escape(one.process)}<td class=n>{one.share:.0%}"
+            f"<tr><th>{escape(one.process)}<td class=n>{one.share:.0%} of {one.builds}"
             f"<td class=bar><meter min=0 max=1 value={one.share:.3f} "
             f"aria-label='yield of {escape(one.process, quote=True)}'>{one.share:.0%}</meter>"
             f"<td class=n>{one.coverage_mm:.2f} mm</tr>"

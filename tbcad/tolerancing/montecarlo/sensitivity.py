@@ -1,14 +1,14 @@
 """Each kind of error by itself: what it costs, and by which factor it may grow."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from tbcad.tolerancing.montecarlo.builds import coverage_at_yield
 from tbcad.tolerancing.montecarlo.draws import shell_error_shapes
-from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.types import Floats
 
 WorstCoverage = Callable[[Errors], Floats]
@@ -32,8 +32,7 @@ class SingleErrorEffect:
 
 def present_kinds(errors: Errors) -> list[str]:
     """The kinds of error that are not zero."""
-    kinds = {field.name: getattr(errors, field.name) for field in fields(errors)}
-    return [kind for kind, error in kinds.items() if error.spread != 0 or error.mean != 0]
+    return [kind for kind, error in vars(errors).items() if error.spread != 0 or error.mean != 0]
 
 
 def shell_kinds(errors: Errors, walls: int) -> list[str]:
@@ -49,12 +48,8 @@ def only_kind(errors: Errors, kind: str) -> Errors:
 
 def scaled(errors: Errors, factor: float) -> Errors:
     """Errors, spread and mean, multiplied."""
-    kinds = {kind: getattr(errors, kind) for kind in present_kinds(errors)}
-    grown = {
-        kind: replace(error, spread=error.spread * factor, mean=error.mean * factor)
-        for kind, error in kinds.items()
-    }
-    return replace(errors, **grown)
+    kinds: list[Error] = list(vars(errors).values())
+    return Errors(*(replace(k, spread=k.spread * factor, mean=k.mean * factor) for k in kinds))
 
 
 def one_at_a_time(

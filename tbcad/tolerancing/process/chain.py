@@ -120,9 +120,8 @@ def _step(name: str, tables: Table, where: str) -> ChainStep:
 def _sum(parts: list[tuple[str, ErrorSpec]], kind: str) -> Table:
     """One kind of error of all steps that have it, as a table."""
     if not parts:
-        return {"magnitude": 0, "source": NOTHING} | (
-            {"length_mm": 80} if kind == "warp_um" else {}
-        )
+        length = {"length_mm": 80} if kind == "warp_um" else {}
+        return {"magnitude": 0, "source": NOTHING, **length}
     kinds = [part for _, part in parts]
     largest = max(kinds, key=lambda part: part.magnitude)
     source = "; ".join(f"{name}: {part.source.strip()}" for name, part in parts)

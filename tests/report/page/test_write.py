@@ -97,10 +97,11 @@ def test_same_bytes_each_time(export: Path) -> None:
 
 
 def test_verdict_is_on_top(export: Path) -> None:
-    made = AsMade(50, (ProcessYield("diamond", 0.74, 60.1), ProcessYield("<fdm>", 0.0, 42.0)))
+    yields = ProcessYield("diamond", 0.74, 60.1, 50), ProcessYield("<fdm>", 0.0, 42.0, 5)
+    made = AsMade(50, yields)
     text = page(export, made)
     assert text.index("PASS") < text.index('id="model"')
-    assert "74%" in text
+    assert "74% of 50" in text
     assert "&lt;fdm&gt;" in text
     assert "<fdm>" not in text
     changed_verdict(export, **{"pass": False})

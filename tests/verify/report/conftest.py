@@ -16,8 +16,8 @@ from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.synthetic_export import Cells
 
 YIELDS = (
-    *(("diamond", 0.98, 60.04), ("cnc", 0, 58.9), ("sla", 0, 51.4)),
-    *(("fdm", 0, 42), ("sls", 0, 0)),
+    *(("diamond", 0.98, 60.04, 50), ("cnc", 0.7, 59.98, 10), ("sla", 0, 51.4, 5)),
+    *(("fdm", 0, 42, 5), ("sls", 0, 0, 0)),
 )
 
 

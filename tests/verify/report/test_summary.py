@@ -81,8 +81,9 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
+    assert "50 simulated builds, or until 3 fail:" in lines[-8]  # 47 of 50 are 94 %
     assert lines[-7] == "  by: diamond 98% 60"
-    assert lines[-6] == "  not by: cnc 0% 58.9, sla 0% 51.4; more: --for-process"
+    assert lines[-6] == "  not by: cnc 7/10 60, sla 0/5 51.4; more: --for-process"
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
@@ -171,7 +172,7 @@ def test_json_has_the_documented_keys(long_report: Report) -> None:
     assert (document["verdict"], document["failed"]) == ("pass", [])
     assert all(list(figure) == ["label", *FIGURE_KEYS, "pass"] for figure in document["figures"])
     assert [figure["check"] for figure in document["figures"]] == [one.check for one in KEY_FIGURES]
-    first = {"process": "diamond", "yield": 0.98, "coverage_mm": 60.04}
+    first = {"process": "diamond", "yield": 0.98, "builds": 50, "coverage_mm": 60.04}
     assert document["as_made"]["processes"][0] == first
     assert {one["bound"] for one in document["figures"]} == {"at least", "at most"}
 

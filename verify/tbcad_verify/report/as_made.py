@@ -19,16 +19,22 @@ class ProcessYield:
     process: str  # its name
     share: float  # of the builds whose every virtual camera sees the whole object
     coverage_mm: float  # median of the builds' minimum coverage
+    builds: int  # as many as asked for, or fewer where enough had failed
 
 
 @dataclass(frozen=True)
 class AsMade:
     """Simulated builds of one design, without any new search for its margin."""
 
-    builds: int = 0  # number of simulated builds by each process
+    builds: int = 0  # by each process at most: `enough_bad` ones end them
     # the largest coverage first; empty if they could not be simulated
     processes: tuple[ProcessYield, ...] = ()
     reason: str = ""  # why not
+
+
+def enough_bad(builds: int) -> int:
+    """Bad builds with which a process is not good, however the others of so many are."""
+    return int(builds * (1 - GOOD) + 1e-9) + 1
 
 
 def as_made_lines(as_made: AsMade | None) -> list[str]:
@@ -40,10 +46,12 @@ def as_made_lines(as_made: AsMade | None) -> list[str]:
     good: list[str] = []
     others: list[str] = []
     for one in as_made.processes:
-        words = f"{one.process} {one.share:.0%} {one.coverage_mm:.3g}"
-        (good if one.share >= GOOD else others).append(words)
+        is_good, count = one.share >= GOOD, f"{one.share * one.builds:.0f}/{one.builds}"
+        words = f"{one.process} {f'{one.share:.0%}' if is_good else count} {one.coverage_mm:.3g}"
+        (good if is_good else others).append(words)
     return [
-        f"Can be made ({as_made.builds} simulated builds: yield, median minimum coverage in mm)",
+        f"Can be made ({as_made.builds} simulated builds, or until "
+        f"{enough_bad(as_made.builds)} fail: yield, median minimum in mm)",
         f"  by: {', '.join(good[:MOST]) or 'none of the built-in processes'}",
         *([f"  not by: {', '.join(others[:NEAREST])}; more: --for-process"] if others else []),
         f"  left out: {NOT_MODELLED}",

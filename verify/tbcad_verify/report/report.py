@@ -261,7 +261,12 @@ def _as_made(report: Report) -> dict[str, Any] | None:
     if as_made is None:
         return None
     processes = [
-        {"process": one.process, "yield": one.share, "coverage_mm": one.coverage_mm}
+        {
+            "process": one.process,
+            "yield": one.share,
+            "builds": one.builds,
+            "coverage_mm": one.coverage_mm,
+        }
         for one in as_made.processes
     ]
     return {"builds": as_made.builds, "processes": processes, "reason": as_made.reason or None}
