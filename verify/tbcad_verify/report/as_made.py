@@ -31,12 +31,16 @@ class AsMade:
     reason: str = ""  # why not
 
 
-def as_made_lines(as_made: AsMade | None) -> list[str]:
-    """The same in words; without simulated builds, the command that makes them."""
+def as_made_lines(as_made: AsMade | None, valleys: bool) -> list[str]:
+    """The same in words, and what the solids have not, where mirrors meet in valleys.
+
+    Without simulated builds: the command that makes them.
+    """
+    fillets = ["Left out of the solids: a cutter's fillets, rounding of ridges"] * valleys
     if as_made is None:
-        return [NOT_SIMULATED]
+        return [NOT_SIMULATED, *fillets]
     if not as_made.processes:
-        return [f"Can be made: not simulated, {as_made.reason}"]
+        return [f"Can be made: not simulated, {as_made.reason}", *fillets]
     good: list[str] = []
     others: list[str] = []
     for one in as_made.processes:
@@ -46,5 +50,5 @@ def as_made_lines(as_made: AsMade | None) -> list[str]:
         f"Can be made ({as_made.builds} simulated builds: yield, median minimum coverage in mm)",
         f"  by: {', '.join(good[:MOST]) or 'none of the built-in processes'}",
         *([f"  not by: {', '.join(others[:NEAREST])}; more: --for-process"] if others else []),
-        f"  left out: {NOT_MODELLED}",
+        f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}",
     ]
