@@ -29,9 +29,9 @@ from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.types import Floats
 
 POINTS = 32  # on each mirror
-# Steps of a sequence that fills a square evenly (M. Roberts, The Unreasonable Effectiveness of
-# Quasirandom Sequences, 2018).
-STEPS = np.array([[0.7548776662466927], [0.5698402909980532]])
+# Steps of a sequence that fills a cube evenly (M. Roberts, The Unreasonable Effectiveness of
+# Quasirandom Sequences, 2018): equal steps of area would fall on the same columns of a grid.
+STEPS = np.array([[0.8191725133961645], [0.6710436067037893], [0.5497004779019703]])
 # By how much a ball may cut in besides the facets' chord error: rounding of fits and of float32.
 TOLERANCE_MM = 5e-4
 
@@ -141,13 +141,12 @@ def _spread(
     size = norm(mesh.area[:, mine]) / 2
     area = np.bincount(own[mine], size, count).astype(np.float64)
     mirror = np.flatnonzero(area).repeat(POINTS)
-    number = np.arange(mirror.size)
-    at = np.cumsum(area)[mirror] - (number % POINTS + 0.5) / POINTS * area[mirror]
+    share, *across = STEPS * np.arange(1, mirror.size + 1) % 1
+    at = np.cumsum(area)[mirror] - share * area[mirror]
     facet = mine[np.minimum(np.searchsorted(np.cumsum(size), at), mine.size - 1)]
-    across = STEPS * number % 1
-    across = np.where(across.sum(axis=0) > 1, 1 - across, across)  # the square's other half
+    u, v = np.where(np.sum(across, axis=0) > 1, np.subtract(1, across), across)
     a, b, c = (mesh.points[mesh.faces[facet, k]].T for k in range(3))
-    return mirror, a + across[0] * (b - a) + across[1] * (c - a), area
+    return mirror, a + u * (b - a) + v * (c - a), area
 
 
 def _tolerances(mesh: Mesh, own: NDArray[np.intp], curvature: Floats) -> Floats:
