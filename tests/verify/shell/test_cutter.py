@@ -8,7 +8,6 @@ from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.touching_balls import cut_depths
 from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.shell import cutter
 from tbcad_verify.shell.cutter import CutterReach, measure_reach
 from trimesh.triangles import closest_point
 
@@ -43,11 +42,8 @@ def on_left(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("radius", [0.25, 0.5, 2.0])
-def test_a_ball_in_a_valley_touches_both_sides(
-    monkeypatch: pytest.MonkeyPatch, radius: float
-) -> None:
+def test_a_ball_in_a_valley_touches_both_sides(radius: float) -> None:
     """Its centre is on x = 0, both radii away from both centres: so it touches at `reached`."""
-    monkeypatch.setattr(cutter, "POINTS", 4000)
     mesh, own, surfaces = two_spheres(hollow=False)
     reached = ASIDE * radius / (RADIUS + radius)
     points, normals = on_left(-reached * np.array([0.0, 0.5, 0.95, 1.05, 1.5]))
@@ -63,14 +59,14 @@ def test_a_ball_in_a_valley_touches_both_sides(
 
 
 def pockets(radius: float, raised: float = 0.0) -> CutterReach:
-    mesh, own, surfaces = two_spheres(hollow=True)
+    mesh, own, surfaces = two_spheres(hollow=True, step=0.2)
     points = mesh.points.copy()
     points[np.abs(points - [1.0, 1.0, 0])[:, :2].sum(axis=1).argmin(), 2] += raised
     return measure_reach(indexed_mesh(points, mesh.faces), own, surfaces, radius)
 
 
 def test_smaller_balls_reach_pockets_and_their_ridge() -> None:
-    for radius in (0.1, 2.0, 19.0, RADIUS):
+    for radius in (0.1, 2.0, RADIUS):
         reach = pockets(radius)
         assert (reach.share.tolist(), reach.depth.tolist()) == ([1, 1], [0, 0])
 

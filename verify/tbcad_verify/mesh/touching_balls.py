@@ -15,7 +15,7 @@ from tbcad_verify.mesh.mesh import Mesh, longest_sides
 from tbcad_verify.mesh.vectors import chunks, cross, dot, norm
 from tbcad_verify.types import Bools, Floats, Ints
 
-BALLS_AT_ONCE = 1 << 12
+BALLS_AT_ONCE = 1 << 10
 LARGE = 1.5  # times the median of the facets' longest sides: larger ones are halved
 NOTHING_MM = 1e-4  # a ball that cuts in less deep than this stays out: float32 rounding
 

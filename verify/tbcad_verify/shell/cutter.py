@@ -28,7 +28,7 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.shell.optics import OpticalSetup
 from tbcad_verify.types import Floats
 
-POINTS = 32  # on each mirror
+BALLS, LEAST = 1 << 12, 32  # on all mirrors of a mesh together, and on each at least
 # Steps of a sequence that fills a cube evenly (M. Roberts, The Unreasonable Effectiveness of
 # Quasirandom Sequences, 2018): equal steps of area would fall on the same columns of a grid.
 STEPS = np.array([[0.8191725133961645], [0.6710436067037893], [0.5497004779019703]])
@@ -67,7 +67,9 @@ def measure_reach(
     depth = cut_depths(mesh, touched, unit(surfaces.take(mirror).gradient(touched)), radius)
     cut = depth > _tolerances(mesh, own, surfaces.curvature)[mirror]
     share, deepest = np.where(area > 0, [[1.0], [0.0]], np.nan)
-    share -= np.bincount(mirror, cut, area.size) / POINTS
+    share -= np.bincount(mirror, cut, area.size) / np.maximum(
+        np.bincount(mirror, minlength=area.size), 1
+    )
     np.maximum.at(deepest, mirror, np.where(cut, depth, 0.0))
     return CutterReach(share, deepest, area)
 
@@ -89,7 +91,9 @@ def mandrel_reach_check(
     found = _surfaces(setup)
     pocket = 1 / max(float(found.curvature[np.unique(own[own >= 0])].max()), np.finfo(float).tiny)
     if radius is None:
-        return informative(name, pocket, "the smallest pocket; name a cutter (--cutter)")
+        return informative(
+            name, pocket, "the smallest pocket: no larger ball; --cutter puts balls on all"
+        )
     negative = Surfaces(found.point, -found.normal, -found.curvature)
     reach = measure_reach(mesh, own, negative, radius)
     deepest = float(np.nanmax(reach.depth))
@@ -140,7 +144,8 @@ def _spread(
     mine = mine[np.argsort(own[mine], kind="stable")]
     size = norm(mesh.area[:, mine]) / 2
     area = np.bincount(own[mine], size, count).astype(np.float64)
-    mirror = np.flatnonzero(area).repeat(POINTS)
+    there = np.flatnonzero(area)
+    mirror = there.repeat(max(LEAST, BALLS // there.size))
     share, *across = STEPS * np.arange(1, mirror.size + 1) % 1
     at = np.cumsum(area)[mirror] - share * area[mirror]
     facet = mine[np.minimum(np.searchsorted(np.cumsum(size), at), mine.size - 1)]
