@@ -171,8 +171,9 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
             )
         report = None
         if verify:
+            cutter = plan.process.ball_mm if plan.process else None
             report = replace(
-                verification(folder, progress=progress, cutter=_cutter_mm(plan.process)),
+                verification(folder, progress=progress, cutter=cutter),
                 folder=out,
                 note=export.note,
                 as_made=simulated.result() if simulated else None,
@@ -184,14 +185,6 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
     from tbcad.app.whole_design import Design
 
     return Build(out, Design(export.spec, mirrors.arrays), export.parts, export.note, report)
-
-
-def _cutter_mm(process: Process | None) -> float | None:
-    """Radius of the ball cutter that a process names, of the mandrel where it has one."""
-    if process is None:
-        return None
-    mandrel, shell = process.mandrel_cutter_mm, process.cutter_radius_mm.magnitude
-    return (shell if mandrel is None else mandrel) or None
 
 
 def _load_libraries() -> None:

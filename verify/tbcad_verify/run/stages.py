@@ -142,7 +142,8 @@ def _verify_shells(
         known = partial(require, setup, no_setup)
         if cutter_mm is not None:
             names = [("fillet width", part.stl, "um") for part in export.parts]
-            sink(Results(checks=guarded(names, lambda: fillet_checks(names, known(), cutter_mm))))
+            fillets = guarded(names, lambda: fillet_checks(known(), cutter_mm))
+            sink(Results(checks=fillets))
         _verify_mandrels(export, negatives, known, cutter_mm, sink)
 
 

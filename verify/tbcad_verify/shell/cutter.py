@@ -17,6 +17,7 @@ from tbcad_verify.mesh.segments import half_edge_vectors
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.touching_balls import cut_depths
 from tbcad_verify.mesh.vectors import norm, unit
+from tbcad_verify.record.export import Part
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -101,26 +102,23 @@ def mandrel_reach_check(
     return at_least(name, largest, radius, reach.words(setup.export.mirrors.ids, radius))
 
 
-def fillet_checks(names: Sequence[CheckName], setup: OpticalSetup, radius: float) -> list[Check]:
+def fillet_checks(setup: OpticalSetup, radius: float) -> list[Check]:
     """Mean width of what a ball leaves in each shell's valleys, on each side of mirrors' edges."""
-    cameras = [part.camera for part in setup.export.parts]
-    return [
-        _fillets(name, shell_mirrors(setup, camera), setup, radius)
-        for name, camera in zip(names, cameras, strict=True)
-    ]
+    return [_fillets(part, setup, radius) for part in setup.export.parts]
 
 
-def _fillets(name: CheckName, own: NDArray[np.intp], setup: OpticalSetup, radius: float) -> Check:
-    mesh = setup.mesh
+def _fillets(part: Part, setup: OpticalSetup, radius: float) -> Check:
+    own, mesh = shell_mirrors(setup, part.camera), setup.mesh
     mine = own > -2
     shell = Mesh(mesh.points, mesh.faces[mine], mesh.twin, mesh.area[:, mine])
     reach = measure_reach(shell, own[mine], _surfaces(setup), radius)
-    half = np.flatnonzero(mesh.twin >= 0)
-    one, other = own[half // 3], own[mesh.twin[half] // 3]
-    edges = half[(one >= 0) & (other >= 0) & (one != other)]
+    half = np.flatnonzero((mesh.twin >= 0) & (own >= 0).repeat(3))
+    other = own[mesh.twin[half] // 3]
+    edges = half[(other >= 0) & (other != own[half // 3])]
     length = norm(half_edge_vectors(mesh, edges)[1]).sum()
-    width = float(np.nansum((1 - reach.share) * reach.area) / length) if length else 0.0
-    return informative(name, 1e3 * width, reach.words(setup.export.mirrors.ids, radius))
+    width = float(np.nansum((1 - reach.share) * reach.area) / length) if edges.size else 0.0
+    words = reach.words(setup.export.mirrors.ids, radius)
+    return informative(("fillet width", part.stl, "um"), 1e3 * width, words)
 
 
 def shell_mirrors(setup: OpticalSetup, camera: str) -> NDArray[np.intp]:
