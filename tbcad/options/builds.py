@@ -25,6 +25,7 @@ from tbcad.options.shared import (
 )
 
 DEFAULT_YIELD = 0.99
+LARGEST_CUTTER_MM = 100.0
 
 
 @dataclass(frozen=True)
@@ -117,10 +118,23 @@ class VerificationOptions(Call):
         ),
     ] = False
 
+    cutter: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Fail unless a ball cutter of this radius reaches all mirrors of a mandrel; of "
+            "shells, say what it does not reach.",
+        ),
+    ] = None
+
     def check(self) -> None:
         """Refuse what cannot be, before heavy libraries are loaded."""
         if not self.time_limit > 0:
             raise InputError(f"--time-limit must be more than 0 seconds, not {self.time_limit:g}")
+        if self.cutter is not None and not 0 < self.cutter <= LARGEST_CUTTER_MM:
+            raise InputError(
+                f"--cutter {self.cutter:g}: allowed is above 0, at most {LARGEST_CUTTER_MM:g} mm"
+            )
         check_is_folder(Path(self.exports))
         check_are_printers(self.printers)
 

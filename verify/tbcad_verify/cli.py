@@ -13,7 +13,7 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import built_in
 from tbcad_verify.report.report import Output
 from tbcad_verify.report.text import WIDTH
-from tbcad_verify.run.verify import STAGE_LIMIT_S, VerifyOptions, verify
+from tbcad_verify.run.verify import LARGEST_CUTTER_MM, STAGE_LIMIT_S, VerifyOptions, verify
 from tbcad_verify.types import Progress
 
 ABOUT = """Verify the files in DIR, which `tbcad build` wrote: every virtual camera sees the whole
@@ -50,6 +50,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         f"{', '.join(built_in())}, or a TOML file; repeatable",
     )
     parser.add_argument(
+        "--cutter",
+        metavar="MM",
+        type=float,
+        help="fail unless a ball cutter of this radius reaches all mirrors of a mandrel",
+    )
+    parser.add_argument(
         "--strict", action="store_true", help="fail also where lists or other paper were changed"
     )
     parser.add_argument(
@@ -71,11 +77,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     if not arguments.time_limit > 0:
         parser.error("--time-limit must be more than 0 seconds")
+    if arguments.cutter is not None and not 0 < arguments.cutter <= LARGEST_CUTTER_MM:
+        parser.error(f"--cutter must be above 0 and at most {LARGEST_CUTTER_MM:g} mm")
     options = VerifyOptions(
         seconds=arguments.time_limit,
         printers=tuple(arguments.printer),
         clients=arguments.clients,
         strict=arguments.strict,
+        cutter_mm=arguments.cutter,
     )
     outputs = dict.fromkeys(arguments.output or ["summary"])
     if len(outputs) > 1:

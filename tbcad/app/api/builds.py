@@ -171,8 +171,9 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
             )
         report = None
         if verify:
+            cutter = plan.process.ball_mm if plan.process else None
             report = replace(
-                verification(folder, progress=progress),
+                verification(folder, progress=progress, cutter=cutter),
                 folder=out,
                 note=export.note,
                 as_made=simulated.result() if simulated else None,

@@ -42,7 +42,11 @@ def verify(options: VerificationOptions) -> Report:
 
     limit, printers = options.time_limit, tuple(options.printers)
     asked = VerifyOptions(
-        seconds=limit, printers=printers, clients=options.clients, strict=options.strict
+        seconds=limit,
+        printers=printers,
+        clients=options.clients,
+        strict=options.strict,
+        cutter_mm=options.cutter,
     )
     try:
         return verify_files(

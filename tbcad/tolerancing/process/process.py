@@ -120,6 +120,12 @@ class Process(Section):
     ball_grade: GradeName
     """Prototype: grade of the balls by ISO 3290-1."""
 
+    @property
+    def ball_mm(self) -> float | None:
+        """Radius of the ball cutter that cuts mirrors, of a mandrel where there is one, mm."""
+        of_shell, of_mandrel = self.cutter_radius_mm.magnitude, self.mandrel_cutter_mm
+        return (of_shell if of_mandrel is None else of_mandrel) or None
+
 
 def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
     """Return a built-in process, or one of a TOML file, with options "kind.key=value" on top.

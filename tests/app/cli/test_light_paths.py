@@ -32,6 +32,7 @@ BAD_INPUT = (
     ("build", "--for-process", "sla", "--yield", "2"),
     ("verify", "absent"),
     ("verify", "absent", "--time-limit", "0"),
+    ("verify", "absent", "--cutter", "0"),
     ("tolerance", "absent"),
     ("tolerance", "absent", "--process", "woodwork"),
     ("tolerance", "absent", "--set", "sphere_um=3"),

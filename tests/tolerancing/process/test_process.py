@@ -295,6 +295,8 @@ ridge_rounding_um = { magnitude = 1, source = "y" }
         nickel = load_process("nickel-diamond")
         assert (nickel.cutter_radius_mm.magnitude, nickel.mandrel_cutter_mm) == (0, 0.5)
         assert load_process("cnc").mandrel_cutter_mm is None
+        named = [load_process(name).ball_mm for name in ("nickel-milled", "cnc", "epoxy", "fdm")]
+        assert [process.ball_mm, *named] == [0.5, 2, 0.5, 0.5, None]
 
     def test_a_step_that_is_taken_twice_counts_twice(self, file: Path) -> None:
         file.write_text('based_on = "cnc"\nsteps = ["coat", "coat"]\n', encoding="utf-8")

@@ -13,7 +13,7 @@ from OCP.gp import gp_Pnt
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 from tbcad_verify.mesh.mesh import mass_properties
 from tbcad_verify.mesh.stl import parse
-from tbcad_verify.mesh.vectors import angles_between
+from tbcad_verify.mesh.vectors import cross, dot, norm
 from tbcad_verify.prototype import seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
@@ -125,7 +125,7 @@ def test_outlines_are_those_of_cells_cut_by_hand(context: PrototypeContext) -> N
         d = points.T - context.pinhole[:, None]
         chief = np.repeat(found.chief[:, [k]], d.shape[1], axis=1)
         first, second = pinhole_cells.tangent_basis(chief)
-        angle = angles_between(chief, d)
+        angle = np.arctan2(norm(cross(chief, d)), dot(chief, d))
         turn = np.arctan2((second * d).sum(axis=0), (first * d).sum(axis=0)) % (2 * np.pi)
         low = (
             np.floor(turn / (2 * np.pi) * pinhole_cells.OUTLINE_DIRECTIONS).astype(int)

@@ -12,6 +12,7 @@ import pytest
 from rich.console import Console
 from tbcad_verify import main
 from tbcad_verify.programs.program_query import skipped
+from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.methods import (
     ELSE,
@@ -87,6 +88,13 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
+
+
+@pytest.mark.parametrize("as_made", [None, AsMade(), AsMade(50, (ProcessYield("cnc", 1, 60.1),))])
+def test_solids_without_fillets_are_told(shell_report: Report, as_made: AsMade | None) -> None:
+    valleys, grooves = (replace(shell_report, valleys=v, as_made=as_made) for v in (True, False))
+    assert "fillets" in "".join(line for line in fits(shown(valleys)) if "solids" in line)
+    assert "fillets" not in shown(grooves)
 
 
 def test_every_key_figure_has_room(long_report: Report) -> None:

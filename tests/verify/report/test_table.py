@@ -66,9 +66,12 @@ def test_long_names_figures_and_words_stay_whole() -> None:
         assert word in text
 
 
+@pytest.mark.parametrize("option", ["time-limit", "cutter"])
 @pytest.mark.parametrize("limit", ["0", "-1", "nan", "soon"])
-def test_a_time_limit_is_a_time(limit: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_limit_is_more_than_nothing(
+    option: str, limit: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as stop:
-        main(["x", f"--time-limit={limit}"])
+        main(["x", f"--{option}={limit}"])
     assert stop.value.code == 2
-    assert "time-limit" in capsys.readouterr().err
+    assert option in capsys.readouterr().err

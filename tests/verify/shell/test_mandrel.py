@@ -73,11 +73,13 @@ def folder(good: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(good, tmp_path / "copy"))
 
 
-def mesh_checks(folder: Path, setup: OpticalSetup) -> dict[str, Check]:
+def mesh_checks(
+    folder: Path, setup: OpticalSetup, cutter_mm: float | None = None
+) -> dict[str, Check]:
     record = read_export(folder)
     mandrel = record.mandrels[0]
     facets, _ = read_facets(folder, mandrel.stl)
-    results = mandrel_results(record, mandrel, facets, lambda: setup)
+    results = mandrel_results(record, mandrel, facets, lambda: setup, cutter_mm)
     return {check.name: check for check in results.checks}
 
 
@@ -147,9 +149,34 @@ def test_a_broken_mesh_is_refused(folder: Path, setup: OpticalSetup, mirrors: Mi
         assert found in failing(folder, setup), change
 
 
+@pytest.mark.parametrize("share", [None, 0.1, 0.97, 1.03])
+def test_balls_up_to_the_smallest_pocket_reach_all(
+    good: Path, setup: OpticalSetup, mirrors: MirrorDesign, edges: str, share: float | None
+) -> None:
+    """But none reaches beside the fins that cut the grooves of pedestals."""
+    pocket = float(1 / mirrors.arrays[0].mirrors.curvature.max())
+    cutter = None if share is None else share * pocket
+    check = mesh_checks(good, setup, cutter)["mandrel reach"]
+    assert check.limit == cutter
+    assert check.passed is (share is None or (share < 1 and edges == "valley"))
+    if edges == "valley" or share is None:
+        assert check.measured == pytest.approx(pocket, rel=1e-4)
+
+
+def test_a_spike_is_in_the_way(folder: Path, setup: OpticalSetup, mirrors: MirrorDesign) -> None:
+    good = camera_a_mandrel_mesh(mirrors)
+    vertices = good.vertices.copy()
+    vertices[good.triangles[1000, 0]] *= 1.05
+    write_stl(folder / STL, Mesh(vertices, good.triangles))
+    check = mesh_checks(folder, setup, 2.0)["mandrel reach"]
+    assert check.passed is False
+    assert check.measured is not None
+    assert 0 < check.measured < 2
+
+
 def test_the_shell_is_no_negative(folder: Path, setup: OpticalSetup, mirrors: MirrorDesign) -> None:
     write_stl(folder / STL, camera_a_mesh(mirrors))
-    assert {"mandrel mirrors", "mandrel surface"} <= {*failing(folder, setup)}
+    assert {"mandrel mirrors", "mandrel surface", "mandrel reach"} <= {*failing(folder, setup)}
 
 
 @pytest.mark.parametrize(

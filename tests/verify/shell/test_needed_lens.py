@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.record.export import read_export
-from tbcad_verify.shell.needed_lens import image_depths, needed_lens
 
 from tbcad.core.camera.requirements import camera_requirements
 from tbcad.core.mirrors.array import design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
 from tbcad.output.manifest import write_manifest
+from tests.verify.shell.rays_of_images import image_depths, needed_lens
 
 
 @pytest.mark.parametrize(

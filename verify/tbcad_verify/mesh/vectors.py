@@ -133,12 +133,3 @@ def polar_and_azimuth(frame: Floats, d: Floats) -> tuple[Floats, Floats]:
     """Polar angles and azimuths (N,) of directions d (3, N), radians."""
     along, zero, third = (dot(np.broadcast_to(row[:, None], d.shape), d) for row in frame)
     return np.arctan2(np.hypot(zero, third), along), np.arctan2(third, zero)
-
-
-def angles_between(a: Floats, b: Floats) -> Floats:
-    """(N,) angles between columns, radians; exact for small ones too.
-
-    Source: W. Kahan, How Futile are Mindless Assessments of Roundoff, 2006, section 12.
-    """
-    one, two = unit(a), unit(b)
-    return np.asarray(2 * np.arctan2(norm(one - two), norm(one + two)))

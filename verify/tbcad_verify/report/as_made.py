@@ -37,12 +37,16 @@ def enough_bad(builds: int) -> int:
     return int(builds * (1 - GOOD) + 1e-9) + 1
 
 
-def as_made_lines(as_made: AsMade | None) -> list[str]:
-    """The same in words; without simulated builds, the command that makes them."""
+def as_made_lines(as_made: AsMade | None, valleys: bool) -> list[str]:
+    """The same in words, and what the solids have not, where mirrors meet in valleys.
+
+    Without simulated builds: the command that makes them.
+    """
+    fillets = ["Left out of the solids: a cutter's fillets, rounding of ridges"] * valleys
     if as_made is None:
-        return [NOT_SIMULATED]
+        return [NOT_SIMULATED, *fillets]
     if not as_made.processes:
-        return [f"Can be made: not simulated, {as_made.reason}"]
+        return [f"Can be made: not simulated, {as_made.reason}", *fillets]
     good: list[str] = []
     others: list[str] = []
     for one in as_made.processes:
@@ -54,5 +58,5 @@ def as_made_lines(as_made: AsMade | None) -> list[str]:
         f"{enough_bad(as_made.builds)} fail: yield, median minimum in mm)",
         f"  by: {', '.join(good[:MOST]) or 'none of the built-in processes'}",
         *([f"  not by: {', '.join(others[:NEAREST])}; more: --for-process"] if others else []),
-        f"  left out: {NOT_MODELLED}",
+        f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}",
     ]

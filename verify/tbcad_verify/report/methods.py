@@ -111,6 +111,7 @@ KEY_FIGURES = (
     KeyFigure("centre error", "mirrors off"),
     KeyFigure("ball centres", "balls off"),
     KeyFigure("mandrel draft", "mandrel draft"),
+    KeyFigure("mandrel reach", "mandrel reach"),
     KeyFigure("step volume", "STEP volume off"),
     KeyFigure("step area", "STEP area off"),
     KeyFigure("pixels, balls", "pixels kept", "%"),

@@ -50,6 +50,7 @@ class Report:
         programs: answers of other programs on this computer; empty unless they were asked.
         printing: a row for each part on each printer.
         shell: whether there is a shell; without one, the mirrors are requirements only.
+        valleys: whether its mirrors meet in valleys, which solids have without a cutter's fillets.
         prototype: what is known of each ball and stop; None without a prototype.
         note: what the build says of itself, such as why a part was left out; "" for nothing.
         folder: where the export lies.
@@ -64,6 +65,7 @@ class Report:
     programs: tuple[Check, ...] = ()
     printing: tuple[dict[str, Any], ...] = ()
     shell: bool = True
+    valleys: bool = False
     prototype: Mapping[str, Any] | None = None
     note: str = ""
     folder: Path | None = None

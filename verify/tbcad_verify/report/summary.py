@@ -40,7 +40,7 @@ DIGITS = 4  # of a figure; below 1, where zeros lead, one less
 def summary(report: Report) -> list[Text]:
     """Verdict, changed files, failures with remedies, key figures, what making leaves, folder."""
     failed = _failure_lines(report)
-    as_made = as_made_lines(report.as_made)[: AS_MADE_LINES if failed else None]
+    as_made = as_made_lines(report.as_made, report.valleys)[: AS_MADE_LINES if failed else None]
     note = textwrap.wrap(report.note, WIDTH, max_lines=NOTE_LINES, placeholder=MORE)
     end = [*_skipped_line(report), *note, _end_line(report)]
     changed = changed_lines(report.checks)

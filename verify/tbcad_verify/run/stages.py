@@ -26,6 +26,7 @@ from tbcad_verify.report.checks import Check, attempt, check_names, guarded, req
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
+from tbcad_verify.shell.cutter import fillet_checks
 from tbcad_verify.shell.integrity import (
     MANIFEST,
     manifest_checks,
@@ -58,11 +59,16 @@ def stage_titles(export: Export) -> tuple[str, ...]:
 
 
 def run_stages(
-    folder: Path, printers: Sequence[str], sink: ResultSink, beside: Processes | None = None
+    folder: Path,
+    printers: Sequence[str],
+    cutter_mm: float | None,
+    sink: ResultSink,
+    beside: Processes | None = None,
 ) -> None:
     """Run all stages, and hand over what each measures.
 
     `printers`: profiles that every part must suit; without any, the built-in ones inform only.
+    `cutter_mm`: radius of a ball that is put on all mirrors; None: no ball is.
 
     Raises:
         BadExport: the folder is not a readable export, or a profile cannot be used.
@@ -92,7 +98,7 @@ def run_stages(
     if beside and export.prototype:
         ending = beside.submit(*work, heard=prototype.put)
         ending.add_done_callback(lambda _: prototype.put(None))
-    _verify_shells(export, facets, profiles, bool(printers), sink)
+    _verify_shells(export, facets, profiles, bool(printers), cutter_mm, sink)
     if beside and export.prototype:
         for results in iter(prototype.get, None):
             sink(results)
@@ -101,10 +107,12 @@ def run_stages(
         _verify_prototype(*work[1:], sink)
 
 
-def run_in_two(folder: Path, printers: Sequence[str], sink: ResultSink) -> None:
+def run_in_two(
+    folder: Path, printers: Sequence[str], cutter_mm: float | None, sink: ResultSink
+) -> None:
     """Run all stages, those of the prototype in another process."""
     with Processes(1) as beside:
-        run_stages(folder, printers, sink, beside)
+        run_stages(folder, printers, cutter_mm, sink, beside)
 
 
 def _verify_shells(
@@ -112,6 +120,7 @@ def _verify_shells(
     facets: list[Facets],
     profiles: list[Profile],
     required: bool,
+    cutter_mm: float | None,
     sink: ResultSink,
 ) -> None:
     sink(Results(stages=[MESHES]))
@@ -130,18 +139,27 @@ def _verify_shells(
     if shells:
         holes = {name: measures.holes for name, measures in measured.items()}
         setup, no_setup = _trace_shells(export, shells, first, holes, sink)
-        _verify_mandrels(export, negatives, lambda: require(setup, no_setup), sink)
+        known = partial(require, setup, no_setup)
+        if cutter_mm is not None:
+            names = [("fillet width", part.stl, "um") for part in export.parts]
+            fillets = guarded(names, lambda: fillet_checks(known(), cutter_mm))
+            sink(Results(checks=fillets))
+        _verify_mandrels(export, negatives, known, cutter_mm, sink)
 
 
 def _verify_mandrels(
-    export: Export, facets: list[Facets], setup: Callable[[], OpticalSetup], sink: ResultSink
+    export: Export,
+    facets: list[Facets],
+    setup: Callable[[], OpticalSetup],
+    cutter_mm: float | None,
+    sink: ResultSink,
 ) -> None:
     """The negatives, whose mirrors are compared with what was found on the shells."""
     if not export.mandrels:
         return
     sink(Results(stages=[MANDRELS]))
     for mandrel, stl in zip(export.mandrels, facets, strict=True):
-        sink(mandrel_results(export, mandrel, stl, setup))
+        sink(mandrel_results(export, mandrel, stl, setup, cutter_mm))
 
 
 def _scene_of_original(shells: list[ShellPart]) -> RayScene | None:

@@ -42,6 +42,7 @@ from tbcad_verify.step.step_file import PROCESSES, StepFile, read_step_files
 from tbcad_verify.types import Progress
 
 STAGE_LIMIT_S = 600.0
+LARGEST_CUTTER_MM = 100.0
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
 Stamps = dict[str, tuple[int, ...]]
 Files = dict[str, StepFile | Unknown]
@@ -65,6 +66,7 @@ class VerifyOptions:
     clients: bool = False
     # fail also where a file was changed that only people read, such as a list of parts
     strict: bool = False
+    cutter_mm: float | None = None  # radius of a ball that must reach all mirrors of a mandrel
 
 
 def verify(
@@ -98,6 +100,7 @@ def verify(
         tuple(programs),
         tuple(results.printing),
         shell=bool(export.parts),
+        valleys=export.spec.shell.edges == "valley" and bool(export.parts),
         prototype=results.prototype,
         folder=folder,
         seconds=time.monotonic() - started,
@@ -112,7 +115,7 @@ def verify(
 
 def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> None:
     """All stages; an interrupt ends the processes that read files, which take long."""
-    work = export.folder, options.printers
+    work = export.folder, options.printers, options.cutter_mm
     with _steps(export, options.seconds) as steps:
         # Reading STEP files needs none of the stages, and takes as long as they do.
         if options.apart:

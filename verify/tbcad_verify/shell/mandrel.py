@@ -29,12 +29,14 @@ from tbcad_verify.report.checks import (
     attempt,
     check_names,
     guarded,
+    guarded_each,
     informative,
     require,
     short_list,
     worst_offenders,
 )
 from tbcad_verify.run.results import Results
+from tbcad_verify.shell.cutter import mandrel_reach_check, shell_mirrors
 from tbcad_verify.shell.integrity import (
     FOLDS,
     TOPOLOGY,
@@ -57,6 +59,7 @@ CHECKS = {
     "mandrel draft": "deg",
     "mandrel draft, deviation from record": "deg",
     "mandrel pull": "facets",
+    "mandrel reach": "mm",
 }
 
 
@@ -70,11 +73,16 @@ class _Shared:
 
 
 def mandrel_results(
-    export: Export, mandrel: Mandrel, facets: Facets, setup: Callable[[], OpticalSetup]
+    export: Export,
+    mandrel: Mandrel,
+    facets: Facets,
+    setup: Callable[[], OpticalSetup],
+    cutter_mm: float | None = None,
 ) -> Results:
     """All checks of one negative's mesh, and its mass.
 
     `setup`: gives what was found on the shells; may raise `Unknown`.
+    `cutter_mm`: radius of a ball that must reach all mirrors; None: no ball is put on them.
     """
     mesh, no_mesh = attempt(lambda: mesh_from_facets(facets))
     topology = guarded(
@@ -87,7 +95,7 @@ def mandrel_results(
     )
     checks = guarded(
         check_names(CHECKS, mandrel.stl),
-        lambda: mandrel_checks(export, mandrel, require(mesh, no_mesh), setup()),
+        lambda: mandrel_checks(export, mandrel, require(mesh, no_mesh), setup(), cutter_mm),
     )
     mass, no_mass = attempt(lambda: mass_properties(require(mesh, no_mesh)))
     ends = mesh_ends_checks(export, mandrel, mass, no_mass)
@@ -97,12 +105,16 @@ def mandrel_results(
 
 
 def mandrel_checks(
-    export: Export, mandrel: Mandrel, mesh: Mesh, setup: OpticalSetup
+    export: Export,
+    mandrel: Mandrel,
+    mesh: Mesh,
+    setup: OpticalSetup,
+    cutter_mm: float | None,
 ) -> list[Check]:
     """Everything that is measured on one negative's mesh but its topology."""
-    shared = _shared(mesh, setup.mesh, _shell_mirrors(setup, mandrel.camera), len(export.mirrors))
+    shared = _shared(mesh, setup.mesh, shell_mirrors(setup, mandrel.camera), len(export.mirrors))
     modelled = export.mirrors.surfaces().coated(-export.coating_mm)
-    mirrors, surface, body, draft, recorded, pull = check_names(CHECKS, mandrel.stl)
+    mirrors, surface, body, draft, recorded, pull, reach = check_names(CHECKS, mandrel.stl)
     ids = export.mirrors.ids
     lost = shared.missing.astype(np.float64)
     errors = _surface_errors(mesh, shared.own, modelled, export.mirrors.camera == mandrel.camera)
@@ -129,6 +141,7 @@ def mandrel_checks(
             f"{least:.2f} degrees along the recorded pull, the record has {mandrel.draft_deg:.2f}",
         ),
         _pull_check(pull, least, int(caught.sum())),
+        *guarded_each([reach], [mandrel_reach_check], mesh, shared.own, setup, cutter_mm),
     ]
 
 
@@ -143,14 +156,6 @@ def _pull_check(name: CheckName, least: float, caught: int) -> Check:
     if least < 0:
         return informative(name, caught)
     return at_most(name, caught, 0, "the shell catches there when it is drawn")
-
-
-def _shell_mirrors(setup: OpticalSetup, camera: str) -> NDArray[np.intp]:
-    """(F,) recorded mirror of each facet of the shells; -1: none, -2: of another camera's shell."""
-    label = setup.recovery.segments.label
-    cameras = np.array([part.camera for part in setup.export.parts])
-    mine = cameras[setup.part[label]] == camera
-    return np.where(mine, setup.owner()[label], -2)
 
 
 def _shared(mesh: Mesh, shell: Mesh, mirror: NDArray[np.intp], count: int) -> _Shared:

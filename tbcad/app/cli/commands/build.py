@@ -94,9 +94,10 @@ def verify_command(
     Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
     """
     output, folder = output_mode(full, quiet, json), Path(options.exports)
-    if as_built is not None and (options.printers or options.clients or options.strict):
+    asked = (options.printers, options.clients, options.strict, options.cutter)
+    if as_built is not None and any(asked):
         raise InputError(
-            "--as-built is about no files: leave out --printer, --clients and --strict"
+            "--as-built is about no files: leave out --printer, --clients, --strict and --cutter"
         )
     options.check()
     if as_built is not None:

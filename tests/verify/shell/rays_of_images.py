@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-
 from tbcad_verify.mesh.surfaces import Surfaces, reflect_directions
 from tbcad_verify.mesh.vectors import cross, dot, norm, unit
 from tbcad_verify.record.export import Camera, Export
