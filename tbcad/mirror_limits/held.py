@@ -35,18 +35,10 @@ DEFOCUS = (2, 0)
 MM_PER_UNIT = {"um": MM_PER_UM, "mm": 1.0}
 
 
-@dataclass(frozen=True)
-class Patches:
-    """All mirrors of an export, a's first."""
-
-    radius: Floats  # R, mm, (m,)
-    half: Floats  # h, distance of each one's farthest corner from its apex, mm, (m,)
-
-    @classmethod
-    def of(cls, export: ExportedDesign) -> "Patches":
-        """Those of both halves."""
-        radius = np.concatenate([one.mirrors.radius for one in export.reflectors])
-        return cls(radius, np.concatenate([cell_radii(one.cells) for one in export.reflectors]))
+def radii_and_halves(export: ExportedDesign) -> tuple[Floats, Floats]:
+    """Radius R of mirrors, a's first, and distance h of each one's farthest corner, mm, (m,)."""
+    radius = np.concatenate([one.mirrors.radius for one in export.reflectors])
+    return radius, np.concatenate([cell_radii(one.cells) for one in export.reflectors])
 
 
 @dataclass(frozen=True)
@@ -105,8 +97,8 @@ def chain_of(
     InputError where the mandrel's cutter does not fit into its smallest pocket, or errors are
     larger than a mirror.
     """
-    patches = Patches.of(export)
-    cutter, smallest = process.mandrel_cutter_mm, float(patches.radius.min())
+    radius, half = radii_and_halves(export)
+    cutter, smallest = process.mandrel_cutter_mm, float(radius.min())
     if cutter is not None and cutter >= smallest:
         raise InputError(
             f"--chain {name}: the mandrel's cutter has a radius of {cutter:g} mm, allowed is less "
@@ -114,7 +106,7 @@ def chain_of(
         )
     length, kinds = process.warp_um.length_mm, found.each.shape[1]
     each, mandrel, replica = (
-        two_sigma(parts, patches, length)[:, :kinds]
+        two_sigma(parts, radius, half, length)[:, :kinds]
         for parts in ([process], *mandrel_and_replica(process.made))
     )
     whole = mandrel + replica
@@ -131,7 +123,9 @@ def chain_of(
     return Chain(name, process, wanted, good, figures, each, share)
 
 
-def two_sigma(parts: Sequence[Process | ChainStep], patches: Patches, warp_length: float) -> Floats:
+def two_sigma(
+    parts: Sequence[Process | ChainStep], radius: Floats, half: Floats, warp_length: float
+) -> Floats:
     """Two standard deviations of m mirrors by all parts together, (m, 4).
 
     As a fit of each patch finds them. Offset (um): what centre, radius and defocus of the waviness
@@ -144,7 +138,7 @@ def two_sigma(parts: Sequence[Process | ChainStep], patches: Patches, warp_lengt
         hypot(*(getattr(part, kind).sigma for part in parts if getattr(part, kind)))
         for kind in ADDED
     )
-    radius, half, even = patches.radius, patches.half, np.ones_like(patches.radius)
+    even = np.ones_like(radius)
     defocus = sqrt(3 * term_shares()[TERMS.index(DEFOCUS)]) * waviness
     columns = (
         hypot(centre, grown, defocus) * even,

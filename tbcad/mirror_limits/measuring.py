@@ -1,39 +1,20 @@
 """Which mirrors a workshop measures, and how exactly."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.mirror_limits.held import Patches, mandrel_and_replica
+from tbcad.mirror_limits.held import mandrel_and_replica, radii_and_halves
 from tbcad.mirror_limits.sensitivity import MM_PER_UM, MirrorLimits
 from tbcad.tolerancing.process.chain import ChainStep
 from tbcad.types import Floats, Ints
 
 SAMPLES = 30  # of each half: a day of measuring, a judgement
 GOOD = 0.99  # share of the mirrors that is said to be within limits
-UNNAMED = "no instrument is named"
 UNCERTAINTY_SHARE = 0.25  # of a limit that the expanded uncertainty may have: a judgement
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """The instrument for the form of a solid's mirrors, and what is asked of it."""
-
-    solid: str  # "mandrel" or "shell"
-    instrument: str
-    uncertainty_um: float | None  # expanded, of a height; None: no step names an instrument
-    required_um: float  # the largest that is allowed
-
-    @property
-    def verdict(self) -> str:
-        """Whether the instrument is exact enough."""
-        if self.uncertainty_um is None:
-            return "agree on one"
-        fine = self.uncertainty_um <= self.required_um
-        return "does" if fine else "too coarse: name another in measured_with"
 
 
 def sampled(apex: Floats, limits: MirrorLimits, count: int = SAMPLES) -> Ints:
@@ -61,37 +42,36 @@ def confidence(count: int, good: float = GOOD) -> float:
     return float(1 - good**count)
 
 
-def needed(confident: float, good: float = GOOD) -> int:
-    """How many mirrors give a confidence: `confidence` inverted."""
-    return int(np.ceil(np.log1p(-confident) / np.log(good)))
-
-
 def height_uncertainty(export: ExportedDesign, limits: MirrorLimits) -> float:
     """Largest expanded uncertainty of heights with which all limits can be told, um.
 
     Of a cell of the half width h a tilt t lifts the rim by h t, a radius that is off by r by
     r h^2 / (2 R^2).
     """
-    patches = Patches.of(export)
-    half, ones = patches.half, np.ones_like(patches.half)
-    lifted = np.stack([ones, half, (half / patches.radius) ** 2 / (2 * MM_PER_UM), ones], axis=1)
+    radius, half = radii_and_halves(export)
+    ones = np.ones_like(half)
+    lifted = np.stack([ones, half, (half / radius) ** 2 / (2 * MM_PER_UM), ones], axis=1)
     return UNCERTAINTY_SHARE * float((limits.each * lifted[:, : limits.each.shape[1]]).min())
 
 
 def measurements(
     export: ExportedDesign, limits: MirrorLimits, steps: Sequence[ChainStep], share: Floats
-) -> list[Measurement]:
-    """The last instrument that steps name for the shell, and for the mandrel if there is one.
+) -> list[dict[str, Any]]:
+    """The last instrument that steps name for the mandrel, if there is one, and for the shell.
 
-    The mandrel may use a share (2 m, kinds) of the limits.
+    With the uncertainty that is required (um), and whether it has that. The mandrel may use a share
+    (2 m, kinds) of the limits.
     """
     mandrel, replica = mandrel_and_replica(steps)
-    parts = [("shell", replica, limits)]
-    if mandrel:
-        parts.insert(0, ("mandrel", mandrel, limits.part(share)))
+    parts = [("Mandrel", mandrel, limits.part(share))] if mandrel else []
     plan = []
-    for solid, some, allowed in parts:
-        named = [one for step in some if (one := step.measured_with)]
-        words, known = (named[-1].value, named[-1].uncertainty_um) if named else (UNNAMED, None)
-        plan.append(Measurement(solid, words, known, height_uncertainty(export, allowed)))
+    for solid, some, allowed in (*parts, ("Shell", replica, limits)):
+        required = height_uncertainty(export, allowed)
+        words, verdict = "No instrument is named", "agree on one"
+        for one in (step.measured_with for step in some if step.measured_with):
+            words = f"{one.value}, U {one.uncertainty_um:g} um"
+            fine = one.uncertainty_um <= required
+            verdict = "it does" if fine else "too coarse, name another in measured_with"
+        row = {"solid": solid, "instrument": words, "required_um": required, "verdict": verdict}
+        plan.append(row)
     return plan

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict
+from math import ceil, log
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,6 @@ from tbcad.mirror_limits.measuring import (
     GOOD,
     confidence,
     measurements,
-    needed,
     sampled,
 )
 from tbcad.mirror_limits.sensitivity import (
@@ -97,7 +97,6 @@ def _record(
     smallest, median = limits.each.min(axis=0), np.median(limits.each, axis=0)
     process, numbers = chain.process, sampled(export.reflectors[0].mirrors.apex, limits)
     ids = [mirror_ids(one.camera_id, len(one)) for one in export.reflectors]
-    plan = measurements(export, limits, process.made, chain.mandrel_share)
     return {
         "schema": SCHEMA,
         "exports": str(export.folder),
@@ -127,12 +126,12 @@ def _record(
             "steps": [step.model_dump(mode="json", exclude_none=True) for step in process.made],
         },
         "finish": {"rq_nm": roughness_nm(), "scattered": SCATTERED},
-        "measuring": [asdict(one) | {"verdict": one.verdict} for one in plan],
+        "measuring": measurements(export, limits, process.made, chain.mandrel_share),
         "samples": {
             "mirrors": [[names[k] for k in numbers] for names in ids],
             "good": GOOD,
             "confidence": confidence(len(ids) * len(numbers)),
-            "for_95": needed(0.95),
+            "for_95": ceil(log(1 - 0.95) / log(GOOD)),
         },
     }
 

@@ -17,8 +17,8 @@ from tbcad.core.spec.load import load_spec
 from tbcad.drawings.order_sheet import order_sheet
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import read_export
-from tbcad.mirror_limits.held import Patches, chain_of, two_sigma
-from tbcad.mirror_limits.measuring import confidence, needed, sampled
+from tbcad.mirror_limits.held import chain_of, two_sigma
+from tbcad.mirror_limits.measuring import confidence, sampled
 from tbcad.mirror_limits.sensitivity import MirrorLimits
 from tbcad.shell.files import design_mandrel, shell_envelope, write_mandrels, write_shell_solids
 from tbcad.tolerancing.process.chain import ChainStep
@@ -76,7 +76,7 @@ def test_radius_is_what_a_fit_of_the_patch_finds() -> None:
         {"title": "x", "waviness_um": {"magnitude": 0.3, "source": "test"}}
     )
     radius, half = 40.0, 3.5
-    held = two_sigma([step], Patches(np.array([radius]), np.array([half])), 80.0)[0]
+    held = two_sigma([step], np.array([radius]), np.array([half]), 80.0)[0]
     rho = np.sqrt(np.linspace(0, 1, 2001))
     amplitude = 2 * 0.3e-3 * sqrt(4 / 21)
     height = amplitude * sqrt(3) * (2 * rho**2 - 1)
@@ -91,9 +91,16 @@ def test_the_page_is_whole_and_legible(exports: Path, written: Path) -> None:
     check_texts(sheet)
     told = [one.text for one in texts(sheet)]
     assert min(one.height for one in texts(sheet)) >= 1.6
-    assert {"A", "B", "C", "S1", "F1", "MS1", "MF1", "through 5", "blind 8.6"} <= set(told)
+    assert {"A", "B", "C", "B7", "C8", "MB7", "MC8", "5", "8.6"} <= set(told)
     whole = " ".join(told)
-    for words in ("Rq (Sq) 4.4 nm", "190 degrees", "SiO2", "ball cutter R 0.5 mm", "0.99^60 = 45%"):
+    for words in (
+        "Rq (Sq) 4.4 nm",
+        "190 degrees",
+        "SiO2",
+        "ball cutter R 0.5 mm",
+        "0.99^60 = 45%",
+        "22 x Ø 4.3, 8 x Ø 4",
+    ):
         assert words in whole, words
     assert b"/Count 1" in (written / "order.pdf").read_bytes()
 
@@ -155,7 +162,6 @@ def test_samples_are_tight_ones_all_over_the_shell() -> None:
     away = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
     assert away.max() < 45  # of a side of 100
     assert confidence(299) >= 0.95 > confidence(298)
-    assert needed(0.95) == 299
 
 
 def test_scatter_of_roughness() -> None:
