@@ -105,7 +105,8 @@ def drawing(circles: int, units: int = MM, layer: str = "centre") -> FileBytes:
     for k in range(circles):
         space.add_circle((k, 2), 0.5, dxfattribs={"layer": "cut"})
     space.add_circle((9, 9), 9, dxfattribs={"layer": layer})
-    space.add_lwpolyline([(0, 0), (3, 0), (3, 4), (0, 4)], dxfattribs={"layer": "cut"})
+    square = [(0, 0), (3, 0), (3, 4), (0, 4)]
+    space.add_lwpolyline(square, close=True, dxfattribs={"layer": "cut"})
     text = io.StringIO()
     document.write(text)
     return file_of(text.getvalue())
