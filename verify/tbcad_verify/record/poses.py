@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,10 +139,27 @@ def contradictions(export: Export) -> list[str]:
     wrong = [name for name, (one, two) in pairs.items() if abs(one - two) > UNLIKE_SPEC]
     if export.spec.mesh.largest_mm > LARGEST_MESH_ERROR_MM:
         wrong.append(f"a mesh error of more than {LARGEST_MESH_ERROR_MM:g} mm in the spec")
+    wrong += _beyond_the_limits(export)
     shells = export.parts if export.spec.shell.negative else ()
     if sorted(one.camera for one in export.mandrels) != sorted(one.camera for one in shells):
         wrong.append("the mandrels of shell.negative")
     return sorted(wrong)
+
+
+def _beyond_the_limits(export: Export) -> Iterator[str]:
+    """Limits of the spec that the prototype's record exceeds."""
+    if (prototype := export.prototype) is None:
+        return
+    spec, (low, high) = export.spec.prototype, prototype.swing
+    if high - low > spec.max_swing_deg:
+        yield f"a swing of {high - low:.1f} deg above prototype.max_swing_deg"
+    if prototype.balls.cap.any() and not spec.caps:
+        yield "caps without prototype.caps"
+    bought = prototype.balls.diameter_mm[~prototype.balls.cap].max(initial=0)
+    if bought > spec.largest_ball_mm:
+        yield f"a ball of {bought:g} mm above prototype.largest_ball_mm"
+    if len(prototype.balls) != spec.k:
+        yield f"{len(prototype.balls)} balls, not prototype.k"
 
 
 def directions(optics: OpticsSpec) -> Floats:
