@@ -96,9 +96,13 @@ class MeshSpec(Strict):
         return max(self.chord_error_mm, self.structure_error_mm)
 
 
-class PrinterSpec(Strict):
-    """The material of all printed parts of the prototype."""
+_Side = Annotated[float, Field(ge=20, le=2000)]
 
+
+class PrinterSpec(Strict):
+    """Printer and material of all printed parts of the prototype but caps."""
+
+    bed_mm: Annotated[list[_Side], Field(min_length=3, max_length=3)]
     density_g_cm3: float = Field(gt=0, le=20)
 
 
