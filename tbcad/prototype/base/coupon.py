@@ -28,7 +28,7 @@ from tbcad.types import Floats
 
 # Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.
 BAR_HEIGHT, BAR_MAX_MM = 0.8, 1.21
-BESIDE_TEXT_MM = 0.8  # of a bar
+BESIDE_TEXT_MM = 1.6  # of a bar
 GAP_MM = 3.0  # round texts and between seats
 SUNK_MM = 0.3  # of texts into their face
 DECIMALS = 6  # to which sizes are the same, mm
