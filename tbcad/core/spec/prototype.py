@@ -232,7 +232,7 @@ class StageSpec(Section):
     """Current of an LED, at most; the resistor is the next larger of the series E24."""
     led_supply_v: float = Field(24.0, ge=3, le=48)
     """Voltage that LED and resistor are in series at."""
-    led_wall_mm: float = Field(1.2, ge=0.8, le=20)
+    led_wall_mm: float = Field(1.3, ge=0.8, le=20)
     """Wall round an LED's pocket."""
     wire_mm: float = Field(2.4, ge=1, le=10)
     """Width of the wires' channels."""

@@ -27,8 +27,8 @@ from tbcad.prototype.printed import PlacedSolid
 from tbcad.types import Floats
 
 # Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.
-BAR_HEIGHT, BAR_MAX_MM = 0.8, 0.6
-BESIDE_TEXT_MM = 0.8  # of a bar
+BAR_HEIGHT, BAR_MAX_MM = 0.8, 1.21
+BESIDE_TEXT_MM = 1.6  # of a bar
 GAP_MM = 3.0  # round texts and between seats
 SUNK_MM = 0.3  # of texts into their face
 DECIMALS = 6  # to which sizes are the same, mm

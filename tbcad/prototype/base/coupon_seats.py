@@ -41,6 +41,7 @@ KEEL_MM = 3.0  # thickness of the plate below a seat
 INSIDE_MM = 0.3  # from the wall's faces to the upper edges of that plate
 # Of the core beyond the foot: with the same radius, faces would lie on each other.
 BEYOND_FOOT_MM = 0.5
+RIM_MM = 1.3  # width of the core's upper end, round the cup
 BEYOND_MM = 1.0  # of what is cut away beyond the seat
 ROUNDING_MM = 1e-6
 UP = np.eye(3)[2]
@@ -146,9 +147,9 @@ def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape
     apex = _half_leg(seats, spec, k) / np.sin(np.pi / 3)
     if max(core, apex) >= boss:
         return
-    low = float(seats.front[k]) - BEYOND_MM
-    length = float(seats.back[k]) + BEYOND_MM - low
-    inner = cylinder(low * UP, UP, core, length)
+    low, top = float(seats.front[k]) - BEYOND_MM, core_top(seats, spec, k)
+    end = float(seats.back[k]) + BEYOND_MM
+    length, inner = end - low, cylinder(top * UP, UP, core, end - top)
     for azimuth in _leg_azimuths(seats, k):
         ends = np.array([azimuth, azimuth + 2 * np.pi / 3])
         first = apex * unit_circle(ends.mean())
@@ -170,6 +171,14 @@ def _half_leg(seats: Seats, spec: BaseSpec, k: int) -> float:
 def core_radius(seats: Seats, spec: BaseSpec, k: int) -> float:
     """Radius of what stays whole round the pocket, mm; no less than the boss where no leg is."""
     return float(wall_section(seats, spec, k)[-2, 1]) + BEYOND_FOOT_MM
+
+
+def core_top(seats: Seats, spec: BaseSpec, k: int) -> float:
+    """Where the core begins along the axis, mm: its rim round the cup is no knife edge."""
+    core, front = core_radius(seats, spec, k), float(seats.front[k])
+    inner = max(core - RIM_MM, float(seats.pocket[k]))
+    whole = core >= seats.boss[k]
+    return front if whole else float(np.sqrt(max(seats.cup[k] ** 2 - inner**2, front**2)))
 
 
 def wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:
@@ -200,8 +209,7 @@ def outline(seats: Seats, spec: BaseSpec, k: int, lean: float) -> Floats:
 def height(seats: Seats, spec: BaseSpec, k: int, pose: SeatPose) -> float:
     """Of the ball's centre above the bed, on which the lowest of legs and core lies, mm."""
     section, core = wall_section(seats, spec, k), core_radius(seats, spec, k)
-    cup, cone = float(seats.cup[k]), _cone(seats, spec, k)
-    edges = [[float(np.sqrt(max(cup**2 - core**2, 0.0))), core], [cone - core, core]]
+    edges = [[core_top(seats, spec, k), core], [_cone(seats, spec, k) - core, core]]
     whole = section if core >= seats.boss[k] else np.array([*section[section[:, 1] < core], *edges])
     round_it = whole @ [[-np.cos(pose.lean)], [-np.sin(pose.lean)]]
     on_legs = section[section[:, 1] >= core]
@@ -232,8 +240,8 @@ def keel_corners(
     which the kernel fails at.
     """
     back, foot = wall_section(seats, spec, k)[-2]
-    rim, first = min(core_radius(seats, spec, k), float(seats.boss[k])), float(seats.front[k])
-    first = max(first, float(np.sqrt(max(seats.cup[k] ** 2 - rim**2, 0.0)))) + INSIDE_MM
+    rim = min(core_radius(seats, spec, k), float(seats.boss[k]))
+    first = core_top(seats, spec, k) + INSIDE_MM
     rim, end = (float(np.sqrt(r**2 - KEEL_MM**2 / 4)) - INSIDE_MM for r in (rim, foot))
     last = back - INSIDE_MM
     ends = np.array([[first, -rim], [last, -end], [last, end]]) @ leaning(pose.lean)

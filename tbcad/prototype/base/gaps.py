@@ -12,7 +12,7 @@ from tbcad.prototype.base.profile import at_azimuths, meridian, outward
 from tbcad.prototype.base.seats import Seats
 from tbcad.types import Bools, Floats
 
-STEP_MM = 0.25
+STEP_MM, END_STEPS = 0.25, 4
 ROOM_MM = 1.0  # round the end of a boss
 MIN_PART_MM = 8.0  # of a rib or ring between gaps
 BEYOND_MM = 5.0  # by which a gap's section extends beyond the rib
@@ -48,8 +48,14 @@ def rib_gaps(base: BaseLayout, azimuth: float, side: float) -> list[Floats]:
     gaps = []
     for first, last in _spans(~keep):
         steps = np.unique(np.linspace(first, last, GAP_POINTS).round().astype(int))
-        outer = place[steps] + BEYOND_MM * normal[steps]
-        inner = place[steps] - (height + BEYOND_MM) * normal[steps]
+        middle = place[steps]
+        # A gap at the rib's end goes beyond it: what is left of a step would be a fin.
+        if first == 0:
+            middle[0] -= END_STEPS * (place[1] - place[0])
+        if last == len(place) - 1:
+            middle[-1] += END_STEPS * (place[-1] - place[-2])
+        outer = middle + BEYOND_MM * normal[steps]
+        inner = middle - (height + BEYOND_MM) * normal[steps]
         gaps.append(np.vstack([outer, inner[::-1]]))
     return gaps
 

@@ -101,6 +101,8 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
         boss, disc, thickness = 0.0, outer, max(DISC_MM, pattern.head[1] + BELOW_HEAD_MM)
     back = front - thickness
     face = back - spec.hub_bosses_mm[0] if pattern.boss else back
+    # A clamp's slit ends at a cut below the disc, twice as far from it as it is wide.
+    lock_end = back - 2 * SLIT_MM * (spec.lock == "clamp")
     return Hub(
         front=front,
         back=back,
@@ -113,7 +115,7 @@ def hub_layout(spec: BaseSpec, front: float) -> Hub:
         depth=spec.insert_depth_mm if pattern.boss else thickness,
         head=pattern.head,
         lock=spec.lock if pattern.boss else None,
-        lock_z=(back + face + spec.insert_depth_mm) / 2 if pattern.boss else face,
+        lock_z=(lock_end + face + spec.insert_depth_mm) / 2 if pattern.boss else face,
         key_radius=pattern.circle / 2,
     )
 

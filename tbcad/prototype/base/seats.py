@@ -24,15 +24,16 @@ from tbcad.prototype.base.holding import (
     pad_normals,
     worst_force_needed,
 )
-from tbcad.types import Floats
+from tbcad.types import Bools, Floats
 
 LIP_MM = 0.5  # of the cup in front of the pads
 OFF_PATH_MM = 0.6  # minimum between a pad and the insertion path of another ball
+MIN_RIM_MM, RIM_POINTS = 1.4, 72  # of a cup beside the path of another ball
 ENOUGH_ROOM_MM = OFF_PATH_MM + 1  # beyond which more room makes no path or rotation better
 MAX_PAD = 2 / 3  # diameter of a pad in radii of its ball
 MIN_PAD_RELIEF = 0.8  # of the cup's clearance, by which pads stand out at their edges
 # A ball may be inserted at a slant, as long as it touches no pad of its own before its place.
-SLANTS = np.radians([0.0, 10.0, 20.0])
+SLANTS = np.radians([0.0, 10.0, 20.0, 30.0])
 SLANT_AZIMUTHS = np.radians(np.arange(0, 360, 30))
 
 
@@ -167,9 +168,23 @@ def _with_clear_paths(seats: Seats) -> Seats:
     tries = [replace(seats, insertion=length * (one @ seats.axes)) for one in directions]
     # Room that a path leaves to the pads of all other seats.
     room = np.stack([_room_at_pads(one).min(axis=(0, 1)) for one in tries])
+    # A cup's rim that a path leaves thin is worse than a pad nearer to the path.
+    thin = np.stack([thin_rims(one) for one in tries])
+    steep = slant[:, None] > np.pi / 2 - np.arccos(seats.front / seats.cup)
+    room = np.where(steep, -np.inf, np.where(thin, np.minimum(room, OFF_PATH_MM - 1), room))
     best = _first_with_enough(room)
     insertion = [tries[b].insertion[j] for j, b in enumerate(best.tolist())]
     return replace(seats, insertion=np.stack(insertion))
+
+
+def thin_rims(seats: Seats) -> Bools:
+    """Whether the path of each ball leaves less than a wall of another cup's rim, (k,)."""
+    around = unit_circle(np.linspace(0, 2 * np.pi, RIM_POINTS, endpoint=False))
+    rim = np.sqrt(seats.cup**2 - seats.front**2)[:, None, None]
+    points = seats.at_depth(seats.front)[:, None] + rim * (around @ seats.axes[:, :2])
+    gap = np.stack([_from_paths(seats, one) for one in points]).min(axis=1)
+    np.fill_diagonal(gap, np.inf)
+    return np.asarray((np.abs(gap) < MIN_RIM_MM).any(axis=0))
 
 
 def _with_clear_pads(seats: Seats) -> Seats:
@@ -197,11 +212,16 @@ def insertion_clearance(seats: Seats) -> Floats:
 
 def _room_at_pads(seats: Seats) -> Floats:
     """Room between each pad and the path of each ball, mm, (k, 3, k); infinite for its own."""
-    length = norm(seats.insertion)
-    toward = seats.contacts[:, :, None] - seats.centre
-    out = seats.insertion / length[:, None]
-    along = np.clip(dot(toward, out), 0, length)
-    room = norm(toward - along[..., None] * out) - seats.cup - seats.pad[:, None, None]
+    room = _from_paths(seats, seats.contacts) - seats.pad[:, None, None]
     ball = np.arange(len(seats))
     room[ball, :, ball] = np.inf
     return room
+
+
+def _from_paths(seats: Seats, points: Floats) -> Floats:
+    """Distance of points (..., 3) from the path of each ball, which is as wide as its cup."""
+    length = norm(seats.insertion)
+    toward = points[..., None, :] - seats.centre
+    out = seats.insertion / length[:, None]
+    along = np.clip(dot(toward, out), 0, length)
+    return np.asarray(norm(toward - along[..., None] * out) - seats.cup)

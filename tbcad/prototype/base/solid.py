@@ -65,6 +65,7 @@ SUNK_MM = 0.4  # of numbers into their face
 SAME_MM = (1e-5, 1e-6, 1e-4)
 COLUMN_MM = 80.0  # length of the space that is kept free behind a boss
 RIB_ROOT = 0.6  # of the hub's radius, to where ribs go in it
+HEAD_MM = 7.0  # diameter of the flat for an M3 screw's head
 LABEL_ROOM = 0.85  # of a boss's end
 RIB_MIDDLE = -0.5  # of a rib beside its azimuth, in its thicknesses
 
@@ -123,7 +124,9 @@ def _clamp_cuts(hub: Hub, spec: BaseSpec) -> list[TopoDS_Shape]:
     middle = np.array([-(hub.bore + hub.boss) / 2, 0.0, hub.lock_z])
     half = float(np.sqrt(hub.boss**2 - middle[0] ** 2))
     head_side = cylinder(middle, -across, SCREW_MM / 2, half + THROUGH_MM)
-    return [slit, relief, head_side, *_screw_with_insert(middle, across, half, spec)]
+    # The boss is round: without a flat its head would be half in it.
+    flat = cylinder(middle - half * across, -across, HEAD_MM / 2, hub.boss)
+    return [slit, relief, head_side, flat, *_screw_with_insert(middle, across, half, spec)]
 
 
 def _block(far: float, half: float, low: float, high: float) -> TopoDS_Shape:

@@ -68,7 +68,7 @@ HEAD_HOLE_MM, HEAD_DEPTH_MM = 9.0, 8.0  # counterbore
 # The bracket's foot.
 MOUNT_WEB_MM = 10.0  # from the bracket's upper end to the webs
 BRACKET_FOOT_MM = 70.0  # length of the foot beyond the bracket
-FOOT_BORDER_MM = 13.0  # of the foot beside the bracket
+FOOT_BORDER_MM = 15.0  # of the foot beside the bracket: washers clear the webs by 1 mm
 WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
 SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's edges to its slots
 AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane

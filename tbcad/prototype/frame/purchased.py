@@ -130,13 +130,8 @@ def purchased_components(
         return _rotary_stage(base, drive.motor, plate)
     components = [_motor(base, drive, plate)]
     if drive.wheel and drive.pinion:
-        start, end = base.hub.mount, base.hub.mount - drive.wheel["width_mm"]
-        ends = [
-            (hub_point(base, start + THROUGH_MM, x, y), hub_point(base, end - THROUGH_MM, x, y))
-            for x, y in base.hub.holes.tolist()
-        ]
         # The holes that are drilled into the wheel for the screws into the hub.
-        holes = [cylinder_between(*both, SCREW_MM / 2) for both in ends]
+        holes = _hub_screw_holes(base, drive.wheel["width_mm"], SCREW_MM)
         components += [
             _wheel("wheel", base, drive.wheel, 0.0, *holes, rotates=True),
             _wheel("pinion", base, drive.pinion, drive.centre_mm),
@@ -146,13 +141,24 @@ def purchased_components(
     return (*components, *(_on_shaft(base, plate, shaft_parts) if shaft_parts else ()))
 
 
+def _hub_screw_holes(base: BaseLayout, length: float, diameter: float) -> list[Cylinder]:
+    """Holes for the screws into the hub, through a body behind it."""
+    start, end = base.hub.mount + THROUGH_MM, base.hub.mount - length - THROUGH_MM
+    return [
+        cylinder_between(hub_point(base, start, x, y), hub_point(base, end, x, y), diameter / 2)
+        for x, y in base.hub.holes.tolist()
+    ]
+
+
 def _coupling(base: BaseLayout, part: PurchasedPart) -> Component:
     """A flange on the hub's face, and its collar, which keys of the flange's screws pass."""
     face = base.hub.mount
     flange = axial_cylinder(base, face, face - COUPLING_FLANGE_MM, part["flange_mm"] / 2)
     end = face - COUPLING_MM + COUPLING_GAP_MM
     collar = axial_cylinder(base, face, end, COUPLING_COLLAR_MM / 2)
-    return Component("coupling", part.what, (flange, collar), part=part.name, rotates=True)
+    bore = axial_cylinder(base, face + THROUGH_MM, end - THROUGH_MM, part["bore_mm"] / 2)
+    holes = (bore, *_hub_screw_holes(base, COUPLING_FLANGE_MM, part["hole_mm"]))
+    return Component("coupling", part.what, (flange, collar), holes, part=part.name, rotates=True)
 
 
 def _component(

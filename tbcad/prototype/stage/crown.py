@@ -39,7 +39,7 @@ OPEN_MM = 0.5  # by which a groove reaches into the pillar that it comes from
 STUD_MM, STUD_HEIGHT_MM, STUD_PLAY_MM = 1.5, 2.5, 0.15  # largest radius, height, play in the disc
 DISC_PER_STUD = 10.0  # smallest ratio of the diameter of the disc to the radius of a stud
 STUD_PLACE = 0.65  # of the disc's radius
-STUD_GAP_MM, STUD_EDGE_MM = 0.2, 0.8  # material between a stud and the bore, and the disc's edge
+STUD_GAP_MM, STUD_EDGE_MM = 0.2, 1.4  # material between a stud and the bore, and the disc's edge
 POCKET = 0.75  # height of a pocket's wall: share of the LED's body below the centre of its dome
 THROUGH_MM = 1.0  # by which a removed body extends beyond the part
 ROOM_GAP_MM = 0.1  # between arms and the level of the disc's face, above which the object may be
@@ -83,7 +83,7 @@ class Arm:
         top = np.array([lap, (self.inner, self.floor), (self.outer, self.floor)])
         upper, under = np.array([self.root, corner]), np.array([(self.root[0], self.low)])
         sections = (
-            np.vstack([upper, self._arc(direction, bottom), under]),
+            np.vstack([upper, self._arc(max(direction, end), bottom), under]),
             np.vstack([top, self._arc(side, end)]),
         )
         return [self._prism(section, self.half_width) for section in sections]
@@ -94,8 +94,9 @@ class Arm:
         root, corner = np.array(self.root), np.array([self.inner, self.turn])
         along = unit(corner - root)
         deep, above = ARM_GROOVE_MM * np.array([along[1], -along[0]]), LAP_MM * UP[1:]
-        start, end = root - LAP_MM * along, corner + ARM_GROOVE_MM * along
-        slanting = np.array([start + deep, end + deep, end + above, start + above])
+        start, end = root - LAP_MM * along, corner
+        round_it = np.add(end, [ARM_GROOVE_MM, 0.0])
+        slanting = np.array([start + deep, end + deep, round_it, end + above, start + above])
         top = self.floor + LAP_MM
         return [
             self._prism(slanting, half),
@@ -234,7 +235,8 @@ def _stud_radius(stage: StageSpec) -> float:
 def _stud_places(stage: StageSpec, leds: Floats, wire: float) -> Floats:
     """Places (2, 2) of the disc's studs, where they are farthest from the grooves."""
     stud = _stud_radius(stage)
-    radius = max(STUD_PLACE * stage.disc_mm / 2, wire + STUD_GAP_MM + stud)
+    outmost, inmost = stage.disc_mm / 2 - stud - STUD_EDGE_MM, wire + STUD_GAP_MM + stud
+    radius = max(min(STUD_PLACE * stage.disc_mm / 2, outmost), inmost)
     min_disc = radius + stud + STUD_EDGE_MM
     if min_disc > stage.disc_mm / 2:
         raise SpecError(

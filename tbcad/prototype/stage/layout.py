@@ -77,7 +77,7 @@ def stage_layout(
         plate=plate,
         rim=_rim(stage, keep_out.capture, plate, neck),
         neck=neck,
-        wire=neck / 2,
+        wire=neck / 2 if len(leds) else 0.0,
         post=post,
         wall=min(stage.wall_mm, WALL_OF_POST * post),
         joint=joint,

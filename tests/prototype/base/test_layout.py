@@ -21,7 +21,7 @@ from tbcad.prototype.base.profile import (
     LightSpheroid,
     distance_outside,
 )
-from tbcad.prototype.base.seats import OFF_PATH_MM, insertion_clearance, seat_layout
+from tbcad.prototype.base.seats import OFF_PATH_MM, insertion_clearance, seat_layout, thin_rims
 
 SPEC = BaseSpec()
 
@@ -68,10 +68,11 @@ class TestSeats:
         self, base: BaseLayout, paper_design: MirrorDesign
     ) -> None:
         assert insertion_clearance(base.seats).min() > OFF_PATH_MM
+        assert not thin_rims(base.seats).any()
         ten = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
         seats = seat_layout(SPEC, ten)
         cosine = -dot(seats.insertion, seats.axis) / norm(seats.insertion)
-        assert 5 < np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 21
+        assert 5 < np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 31
         # On its path out a ball leaves its own pads.
         assert dot(seats.insertion[:, None], seats.pad_normals).min() > 0
         assert insertion_clearance(seats).min() > OFF_PATH_MM

@@ -102,7 +102,7 @@ class TestStage:
             places = list(SIZED.stage.leds_mm)
             return {"leds_mm": [*places[: number - 1], place, *places[number:]]}
 
-        one_side = [(23.4, 0.0, -8.0), (18.8, 14.0, -6.0), (18.8, -14.0, -3.0), (10.4, 20.9, -8.0)]
+        one_side = [(23.5, 0.0, -8.0), (18.8, 14.0, -6.0), (18.8, -14.0, -3.0), (10.5, 21.0, -8.0)]
         level = [(x, y, -8.0) for x, y, _ in SIZED.stage.leds_mm]
         disc = np.array([[-90.0, 0.0], [110.0, 0.0], [110.0, 150.0], [-90.0, 150.0]])
         swept = replace(keep_out, sections=(SweptSection(disc, -np.pi, np.pi),))
@@ -121,7 +121,7 @@ class TestStage:
             (moved(1, 10.6, 7.5, -22.0), "LED 1 is too low for its pocket"),
             (
                 moved(3, -3.4, 8.0, -13.5),
-                "LED 3 is in the object's room: move it outward to 23.3 mm",
+                "LED 3 is in the object's room: move it outward to 23.4 mm",
             ),
             (moved(4, 5.1, 22.9, -3.0), "LED 4 collides with LED 3"),
             ({"keep_out": replace(keep_out, used=keep_out.used + np.pi)}, "mm inside the light of"),

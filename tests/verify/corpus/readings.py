@@ -30,7 +30,6 @@ from tbcad_verify.prototype import (
     stage_checks,
 )
 from tbcad_verify.prototype import stages as prototype_stages
-from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import gcode_checks, homing_checks, klipper_checks
@@ -65,7 +64,7 @@ PURE: dict[Any, tuple[str, ...]] = {
     verification: ("area_checks",),
     shell_checks: ("wall", "cells_of_export"),
     prototype_stages: ("measure_part", "joined_meshes"),
-    prototype_stages.swing: ("_parts_apart",),
+    prototype_stages.bodies_apart: ("overlaps",),
     measured_parts: ("manifold",),
     assembly: ("manifold", "read_solids"),
     bodies: ("_scene", "join_meshes", "build_scene"),
@@ -91,7 +90,6 @@ def remembered() -> Iterator[None]:
         (stages, "read_facets", _file_key),
         (stages, "read_3mf", _file_key),
         (assembly, "assembly_meshes", _drawn_key),
-        (assembly, "fastener_solids", _fasteners_key),
         (prototype_stages.ball_views, "ball_views", _traced_key),
         (prototype_stages.swing, "axial_solid", _solid_key),
         (prototype_stages.swing, "sweep", _sweep_key),
@@ -183,10 +181,6 @@ def _solid_key(measured: MeasuredPrototype, name: str, solid: manifold3d.Manifol
 
 def _sweep_key(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> object:
     return measured.context.prototype.swing, measured.context.frame, moving, still
-
-
-def _fasteners_key(context: PrototypeContext, drawn: dict[str, Shape], *, turns: bool) -> object:
-    return context.prototype.fasteners, drawn, turns
 
 
 def _traced_key(measured: MeasuredPrototype, *_: object) -> object:

@@ -11,11 +11,13 @@ import numpy as np
 
 from tbcad_verify.printing.part_measures import PartMeasures, thin_area
 from tbcad_verify.printing.placement import SLACK_MM, BedPlacement, place, pose_text
-from tbcad_verify.printing.profile import Profile
-from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative
+from tbcad_verify.printing.profile import Profile, load
+from tbcad_verify.record.prototype_sections import PrintedPart
+from tbcad_verify.record.spec import PrinterSpec
+from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative, require
 from tbcad_verify.types import Floats
 
-UNIT = "problems"
+UNIT, OWN = "problems", "printable"
 DIGITS = 9
 
 
@@ -110,6 +112,27 @@ def print_check(one: PrintAssessment, required: bool) -> Check:
         return at_most(name, count, 0, detail)
     pose, material = pose_text(one.placement.pose), one.profile.material
     return informative(name, count, detail or f"fits: {pose}, {one.mass_g:.0f} g {material}")
+
+
+def own_print_name(part: PrintedPart) -> CheckName:
+    """Name, file and unit of the check of a prototype's part by the process that prints it."""
+    return OWN, part.stl, UNIT
+
+
+def own_print_checks(
+    part: PrintedPart, printer: PrinterSpec, measures: PartMeasures | None, lost: str
+) -> list[Check]:
+    """Whether a prototype's part can be printed: a cap in resin, any other by FDM on a bed.
+
+    Raises:
+        Unknown: it was not measured, for the reason `lost`.
+    """
+    bed = {"bed_mm": tuple(printer.bed_mm), "clearance_mm": printer.bed_margin_mm}
+    resin = part.role == "cap"
+    profile = load("sla") if resin else load("fdm").model_copy(update=bed)
+    problems = assess(part.stl, require(measures, lost), profile).problems
+    detail = f"{profile.name}: {'; '.join(problems)}"
+    return [at_most(own_print_name(part), len(problems), 0, detail)]
 
 
 def _mesh_problems(measures: PartMeasures, profile: Profile) -> Iterator[str]:

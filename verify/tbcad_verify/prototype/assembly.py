@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.glb import read_glb
-from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype_sections import PrintedPart
@@ -37,12 +37,9 @@ from tbcad_verify.types import Floats, Ints
 Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
 CHECKS = {"inventory": "faults", "leds as designed": "faults", "assembly step": "mm"}
-BOXES = {"assembly": "mm"}
 TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})
 TOOL = "tool"  # role of parts that are not in the assembly
-SUNK = ("INSERT-", "DOWEL-", "MAGNET-", "LED-")  # fasteners that stand out of nothing
-OFF_MM = 0.25  # the assembly is meshed coarsely
 SAME_MM = 1e-6  # of corners in two STEP files
 SINGLE_MM = 2e-3  # of the same corner in the GLB, whose numbers are single precision
 CLAIM_SHARE = 1e-5  # see `PartComparison.claim`
@@ -218,58 +215,14 @@ def _balls(context: PrototypeContext) -> Iterator[tuple[str, Floats, float]]:
         yield f"ball_{k + 1}", balls.columns("bx", 3)[:, k], float(balls.body_radius_mm[k])
 
 
-def box_checks(
-    names: list[CheckName],
-    context: PrototypeContext,
-    parts: list[MeasuredPart],
-    drawn: dict[str, Shape],
-) -> list[Check]:
-    """The box of every part and ball in the GLB, against its own mesh's or the record's."""
-    placed = of_roles(parts, "base", "cap", "stage", "frame")
-    boxes = {part.part.name: _box(part.placed_mesh.points) for part in placed}
-    boxes |= {name: np.stack([at - radius, at + radius]) for name, at, radius in _balls(context)}
-    error = {title: np.inf for title in boxes.keys() - drawn.keys()}
-    for title in boxes.keys() & drawn.keys():
-        error[title] = float(np.abs(_box(drawn[title][0]) - boxes[title]).max())
-    error |= {one.name: 0.0 if one.name in drawn else np.inf for one in context.prototype.bought}
-    wrong = sorted(title for title, value in error.items() if value > OFF_MM)
-    detail = f"missing or elsewhere: {short_list(wrong)}"
-    return [at_most(names[0], max(error.values()), OFF_MM, detail)]
-
-
-def _box(points: Floats) -> Floats:
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def fixed_solids(context: PrototypeContext, drawn: dict[str, Shape]) -> list[tuple[str, Any]]:
-    """Names and manifold3d solids of panels and what is bought that do not rotate with the base.
+def all_solids(parts: list[MeasuredPart], drawn: Mapping[str, Shape]) -> dict[str, Any]:
+    """All bodies of the assembly by name as manifold3d has them; printed ones are their meshes'.
 
     Raises:
-        Unknown: one is missing, or no closed solid.
+        Unknown: one is no closed solid, or a part has no mesh.
     """
-    shroud = context.prototype.shroud
-    names = [one.name for one in context.prototype.bought if not one.turns]
-    names += [panel.name for panel in shroud.panels] if shroud else []
-    solids = [(name, closed_solid(name, drawn)) for name in names]
-    return [*solids, *fastener_solids(context, drawn, turns=False)]
-
-
-def fastener_solids(
-    context: PrototypeContext, drawn: dict[str, Shape], *, turns: bool
-) -> list[tuple[str, Any]]:
-    """All screws and nuts that rotate with the base, or all others, as one solid with a name.
-
-    Inserts, dowels, magnets and LEDs are inside of what holds them.
-
-    Raises:
-        Unknown: one is missing, or no closed solid.
-    """
-    import manifold3d
-
-    some = [one for one in context.prototype.fasteners if one.turns == turns]
-    solids = [closed_solid(one.name, drawn) for one in some if not one.part.startswith(SUNK)]
-    title = "fasteners of the base" if turns else "fasteners of stage and frame"
-    return [(title, manifold3d.Manifold.compose(solids))] if solids else []
+    solids = {name: closed_solid(name, drawn) for name in sorted(drawn) if name not in VIEWS}
+    return solids | {part.part.name: part.solid for part in parts if part.part.name in solids}
 
 
 def closed_solid(name: str, drawn: Mapping[str, Shape]) -> Any:

@@ -32,11 +32,11 @@ LEDS = {"LED-3": 3.0, "LED-5": 5.0}  # diameter of the body
 TNUT_MM = (0.5, 4.5)  # where its thread begins and ends below the slot's face
 # Diameters of holes that are fasteners' only (ISO 273 medium, tapped, pilots), by what they are in.
 IN_PLATE_MM = (4.2,)
-IN_PRINTED_MM = (1.7, 2.8, 3.4, 4.5, 5.5, 6.6)
+IN_PRINTED_MM = (2.0, 2.8, 3.4, 4.5, 5.5, 6.6)
 # Drawn without holes: bodies of catalogue parts.
 SOLID = frozenset(
     {
-        *("motor", "rotary_stage", "rotary_stage_top", "coupling", "camera"),
+        *("motor", "rotary_stage", "rotary_stage_top", "camera"),
         *("upright_left", "upright_right"),
     }
 )

@@ -9,12 +9,7 @@ import numpy as np
 from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import (
-    MeasuredPart,
-    distance_to_facets,
-    joined_meshes,
-    of_roles,
-)
+from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -30,14 +25,11 @@ CHECKS = {
     "object room": "mm^3",
     "leds seen": "LEDs",
     "leds inside": "outside the capture sphere",
-    "leds free": "in the stage",
-    "leds to stage": "mm",
 }
 NEEDED = 2  # LEDs, for the three coordinates of a centre
 ROOM_MM3 = 0.1  # of parts in the room: facets of the arms' rounding
 LIFT_MM = 0.01  # of the room above the disc
 ROOM_SIDES = 180
-CUBE_MM = 0.02  # edge of the cube that represents an LED
 
 
 def checks(
@@ -45,11 +37,10 @@ def checks(
 ) -> list[Check]:
     """Room and LEDs against the parts of stage and frame.
 
-    Every LED is inside the capture sphere and not in the stage's material. The distance of the
-    farthest from the stage informs: an LED in its pocket has a wall close by.
+    Every LED is inside the capture sphere.
     """
-    room, seen, inside, free, on_stage = names
-    leds, stage = context.prototype.leds, of_roles(fixed, "stage")
+    room, seen, inside = names
+    leds = context.prototype.leds
     volume, filled = _volume_in_room(context, fixed)
     empty = at_most(room, volume, ROOM_MM3, f"in the object's room: {short_list(filled)}")
     if not leds:
@@ -58,30 +49,11 @@ def checks(
     ids, few = context.mirror_ids, counted < NEEDED
     few_text = worst_offenders(ids, counted.astype(np.float64), "", few, ".0f")
     beyond = [led.name for led in leds if np.linalg.norm(led.position) > context.radius]
-    made = [
+    return [
         empty,
         at_least(seen, int(counted.min()), NEEDED, f"seen past an object in its room: {few_text}"),
         at_most(inside, len(beyond), 0, f"the camera may not see {short_list(beyond)}"),
     ]
-    if not stage:
-        return [*made, *(informative(name, 0, "no stage") for name in (free, on_stage))]
-    mesh, facet = joined_meshes(stage)
-    distance = [distance_to_facets(led.position, mesh, np.arange(facet.size)) for led in leds]
-    sunk = [led.name for led in leds if _is_in_material(stage, led.position)]
-    k = int(np.argmax(distance))
-    return [
-        *made,
-        at_most(free, len(sunk), 0, f"in the material of the stage: {short_list(sunk)}"),
-        informative(on_stage, distance[k], f"{leds[k].name} is farthest from the stage"),
-    ]
-
-
-def _is_in_material(stage: list[MeasuredPart], point: Floats) -> bool:
-    """Whether a small cube about a point is in the material of a part."""
-    import manifold3d
-
-    cube = manifold3d.Manifold.cube([CUBE_MM] * 3, center=True).translate(point)
-    return any((part.solid ^ cube).volume() > cube.volume() / 2 for part in stage)
 
 
 def _room(context: PrototypeContext) -> tuple[float, float, float]:

@@ -14,6 +14,7 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.prototype import (
     assembly,
     bodies,
+    bodies_apart,
     camera_gauge_checks,
     camera_mount_checks,
     caps,
@@ -22,7 +23,6 @@ from tbcad_verify.prototype import (
     fastener_checks,
     holding_checks,
     key_access,
-    measured_parts,
     seats,
     stage_checks,
     swing,
@@ -182,7 +182,6 @@ def _fits(found: _Findings) -> Iterator[Job]:
     yield camera_mount_checks, RECORD_FILE, solids
     yield camera_gauge_checks, RECORD_FILE, parts
     yield drive_checks, RECORD_FILE, parts, solids
-    yield (measured_parts.BED, measured_parts.bed_checks), RECORD_FILE, parts
 
 
 def _seats(found: _Findings) -> Iterator[Job]:
@@ -198,10 +197,9 @@ def _light(found: _Findings) -> Iterator[Job]:
 def _swing(found: _Findings) -> Iterator[Job]:
     context, parts, drawn = found.context, found.parts, found.drawn
     file, fixed = context.prototype.assembly.glb, ("stage", "frame")
-    still = Once(lambda: assembly.fixed_solids(context, drawn()))
-    turning = Once(lambda: assembly.fastener_solids(context, drawn(), turns=True))
-    yield swing, PLACED, found.measured, parts, still, turning
-    yield (assembly.BOXES, assembly.box_checks), file, parts, drawn
+    solids = Once(lambda: assembly.all_solids(parts, drawn()))
+    yield swing, PLACED, found.measured, solids
+    yield bodies_apart, file, solids, drawn
     yield (lamp_light.DARK, lamp_light.dark_checks), file, found.bodies
     yield (cut_checks.SHROUD, cut_checks.shroud_checks), PATTERNS, drawn, found.solids
     yield lamp_light, file, found.bodies, found.solids

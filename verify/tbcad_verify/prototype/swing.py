@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import pdist
 
-from tbcad_verify.prototype.bodies import MeasuredPrototype
+from tbcad_verify.prototype.bodies import MeasuredPrototype, turning
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
-    at_least,
     at_most,
     informative,
     short_list,
@@ -27,8 +24,6 @@ from tbcad_verify.types import Floats
 SEARCH_MM = 8.0  # larger clearances are all reported as this
 MIN_STEP_RAD = np.radians(0.5)  # between two samples, however near things are
 TOUCH_MM3 = 0.01
-# Faces in contact, as of screwed parts, overlap by the error of facets and float32.
-CONTACT_MM3 = 1.0
 BALL_SEGMENTS = 64
 GRAIN_MM = 2.0  # longest edge between points on surfaces
 # Points of two surfaces may be farther apart than these by this: no point of a facet is farther
@@ -37,13 +32,10 @@ BETWEEN_MM = 2 * GRAIN_MM / float(np.sqrt(3))
 CLEAR_MM = 1.0  # a distance about the axis for which one sample is enough
 GROWTH = 1.5  # of a distance from one sample to the next, mostly at most
 MIN_LEVER_MM = 1e-9
-FAR_MM = 1e3  # reported of a prototype with one ball
-CHECKS = {
-    "swing": "mm^3",
-    "swing clearance": "mm",
-    "parts apart": "mm^3",
-    "balls apart": "mm",
-}
+CHECKS = {"swing": "mm^3", "swing clearance": "mm"}
+
+SUNK = ("INSERT-", "DOWEL-", "MAGNET-", "LED-")  # fasteners that stand out of nothing
+TITLES = {True: "fasteners of the base", False: "fasteners of stage and frame"}
 
 NamedSolids = list[tuple[str, Any]]  # name and manifold3d solid
 
@@ -129,21 +121,13 @@ def checks(
     names: list[CheckName],
     context: PrototypeContext,
     measured: MeasuredPrototype,
-    parts: list[MeasuredPart],
-    bought: NamedSolids,
-    on_base: NamedSolids,
+    solids: Mapping[str, Any],
 ) -> list[Check]:
-    """Rotate the base from end to end of its swing, and test whether parts fit at angle zero.
-
-    What is bought is fixed, or rotates with the base (`on_base`, without the balls).
-    """
-    swing, clearance, apart, balls = names
-    rotating, fixed = (
-        [(part.part.name, part.solid) for part in of_roles(parts, *roles)]
-        for roles in (("base", "cap"), ("stage", "frame"))
+    """Rotate the base from end to end of its swing."""
+    swing, clearance = names
+    moving, still = (
+        [axial_solid(measured, *one) for one in group] for group in _groups(measured, solids)
     )
-    moving = [axial_solid(measured, *one) for one in [*rotating, *on_base, *_ball_solids(measured)]]
-    still = [axial_solid(measured, *one) for one in [*fixed, *bought]]
     sweeps = [sweep(measured, one, two) for one in moving for two in still]
     volume = max((one.volume for one in sweeps), default=0.0)
     nearest = min(sweeps, key=lambda one: one.gap, default=None)
@@ -159,9 +143,31 @@ def checks(
     return [
         at_most(swing, volume, TOUCH_MM3, short_list(hits)),
         informative(clearance, nearest.gap if nearest else SEARCH_MM, where),
-        _parts_apart(apart, [rotating, fixed]),
-        _balls_apart(balls, measured),
     ]
+
+
+def _groups(
+    measured: MeasuredPrototype, solids: Mapping[str, Any]
+) -> tuple[NamedSolids, NamedSolids]:
+    """Bodies that rotate with the base, and those that do not; screws and nuts are one each.
+
+    What is on the shaft rotates in its bearings, and is left out.
+    """
+    import manifold3d
+
+    prototype, swung = measured.context.prototype, turning(measured.context, solids)
+    driven = {one.name for one in prototype.bought if one.turns}
+    apart = {one.name for one in prototype.fasteners} | driven
+    groups: dict[bool, NamedSolids] = {True: _ball_solids(measured), False: []}
+    for name in sorted(solids.keys() - apart):
+        if not name.startswith("ball_"):
+            groups[name in swung].append((name, solids[name]))
+    for turns, title in TITLES.items():
+        some = [one for one in prototype.fasteners if one.turns == turns]
+        screws = [solids[one.name] for one in some if not one.part.startswith(SUNK)]
+        if screws:
+            groups[turns].append((title, manifold3d.Manifold.compose(screws)))
+    return groups[True], groups[False]
 
 
 def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> PairSweep:
@@ -169,14 +175,14 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
 
     Where both touch is no farther from the axis than either of them reaches, so no point of it
     moves more than that distance times the step. No step is smaller than `MIN_STEP_RAD`. Where
-    their positions along the axis and distances from it keep both apart, one sample is enough.
+    their positions along the axis and distances from it keep both apart, no sample is needed: a
+    body inside another is so at angle zero too, where all are tested against all.
     """
     low, high = np.radians(measured.context.prototype.swing).tolist()
     names = (moving.name, still.name)
     bound = moving.distance_at_any_angle(still)
     if bound >= CLEAR_MM:
-        shared = _volume_inside(measured, moving, still, low)
-        return PairSweep(names, shared, min(SEARCH_MM, bound), low)
+        return PairSweep(names, 0.0, min(SEARCH_MM, bound), low)
     lever = max(min(moving.reach, still.reach), MIN_LEVER_MM)
     at, samples, volume, worst, gap, distance = low, 0, 0.0, low, SEARCH_MM, SEARCH_MM
     while True:
@@ -203,29 +209,6 @@ def _gap_and_volume(one: Any, two: Any, before: float) -> tuple[float, float]:
     if not distance < near:
         distance = float(one.min_gap(two, SEARCH_MM))
     return distance, 0.0 if distance > 0 else float((one ^ two).volume())
-
-
-def _volume_inside(
-    measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid, angle: float
-) -> float:
-    """Volume, mm^3, that two solids share whose surfaces never meet: one is inside the other.
-
-    It is where its positions along the axis are between those of the other, its farthest point
-    from the axis is nearer than the other's, and its box is in the other's; else no volume need be
-    worked out.
-    """
-
-    def inside(inner: AxialSolid, outer: AxialSolid) -> bool:
-        low, high = inner.box
-        return bool(low[0] >= outer.box[0, 0] and (high <= outer.box[1]).all())
-
-    if not (inside(moving, still) or inside(still, moving)):
-        return 0.0
-    one, two = _placed(measured, moving, still, angle)
-    (a, b), (c, d) = (np.reshape(solid.bounding_box(), (2, 3)) for solid in (one, two))
-    if not (((a >= c) & (b <= d)).all() or ((c >= a) & (d <= b)).all()):
-        return 0.0
-    return float((one ^ two).volume())
 
 
 def _placed(
@@ -261,25 +244,3 @@ def _ball_solids(measured: MeasuredPrototype) -> NamedSolids:
         for r, centre in zip(radius.tolist(), measured.body.T[which], strict=True)
     ]
     return [("the balls", manifold3d.Manifold.compose(polyhedra))]
-
-
-def _parts_apart(name: CheckName, groups: list[NamedSolids]) -> Check:
-    """Parts that are assembled overlap nowhere, at angle zero."""
-    shared = [
-        (float((a ^ b).volume()), f"{one} and {two}")
-        for group in groups
-        for (one, a), (two, b) in combinations(group, 2)
-    ]
-    worst = sorted((pair for pair in shared if pair[0] > CONTACT_MM3), reverse=True)
-    texts = [f"{pair} {volume:.3g} mm^3" for volume, pair in worst]
-    volume = max((volume for volume, _ in shared), default=0.0)
-    return at_most(name, volume, CONTACT_MM3, f"share room: {short_list(texts)}")
-
-
-def _balls_apart(name: CheckName, measured: MeasuredPrototype) -> Check:
-    """Minimum distance between two balls, or caps' bodies."""
-    radius = measured.body_radius
-    one, two = np.triu_indices(radius.size, 1)
-    gap = pdist(measured.body.T) - radius[one] - radius[two]
-    texts = [f"balls {one[k] + 1} and {two[k] + 1} overlap" for k in np.flatnonzero(gap < 0)]
-    return at_least(name, float(gap.min(initial=FAR_MM)), 0, short_list(texts))

@@ -97,7 +97,7 @@ class MeshSpec(Strict):
 
 
 class PrinterSpec(Strict):
-    """Bed and material of all printed parts of the prototype."""
+    """Printer and material of all printed parts of the prototype but caps."""
 
     density_g_cm3: float = Field(gt=0, le=20)
     bed_mm: list[Annotated[float, Field(ge=20, le=2000)]] = Field(min_length=3, max_length=3)

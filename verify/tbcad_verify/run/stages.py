@@ -14,7 +14,14 @@ from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.rays import RayScene, build_scene
 from tbcad_verify.mesh.stl import Facets, read_facets
 from tbcad_verify.mesh.threemf import read_3mf, same_check
-from tbcad_verify.printing.assessment import assess, print_check, print_name, to_row
+from tbcad_verify.printing.assessment import (
+    assess,
+    own_print_checks,
+    own_print_name,
+    print_check,
+    print_name,
+    to_row,
+)
 from tbcad_verify.printing.part_measures import PartMeasures, measure
 from tbcad_verify.printing.profile import Profile, built_in, load
 from tbcad_verify.prototype.measured_parts import MeasuredPart
@@ -196,6 +203,8 @@ def _verify_prototype(
     for printed in measured:
         measures, lost = attempt(partial(_measures, printed))
         _assess_printing(printed.part.stl, measures, lost, profiles, required, sink)
+        own = partial(own_print_checks, printed.part, export.spec.printer, measures, lost)
+        sink(Results(checks=guarded([own_print_name(printed.part)], own)))
 
 
 def _compare_3mf(

@@ -1,0 +1,117 @@
+"""No two bodies of the assembly share room at base angle zero, but where a fit is meant.
+
+Printed parts are those of their STL files, all other bodies those of the GLB. The assembly has no
+belt: it is what runs round both wheels, within their rims.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.fastener_checks import MOTOR_DEPTH_MM
+from tbcad_verify.record.spec import BaseSpec
+from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
+from tbcad_verify.types import Floats
+
+CHECKS = {"bodies apart": "mm", "meant fits": "pairs"}
+# Mean thickness of what chords cut from round faces in contact: two thirds of the 0.1 mm by which
+# facets of the GLB leave them. On flat faces nothing is cut; a clash of less harms no print.
+SKIN_MM = 0.07
+# Greatest depth of a screw in a body that is drawn without its tapped hole: NEMA 17; a tripod's
+# thread (ISO 1222); of a rotary stage one and a half diameters, which is assumed.
+TAPPED_MM = {"motor": MOTOR_DEPTH_MM, "camera": 5.5, "rotary_stage": 9.0, "rotary_stage_top": 9.0}
+SCREW = r"(?:M|UNC1/4-20x)\d.*"
+BELT, WHEELS, BELT_MM = "belt", ("wheel", "pinion"), 2.5
+# Other fits by what both bodies are, and how deep one is pressed into the other, mm: a seat and a
+# dowel by the design's keys, a belt as it lies below the rims that its wheels are drawn with.
+FITS: tuple[tuple[str, str, Callable[[BaseSpec], float]], ...] = (
+    (r"ball_\d+|cap_\d+", r"carrier(_\d+)?", lambda base: -base.pad_offset_mm),
+    (r"DOWEL-.*", r"carrier(_\d+)?", lambda base: -base.dowel_press_mm / 2),
+    (BELT, "|".join(WHEELS), lambda base: BELT_MM),
+)
+
+
+def checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    solids: Mapping[str, Any],
+    drawn: Mapping[str, Shape],
+) -> list[Check]:
+    """All bodies against all; meant fits are listed with their depth."""
+    with_belt = drawn.keys() >= {*WHEELS}
+    own = {BELT: belt(context, [drawn[name][0] for name in WHEELS])} if with_belt else {}
+    skin = max(SKIN_MM, context.export.mesh_error_mm)
+    fits, worst, clashes = list[str](), 0.0, list[tuple[float, str]]()
+    for pair, shared in overlaps({**solids, **own}):
+        depth = meant_fit(context, pair, shared, skin)
+        if depth is not None:
+            fits.append(f"{' and '.join(pair)} {depth:.2f}")
+            continue
+        worst = max(worst, thick := thickness(shared))
+        if thick > skin:
+            text = f"{' and '.join(pair)} share {shared.volume():.3g} mm^3"
+            clashes.append((-shared.volume(), text))
+    apart = at_most(names[0], worst, skin, short_list([text for _, text in sorted(clashes)]))
+    return [apart, informative(names[1], len(fits), ", ".join(fits))]
+
+
+def overlaps(solids: Mapping[str, Any]) -> list[tuple[tuple[str, str], Any]]:
+    """All pairs of solids that share room, by name, and the room."""
+    titles = sorted(solids)
+    low, high = np.split(np.array([solids[name].bounding_box() for name in titles]), 2, axis=1)
+    near = ((low[:, None] < high) & (low < high[:, None])).all(axis=2)
+    pairs = [(titles[a], titles[b]) for a, b in np.argwhere(np.triu(near, 1)).tolist()]
+    rooms = [(pair, solids[pair[0]] ^ solids[pair[1]]) for pair in pairs]
+    return [(pair, room) for pair, room in rooms if not room.is_empty()]
+
+
+def thickness(shared: Any) -> float:
+    """Mean thickness of the thickest piece of a solid, mm: of a thin sheet, its thickness."""
+    pieces = (piece for piece in shared.decompose() if piece.surface_area() > 0)
+    return max((2 * piece.volume() / piece.surface_area() for piece in pieces), default=0.0)
+
+
+def meant_fit(
+    context: PrototypeContext, pair: tuple[str, str], shared: Any, skin: float
+) -> float | None:
+    """Depth of a fit that is in the tables and no deeper than there, mm; None of anything else."""
+    placed = {some.name: some for some in context.prototype.fasteners}
+    base = context.export.spec.prototype.base
+    for name, other in (pair, pair[::-1]):
+        screw = placed.get(name)
+        if screw and other in TAPPED_MM and re.fullmatch(SCREW, screw.part):
+            # Its shank beyond the face that it presses on, in what it is turned into.
+            corners = shared.to_mesh64().vert_properties[:, :3]
+            along = (corners - screw.position) @ screw.along
+            shank, depth = along.min() >= -skin, float(np.ptp(along))
+            fits = shank and screw.through[-1] == other and depth <= TAPPED_MM[other] + skin
+            return depth if fits else None
+        for first, second, pressed in FITS:
+            if re.fullmatch(first, screw.part if screw else name) and re.fullmatch(second, other):
+                depth = thickness(shared)
+                return depth if 0 < pressed(base) >= depth - skin else None
+    return None
+
+
+def belt(context: PrototypeContext, wheels: list[Floats]) -> Any:
+    """The room of a belt round two wheels, whose corners (V, 3) are given."""
+    import manifold3d
+
+    def loop(inset: float) -> Any:
+        points = [_shrunk(corners @ context.frame.T, inset) for corners in wheels]
+        return manifold3d.Manifold.hull_points(np.concatenate(points) @ context.frame)
+
+    return loop(0.0) - loop(BELT_MM)
+
+
+def _shrunk(corners: Floats, inset: float) -> Floats:
+    """Corners (V, 3) along the axis and across it, nearer to their middle across."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    share = 1 - 2 * inset / (high - low)[1]
+    return np.asarray((low + high) / 2 + (corners - (low + high) / 2) * [1.0, share, share])
