@@ -101,10 +101,14 @@ def step_failing(folder: Path) -> dict[str, str]:
 
 @ON_VALLEYS
 def test_a_whole_export_passes(folder: Path, edges: str) -> None:
-    report = verify(folder, options=IN_PROCESS)
+    cutter = 2.0 if edges == "valley" else None  # none reaches beside the fins for grooves
+    report = verify(folder, options=replace(IN_PROCESS, cutter_mm=cutter))
     about = [check for check in report.checks if check.file.startswith("mandrel")]
     assert not [check for check in report.checks if check.passed is not True]
     assert sum(check.name == "mandrel mirrors" for check in about) == 2
+    widths = [check.measured for check in report.checks if check.name == "fillet width"]
+    assert len(widths) == (2 if cutter else 0)
+    assert all(width is not None and 300 < width < 900 for width in widths)  # 2 mm tan 13 degrees
     assert sum(check.name == "step walls" for check in about) == 2 * (edges == "pedestal")
     assert "mandrels" in stage_titles(read_export(folder))
 
