@@ -333,7 +333,7 @@ def stl(facets: np.ndarray, turn: int = 1) -> bytes:
     """A binary STL; `turn` -1 stores the normals against the corners' order."""
     table = np.zeros(len(facets), FACET)
     table["normal"], table["corners"] = turn * normals(facets), facets
-    return b"synthetic".ljust(HEAD) + np.uint32(len(facets)).tobytes() + table.tobytes()
+    return bytes(HEAD) + np.uint32(len(facets)).tobytes() + table.tobytes()
 
 
 def normals(facets: np.ndarray) -> np.ndarray:

@@ -71,7 +71,7 @@ PURE: dict[Any, tuple[str, ...]] = {
     bodies: ("_scene", "join_meshes", "build_scene"),
     camera_gauge_checks: ("joined_meshes", "build_scene"),
     caps: ("fit_sphere",),
-    cut_checks: ("dxf_entities",),
+    cut_checks: ("read_dxf",),
     fastener_checks: ("_hole_spans",),
     gcode_checks: ("run_program",),
     homing_checks: ("run_program",),

@@ -7,6 +7,7 @@ meshes. Angles in degrees, lengths in mm.
 from __future__ import annotations
 
 import json
+import tempfile
 from dataclasses import dataclass, field
 from itertools import chain, pairwise
 from pathlib import Path
@@ -16,6 +17,8 @@ import manifold3d
 import numpy as np
 import trimesh
 
+from tbcad.cad.formats.assembly import ColouredMesh, MeshGroup, write_glb
+from tbcad.cad.kernel.mesh import Mesh
 from tests.verify.synthetic_export import (
     PIN,
     B,
@@ -351,6 +354,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             "homed_deg": switch_angle(stops) + 2,
             "travel_deg": 200.0,
             "pin": "ROD-4x40",
+            "zero_error_deg": 0.7,
         },
         "fasteners": [],
         "assembly_steps": [],
@@ -358,22 +362,22 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         "lamps": None,
         "shroud": None,
         "drawings": [],
+        "caps": [],
         "assembly": {"glb": "whole.glb"},
     }
     return found, files
 
 
 def glb(spec: SyntheticPrototype, drawn: dict[str, np.ndarray]) -> bytes:
-    """Triangles (F, 3, 3) in mm, z up, as glTF has them: metres, y up."""
-    scene = trimesh.Scene()
+    """Triangles (F, 3, 3) in mm as a build draws them."""
+    bodies = []
     for name, corners in drawn.items():
-        away = np.add(corners, [spec.drawn_off.get(name, 0.0), 0, 0])
-        points = away.reshape(-1, 3)[:, [0, 2, 1]] * [1e-3, 1e-3, -1e-3]
-        faces = np.arange(len(points)).reshape(-1, 3)
-        scene.add_geometry(
-            trimesh.Trimesh(points, faces, process=False), node_name=name, geom_name=name
-        )
-    return bytes(trimesh.exchange.gltf.export_glb(scene))
+        points = np.add(corners, [spec.drawn_off.get(name, 0.0), 0, 0]).reshape(-1, 3)
+        mesh = Mesh(points, np.arange(len(points)).reshape(-1, 3))
+        bodies.append(ColouredMesh(name, mesh, (0.5, 0.5, 0.5, 1.0)))
+    with tempfile.TemporaryDirectory() as room:
+        write_glb(Path(room) / "whole.glb", "prototype", [MeshGroup("all", tuple(bodies))])
+        return (Path(room) / "whole.glb").read_bytes()
 
 
 def shell_of(spec: SyntheticPrototype) -> Shell:

@@ -49,7 +49,9 @@ def context(synthetic_prototype: Path) -> PrototypeContext:
     home, top = record.home, float(record.stops.angle.max())
     angles = HomeAngles(home.switch, home.homed, top - home.switch + 3)
     texts = {
-        "settings": joined(settings_lines("a title", settings(DRIVE, MOTION, angles))),
+        "settings": joined(
+            settings_lines("settings of x for grblhal", settings(DRIVE, MOTION, angles))
+        ),
         "klipper": joined(klipper_program(record.program.splitlines(), MOTION, angles)),
         "klipper_config": joined(klipper_config(DRIVE, MOTION, lights(1, MOTION))),
     }
@@ -233,7 +235,7 @@ def test_no_line_of_the_configuration_may_go_come_twice_or_be_another(
     [
         ("step_pin: FILL_IN", "step_pin: mcu:gpio11", False),
         ("pins: FILL_IN", "pins: !PA1", False),
-        ("[respond]", "# a note\n\n[respond]", False),
+        ("[respond]", "# a note\n[respond]", True),
         ("dir_pin: ", "dir_pin: !", True),
         ("endstop_pin: ^", "endstop_pin: ^!", True),
         ("    RESPOND", "    M84\n    RESPOND", True),

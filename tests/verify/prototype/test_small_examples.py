@@ -10,7 +10,7 @@ import pytest
 from ezdxf.document import Drawing
 from ezdxf.units import IN, MM
 from tbcad_verify.prototype.bodies import Bodies
-from tbcad_verify.prototype.cut_checks import read_dxf
+from tbcad_verify.prototype.flat_drawings import read_dxf
 from tbcad_verify.prototype.light.lamp_light import FACET_MM, EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import (
     MAX_ANGLE,
@@ -19,6 +19,7 @@ from tbcad_verify.prototype.light.pinhole_cells import (
     cell_outlines,
     first_mirrors,
 )
+from tbcad_verify.record.files import FileBytes
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Bools, Floats
 
@@ -94,18 +95,25 @@ def test_only_rays_near_an_edge_are_undecided(y: float, stopped: tuple[bool, boo
     assert found == stopped
 
 
-def drawing(circles: int, units: int = MM, layer: str = "centre") -> str:
+def drawing(circles: int, units: int = MM, layer: str = "centre") -> FileBytes:
     """A DXF with circles and a square to be cut, and a circle that only shows something."""
     document = Drawing.new("R2010")
     document.units = units
+    for name in sorted({"cut", layer}):
+        document.layers.add(name)
     space = document.modelspace()
     for k in range(circles):
         space.add_circle((k, 2), 0.5, dxfattribs={"layer": "cut"})
     space.add_circle((9, 9), 9, dxfattribs={"layer": layer})
-    space.add_lwpolyline([(0, 0), (3, 0), (3, 4), (0, 4)], dxfattribs={"layer": "cut"})
+    square = [(0, 0), (3, 0), (3, 4), (0, 4)]
+    space.add_lwpolyline(square, close=True, dxfattribs={"layer": "cut"})
     text = io.StringIO()
     document.write(text)
-    return text.getvalue()
+    return file_of(text.getvalue())
+
+
+def file_of(text: str) -> FileBytes:
+    return FileBytes("plate.dxf", np.frombuffer(text.encode(), np.uint8), "")
 
 
 def test_what_is_cut_is_read() -> None:
@@ -115,14 +123,14 @@ def test_what_is_cut_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("file", "words"),
     [
         (drawing(1001), "1001 circles"),
-        (drawing(2, IN), "not in millimetres"),
-        (drawing(2, layer="cuts"), "a layer cuts"),
-        ("plate", "is no DXF"),
+        (drawing(2, IN), r"\$INSUNITS is 1, allowed is 4"),
+        (drawing(2, layer="cuts"), "layer cuts is foreign"),
+        (file_of("plate"), "no DXF"),
     ],
 )
-def test_anything_else_is_not_read(text: str, words: str) -> None:
+def test_anything_else_is_not_read(file: FileBytes, words: str) -> None:
     with pytest.raises(Unknown, match=words):
-        read_dxf(text)
+        read_dxf(file)

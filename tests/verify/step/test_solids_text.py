@@ -60,7 +60,7 @@ def test_the_wall_is_the_design_s(casing: Casing, sample: Export) -> None:
 def test_what_is_no_shell_is_unknown(text: str) -> None:
     with pytest.raises(Unknown, match="0 surfaces of revolution"):
         read_casing(StepTable(text.replace("SURFACE_OF_REVOLUTION", "PLANE")), frozenset())
-    with pytest.raises(Unknown, match="no product's"):
+    with pytest.raises(Unknown, match="allowed is no such entity"):
         read_solids(text.replace("PRODUCT(", "PRODUCTS("))
 
 

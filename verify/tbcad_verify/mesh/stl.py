@@ -12,6 +12,7 @@ from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 
 FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+TITLE, SHOWN = 80, 40  # bytes that some programs take for a unit or a colour; characters of it
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,9 @@ def read_facets(folder: Path, name: str) -> tuple[Facets, FileBytes]:
     """Facets of a binary STL, and the bytes they came from.
 
     Raises:
-        BadExport: ASCII, a size that does not follow from the count (found out before the file
-            is read), no facets, or numbers that are not finite.
+        BadExport: ASCII, words in the header, colours of facets, no facets, numbers that are not
+            finite, or a size that does not follow from the count (found out before the file is
+            read).
 
     Source: the 84 + 50 n byte layout of the 1988 StereoLithography Interface Specification.
     """
@@ -46,13 +48,16 @@ def parse(blob: FileBytes) -> Facets:
     table = blob.data[HEAD:].view(FACET)
     corners = np.ascontiguousarray(table["corners"])
     normals = np.ascontiguousarray(table["normal"])
+    if blob.data[:TITLE].any() or table["attribute"].any():
+        said = repr(blob.data[:TITLE].tobytes().strip(b"\0")[:SHOWN])
+        raise BadExport(f"{blob.name}: words {said} or colours, allowed are zeros; {AGAIN}")
     _refuse_infinite(blob.name, corners)
     _refuse_infinite(blob.name, normals)
     return Facets(blob.name, normals, corners)
 
 
 def _refuse_foreign(name: str, size: int, head: bytes) -> None:
-    count = int.from_bytes(head[80:HEAD], "little") if len(head) == HEAD else 0
+    count = int.from_bytes(head[TITLE:HEAD], "little") if len(head) == HEAD else 0
     if size == HEAD + FACET.itemsize * count and count > 0:
         return
     if head[:5].lower() == b"solid":

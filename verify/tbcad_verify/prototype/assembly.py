@@ -5,8 +5,7 @@ Purchased parts have no file of their own. Their shapes are taken from the assem
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -16,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.glb import read_glb
 from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold, of_roles
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
@@ -46,10 +46,8 @@ OFF_MM = 0.25  # the assembly is meshed coarsely
 SAME_MM = 1e-6  # of corners in two STEP files
 SINGLE_MM = 2e-3  # of the same corner in the GLB, whose numbers are single precision
 CLAIM_SHARE = 1e-5  # see `PartComparison.claim`
-METRE_MM = 1000.0
+BYTE = 1 / 255
 UPWARD = np.array([0.0, 0.0, 1.0])
-# glTF's y is up: rows that its x, y and z are in the frame of the shell.
-UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 # Radius of an LED's pocket, and height of its dome's centre over the pocket's floor, mm. Usual T-1
 # and T-1 3/4: flange 3.8 and 5.9, height 5.4 and 8.7, dome 3 and 5; play 0.1 all round.
 LEDS = {"LED-3": (3.8 / 2 + 0.1, 5.4 - 1.5), "LED-5": (5.9 / 2 + 0.1, 8.7 - 2.5)}
@@ -64,22 +62,8 @@ def assembly_meshes(context: PrototypeContext) -> dict[str, Shape]:
     name = context.prototype.assembly.glb
     if not name:
         raise Unknown("there is no GLB of the assembly")
-    data = read(context.export.folder, name).data.tobytes()
-    return {title: _welded(*shape) for title, shape in _shapes(data)}
-
-
-def _shapes(data: bytes) -> Iterable[tuple[str, Shape]]:
-    import trimesh
-
-    try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
-        for node in sorted(scene.graph.nodes_geometry):
-            transform, geometry = scene.graph[node]
-            mesh = scene.geometry[geometry]
-            points = trimesh.transform_points(mesh.vertices, transform)
-            yield str(node), (METRE_MM * points @ UP, np.asarray(mesh.faces, dtype=np.int64))
-    except Exception as error:
-        raise Unknown(f"the GLB cannot be read ({type(error).__name__}: {error})") from error
+    bodies = read_glb(read(context.export.folder, name))
+    return {title: _welded(body.points, body.faces) for title, body in sorted(bodies.items())}
 
 
 def _welded(points: Floats, faces: NDArray[np.int64]) -> Shape:
@@ -121,7 +105,10 @@ def part_solids(context: PrototypeContext) -> dict[str, TextSolid]:
 def _solids(context: PrototypeContext, file: str) -> dict[str, TextSolid]:
     if not file:
         raise Unknown("there is no STEP file")
-    return read_solids(read(context.export.folder, file, MAX_TEXT_BYTES).text())
+    try:
+        return read_solids(read(context.export.folder, file, MAX_TEXT_BYTES).text())
+    except Unknown as error:
+        raise Unknown(f"{file}: {error}") from error
 
 
 def checks(
@@ -161,6 +148,18 @@ def _inventory_faults(
     for one in prototype.bought:
         if one.turns != (one.name in TURNING):
             yield f"{one.name} turns" if one.turns else f"{one.name} does not turn"
+    for name, body in read_glb(read(context.export.folder, prototype.assembly.glb)).items():
+        if name in solids and not _alike(body.colour, solids[name].colour):
+            yield f"{name} has another colour in {prototype.assembly.glb}"
+
+
+def _alike(light: tuple[float, ...], told: tuple[float, ...]) -> bool:
+    """Whether a colour as light is one as sRGB (IEC 61966-2-1), as far as bytes tell; opacities."""
+    code = np.array(told[:3])
+    linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+    return len(told) == len(light) and bool(
+        (np.abs([*linear, *told[3:]] - np.array(light)) <= BYTE).all()
+    )
 
 
 def _led_faults(context: PrototypeContext, crown: TextSolid | None) -> Iterator[str]:

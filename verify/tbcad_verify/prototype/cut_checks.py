@@ -1,7 +1,6 @@
 """What is cut, drilled or folded: DXF files and drill table against bodies of the assembly.
 
-Flat drawings are read by group codes in plain Python. Another unit, or a layer that tbcad does not
-draw on, is refused: who cuts may take it for a cut. The shroud is a closed box of card round
+All that is on the layer `cut` is a cut of the body. The shroud is a closed box of card round
 everything, and its patterns fold to its panels.
 """
 
@@ -9,98 +8,44 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tbcad_verify.prototype.assembly import VIEWS, Shape
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.flat_drawings import FlatDrawing, read_dxf
+from tbcad_verify.prototype.sheets import sheet_faults
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype import PLATE_HOLES
 from tbcad_verify.record.prototype_sections import Panel, Shroud
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, no_faults, require
+from tbcad_verify.report.checks import Check, CheckName, at_most, no_faults, require
 from tbcad_verify.step.solids_text import TextSolid, holes
 from tbcad_verify.types import Floats
 
 CHECKS, SHROUD = {"drawings": "faults", "plate holes": "faults"}, {"shroud": "faults"}
 DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
 TAPPED_M5_MM = 4.2
+ROUND = ("cylinder", "sphere")
 CORNERS = 4  # of a strip
 SAME_MM = 1e-6
 SINGLE_MM = 2e-3  # of the GLB's single precision
-CUT, FOLD = "cut", "fold"  # the layer of outlines and holes, and that of folds
-LAYERS = frozenset({CUT, FOLD, "centre", "dimensions", "frame"})
-# Group codes; X and Y of a line's end too.
-X, Y, END_X, END_Y, RADIUS, LAYER, VARIABLE, VALUE, NAME = 10, 20, 11, 21, 40, 8, 9, 70, 2
-MILLIMETRES = "4"
-MOST_CIRCLES = 1000
 FLAP_MM = 15.0  # width of a flap
 FLAPS = {"shroud_front": 3, "shroud_back": 3, "shroud_right": 1}  # folds of panels that have any
 PREFIX = "shroud_"
 SHEET = re.compile(r"CARD-(\d+)x(\d+)x(\d+)")
-
-Entity = dict[int, list[str]]
-
-
-class FlatDrawing(NamedTuple):
-    """What a DXF says is to be cut."""
-
-    circles: Floats  # (N, 3) x, y and radius, mm
-    corners: Floats  # (M, 2) of the outlines
-
-
-def read_dxf(text: str) -> FlatDrawing:
-    """Circles and outlines on the layer to be cut.
-
-    Raises:
-        Unknown: it is no DXF, or has too many circles.
-    """
-    entities = dxf_entities(text)
-    circles = [[one[code][0] for code in (X, Y, RADIUS)] for one in _on(CUT, "CIRCLE", entities)]
-    if len(circles) > MOST_CIRCLES:
-        raise Unknown(f"a drawing has {len(circles)} circles")
-    outlines = [np.array([one[X], one[Y]]).T for one in _on(CUT, "LWPOLYLINE", entities)]
-    corners = np.concatenate([np.zeros((0, 2)), *outlines])
-    return FlatDrawing(np.array(circles, dtype=float).reshape(-1, 3), corners.astype(float))
-
-
-def _on(layer: str, kind: str, entities: list[Entity]) -> list[Entity]:
-    return [one for one in entities if (one[0], one.get(LAYER)) == ([kind], [layer])]
-
-
-def dxf_entities(text: str) -> list[Entity]:
-    """Entities of a DXF, the values of each by group code.
-
-    Raises:
-        Unknown: it is no DXF, in another unit than millimetres, or on a layer of another name.
-    """
-    lines = [line.strip() for line in text.splitlines()]
-    try:
-        codes = [int(line) for line in lines[::2]]
-        pairs = list(zip(codes, lines[1::2], strict=True))
-        begin = pairs.index((NAME, "ENTITIES"))
-        end = pairs.index((0, "ENDSEC"), begin)
-    except ValueError:
-        raise Unknown("a drawing is no DXF") from None
-    unit = [k for k, pair in enumerate(pairs) if pair == (VARIABLE, "$INSUNITS")]
-    if [pairs[k + 1] for k in unit] != [(VALUE, MILLIMETRES)]:
-        raise Unknown("a drawing is not in millimetres")
-    found: list[Entity] = []
-    for code, value in pairs[begin + 1 : end]:
-        if code == 0:
-            found.append({})
-        if found:
-            found[-1].setdefault(code, []).append(value)
-    if others := {layer for one in found for layer in one.get(LAYER, ())} - LAYERS:
-        raise Unknown(f"a drawing has a layer {min(others)}")
-    return found
 
 
 def checks(
     names: list[CheckName], context: PrototypeContext, assembly: Mapping[str, TextSolid]
 ) -> list[Check]:
     """All drawings, and the drill table of the plate."""
-    faults = _drawing_faults(context, assembly), _table_faults(context, assembly)
+    drawings = [*_drawing_faults(context, assembly), *_cap_faults(context, assembly)]
+    folder, record = context.export.folder, context.prototype
+    for name in [one.pdf for one in record.drawn]:
+        if (folder / name).exists():
+            drawings += sheet_faults(read(folder, name, MAX_TEXT_BYTES))
+    faults = drawings, _table_faults(context, assembly)
     return [no_faults(*pair) for pair in zip(names, faults, strict=True)]
 
 
@@ -112,22 +57,22 @@ def _drawing_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]
         yield f"{part}: drawn without need" if part in drawings else f"{part}: no drawing"
     for name, part in needed.items():
         if part in drawings and name in assembly:
-            flat = read_dxf(_text(context, drawings[part]))
+            flat = _flat(context, drawings[part])
             if name == "lamp_1":
                 yield from _strip_faults(context, assembly[name], flat)
             else:
                 yield from _board_faults(context, name, assembly[name], flat)
 
 
-def _text(context: PrototypeContext, file: str) -> str:
-    return read(context.export.folder, file, MAX_TEXT_BYTES).text()
+def _flat(context: PrototypeContext, file: str) -> FlatDrawing:
+    return read_dxf(read(context.export.folder, file, MAX_TEXT_BYTES))
 
 
 def _strip_faults(context: PrototypeContext, solid: TextSolid, flat: FlatDrawing) -> Iterator[str]:
     """The strips of a lamp side by side, their length across the paper, and no holes."""
     lamps = context.prototype.lamps
     size = np.sort(np.ptp(solid.corners, axis=0)[1:])[::-1]
-    if lamps is None or len(flat.corners) != CORNERS * lamps.strips:
+    if lamps is None or [len(one) for one in flat.outlines] != [CORNERS] * lamps.strips:
         yield "lamp_1: its drawing does not have each strip's outline"
         return
     if lamps.length < lamps.width:
@@ -137,7 +82,7 @@ def _strip_faults(context: PrototypeContext, solid: TextSolid, flat: FlatDrawing
     wide = size[1] / lamps.strips
     ends = np.column_stack([np.zeros(lamps.strips), wide * np.arange(lamps.strips)])
     off = max(np.abs(low - ends).max(), np.abs(high - ends - [size[0], wide]).max())
-    if off > SAME_MM or len(flat.circles):
+    if off > SAME_MM or any(map(len, (flat.circles, flat.lines, flat.arcs))):
         yield f"lamp_1: its outlines are not {lamps.strips} of {size[0]:g} x {wide:g} mm"
 
 
@@ -151,12 +96,18 @@ def _board_faults(
     level = context.level_axes
     axes = {"plate": level[:2], "wheel": context.frame[1:]}.get(name, level[[2, 1]])
     corners, low = solid.corners @ axes.T, np.zeros(2)
+    size = np.ptp(corners, axis=0)
+    if name == "wheel" and flat.outlines:
+        yield f"{name}: {len(flat.outlines)} outlines, where circles are its outline"
     if name != "wheel":
-        low, size = corners.min(axis=0), np.ptp(corners, axis=0)
-        outline = flat.corners if len(flat.corners) else np.zeros((1, 2))
-        ends = np.stack([outline.min(axis=0), outline.max(axis=0) - size])
-        if np.abs(ends).max() > SAME_MM:
+        low = corners.min(axis=0)
+        box = np.array([[0, 0], [size[0], 0], size, [0, size[1]]])
+        if flat.corners.shape != box.shape or np.abs(flat.corners - box).max() > SAME_MM:
             yield f"{name}: its outline is not {size[0]:g} x {size[1]:g} mm"
+    if len(flat.arcs) or (len(flat.lines) and name != "upright_left"):
+        yield f"{name}: {len(flat.lines)} lines and {len(flat.arcs)} arcs to be cut"
+    elif len(flat.lines) and np.abs(np.ptp(flat.lines, axis=1) - [size[0], 0]).max() > SAME_MM:
+        yield f"{name}: a line to be cut does not run along all of it"
     radii: list[float] = []
     for face in solid.faces:
         if face.hollow and all(abs(face.radius - radius) > SAME_MM for radius in radii):
@@ -174,6 +125,26 @@ def _board_faults(
         away = np.abs(flat.circles - [x, y, radius]).max(axis=1, initial=0.0)
         if not (away <= SAME_MM).any():
             yield f"{name}: no circle of {radius:g} mm radius at {x:.2f}, {y:.2f}"
+
+
+def _cap_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Iterator[str]:
+    """The profile of a cap, drawn at full size: arcs of its spheres, corners on its round faces."""
+    for cap in context.prototype.caps:
+        name = f"cap_{cap.ball}"
+        flat, solid = _flat(context, cap.dxf), require(assembly.get(name), f"there is no {name}")
+        radii = {kind: [one.radius for one in solid.faces if one.kind == kind] for kind in ROUND}
+        off = [away(flat.arcs[:, 2], radii["sphere"]), away(radii["sphere"], flat.arcs[:, 2])]
+        out = np.abs(flat.corners[1:-1, 0])
+        off += [away(out, radii["cylinder"]), away(radii["cylinder"], out)]
+        others = len(flat.circles), len(flat.lines), len(flat.folds), len(flat.outlines) - 1
+        if max(off) > SAME_MM or any(others):
+            yield f"{cap.dxf}: not the profile of {name}"
+
+
+def away(values: ArrayLike, others: ArrayLike) -> float:
+    """Largest distance of values (N,) from the nearest of others (M,)."""
+    apart = np.abs(np.subtract.outer(np.asarray(values), np.asarray(others)))
+    return float(apart.min(axis=1, initial=np.inf).max(initial=0.0))
 
 
 def _table_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) -> Iterator[str]:
@@ -232,15 +203,16 @@ def _panel_faults(
     sides, size = np.sort(box[1] - box[0]), np.array(panel.size)
     if np.abs(sides - np.sort([thick, *size])).max() > SAME_MM:
         yield f"{panel.name} is drawn {sides[1]:g} x {sides[2]:g} mm and {sides[0]:g} mm thick"
-    entities = dxf_entities(_text(context, panel.dxf))
-    outlines, folds = _on(CUT, "LWPOLYLINE", entities), _on(FOLD, "LINE", entities)
-    if len(outlines) != 1:
-        yield f"{panel.dxf}: {len(outlines)} outlines"
+    flat = _flat(context, panel.dxf)
+    if [len(one) for one in (flat.outlines, flat.circles, flat.lines, flat.arcs)] != [1, 0, 0, 0]:
+        yield f"{panel.dxf}: another cut than one outline"
         return
-    corners = np.array([outlines[0][X], outlines[0][Y]], dtype=float).T
+    corners, folds = flat.corners, flat.folds
+    inside = np.minimum(corners, size - corners).min(axis=1)
+    if inside.max() > FLAP_MM + SAME_MM:
+        yield f"{panel.dxf}: its outline is {inside.max():g} mm inside the panel"
     flaps = np.zeros(4)  # below, left, above, right
-    for one in folds:
-        line = np.array([[one[X][0], one[Y][0]], [one[END_X][0], one[END_Y][0]]], dtype=float)
+    for line in folds:
         edges = [line[:, 1], line[:, 0], size[1] - line[:, 1], size[0] - line[:, 0]]
         flaps += FLAP_MM * np.array([np.abs(edge).max() < SAME_MM for edge in edges])
     if len(folds) != FLAPS.get(panel.name, 0) or (flaps > 0).sum() != len(folds):

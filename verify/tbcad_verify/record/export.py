@@ -189,12 +189,13 @@ class Export:
         return tuple(self.prototype.parts) if self.prototype else ()
 
     @property
-    def part_files(self) -> frozenset[str]:
-        """All files of all parts, and of their assembly."""
+    def files(self) -> frozenset[str]:
+        """All files that are read: records, parts, their assembly, drawings and programs."""
         parts = (*self.parts, *self.mandrels, *self.printed)
         names = {name for part in parts for name in (part.stl, part.step, part.threemf)}
+        names |= {DESIGN, MIRRORS}
         if self.prototype:
-            names |= {self.prototype.assembly.step, self.prototype.assembly.glb}
+            names |= self.prototype.files
         return frozenset(names - {""})
 
     @property

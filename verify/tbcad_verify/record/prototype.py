@@ -19,7 +19,9 @@ from tbcad_verify.record.prototype_sections import (
     Assembly,
     AssemblyStep,
     Balls,
+    BoughtDrawing,
     CameraPlace,
+    CapDrawing,
     Drawing,
     Frame,
     Home,
@@ -72,7 +74,8 @@ class Prototype(Strict):
     assembly_steps: list[AssemblyStep] = Field(max_length=MOST)  # in their order
     lamps: Lamps | None  # that light the object; None without any
     shroud: Shroud | None  # round the rig; None without
-    drawings: list[Drawing] = Field(max_length=MOST)  # of what is cut or drilled
+    drawings: list[BoughtDrawing] = Field(max_length=MOST)  # of what is cut or drilled
+    caps: list[CapDrawing] = Field(max_length=MOST)
     assembly: Assembly = Assembly()  # files of the whole
     balls: Balls  # K of them
     plan: Plan  # every picture
@@ -99,6 +102,18 @@ class Prototype(Strict):
         if len({part.stl for part in self.parts}) != len(self.parts):
             raise ValueError("parts must each have an STL of their own")
         return self
+
+    @property
+    def drawn(self) -> list[Drawing]:
+        """All drawings."""
+        return [*self.drawings, *self.caps]
+
+    @property
+    def files(self) -> frozenset[str]:
+        """Tables, programs, drawings, and files of the whole."""
+        drawings = [name for one in self.drawn for name in (one.dxf, one.pdf)]
+        panels = [one.dxf for one in self.shroud.panels] if self.shroud else []
+        return frozenset({*self.digests, *drawings, *panels, self.assembly.step, self.assembly.glb})
 
     @property
     def moved(self) -> bool:

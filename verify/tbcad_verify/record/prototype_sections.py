@@ -226,10 +226,22 @@ class AssemblyStep(Strict):
 
 
 class Drawing(Strict):
-    """A drawing: the part that it shows, by its name in the parts list, and what is cut by."""
+    """Files of a drawing: what is cut by, and what is read."""
+
+    dxf: PlainFile
+    pdf: PlainFile
+
+
+class BoughtDrawing(Drawing):
+    """The drawing of a part, by its name in the parts list."""
 
     part: str = Field(max_length=WIDEST)
-    dxf: PlainFile
+
+
+class CapDrawing(Drawing):
+    """The drawing of a cap, by the number of its ball."""
+
+    ball: int
 
 
 class Home(Strict):
@@ -239,6 +251,8 @@ class Home(Strict):
     homed: Angle = Field(alias="homed_deg")
     travel: Annotated[float, Field(alias="travel_deg", ge=0, le=720)]
     pin: str = Field(max_length=WIDEST)
+    # by which angle zero may be off, as the play of pin and key allows
+    zero_error: Annotated[float, Field(alias="zero_error_deg", ge=0, le=180)]
 
 
 class MarkPicture(Strict):

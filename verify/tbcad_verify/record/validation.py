@@ -116,7 +116,7 @@ def parse_json(blob: FileBytes, schema: str) -> dict[str, Any]:
     """
     try:
         value = json.loads(
-            blob.text(), parse_constant=_refuse_constant, object_pairs_hook=_refuse_doubles
+            blob.text(), parse_constant=_refuse_constant, object_pairs_hook=refuse_doubles
         )
     except (ValueError, RecursionError) as error:
         raise BadExport(f"{blob.name}: broken JSON ({error}); {AGAIN}") from error
@@ -227,7 +227,7 @@ def _list_words(node: dict[str, Any]) -> str:
     return f"a list of {count}, each {_words(inner)}"
 
 
-def _refuse_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def refuse_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """The object; programs differ in which of two values with the same key they take."""
     value = dict(pairs)
     if len(value) != len(pairs):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
-from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -41,11 +40,11 @@ from tbcad_verify.report.report import NAME
 from tbcad_verify.report.text import CHANGED, PAPER
 
 LEAST_VOLUME_MM3 = 1e-6
-PART_KINDS = (".step", ".stl", ".3mf")  # of files that must be measured
+KINDS = {"stl": ".stl", "step": ".step", "threemf": ".3mf"}  # files that every part has
 # Written after the manifest; report.html shows what a verification found, and is no part.
 OWN_FILES = frozenset({"manifest.json", NAME, "report.html"})
-# What a person reads, and no machine: its owner may edit it.
-PAPER_FILES = ("bom.csv", "wiring.csv", "camera.json", "*.pdf", "*.png")
+# What a person reads, and no machine: its owner may edit it. Drawings keep their paper's size.
+PAPER_FILES = ("bom.csv", "wiring.csv", "camera.json", "*.pdf")
 MANIFEST = (
     ("manifest", "manifest.json", "wrong files"),
     PAPER,
@@ -71,9 +70,8 @@ def manifest_checks(export: Export, parsed: Mapping[str, tuple[int, str]]) -> li
     ]
     edited = [name for name in changed if is_paper(name)]
     wrong = [name for name in changed if not is_paper(name)]
-    unlisted = sorted({*parsed} - {*export.manifest} - OWN_FILES)
-    parts = {name for name in export.manifest if PurePosixPath(name).suffix.lower() in PART_KINDS}
-    unread = sorted(parts - export.part_files)
+    unlisted = sorted({*parsed, *export.files} - {*export.manifest} - OWN_FILES)
+    unread = sorted({*export.manifest} - export.files - {*PAPER_FILES})
     others = sorted(listing(export.folder) - {*export.manifest} - OWN_FILES)
     manifest, paper, other_files = MANIFEST
     return [
@@ -96,6 +94,7 @@ def is_paper(name: str) -> bool:
 
 RECORD = (
     ("requirements", "design.json", "unlike its spec"),
+    ("part files", "design.json", "files"),
     ("ids", "mirrors.csv", "bad ids"),
     ("poses", "mirrors.csv", "mm off"),
     ("figures", "mirrors.csv", "mm off"),
@@ -105,7 +104,9 @@ RECORD = (
 
 def record_checks(export: Export) -> list[Check]:
     """Record and spec agree, and mirrors are on their ellipsoids."""
-    return guarded_each(RECORD, (_requirements, _ids, _poses, _figures, _directions), export)
+    return guarded_each(
+        RECORD, (_requirements, _part_files, _ids, _poses, _figures, _directions), export
+    )
 
 
 def mesh_checks(file: str, topology: Topology) -> list[Check]:
@@ -177,6 +178,19 @@ def _found(export: Export, name: str) -> tuple[int, str] | None:
 def _requirements(name: CheckName, export: Export) -> Check:
     keys = contradictions(export)
     return at_most(name, len(keys), 0, f"the record is not its own spec's: {short_list(keys)}")
+
+
+def _part_files(name: CheckName, export: Export) -> Check:
+    """Every part has a mesh, and where any has more a solid and a 3MF, all called as it is."""
+    parts = (*export.parts, *export.mandrels, *export.printed)
+    kinds = KINDS if any(part.step or part.threemf for part in parts) else {"stl": ".stl"}
+    wrong = [
+        f"{part.name} has {getattr(part, kind) or 'none'} for {part.name}{suffix}"
+        for part in parts
+        for kind, suffix in kinds.items()
+        if getattr(part, kind) != part.name + suffix
+    ]
+    return at_most(name, len(wrong), 0, short_list(wrong))
 
 
 def _ids(name: CheckName, export: Export) -> Check:

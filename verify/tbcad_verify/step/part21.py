@@ -17,7 +17,6 @@ from tbcad_verify.types import Floats
 
 # No expression tries again what it has read, so that the time grows with the length alone.
 TEXT = r"'(?:[^']++|'')*+'"
-NOTE = re.compile(rf"{TEXT}|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?")  # a comment, or a text as it is
 ENTITY = re.compile(
     rf"\s*+#(\d{{1,15}}+)\s*+=\s*+([A-Z]\w*+)?\s*+\(((?:[^';=]++|{TEXT})*+);",
 )
@@ -40,10 +39,12 @@ GEOMETRY = frozenset(
 
 
 class StepTable:
-    """The entities of a STEP file with one data section, by number, but for complex ones (units).
+    """The entities of a STEP file with one data section and no comments, by number.
 
     Attributes:
-        kinds: name of each.
+        head: text before the first of them.
+        entities: name, empty for complex ones (units), and text of the parameters of each.
+        kinds: name of each, but for complex ones.
         bodies: text of its parameters.
     """
 
@@ -53,7 +54,9 @@ class StepTable:
         Raises:
             ValueError: the text is no STEP file, or two entities have one number.
         """
-        entities = _entities(text)
+        start = _data_start(text)
+        self.head, self.entities = text[:start], _entities(text, start)
+        entities = self.entities
         self.kinds = {number: kind for number, (kind, _) in entities.items() if kind}
         self.bodies = {number: body for number, (kind, body) in entities.items() if kind}
         self._references: dict[int, list[int]] = {}
@@ -128,11 +131,11 @@ class StepTable:
         return self.triple(point), self.triple(axis)
 
 
-def _entities(text: str) -> dict[int, tuple[str, str]]:
-    """Name, empty for complex ones, and text of the parameters of each entity."""
+def _entities(text: str, place: int) -> dict[int, tuple[str, str]]:
+    """Name and text of the parameters of each entity from a place on."""
     if "/*" in text:
-        text = NOTE.sub(lambda found: found[0] if found[0].startswith("'") else " ", text)
-    place, numbers = _data_start(text), 0
+        raise ValueError("broken STEP text: a comment")
+    numbers = 0
     entities: dict[int, tuple[str, str]] = {}
     while (match := ENTITY.match(text, place)) and (inside := match[3].rstrip()).endswith(")"):
         plain = LABEL.sub("", inside)

@@ -55,10 +55,10 @@ def run_checks(checks: Checks, file: str, comparison: PartComparison) -> list[Ch
 
 
 def solid(name: CheckName, part: PartComparison) -> Check:
-    """One solid of one closed shell, with the part's name."""
-    counts, named = part.file.counts, part.file.solids
+    """One solid of one closed shell, its product and it with the part's name."""
+    counts, named = part.file.counts, part.file.solids + part.file.products
     faults = (
-        int(named != (part.name,))
+        int(named != (part.name, part.name))
         + abs(counts["solids"] - 1)
         + abs(counts["shells"] - 1)
         + counts["open_edges"]

@@ -9,6 +9,7 @@ valley between mirrors.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from tbcad_verify.mesh.spheroids import growth, least_wall
 from tbcad_verify.record.export import Camera
 from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
+from tbcad_verify.step.grammar import refuse_foreign
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.types import Floats
 
@@ -47,6 +49,7 @@ class TextSolid:
 
     corners: Floats  # (V, 3) mm, sorted
     faces: tuple[RoundFace, ...]  # the round ones
+    colour: tuple[float, ...] = ()  # red, green, blue (sRGB) and opacity, 0 to 1; empty: none
 
 
 def read_solids(text: str) -> dict[str, TextSolid]:
@@ -57,6 +60,7 @@ def read_solids(text: str) -> dict[str, TextSolid]:
     """
     try:
         table = StepTable(text)
+        refuse_foreign(table)
         _refuse_moved(table)
         solids = [
             (_product(table, shape), solid)
@@ -72,7 +76,8 @@ def read_solids(text: str) -> dict[str, TextSolid]:
         names = [name for name, _ in solids]
         if len(set(names)) != len(names):
             raise Unknown("two solids have the same name")
-        return {name: _solid(table, solid) for name, solid in solids}
+        colours = dict(_colours(table))
+        return {name: _solid(table, solid, colours.get(solid, ())) for name, solid in solids}
     except (LookupError, ValueError) as error:
         raise Unknown(f"broken STEP text ({type(error).__name__}: {error})") from error
 
@@ -155,7 +160,16 @@ def _product(table: StepTable, shape: int) -> str:
     return table.label(product)
 
 
-def _solid(table: StepTable, solid: int) -> TextSolid:
+def _colours(table: StepTable) -> Iterator[tuple[int, tuple[float, ...]]]:
+    """Each styled solid, and its colour and opacity."""
+    for item in table.of("STYLED_ITEM"):
+        style, solid = table.references(item)
+        kinds = {table.kinds[one]: table.numbers(one) for one in table.reached(style)}
+        (clear,) = kinds.get("SURFACE_STYLE_TRANSPARENT", [0.0])
+        yield solid, (*kinds["COLOUR_RGB"], 1 - clear)
+
+
+def _solid(table: StepTable, solid: int, colour: tuple[float, ...]) -> TextSolid:
     reached = list(table.reached(solid))
     points = [
         table.triple(table.references(one)[0])
@@ -165,7 +179,7 @@ def _solid(table: StepTable, solid: int) -> TextSolid:
     corners = np.array(points).reshape(-1, 3)
     faces = [round_face(table, one) for one in reached if table.kinds.get(one) == "ADVANCED_FACE"]
     order = np.lexsort(corners.T[::-1])
-    return TextSolid(corners[order], tuple(face for face in faces if face))
+    return TextSolid(corners[order], tuple(face for face in faces if face), colour)
 
 
 def round_face(table: StepTable, face: int) -> RoundFace | None:

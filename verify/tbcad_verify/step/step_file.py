@@ -20,6 +20,7 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.processes import ProcessEnded, Processes
+from tbcad_verify.step.grammar import refuse_foreign
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.types import Floats
 
@@ -69,6 +70,7 @@ class StepFile:
     """One STEP file."""
 
     solids: tuple[str, ...]  # names of the solids in the text
+    products: tuple[str, ...]  # and of the products
     counts: dict[str, int]  # the kernel's solids, shells and open edges
     valid: bool  # the kernel's check of the shape
     gap: float  # tolerance to which the kernel had to widen corners and edges until they met, mm
@@ -148,8 +150,10 @@ def read_text(path: Path) -> Row:
     try:
         # Names are ASCII, and the standard writes all other characters so too.
         table = StepTable(path.read_bytes().decode("ascii"))
+        refuse_foreign(table)
         return {
             "solids": [table.label(one) for one in table.of("MANIFOLD_SOLID_BREP")],
+            "products": [table.label(one) for one in table.of("PRODUCT")],
             "faces": [_text_face(table, one) for one in table.of("ADVANCED_FACE")],
             "properties": _properties(table),
         }
@@ -205,6 +209,7 @@ def parse(text: Row, solid: Row) -> StepFile:
     area = sum(row["area"] for row in rows)
     return StepFile(
         tuple(text["solids"]),
+        tuple(text["products"]),
         {key: solid[key] for key in ("solids", "shells", "open_edges")},
         solid["valid"],
         solid["gap"],

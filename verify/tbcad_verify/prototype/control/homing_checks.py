@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from tbcad_verify.report.checks import Check, CheckName, Unknown, no_faults, req
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
 from tbcad_verify.types import Floats
 
-PIN_HOLE_MM = 4.2
+PIN_MM, PIN_HOLE_MM = 4.0, 4.2
+PINNED, DOWEL = ("zero_disc", "bearing_head"), re.compile(r"DOWEL-(\d+)x\d+")
 MIN_PIN_OUT_MM = 40.0  # of the pin from the axis: for 0.3 degrees
 SAME_MM = 1e-6
 ROLLER_MM = 2.4  # radius
@@ -29,7 +30,21 @@ SWITCH_DEG = 1.5  # of the switch's angle from the record's
 MIN_FREE_DEG = 2.5  # of the switch below all that the program drives to
 TOP_MM = 0.01  # of the tab's corners
 SETTING = re.compile(r"\$(\d{1,3})=(-?\d+(?:\.\d+)?(?:e-?\d+)?)")
-COMMENT = re.compile(r"\([^()]{1,76}\)")
+# What people read beside the settings, and obey.
+TOLD = (
+    *(r"settings of [\w .-]+ for grbl(?:hal)?", "microseconds of a step's pulse"),
+    *("motor always on, for the base falls without it", r"\d if the base turns against its arrow"),
+    *("what status reports tell", r"reports in degrees, not divided by 25\.4"),
+    *("no laser, no lathe", r"steps a degree|degrees a minute, at most|degrees/s\^2"),
+    *("degrees of travel", "motor on in alarms too", "no sleep: it lets the motor go"),
+    "the switch opens when it is pressed; other inputs are empty",
+    *("inputs of switches are pulled up", "homing", "homing: (?:passes|(?:this|no other) axis)"),
+    *("homing: toward negative angles", "homing: degrees a minute, to find the switch(?: again)?"),
+    *("homing: ms until the switch has settled", "homing: degrees of pull-off", "soft limits"),
+    *("hard limit: the switch stops the base", "no soft limits: the base is not homed"),
+    *("no hard limits", "no homing"),
+)
+COMMENT = re.compile(rf"\((?:{'|'.join(TOLD)})\)")
 SHARE = 1e-6
 PULSE_US, DEBOUNCE_MS = 10.0, 25.0
 PLACES = 1.0  # bit of $10 in both firmwares: the machine's place
@@ -53,9 +68,9 @@ def checks(
 
 
 def _pin(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
-    """One hole in the disc, one in the head, in line at base angle zero; the rod is long enough."""
-    axis, places = context.frame[0], []
-    for name in ("zero_disc", "bearing_head"):
+    """Holes of disc and head in line at base angle zero; the rod is long enough; the play."""
+    axis, home, places = context.frame[0], context.prototype.home, []
+    for name in PINNED:
         solid = require(solids.get(name), f"the assembly has no {name}")
         found = holes(solid.faces, PIN_HOLE_MM / 2, SAME_MM)
         found = [hole for hole in found if abs(hole.axis @ axis) > 1 - SAME_MM]
@@ -69,10 +84,34 @@ def _pin(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator
     if distance_to_line(disc, np.zeros(3), axis) < MIN_PIN_OUT_MM:
         yield "the zero pin is too near to the axis"
     path = float((solids["zero_disc"].corners @ axis).max() - head @ axis)
-    pin = context.prototype.home.pin
-    rod = re.fullmatch(r"ROD-4x(\d+)", pin)
+    rod = re.fullmatch(r"ROD-4x(\d+)", home.pin)
     if not rod or float(rod[1]) < path:
-        yield f"{pin} does not reach through {path:.0f} mm"
+        yield f"{home.pin} does not reach through {path:.0f} mm"
+    error = _play(context, solids, PINNED, disc, PIN_MM)
+    for one in context.prototype.fasteners:
+        if one.through[0] == "zero_disc" and (dowel := DOWEL.fullmatch(one.part)):
+            error += _play(context, solids, one.through, one.position, float(dowel[1]))
+    if not math.isclose(error, home.zero_error, rel_tol=SHARE):
+        yield f"zero_error_deg is {home.zero_error:.4g}; the play of pin and key is {error:.4g} deg"
+
+
+def _play(
+    context: PrototypeContext,
+    solids: Mapping[str, TextSolid],
+    bodies: Sequence[str],
+    place: Floats,
+    diameter: float,
+) -> float:
+    """Angle by which bodies turn on a pin through all of them: half its play in each, degrees."""
+    axis = context.frame[0]
+    gaps = [
+        face.radius - diameter / 2
+        for body in bodies
+        for face in solids[body].faces
+        if face.hollow and distance_to_line(face.point, place, axis) < SAME_MM
+    ]
+    lever = distance_to_line(place, np.zeros(3), axis)
+    return math.degrees(len(bodies) * max(gaps, default=math.inf) / lever)
 
 
 def _polar(context: PrototypeContext, points: Floats) -> Floats:
@@ -159,7 +198,7 @@ def parsed_settings(text: str) -> tuple[dict[int, float], list[str]]:
                 faults.append(f"${found[1]} is there twice")
             values[int(found[1])] = float(found[2])
         elif not COMMENT.fullmatch(line):
-            faults.append(f"line {number} is no setting")
+            faults.append(f"line {number}, {line!r}, is no setting, and no words that tbcad writes")
     order = list(values)
     if values.get(20) and (22 not in order or order.index(22) > order.index(20)):
         faults.append("$20 before $22, which GRBL refuses")

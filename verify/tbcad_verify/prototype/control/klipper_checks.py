@@ -52,6 +52,8 @@ FORMS = {
 SECOND_MS, MINUTE_S = 1000.0, 60.0
 PIN = r"[\w.:]+"
 CONFIG = (
+    "# base of the prototype: degrees for millimetres; fill in the pins of the board",
+    "# zero pin in before RESTART, FIRMWARE_RESTART or the supply's switch: they let it fall",
     *(r"\[printer\]", "kinematics: none", "max_velocity: 1000", "max_accel: 1000"),
     *(r"\[pause_resume\]", r"\[respond\]", r"\[idle_timeout\]", r"timeout: \d+", "gcode:"),
     r'    RESPOND MSG="idle, the motor stays on"',
@@ -119,15 +121,15 @@ def run_klipper(text: str, axis: str, switch: float, homed: float) -> Machine:
 
 
 def config_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
-    """The first line that is another; comments and blank lines have no use."""
+    """The first line that is another; what its comments tell is obeyed by people."""
     text = require(context.prototype.klipper_config, f"there is no {KLIPPER_CONFIG}")
-    lines = [line for line in text.splitlines() if line and not line.startswith("# ")]
+    lines = text.splitlines()
     forms: list[str | tuple[str, float]] = [*CONFIG, *_steps(context, ratio)]
     for name in ("release", "lamp", *(f"led_{k + 1}" for k in range(len(context.prototype.leds)))):
         forms += [rf"\[output_pin {name}\]", rf"pin: {PIN}", "value: 0"]
     for line, form in zip_longest(lines, forms):
         if line is None or form is None or not _fits(line, form):
-            yield f"{KLIPPER_CONFIG}: {line or 'its end'!r} is no {form or 'line of it'!r}"
+            yield f"{KLIPPER_CONFIG}: {line or 'its end'!r}, allowed is {form or 'its end'!r}"
             return
 
 

@@ -1,0 +1,185 @@
+"""Flat drawings as DXF, by group codes in plain Python and by a closed grammar.
+
+A machine that cuts obeys units, hidden layers, blocks, bulges and extrusions as readily as lines.
+So there are the sections, layers, kinds of entities and group codes that tbcad writes, and no
+others. What is on the layers `cut` and `fold` is measured, all of it.
+Source: Autodesk's DXF reference for R2010.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from tbcad_verify.record.files import FileBytes
+from tbcad_verify.report.checks import Unknown
+from tbcad_verify.types import Floats
+
+CUT, FOLD = "cut", "fold"  # the layer of outlines and holes, and that of folds
+X, Y, END_X, END_Y, RADIUS, LAYER, NAME, FLAGS, COLOUR = 10, 20, 11, 21, 40, 8, 2, 70, 62
+MOST_CIRCLES = 1000
+SECTIONS = ["HEADER", "CLASSES", "TABLES", "BLOCKS", "ENTITIES", "OBJECTS"]
+# Variables that say what a number means, or where: all others only show something.
+HEADER = {
+    **{"$INSUNITS": "4", "$MEASUREMENT": "1", "$LUNITS": "2", "$AUNITS": "0", "$TILEMODE": "1"},
+    **{"$ANGDIR": "0", "$ANGBASE": "0.0", "$INSBASE": "0.0", "$DIMLFAC": "1.0", "$DIMALT": "0"},
+    **{"$THICKNESS": "0.0", "$ELEVATION": "0.0", "$UCSORG": "0.0", "$UCSXDIR": "1.0"},
+    **{"$UCSYDIR": "0.0", "$DIMPOST": "", "$UCSNAME": ""},
+}
+LAYERS = re.compile("0|Defpoints|cut|fold|engrave|hidden|hatch|rays|centre|dimensions|frame")
+BLOCKS = re.compile(r"\*(Model_Space|Paper_Space|D\d+)")
+COMMON = {0, 5, 100, 330, LAYER, X, Y, 30}  # group codes of all entities; 30 and 31: z
+CODES = {
+    "LINE": {END_X, END_Y, 31},
+    "CIRCLE": {RADIUS},
+    "ARC": {RADIUS, 50, 51},
+    "LWPOLYLINE": {90, FLAGS},
+    "TEXT": {1, RADIUS, END_X, END_Y, 31, 50, 72},
+    "DIMENSION": {
+        *(1, NAME, 3, END_X, END_Y, 31, 13, 23, 33, 14, 24, 34, 15, 25, 35, 42, 50, FLAGS, 71, 280),
+    },
+}
+DRAWN = {
+    CUT: {"LINE", "CIRCLE", "ARC", "LWPOLYLINE"},
+    FOLD: {"LINE"},
+    "centre": {"LINE", "CIRCLE", "ARC"},
+    "dimensions": {"LINE", "LWPOLYLINE", "TEXT", "DIMENSION"},
+    "frame": {"LINE", "LWPOLYLINE", "TEXT"},
+}
+
+Group = tuple[int, str]
+Entity = dict[int, list[str]]
+
+
+class FlatDrawing(NamedTuple):
+    """What a DXF says is to be cut and folded."""
+
+    circles: Floats  # (N, 3) x, y and radius, mm
+    outlines: list[Floats]  # (M, 2) corners of each, closed unless it has arcs beside it
+    lines: Floats  # (L, 2, 2) both ends of other cuts, mm
+    arcs: Floats  # (A, 3) x, y and radius, mm
+    folds: Floats  # (F, 2, 2) both ends, mm
+
+    @property
+    def corners(self) -> Floats:
+        """(M, 2) corners of all outlines."""
+        return np.concatenate([np.zeros((0, 2)), *self.outlines])
+
+
+def read_dxf(blob: FileBytes) -> FlatDrawing:
+    """All that is to be cut and folded.
+
+    Raises:
+        Unknown: it is no DXF, or has something that tbcad does not write.
+    """
+    try:
+        entities = _entities(blob.text())
+    except (ValueError, KeyError) as error:
+        raise Unknown(f"{blob.name}: no DXF of tbcad's ({error})") from None
+    some = {
+        (layer, kind): [one for one in entities if one[0] == [kind] and one[LAYER] == [layer]]
+        for layer in (CUT, FOLD)
+        for kind in CODES
+    }
+    circles, arcs = (_numbers(some[CUT, kind], (X, Y, RADIUS)) for kind in ("CIRCLE", "ARC"))
+    if len(circles) > MOST_CIRCLES:
+        raise Unknown(f"{blob.name}: {len(circles)} circles, allowed are {MOST_CIRCLES}")
+    outlines = some[CUT, "LWPOLYLINE"]
+    closed = "0" if len(arcs) else "1"
+    if any(one[FLAGS] != [closed] for one in outlines):
+        raise Unknown(f"{blob.name}: an outline is {'closed' if len(arcs) else 'open'}")
+    lines, folds = (
+        _numbers(some[layer, "LINE"], (X, Y, END_X, END_Y)).reshape(-1, 2, 2)
+        for layer in (CUT, FOLD)
+    )
+    corners = [np.array([one[X], one[Y]], dtype=float).T for one in outlines]
+    return FlatDrawing(circles, corners, lines, arcs, folds)
+
+
+def _numbers(some: list[Entity], codes: tuple[int, ...]) -> Floats:
+    return np.array([[one[code][0] for code in codes] for one in some], dtype=float).reshape(
+        -1, len(codes)
+    )
+
+
+def _entities(text: str) -> list[Entity]:
+    """Entities of the drawing itself, the values of each by group code.
+
+    Raises:
+        ValueError: something is not allowed, or no DXF.
+        KeyError: a group is missing.
+    """
+    lines = [line.strip() for line in text.splitlines()]
+    pairs = list(zip(map(int, lines[::2]), lines[1::2], strict=True))
+    starts = [k for k, pair in enumerate(pairs) if pair == (0, "SECTION")]
+    ends = [k for k, pair in enumerate(pairs) if pair == (0, "ENDSEC")]
+    if [pairs[k + 1] for k in starts] != [(NAME, name) for name in SECTIONS]:
+        raise ValueError(f"sections must be {', '.join(SECTIONS)}")
+    whole = [0, *(k for pair in zip(starts, ends, strict=True) for k in pair), len(pairs) - 1]
+    gaps = [b - a for a, b in zip(whole[::2], whole[1::2], strict=True)]
+    if gaps != [0, *[1] * (len(SECTIONS) - 1), 1] or pairs[-1] != (0, "EOF"):
+        raise ValueError("something stands between the sections")
+    header, _, tables, blocks, entities, _ = (
+        pairs[start + 2 : end] for start, end in zip(starts, ends, strict=True)
+    )
+    _refuse_header(header)
+    _refuse_layers(_grouped(tables))
+    _refuse_blocks(_grouped(blocks))
+    found = _grouped(entities)
+    for one in found:
+        _refuse_entity(one)
+    return found
+
+
+def _grouped(pairs: list[Group]) -> list[Entity]:
+    """Values by group code, of each that a group code 0 begins."""
+    found: list[Entity] = []
+    for code, value in pairs:
+        if code == 0:
+            found.append({})
+        found[-1].setdefault(code, []).append(value)
+    return found
+
+
+def _refuse_header(pairs: list[Group]) -> None:
+    names = [k for k, (code, _) in enumerate(pairs) if code == 9]
+    values = {pairs[k][1]: pairs[k + 1][1] for k in names}
+    for name, allowed in HEADER.items():
+        if values.get(name) != allowed or len(values) < len(names):
+            given = values.get(name, "missing")
+            raise ValueError(f"{name} is {given}, allowed is {allowed}, once")
+
+
+def _refuse_layers(tables: list[Entity]) -> None:
+    """Refuse layers that are off, frozen, locked, or not plotted, and those of another name."""
+    for one in tables:
+        if one[0] == ["LAYER"]:
+            shown = one[FLAGS] == ["0"] and int(one[COLOUR][0]) > 0
+            plotted = one.get(290, ["1"]) == ["1"] or one[NAME] == ["Defpoints"]
+            if not (LAYERS.fullmatch(one[NAME][0]) and shown and plotted):
+                raise ValueError(f"layer {one[NAME][0]} is foreign or hidden")
+
+
+def _refuse_blocks(blocks: list[Entity]) -> None:
+    """Refuse blocks but the pictures of dimensions, which have no cuts."""
+    for one in blocks:
+        if one[0] == ["BLOCK"]:
+            if not BLOCKS.fullmatch(one[NAME][0]):
+                raise ValueError(f"a block {one[NAME][0]}")
+            inside = one[NAME][0]
+        elif one[0] != ["ENDBLK"]:
+            _refuse_entity(one)
+            if not inside.startswith("*D") or one[LAYER] != ["dimensions"]:
+                raise ValueError(f"{one[0][0]} in block {inside}")
+
+
+def _refuse_entity(one: Entity) -> None:
+    (kind,), layer = one[0], one.get(LAYER, ["none"])
+    if kind not in DRAWN.get(layer[0], ()) or len(layer) > 1:
+        raise ValueError(f"{kind} on layer {layer[0]}")
+    if foreign := one.keys() - COMMON - CODES[kind]:
+        raise ValueError(f"{kind} on layer {layer[0]} with group code {min(foreign)}")
+    if {*one.get(30, ()), *one.get(31, ())} - {"0.0"}:
+        raise ValueError(f"{kind} on layer {layer[0]} is not in the plane of the paper")
