@@ -407,6 +407,7 @@ def spec(design: Design, sensor: dict[str, Any]) -> dict[str, Any]:
         "semi_minor_mm": B,
     }
     value["camera"] = sensor
+    value["printer"]["bed_mm"] = [300.0, 300.0, 300.0]
     for section, chosen in CHOSEN.items():
         (value["prototype"][section] if section else value["prototype"]).update(chosen)
     value["mirrors"] |= {"radius_rule": "traced"}

@@ -61,15 +61,12 @@ def sparse(name: str, head: bytes, size: int = LONG) -> Job:
 
 def headed(more: int) -> bytes:
     """An STL's head for two gigabytes, and so many facets more than there are."""
-    return b"corpus".ljust(80) + (ROWS + more).to_bytes(4, "little")
+    return bytes(80) + (ROWS + more).to_bytes(4, "little")
 
 
-def one_bit(folder: Path) -> Sequence[str]:
-    """A bit of an STL's heading, which nobody measures."""
-    data = bytearray((folder / "shell_a.stl").read_bytes())
-    data[0] ^= 1
-    put(folder, "shell_a.stl", bytes(data))
-    return ["shell_a.stl"]
+def heading(folder: Path) -> None:
+    data = (folder / "shell_a.stl").read_bytes()
+    put(folder, "shell_a.stl", b"UNITS=in".ljust(80, b"\0") + data[80:])
 
 
 def again(name: str) -> Job:
@@ -95,6 +92,9 @@ FILES: tuple[Mutation, ...] = (
         ("a table linked from outside", link_out("mirrors.csv"), "leads out"),
         ("a pipe for an STL", instead("shell_a.stl", os.mkfifo), "shell_a.stl: not a regular file"),
     ),
+    *refusing(
+        "heading", ("a unit in an STL's heading", heading, "shell_a.stl", "allowed are zeros")
+    ),
     # Refused before anybody reads so much, the hash included; so nobody needs to sign them.
     *refusing(
         "long file",
@@ -107,7 +107,6 @@ FILES: tuple[Mutation, ...] = (
     ),
     *failing(
         "manifest",
-        ("one bit of a heading, which nobody measures", one_bit, "manifest"),
         (
             "a wrong hash",
             manifest(lambda files: files["shell_a.step"].update(sha256="0" * 64)),

@@ -21,6 +21,7 @@ RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
 BALLS, HOLES = "balls.csv", "plate_holes.csv"
 SETTINGS = "grbl_settings.txt"
+CAP, SHEET = "drawing_cap_1.dxf", "drawing_plate.pdf"
 PLATE, WHEEL, LAMP = (f"drawing_{name}.dxf" for name in ("plate", "wheel", "lamp"))
 KLIPPER = "rotation_plan_klipper.gcode"
 
@@ -130,6 +131,11 @@ def text_of(name: str, pattern: str, new: str, count: int = 0) -> Job:
     return rewritten(name, lambda text: re.sub(pattern, new, text, count=count))
 
 
+def sheet(old: bytes, new: bytes) -> Job:
+    """Change a drawing's PDF."""
+    return lambda folder: change(folder, SHEET, lambda data: data.replace(old, new, 1)) or ()
+
+
 def step_text(how: Callable[[str], str]) -> Job:
     """Change the text of the STEP assembly."""
     return rewritten(STEP, how)
@@ -195,6 +201,19 @@ def spigot(cap: str, by: float) -> Job:
         )
 
     return rewritten(f"{cap}.step", how)
+
+
+def white(material: Any) -> None:
+    material["pbrMetallicRoughness"]["baseColorFactor"] = [1.0, 1.0, 1.0, 1.0]
+
+
+def drawn_on(space: Any, layer: str) -> None:
+    space.add_line((0, 0), (10, 10), {"layer": layer})
+
+
+def bent_outline(space: Any) -> None:
+    (outline,) = (one for one in space.query("LWPOLYLINE") if one.dxf.layer == "cut")
+    outline.set_points([(x, y, 0, 0, 0.5) for x, y, *_ in outline.get_points()])
 
 
 def flat_fold(space: Any) -> None:
@@ -265,9 +284,9 @@ FAILING: Broken = {
     },
     ("inventory", BOTH): {
         "a part not drawn": (undrawn("stage_post"), "stage_post is missing"),
-        "a body too many": (
-            glb(lambda document, _: document["nodes"].append({"name": "extra", "mesh": 0})),
-            "extra",
+        "a white body": (
+            glb(lambda document, _: white(document["materials"][0])),
+            "carrier has another colour",
         ),
     },
     ("inventory", RECORD): {
@@ -317,6 +336,15 @@ FAILING: Broken = {
             ("a hole less", WHEEL, fewer_circles, "circles for 6 holes"),
             ("a longer outline", PLATE, longer_outline, "plate: its outline"),
             ("a longer strip", LAMP, longer_outline, "lamp_1: its outlines are not"),
+            ("a cut beside the holes", PLATE, lambda s: drawn_on(s, "cut"), "1 lines and 0 arcs"),
+        )
+    }
+    | {
+        f"sheet: {name}": (sheet(old, new), words)
+        for name, old, new, words in (
+            ("a script", b"/Catalog", b"/Catalog/OpenAction<</S/JavaScript/JS(x)>>", "objects"),
+            ("half the page", b"1190.5512 841.8898", b"595.2756 420.9449", "its frame"),
+            ("a scaled page", b"/Type/Page/", b"/Type/Page/UserUnit 2/", "objects"),
         )
     },
     ("drawings", RECORD): {"no drawing of the plate": (at("drawings/0"), "no drawing")},
@@ -336,6 +364,10 @@ FAILING: Broken = {
             "the switch trips at",
         ),
         "home: another end of homing": (at("home/homed_deg", 0.0), "homing ends at 0"),
+        "home: 67 times too small an error": (
+            at("home/zero_error_deg", lambda value: value / 67),
+            "the play of pin and key is",
+        ),
         "home: too short a pin": (at("home/pin", "ROD-4x10"), "does not reach"),
     },
     ("klipper", KLIPPER): {
@@ -401,8 +433,52 @@ FAILING: Broken = {
 }
 # By which a check cannot be made.
 UNSURE: Broken = {
-    ("inventory", STEP): {"a part moved": (step_text(moved_part), "the assembly moves a part")},
-    ("drawings", PLATE): {"drawing: no DXF": (text_of(PLATE, "(?s).*", "plate", 1), "no DXF")},
+    ("inventory", STEP): {
+        "a part moved": (step_text(moved_part), "the assembly moves a part"),
+        **{
+            f"STEP: {name}": (text_of(STEP, old, new, 1), words)
+            for name, old, new, words in (
+                ("centimetres", r"\.MILLI\.,\.METRE", ".CENTI.,.METRE", "MILLI"),
+                ("thousandths of a radian", r"\$,\.RADIAN", ".MILLI.,.RADIAN", "RADIAN"),
+                ("another product", r"PRODUCT\('plate'", "PRODUCT('steel plate'", "PRODUCT(@,@"),
+                ("a face's name", r"ADVANCED_FACE\(''", "ADVANCED_FACE('tap M5'", "no name"),
+                ("a comment", "DATA;", "DATA; /* scale by 10 */", "a comment"),
+                (
+                    "a solid listed twice",
+                    r"(BREP_SHAPE\w+\('',\(#\d+,)(#\d+)",
+                    r"\1\2,\2",
+                    "(#AXIS2",
+                ),
+                (
+                    "a body that is hidden",
+                    r"ENDSEC;\s+END",
+                    "#999999=INVISIBILITY((#1));\nENDSEC;\nEND",
+                    "no such entity",
+                ),
+            )
+        },
+    },
+    ("inventory", GLB): {
+        f"GLB: {name}": (glb(how), words)
+        for name, how, words in (
+            ("a body too many", lambda d, _: d["nodes"].append({"name": "x", "mesh": 0}), "node"),
+            ("another file", lambda d, _: d["buffers"][0].update(uri="http://x/y"), "buffers"),
+            ("an extension", lambda d, _: d.update(extensionsRequired=["x"]), "extensionsRequired"),
+            ("ten times the size", lambda d, _: d["nodes"][0].update(scale=[10, 10, 10]), "scale"),
+            ("a second scene", lambda d, _: d["scenes"].append({"nodes": [1]}), "scenes"),
+        )
+    },
+    ("drawings", "DXF"): {
+        f"drawing: {name}": (job, words)
+        for name, job, words in (
+            ("no DXF", text_of(PLATE, "(?s).*", "plate", 1), "no DXF"),
+            ("a cap in inches", text_of(CAP, r"(INSUNITS\n 70\n)4", r"\g<1>1"), "$INSUNITS is 1"),
+            ("other measures", text_of(CAP, r"(MEASUREMENT\n 70\n)1", r"\g<1>0"), "$MEASUREMENT"),
+            ("an engraving", redrawn(PLATE, lambda s: drawn_on(s, "engrave")), "layer engrave"),
+            ("a layer off", redrawn(PLATE, lambda s: s.doc.layers.get("cut").off()), "hidden"),
+            ("a bent outline", redrawn(PLATE, bent_outline), "group code 42"),
+        )
+    },
     ("drive", RECORD): {
         "another motor": (at("bought/motor/part", "NEMA17-20"), "NEMA17-20 is no motor"),
         "a wheel of more teeth": (at("bought/wheel/part", "GT2-80"), "not 80 teeth"),

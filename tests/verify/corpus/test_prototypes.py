@@ -27,7 +27,12 @@ def test_edited_paper_is_told_and_refused_only_strictly(
     paper = [name for name in load(folder, "manifest.json")["files"] if is_paper(name)]
     assert {"bom.csv", "wiring.csv", "camera.json", "drawing_plate.pdf"} <= {*paper}
     for name in paper:
-        change(folder, name, lambda data: data + b"18,1,TIES,cable ties,,,,,,,,,,,,,bought\n")
+        ties = b"18,1,TIES,cable ties,,,,,,,,,,,,,bought\n"
+        change(
+            folder,
+            name,
+            lambda data: data.replace(b"(Title)", b"(Name)") + ties * (b"%PDF" != data[:4]),
+        )
     assert main([str(folder), "-q"]) == 0
     verdict, line = capsys.readouterr().out.splitlines()
     assert verdict.startswith("PASS")

@@ -20,6 +20,7 @@ from tbcad_verify.mesh.mesh import (
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import norm
+from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
@@ -38,6 +39,7 @@ ROTATION = 1e-9  # largest deviation of the axes from a rotation
 BED_MM = 0.05
 # Round bosses meet ribs in grooves that run out to a few degrees; a sharper bend is a fold.
 FOLD_RAD = 0.02
+BED = {"printer bed": "mm"}
 POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 
@@ -149,3 +151,18 @@ def manifold(points: Floats, faces: Any) -> Any:
 
     mesh = manifold3d.Mesh64(np.ascontiguousarray(points), faces.astype(np.uint64))
     return manifold3d.Manifold(mesh)
+
+
+def bed_checks(
+    names: list[CheckName], context: PrototypeContext, parts: list[MeasuredPart]
+) -> list[Check]:
+    """Every part as it lies on the spec's bed, without its margin."""
+    printer = context.export.spec.printer
+    room = np.subtract(printer.bed_mm, [2 * printer.bed_margin_mm] * 2 + [0.0])
+    beyond = {
+        one.part.name: float((np.ptp(require(one.mesh, one.reason).points, axis=0) - room).max())
+        for one in parts
+    }
+    worst = max(beyond, key=lambda name: beyond[name])
+    size = " x ".join(f"{side:g}" for side in room)
+    return [at_most(names[0], beyond[worst], BED_MM, f"{worst} does not fit {size} mm")]

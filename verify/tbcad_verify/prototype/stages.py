@@ -22,6 +22,7 @@ from tbcad_verify.prototype import (
     fastener_checks,
     holding_checks,
     key_access,
+    measured_parts,
     seats,
     stage_checks,
     swing,
@@ -181,6 +182,7 @@ def _fits(found: _Findings) -> Iterator[Job]:
     yield camera_mount_checks, RECORD_FILE, solids
     yield camera_gauge_checks, RECORD_FILE, parts
     yield drive_checks, RECORD_FILE, parts, solids
+    yield (measured_parts.BED, measured_parts.bed_checks), RECORD_FILE, parts
 
 
 def _seats(found: _Findings) -> Iterator[Job]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from tbcad_verify.mesh.surfaces import reflect_directions
 from tbcad_verify.mesh.vectors import axis_frame, dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, OpticsSpec
+from tbcad_verify.record.spec import AUTO, LARGEST_MESH_ERROR_MM, OpticsSpec
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
@@ -138,10 +139,27 @@ def contradictions(export: Export) -> list[str]:
     wrong = [name for name, (one, two) in pairs.items() if abs(one - two) > UNLIKE_SPEC]
     if export.spec.mesh.largest_mm > LARGEST_MESH_ERROR_MM:
         wrong.append(f"a mesh error of more than {LARGEST_MESH_ERROR_MM:g} mm in the spec")
+    wrong += _beyond_the_limits(export)
     shells = export.parts if export.spec.shell.negative else ()
     if sorted(one.camera for one in export.mandrels) != sorted(one.camera for one in shells):
         wrong.append("the mandrels of shell.negative")
     return sorted(wrong)
+
+
+def _beyond_the_limits(export: Export) -> Iterator[str]:
+    """Limits of the spec that the prototype's record exceeds."""
+    if (prototype := export.prototype) is None:
+        return
+    spec, (low, high) = export.spec.prototype, prototype.swing
+    if high - low > spec.max_swing_deg:
+        yield f"a swing of {high - low:.1f} deg above prototype.max_swing_deg"
+    if prototype.balls.cap.any() and not spec.caps:
+        yield "caps without prototype.caps"
+    bought = prototype.balls.diameter_mm[~prototype.balls.cap].max(initial=0)
+    if spec.largest_ball_mm != AUTO and bought > float(spec.largest_ball_mm):
+        yield f"a ball of {bought:g} mm above prototype.largest_ball_mm"
+    if len(prototype.balls) != spec.k and spec.k != AUTO:
+        yield f"{len(prototype.balls)} balls, not prototype.k"
 
 
 def directions(optics: OpticsSpec) -> Floats:

@@ -97,9 +97,11 @@ class MeshSpec(Strict):
 
 
 class PrinterSpec(Strict):
-    """The material of all printed parts of the prototype."""
+    """Bed and material of all printed parts of the prototype."""
 
     density_g_cm3: float = Field(gt=0, le=20)
+    bed_mm: list[Annotated[float, Field(ge=50, le=2000)]] = Field(min_length=3, max_length=3)
+    bed_margin_mm: float = Field(ge=0, le=50)
 
 
 class BaseSpec(Strict):
@@ -165,6 +167,9 @@ class PrototypeSpec(Strict):
 
     k: Annotated[int, Field(ge=1, le=1000), OR_AUTO]
     picture: Literal["moved", "fixed"]
+    caps: bool
+    max_swing_deg: float = Field(gt=0, le=360)
+    largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
     camera_diameter_mm: Annotated[float, Field(ge=0, le=500), OR_AUTO]
     camera_length_mm: float = Field(ge=0, le=1000)
     base: BaseSpec
