@@ -15,7 +15,7 @@ from tbcad_verify.mesh.surfaces import reflect_directions
 from tbcad_verify.mesh.vectors import axis_frame, dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.spec import AUTO, LARGEST_MESH_ERROR_MM, OpticsSpec
+from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, OpticsSpec
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
@@ -156,9 +156,9 @@ def _beyond_the_limits(export: Export) -> Iterator[str]:
     if prototype.balls.cap.any() and not spec.caps:
         yield "caps without prototype.caps"
     bought = prototype.balls.diameter_mm[~prototype.balls.cap].max(initial=0)
-    if spec.largest_ball_mm != AUTO and bought > float(spec.largest_ball_mm):
+    if bought > spec.largest_ball_mm:
         yield f"a ball of {bought:g} mm above prototype.largest_ball_mm"
-    if len(prototype.balls) != spec.k and spec.k != AUTO:
+    if len(prototype.balls) != spec.k:
         yield f"{len(prototype.balls)} balls, not prototype.k"
 
 
