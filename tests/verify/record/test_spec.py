@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -85,3 +86,11 @@ def test_a_value_outside_its_range_is_refused(
     change = design(lambda found: found["spec"][section].update({key: value}))
     mutation = refused(key, JSON, change, f"spec.{section}.{key} is {value}, allowed is")
     test_broken_export_is_refused(export_folder, mutation)
+
+
+def test_every_key_is_read_or_free_for_a_reason() -> None:
+    path = Path(tbcad_verify.__file__).parent / "record" / "free_keys.toml"
+    rows = tomllib.loads(path.read_text(encoding="utf-8"))["keys"]
+    free = [name for row in rows for name in row["names"]]
+    assert sorted([*keys(Spec), *free]) == sorted(keys(DesignSpec))
+    assert all(row["why"] for row in rows)

@@ -100,7 +100,7 @@ class PrinterSpec(Strict):
     """Bed and material of all printed parts of the prototype."""
 
     density_g_cm3: float = Field(gt=0, le=20)
-    bed_mm: list[Annotated[float, Field(ge=50, le=2000)]] = Field(min_length=3, max_length=3)
+    bed_mm: list[Annotated[float, Field(ge=20, le=2000)]] = Field(min_length=3, max_length=3)
     bed_margin_mm: float = Field(ge=0, le=50)
 
 
