@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad_verify.record.files import FileBytes
-from tbcad_verify.record.validation import fault, refuse_doubles
+from tbcad_verify.record.validation import key_path, refuse_doubles
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats, Ints
 
@@ -124,7 +124,8 @@ def read_glb(blob: FileBytes) -> dict[str, DrawnBody]:
         document = Document.model_validate(json.loads(text, object_pairs_hook=refuse_doubles))
         return _bodies(document, binary)
     except ValidationError as error:
-        raise Unknown(f"{blob.name}: {fault(Document, error)}") from error
+        first = error.errors(include_url=False)[0]
+        raise Unknown(f"{blob.name}: {key_path(first['loc'])}: {first['msg']}") from error
     except (ValueError, IndexError, struct.error) as error:
         raise Unknown(f"{blob.name}: no GLB of tbcad's ({error})") from error
 
