@@ -9,6 +9,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import accumulate
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,7 @@ class TimeLeft:
 
     def __init__(self, expected: Mapping[str, float], clock: Callable[[], float] = monotonic):
         """Take the expected seconds of all stages, in order, by title."""
-        self._begins = dict(zip(expected, _sums_before(expected), strict=True))
+        self._begins = dict(zip(expected, accumulate(expected.values(), initial=0.0), strict=False))
         self._expected, self._clock = expected, clock
         self.total = sum(expected.values())
         self._started = self._stage_started = clock()
@@ -68,13 +69,6 @@ class TimeLeft:
         """Return the estimate in words."""
         minutes, seconds = divmod(round(self.seconds), 60)
         return f"about {minutes}:{seconds:02d} left"
-
-
-def _sums_before(expected: Mapping[str, float]) -> list[float]:
-    sums = [0.0]
-    for seconds in expected.values():
-        sums.append(sums[-1] + seconds)
-    return sums[:-1]
 
 
 class Stages:
@@ -130,12 +124,10 @@ class SilentStages(Stages):
 
 @contextmanager
 def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterator[Stages]:
-    """Show stages while the block runs.
+    """Show stages while the block runs, unless it is silent.
 
-    Args:
-        expected: seconds of each stage, in order, by title; or about the number of stages, and no
-            time left is shown.
-        silent: show nothing.
+    Expected are the seconds of each stage, in order, by title; or about the number of stages, and
+    no time left is shown.
     """
     from rich.console import Console
 

@@ -18,9 +18,8 @@ SLACK_SHARE = 0.2  # of the pull, left in the slack side; 0.1 to 0.3 (Autodesk I
 # Holding torque over gravity while the base rests: friction helps there, and nothing accelerates.
 HOLD_MARGIN = 1.4
 SELF_LOCKING = 0.5  # efficiency below which a worm holds without a current
-RATED_RISE_K = (
-    80.0  # most, with rated current in both phases, on makers' sheets of NEMA 17 steppers
-)
+# Most, with rated current in both phases, on makers' sheets of NEMA 17 steppers.
+RATED_RISE_K = 80.0
 MOUNT_LIMIT_C = 65.0  # at which printed PETG yields: heat deflection at 65 to 75 C
 ROOM_C = 25.0
 MAX_RISE_K = MOUNT_LIMIT_C - ROOM_C
@@ -54,79 +53,24 @@ def base_torques(
 
 @dataclass(frozen=True)
 class DriveLoads:
-    """A drive under the torques of the base."""
+    """A drive under the torques of the base; what concerns a belt is zero without one."""
 
     drive: Drive
     torques: BaseTorques
-
-    @property
-    def teeth_in_mesh(self) -> float:
-        """Of the pinion; zero without a belt."""
-        drive = self.drive
-        if not (drive.pinion and drive.wheel):
-            return 0.0
-        smaller = pitch_diameter(drive.wheel) - pitch_diameter(drive.pinion)
-        wrap = math.pi - 2 * math.asin(smaller / 2 / drive.centre_mm)
-        return drive.pinion["teeth"] * wrap / (2 * math.pi)
-
-    @property
-    def belt_pull(self) -> float:
-        """Greatest pull, N; zero without a belt."""
-        return self.drive.belt_pull(self.torques.peak)
-
-    @property
-    def belt_rating(self) -> float:
-        """Pull that the belt bears for years, N; zero without a belt."""
-        if not self.drive.belt:
-            return 0.0
-        lost = LOST_PER_TOOTH * max(MIN_MESH - math.floor(self.teeth_in_mesh), 0)
-        return self.drive.belt["rating_n"] * max(1 - lost, 0.0)
-
-    @property
-    def belt_tension(self) -> float:
-        """Tension of both sides at rest with which the slack side stays tight, N."""
-        return (0.5 + SLACK_SHARE) * self.belt_pull
-
-    @property
-    def motor_radial(self) -> float:
-        """Force of both sides of the belt on the motor's shaft under the greatest pull, N."""
-        drive = self.drive
-        if not (drive.pinion and drive.wheel):
-            return 0.0
-        cosine = drive.span_mm / drive.centre_mm
-        # Both sides lean by the same angle from the line between the axes.
-        return math.hypot(2 * self.belt_tension * cosine, self.belt_pull * math.sqrt(1 - cosine**2))
-
-    @property
-    def motor_radial_limit(self) -> float:
-        """Force on the shaft under which the motor's bearings last long enough, N; 0 of a stage."""
-        return float(self.drive.rated_radial * (RATED_LIFE_H / MIN_LIFE_H) ** (1 / LIFE_EXPONENT))
-
-    @property
-    def belt_tone(self) -> float:
-        """Frequency of a plucked side with that tension, Hz; zero without a belt."""
-        drive = self.drive
-        if not drive.belt:
-            return 0.0
-        length = drive.belt["teeth"] * drive.belt["pitch_mm"]
-        density = drive.belt.mass_g / length  # g/mm are kg/m
-        return math.sqrt(self.belt_tension / density) / (2 * drive.span_mm * 1e-3)
-
-    @property
-    def self_locking(self) -> bool:
-        """Whether the base stays without a current."""
-        return self.drive.efficiency < SELF_LOCKING
-
-    @property
-    def hold_share(self) -> float:
-        """Share of the rated current with which the motor holds the base at rest."""
-        if self.self_locking:
-            return 0.0
-        return min(HOLD_MARGIN * self.torques.gravity / self.drive.holds_nmm, 1.0)
+    teeth_in_mesh: float  # of the pinion
+    belt_pull: float  # greatest pull, N
+    belt_rating: float  # pull that the belt bears for years, N
+    belt_tension: float  # of both sides at rest with which the slack side stays tight, N
+    belt_tone: float  # frequency of a plucked side with that tension, Hz
+    belt_compliance: float  # turn of the base for each N mm on it, both sides tight, radians
+    motor_radial: float  # force of both sides on the motor's shaft under the greatest pull, N
+    motor_radial_limit: float  # under which the motor's bearings last long enough, N; 0 of a stage
+    self_locking: bool  # whether the base stays without a current
+    hold_share: float  # of the rated current with which the motor holds the base at rest
 
     @property
     def hold_current(self) -> float:
-        """Root mean square of a phase's current, A."""
+        """Root mean square of a phase's current at rest, A."""
         return self.hold_share * self.drive.rated_current
 
     @property
@@ -139,41 +83,27 @@ class DriveLoads:
         """Rise of the motor's temperature at rest, K: as its losses, 80 K with rated current."""
         return RATED_RISE_K * self.hold_share**2
 
+    def _motor_wind_up_at(self, torque: Floats) -> Floats:
+        share = 1.0 if self.self_locking else self.hold_share
+        return self.drive.wind_up_angle(torque / share if share else 0 * torque)
+
+    def wind_up_at(self, torque: Floats) -> Floats:
+        """Angles by which the base yields to torques (N mm) about its axis at rest, radians."""
+        return self._motor_wind_up_at(torque) + torque * self.belt_compliance
+
     @property
     def motor_wind_up(self) -> float:
         """Deviation of the motor at the base, under gravity with the holding current, radians."""
         return float(self._motor_wind_up_at(np.array(self.torques.gravity)))
 
-    def _motor_wind_up_at(self, torque: Floats) -> Floats:
-        share = 1.0 if self.self_locking else self.hold_share
-        return self.drive.wind_up_angle(torque / share if share else 0 * torque)
-
     @property
     def belt_wind_up(self) -> float:
         """Turn of the base by the belt's stretch under gravity, both sides tight, radians."""
-        return self.torques.gravity * self._belt_compliance
-
-    @property
-    def _belt_compliance(self) -> float:
-        """Turn of the base for each N mm on it, both sides tight."""
-        drive = self.drive
-        if not (drive.belt and drive.wheel):
-            return 0.0
-        stiffness = 2 * drive.belt["stiffness_n"] / drive.span_mm
-        return drive.belt_pull(1.0) / stiffness / (pitch_diameter(drive.wheel) / 2)
-
-    def wind_up_at(self, torque: Floats) -> Floats:
-        """Angles by which the base yields to torques (N mm) about its axis at rest, radians."""
-        return self._motor_wind_up_at(torque) + torque * self._belt_compliance
-
-    @property
-    def wind_up(self) -> float:
-        """Of motor and belt together, radians."""
-        return self.motor_wind_up + self.belt_wind_up
+        return self.torques.gravity * self.belt_compliance
 
     def faults(self) -> Iterator[str]:
         """What the drive does not bear, in words."""
-        yields = math.degrees(self.wind_up)
+        yields = math.degrees(self.motor_wind_up + self.belt_wind_up)
         if self.drive.holds_nmm < self.torques.required:
             yield f"holds {self.drive.holds_nmm:.0f} N mm of {self.torques.required:.0f}"
         if self.belt_pull > self.belt_rating:
@@ -189,13 +119,48 @@ class DriveLoads:
             yield f"yields by {yields:.2f} deg, at most {MAX_WIND_UP_DEG:g} are allowed"
 
 
+def drive_loads(drive: Drive, torques: BaseTorques) -> DriveLoads:
+    """What a drive bears under the torques of the base."""
+    pull = drive.belt_pull(torques.peak)
+    tension, self_locking = (0.5 + SLACK_SHARE) * pull, drive.efficiency < SELF_LOCKING
+    held = 0.0 if self_locking else min(HOLD_MARGIN * torques.gravity / drive.holds_nmm, 1.0)
+    teeth = rating = tone = compliance = radial = 0.0
+    if drive.belt and drive.pinion and drive.wheel:
+        centre, span, wheel = drive.centre_mm, drive.span_mm, pitch_diameter(drive.wheel)
+        wrap = math.pi - 2 * math.asin((wheel - pitch_diameter(drive.pinion)) / 2 / centre)
+        teeth = drive.pinion["teeth"] * wrap / (2 * math.pi)
+        lost = LOST_PER_TOOTH * max(MIN_MESH - math.floor(teeth), 0)
+        rating = drive.belt["rating_n"] * max(1 - lost, 0.0)
+        # Both sides lean by the same angle from the line between the axes.
+        cosine = span / centre
+        radial = math.hypot(2 * tension * cosine, pull * math.sqrt(1 - cosine**2))
+        density = drive.belt.mass_g / (drive.belt["teeth"] * drive.belt["pitch_mm"])  # kg/m
+        tone = math.sqrt(tension / density) / (2 * span * 1e-3)
+        stiffness = 2 * drive.belt["stiffness_n"] / span
+        compliance = drive.belt_pull(1.0) / stiffness / (wheel / 2)
+    return DriveLoads(
+        drive=drive,
+        torques=torques,
+        teeth_in_mesh=teeth,
+        belt_pull=pull,
+        belt_rating=rating,
+        belt_tension=tension,
+        belt_tone=tone,
+        belt_compliance=compliance,
+        motor_radial=radial,
+        motor_radial_limit=drive.rated_radial * (RATED_LIFE_H / MIN_LIFE_H) ** (1 / LIFE_EXPONENT),
+        self_locking=self_locking,
+        hold_share=held,
+    )
+
+
 def choose_drive(name: str, torques: BaseTorques, drives: Sequence[Drive]) -> Drive:
     """The first drive of a name that bears the base; SpecError when none does."""
     candidates = [drive for drive in drives if drive.name == name]
     if not candidates:
         known = ", ".join(dict.fromkeys(drive.name for drive in drives))
         raise SpecError(f"no drive {short_text(name)} in drives.csv: use one of {known}")
-    faults = {drive: list(DriveLoads(drive, torques).faults()) for drive in candidates}
+    faults = {drive: list(drive_loads(drive, torques).faults()) for drive in candidates}
     for drive, found in faults.items():
         if not found:
             return drive

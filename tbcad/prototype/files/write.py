@@ -32,7 +32,7 @@ from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.prototype.drawings.parts import listed, sheets
-from tbcad.prototype.drive.loads import DriveLoads, base_torques
+from tbcad.prototype.drive.loads import base_torques, drive_loads
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
@@ -129,7 +129,7 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:
     layout, motion = built.layout, built.spec.prototype.motion
-    loads = DriveLoads(built.drive, base_torques(built.balance, layout.stops.range, motion))
+    loads = drive_loads(built.drive, base_torques(built.balance, layout.stops.range, motion))
     for name, columns, rows in (
         (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),
         ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),

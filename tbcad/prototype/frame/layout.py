@@ -14,8 +14,8 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.balance import home_angles
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.drive.travel import home_angles
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
 from tbcad.prototype.frame.feet import stage_foot, upright_foot

@@ -11,8 +11,7 @@ from tbcad.light.simulate.prototype.run import Plan
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
-from tbcad.tolerancing.prototype.windows import tilted_centres
+from tbcad.tolerancing.prototype.windows import PrototypeDraws, draw_prototypes, tilted_centres
 from tbcad.types import Bools, Floats
 
 # Along each axis, mm. Drawings of T-1 LEDs allow 0.25 mm, and a printed pocket has 0.3 mm of play,

@@ -10,8 +10,8 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.run import Frame
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats
 

@@ -81,13 +81,9 @@ def coverage(
     """Exact coverage diameter (mm) and pixels of v virtual cameras in s builds, two of (s, v).
 
     The halves of a mirror on the seam count together: the smaller diameter, all pixels. A mirror
-    without a cell, or whose image does not surround the object's centre, covers nothing.
-
-    Args:
-        edge_models: both halves as designed.
-        draws: errors of each half.
-        worst_only: only the minimum diameter of each build is exact, the others are not below
-            theirs; and no pixels. It takes less time.
+    without a cell, or whose image does not surround the object's centre, covers nothing. With
+    worst_only, which takes less time, only the minimum diameter of each build is exact, the others
+    are not below theirs; and no pixels.
     """
     camera = virtual_camera_numbers(edge_models[1].halved)
     shape = (len(draws[0]), int(camera.max()) + 1)
@@ -107,12 +103,9 @@ def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
 
     The centre pixel shows the apex, and its designed ray goes through the object's centre, for a
     mirror on the seam past it. A pixel is a fixed place on the sensor: moved and tilted cameras and
-    wrong focal lengths count.
-
-    Returns:
-        Angle between the designed and the built ray after the mirror, radians, and distance of the
-        built ray from the point where the designed one is nearest to the object's centre, mm,
-        (s, m) each; NaN where it misses the sphere.
+    wrong focal lengths count. The errors are the angle between the designed and the built ray after
+    the mirror, radians, and the distance of the built ray from the point where the designed one is
+    nearest to the object's centre, mm, (s, m) each; NaN where it misses the sphere.
     """
     pinhole, middle, scale, *axes = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
     ray = _pixel_rays(edge_model, draws, axes)

@@ -8,11 +8,12 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.array import design as mirror_design
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.prototype.balls.fit import BallFit, ball_fit
 from tbcad.prototype.balls.layout import (
     MORE_BALLS,
+    BallFit,
     PrototypeLayout,
     ball_counts,
+    ball_fit,
     prototype_layout,
 )
 from tbcad.prototype.balls.placement import greedy_placement, min_swing_placement

@@ -13,7 +13,7 @@ import tbcad.rig.calibration.run
 from tbcad.app.cli import run as command
 from tbcad.common.screen import WIDTH
 from tbcad.errors import InputError
-from tbcad.records.exposure import DARK, exposure_name
+from tbcad.records.run import DARK, exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.estimate.jacobian import base_slopes

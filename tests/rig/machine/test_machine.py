@@ -11,7 +11,7 @@ from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.camera import Camera, without_distortion
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
-from tbcad.records.exposure import Frame
+from tbcad.records.run import Frame
 from tbcad.rig.machine.machine import Machine, read_machine, write_machine
 
 FORWARD = unit(np.array([-0.2, 0.0, 1.0]))
