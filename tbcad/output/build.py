@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.common.background import Submit, at_once
+from tbcad.common.schedule import Submit
 from tbcad.core.camera.sheet import write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
@@ -107,19 +108,11 @@ def _write_parts(
         write_shell_solids(design, envelope, folder, progress)
         return Export(design.spec, (SHELL,))
     submit(write_shell_solids, design, envelope, folder)
-    export = _prototype_with_shells(design.spec, write_prototype, optional_prototype)
+    try:
+        export = Export(write_prototype(), PARTS)
+    except (SpecError, InvalidSolidError) as error:
+        if not optional_prototype:
+            raise (only_shell_remains(error) if isinstance(error, SpecError) else error) from None
+        export = Export(design.spec, (SHELL,), f"no prototype: {error}")
     progress("shells")
     return export
-
-
-def _prototype_with_shells(
-    spec: Spec, write_prototype: Callable[[], Spec], optional: bool
-) -> Export:
-    try:
-        return Export(write_prototype(), PARTS)
-    except (SpecError, InvalidSolidError) as error:
-        if optional:
-            return Export(spec, (SHELL,), f"no prototype: {error}")
-        if isinstance(error, SpecError):
-            raise only_shell_remains(error) from None
-        raise

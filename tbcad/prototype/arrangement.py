@@ -37,8 +37,7 @@ from tbcad.prototype.drive.balance import (
     home_angles,
     sum_masses,
 )
-from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.drive.loads import base_torques, choose_drive
+from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
 from tbcad.prototype.electronics import Wiring, wiring_layout
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge

@@ -243,7 +243,7 @@ def wiring_rows(wiring: Wiring, lamps: LampLayout | None, drive: Drive) -> list[
     motor = {"part": drive.motor.name, "output": f"driver {wiring.axis}"}
     rows.append(HOME | {"output": f"limit {wiring.axis}"})
     # A rotary stage's current is its maker's.
-    rows += [MOTOR | motor | {"current_ma": drive.rated_current * MA_PER_A or None}, SUPPLY]
+    rows += [MOTOR | motor | {"current_ma": drive.of_motor("rated_a") * MA_PER_A or None}, SUPPLY]
     empty: Row = dict.fromkeys(COLUMNS)
     return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
 

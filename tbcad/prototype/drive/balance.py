@@ -99,14 +99,6 @@ class BaseBalance:
             return self.torque_amplitude
         return float(np.abs(self.torque(np.array([low, high]))).max())
 
-    def required_torque(self, low: float, high: float, acceleration: float, safety: float) -> float:
-        """Holding torque that a drive must have between two base angles (rad), N mm.
-
-        acceleration is in radians/s^2; safety is on it and gravity together, and covers friction
-        too.
-        """
-        return safety * (self.max_torque(low, high) + self.inertia * acceleration * 1e-6)
-
 
 def sum_masses(frame: Floats, *loads: PointMasses) -> BaseBalance:
     """Sum up the masses on a base whose axis is the first row of a frame (3, 3)."""

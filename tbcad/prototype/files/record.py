@@ -10,12 +10,12 @@ from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
 from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.drive.balance import BaseBalance, power_off, stop_sequence
-from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.drive.loads import (
+from tbcad.prototype.drive.drive import (
     HOLD_MARGIN,
     MAX_RISE_K,
     MAX_WIND_UP_DEG,
     SELF_LOCKING,
+    Drive,
     base_torques,
     drive_loads,
 )

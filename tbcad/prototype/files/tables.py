@@ -12,7 +12,7 @@ import numpy as np
 from tbcad.cad.formats.checked_files import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.drive.loads import DriveLoads
+from tbcad.prototype.drive.drive import DriveLoads
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.records.tables import BallRow, PictureRow, StopRow
 from tbcad.types import Floats

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.formats.assembly import (
     Colour,
@@ -21,7 +22,7 @@ from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.solids import pyramid, sphere
-from tbcad.common.background import Submit, at_once
+from tbcad.common.schedule import Submit
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
@@ -32,7 +33,7 @@ from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.prototype.drawings.parts import listed, sheets
-from tbcad.prototype.drive.loads import base_torques, drive_loads
+from tbcad.prototype.drive.drive import base_torques, drive_loads
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record

@@ -117,7 +117,7 @@ class _LampSearch:
     def mounts(self) -> LampMounts:
         width = self.spec.light.strips * self.strip["width_mm"]
         sides = (self.length, width) if self.level else (width, self.length)
-        return LampMounts(self.spec.frame, self.strip, self.face, sides)
+        return LampMounts(self.spec.frame, self.strip, self.face, sides, self.level)
 
     def places(self, z: float) -> Floats:
         """Middles of the shining faces (l, 3), at a height."""
@@ -170,11 +170,6 @@ class _LampSearch:
         numbered = list(enumerate(places, 1))
         before = [one for one in numbered if one[1][0] > 0]
         behind = [one for one in numbered if one[1][0] < 0]
-        stand, holder, screws = (
-            (mounts.bridge, mounts.bar, mounts.bar_screws)
-            if self.level
-            else (mounts.stand, mounts.holder, mounts.holder_screws)
-        )
         return LampLayout(
             strip=self.strip,
             strips=self.spec.light.strips,
@@ -182,14 +177,14 @@ class _LampSearch:
             level=self.level,
             places=places,
             inward=-np.sign(places[:, :1]) * LEVEL,
-            stands=tuple(stand(number, place) for number, place in before),
-            holders=tuple(holder(number, place) for number, place in behind),
-            screws=tuple(dict.fromkeys(float(at[2]) for at in screws(behind[0][1]))),
+            stands=tuple(mounts.stand(number, place) for number, place in before),
+            holders=tuple(mounts.holder(number, place) for number, place in behind),
+            screws=tuple(dict.fromkeys(float(at[2]) for at in mounts.screws(behind[0][1]))),
             fasteners=tuple(
                 fastener
                 for number, place in behind
                 for fastener in on_uprights(
-                    f"lamp_holder_{number}", screws(place), -LEVEL, HOLDER_MM, self.parts
+                    f"lamp_holder_{number}", mounts.screws(place), -LEVEL, HOLDER_MM, self.parts
                 )
             ),
             bodies=tuple(

@@ -14,7 +14,7 @@ whose spheres have the unit normals g and g' at a point is thus displaced by a g
 to first order in the heights, and a mirror's normal is turned by its height's gradient.
 """
 
-from math import factorial, sqrt
+from math import comb, factorial, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -65,7 +65,8 @@ def term_shares() -> Floats:
 
 def term_polynomials() -> Floats:
     """Coefficients of each term, (t, monomials)."""
-    return np.array([_row(_term(n, m)) for n, m in TERMS])
+    tables = (_term(n, m) for n, m in TERMS)
+    return np.array([[table[powers] for powers in MONOMIALS] for table in tables])
 
 
 def monomials(x: Floats, y: Floats) -> Floats:
@@ -78,7 +79,7 @@ def _term(n: int, m: int) -> Floats:
     size, result = abs(m), np.zeros((DEGREE + 1, DEGREE + 1))
     around = np.zeros_like(result)
     for j in range(size + 1):  # real or imaginary part of (x + i y)^|m|
-        power = factorial(size) // (factorial(j) * factorial(size - j)) * 1j**j
+        power = comb(size, j) * 1j**j
         around[size - j, j] = power.real if m >= 0 else power.imag
     for k in range((n - size) // 2 + 1):
         radial = (-1) ** k * factorial(n - k) / factorial(k)
@@ -95,10 +96,6 @@ def _times_radius(polynomial: Floats, times: int) -> Floats:
         product[:, 2:] += polynomial[:, :-2]
         polynomial = product
     return polynomial
-
-
-def _row(table: Floats) -> Floats:
-    return np.array([table[i, j] for i, j in MONOMIALS])
 
 
 def mean_square_slope() -> float:

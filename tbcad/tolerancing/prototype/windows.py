@@ -103,7 +103,7 @@ def draw_prototypes(
 def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
     """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
 
-    Motor and belt yield to the base's weight: see tbcad.prototype.drive.loads. InputError if the
+    Motor and belt yield to the base's weight: see tbcad.prototype.drive.drive. InputError if the
     file is missing, malformed, or of another plan.
     """
     path = export.folder / StopRow.FILE

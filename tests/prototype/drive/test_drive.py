@@ -10,18 +10,16 @@ from hypothesis import strategies as st
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.drive.drive import (
     DRIVE_COLUMNS,
-    Drive,
-    belt_length,
-    centre_distance,
-    load_drives,
-    pitch_diameter,
-)
-from tbcad.prototype.drive.loads import (
     HOLD_MARGIN,
     BaseTorques,
+    Drive,
     DriveLoads,
+    belt_length,
+    centre_distance,
     choose_drive,
     drive_loads,
+    load_drives,
+    pitch_diameter,
 )
 from tbcad.prototype.purchased.parts import load_parts
 

@@ -9,8 +9,7 @@ from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.drive.loads import base_torques, drive_loads
+from tbcad.prototype.drive.drive import base_torques, drive_loads, load_drives
 from tbcad.prototype.files.tables import (
     BALL_COLUMNS,
     STOP_COLUMNS,
