@@ -74,11 +74,13 @@ class TimeLeft:
 class Stages:
     """Stages of one command, shown on stderr."""
 
-    def __init__(self, bar: Progress | None, expected: Mapping[str, float] | int) -> None:
-        """Show stages on a bar, or in plain lines when there is none."""
+    def __init__(
+        self, bar: Progress | None, expected: Mapping[str, float] | int, silent: bool = False
+    ) -> None:
+        """Show stages on a bar, or in plain lines when there is none, or not at all."""
         self._left = None if isinstance(expected, int) else TimeLeft(expected)
         total = expected if isinstance(expected, int) else sum(expected.values())
-        self._bar = bar
+        self._bar, self._silent = bar, silent
         self._task = bar.add_task("", total=total, left=self._left or "") if bar else None
         self._started = monotonic()
         self._stage = ""
@@ -96,7 +98,8 @@ class Stages:
         self._stage = text
 
     def _print(self, text: str) -> None:
-        print(f"[{monotonic() - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
+        if not self._silent:
+            print(f"[{monotonic() - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
 
     def detail(self, text: str) -> None:
         """Show a step of the stage, on a terminal only."""
@@ -111,17 +114,6 @@ class Stages:
             self._print(text)
 
 
-class SilentStages(Stages):
-    """Stages that nobody is shown."""
-
-    def __init__(self) -> None:
-        """Show nothing."""
-        super().__init__(None, 0)
-
-    def _print(self, text: str) -> None:
-        del text
-
-
 @contextmanager
 def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterator[Stages]:
     """Show stages while the block runs, unless it is silent.
@@ -133,7 +125,7 @@ def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterato
 
     console = Console(stderr=True)
     if silent or not console.is_terminal:
-        yield SilentStages() if silent else Stages(None, 0)
+        yield Stages(None, 0, silent)
         return
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

@@ -59,9 +59,6 @@ def web_page(
         "kind": escape(kind),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
-    return _filled(HEAD + body + FOOT, {**blocks, **parts})
-
-
-def _filled(template: str, blocks: Mapping[str, str]) -> str:
-    """The template with each {{name}} replaced; what is put in is not looked through again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: blocks[found[1]], template)
+    every, template = {**blocks, **parts}, HEAD + body + FOOT
+    # What is put in is not looked through again.
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: every[found[1]], template)

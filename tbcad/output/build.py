@@ -28,7 +28,6 @@ from tbcad.shell.files import (
     write_shell_meshes,
     write_shell_solids,
 )
-from tbcad.shell.mandrel import Mandrel
 from tbcad.types import Progress
 
 
@@ -76,19 +75,16 @@ def write_export(
     for future in pending:
         future.result()
     if mandrel and mandrel.draft.angle < 0:
-        export = replace(export, note="; ".join(filter(None, (export.note, _undercut(mandrel)))))
+        undercut = (
+            f"mandrels: undercut by up to {-np.degrees(mandrel.draft.angle):.0f} degrees, so no "
+            "shell can be drawn off: dissolve them or melt them out, or set shell.edges to valley"
+        )
+        export = replace(export, note="; ".join(filter(None, (export.note, undercut))))
     mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
     write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
     progress("manifest")
     write_manifest(folder, "build")
     return export
-
-
-def _undercut(mandrel: Mandrel) -> str:
-    return (
-        f"mandrels: undercut by up to {-np.degrees(mandrel.draft.angle):.0f} degrees, so no shell "
-        "can be drawn off: dissolve them or melt them out, or set shell.edges to valley"
-    )
 
 
 def _write_parts(

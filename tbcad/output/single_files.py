@@ -174,18 +174,15 @@ def keep_files(paths: list[Path], into: Path) -> None:
         OSError: a file can neither be linked nor copied.
     """
     for path in paths:
-        to = into / _free_name(path.name, into)
+        numbered = (f"{path.name}.kept{number}" for number in count(2))
+        names = chain([path.name, f"{path.name}.kept"], numbered)
+        to = next(into / name for name in names if not os.path.lexists(into / name))
         if path.is_dir() and not path.is_symlink():
             shutil.copytree(
                 path, to, symlinks=True, ignore=_refuse_mount_point, copy_function=_link_or_copy
             )
         else:
             _link_or_copy(path, to)
-
-
-def _free_name(name: str, folder: Path) -> str:
-    names = chain([name, f"{name}.kept"], (f"{name}.kept{number}" for number in count(2)))
-    return next(free for free in names if not os.path.lexists(folder / free))
 
 
 def _refuse_mount_point(folder: str, _: list[str]) -> list[str]:

@@ -59,7 +59,6 @@ class StopPlan:
     error: Floats  # angle between the ball's direction and the mirror's, radians, (m,)
 
     def __len__(self) -> int:
-        """Number of stops."""
         return len(self.angle)
 
     @property

@@ -156,17 +156,26 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
     Coupons are tools and left out. What light passes through is included to be looked at, and
     transparent: the capture sphere, and what the camera sees.
     """
+    layout, centre = prototype.layout, prototype.layout.body_centres()
+    balls = (
+        ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(layout.balls.body_radius[k])), STEEL)
+        for k in (~layout.balls.cap).nonzero()[0].tolist()
+    )
+    card = (  # without flaps; transparent, so that the rig is seen
+        ColouredSolid(panel.name, component_solid(panel.component), CARD)
+        for panel in (prototype.shroud.panels if prototype.shroud else ())
+    )
     purchased = (
         ColouredSolid(component.name, component_solid(component), METAL)
         for component in prototype.frame.purchased
     )
     return (
         _printed("base", prototype, ("base", "cap")),
-        SolidGroup("balls", tuple(_balls(prototype))),
+        SolidGroup("balls", tuple(balls)),
         _printed("stage", prototype, ("stage",)),
         _printed("frame", prototype, ("frame",)),
         SolidGroup("bought", tuple(purchased)),
-        SolidGroup("shroud", tuple(_shroud(prototype))),
+        SolidGroup("shroud", tuple(card)),
         SolidGroup("fasteners", tuple(_fasteners(prototype.fasteners))),
         _views(prototype),
     )
@@ -191,18 +200,6 @@ def _fasteners(fasteners: Sequence[Fastener]) -> Iterator[ColouredSolid]:
             solid = component_solid(fastener_component(at_origin))
             originals[name] = ColouredSolid(name, solid, FASTENER, display_mesh(solid))
         yield originals[name].copy(one.name, fastener_axes(one.along), one.place)
-
-
-def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
-    balls, centre = prototype.layout.balls, prototype.layout.body_centres()
-    for k in (~balls.cap).nonzero()[0].tolist():
-        yield ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
-
-
-def _shroud(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
-    """The panels without flaps; transparent, so that the rig is seen."""
-    for panel in prototype.shroud.panels if prototype.shroud else ():
-        yield ColouredSolid(panel.name, component_solid(panel.component), CARD)
 
 
 def _views(prototype: PrototypeModel) -> SolidGroup:

@@ -41,7 +41,9 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False
     outlines = np.empty((len(draws), len(half), 3))
     surfaces, views = surface_tables(half, draws), view_tables(half, draws)
     forms, pairs = form_tables(half, draws), half.pairs.arrays
-    _move_out(surfaces[:, : len(half)], draws.valley)
+    mirrors, out = surfaces[:, : len(half)], draws.valley[:, None]
+    mirrors[..., APEX] += out[..., None] * mirrors[..., NORMAL]
+    mirrors[..., CURVATURE] /= 1 + out * mirrors[..., CURVATURE]
     if worst_only:  # pictures do not count: cameras that only turn see the same
         views[:, RIGHT:] = views[:1, RIGHT:]
     for build in range(len(draws)):
@@ -56,12 +58,6 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False
     area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
     crossings = outlines[..., CROSSINGS].astype(np.int64)
     return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
-
-
-def _move_out(mirrors: Floats, by: Floats) -> None:
-    """Move surfaces (s, m, 7) along their normals by mm of each build (s,), in place."""
-    mirrors[..., APEX] += by[:, None, None] * mirrors[..., NORMAL]
-    mirrors[..., CURVATURE] /= 1 + by[:, None] * mirrors[..., CURVATURE]
 
 
 def virtual_camera_numbers(halved: Bools) -> Ints:

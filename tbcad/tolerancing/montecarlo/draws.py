@@ -108,18 +108,13 @@ def _half(drawn: Mapping[str, Floats], side: int, warp: WarpMap | None) -> Shell
     if warp is None:  # each mirror is displaced by its own
         return replace(draws, centre=draws.centre + of("warp"))
     for build, numbers in enumerate(of("warp")):
-        _add_warp(draws, build, warp, numbers)
+        centre, radius, foot, astigmatism = warp.moved(numbers)
+        draws.centre[build] += centre
+        draws.radius[build] += radius
+        draws.foot[build] += foot
+        draws.wall[build] += warp.walls_moved(numbers)
+        draws.form[build][:, ASTIGMATISM] += astigmatism
     return draws
-
-
-def _add_warp(draws: ShellDraws, build: int, warp: WarpMap, numbers: Floats) -> None:
-    """Displace the mirrors of a build, in place."""
-    centre, radius, foot, astigmatism = warp.moved(numbers)
-    draws.centre[build] += centre
-    draws.radius[build] += radius
-    draws.foot[build] += foot
-    draws.wall[build] += warp.walls_moved(numbers)
-    draws.form[build][:, ASTIGMATISM] += astigmatism
 
 
 def draw_kinds(

@@ -28,7 +28,7 @@ from tbcad.tolerancing.montecarlo.form import (
     SECOND,
     term_polynomials,
 )
-from tbcad.tolerancing.montecarlo.warp import ShellShape, WarpMaps, warp_maps
+from tbcad.tolerancing.montecarlo.warp import WarpMaps, pivots, smooth_field, warp_map
 from tbcad.types import Bools, Floats, Ints
 
 # Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the
@@ -195,8 +195,13 @@ def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
 
 @lru_cache(maxsize=1)  # processes of one material share the length
 def _warp_maps(a: EdgeModel, b: EdgeModel, length: float) -> WarpMaps:
-    shapes = [ShellShape(one.table, one.cell_radius, one.walls) for one in (a, b)]
-    return warp_maps((shapes[0], shapes[1]), length)
+    chosen = pivots(a.apex, length)  # of both halves the same mirrors
+    fields = (smooth_field(one.apex, length, chosen) for one in (a, b))
+    first, second = (
+        warp_map(one.table, one.cell_radius, one.walls, field)
+        for one, field in zip((a, b), fields, strict=True)
+    )
+    return first, second
 
 
 def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:

@@ -113,15 +113,6 @@ class WarpMap:
 WarpMaps: TypeAlias = tuple[WarpMap, WarpMap]
 
 
-@dataclass(frozen=True)
-class ShellShape:
-    """One half as designed."""
-
-    table: Floats  # apex, normal, curvature of the m mirrors, the seam and the foot, (m + 2, 7)
-    cell_radius: Floats  # distance of each mirror's farthest corner from its apex, mm, (m,)
-    walls: GrooveWalls  # of pedestals
-
-
 @compiled_loop
 def field_values(basis: Floats, numbers: Floats) -> Floats:
     """Displacements (3, p) by random numbers (K, 3) and the field's basis (K, p).
@@ -139,19 +130,13 @@ def field_values(basis: Floats, numbers: Floats) -> Floats:
     return result
 
 
-def warp_maps(halves: tuple[ShellShape, ShellShape], length: float) -> WarpMaps:
-    """The maps of both halves, whose fields follow from the same mirrors of each; lengths in mm."""
-    chosen = pivots(halves[0].table[:-2, :3], length)
-    first, second = (
-        _warp_map(half, smooth_field(half.table[:-2, :3], length, chosen)) for half in halves
-    )
-    return first, second
-
-
-def _warp_map(half: ShellShape, field: SmoothField) -> WarpMap:
-    apex, foot = half.table[:-2, :3], half.table[-1]
-    points, normal = mirror_points(half.table[:-2], RING_SHARE * half.cell_radius)
-    height = np.broadcast_to(_astigmatism(), (len(apex), RING_POINTS + 1, 2))
+def warp_map(table: Floats, cell_radius: Floats, walls: GrooveWalls, field: SmoothField) -> WarpMap:
+    """What a field does to a half: see `EdgeModel` for its table (m + 2, 7) and cell radii (m,)."""
+    apex, foot = table[:-2, :3], table[-1]
+    points, normal = mirror_points(table[:-2], RING_SHARE * cell_radius)
+    x, y = RING_SHARE * np.vstack([np.zeros(2), _circle()]).T
+    astigmatism = monomials(x, y) @ term_polynomials()[list(ASTIGMATISM)].T
+    height = np.broadcast_to(astigmatism, (len(apex), RING_POINTS + 1, 2))
     unknowns = np.concatenate([normal, np.ones((*normal.shape[:2], 1)), height], axis=2)
     above = dot(apex - foot[:3], foot[3:6])
     return WarpMap(
@@ -160,15 +145,9 @@ def _warp_map(half: ShellShape, field: SmoothField) -> WarpMap:
         normal=normal,
         foot_basis=field.basis(apex - above[:, None] * foot[3:6]),
         foot_normal=foot[3:6],
-        wall_basis=np.ascontiguousarray(field.basis(half.walls.point).T),
-        wall_normal=half.walls.normal,
+        wall_basis=np.ascontiguousarray(field.basis(walls.point).T),
+        wall_normal=walls.normal,
     )
-
-
-def _astigmatism() -> Floats:
-    """Height of both terms at the points, (q, 2)."""
-    x, y = RING_SHARE * np.vstack([np.zeros(2), _circle()]).T
-    return monomials(x, y) @ term_polynomials()[list(ASTIGMATISM)].T
 
 
 def _circle() -> Floats:
