@@ -96,26 +96,20 @@ def figure_file(
     What draws gets an empty figure, where "C0", "C1" ... are the colours of CYCLE.
     """
     import matplotlib
+    from cycler import cycler
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with _SETTINGS, matplotlib.rc_context(_settings()):
+    # A user's own settings must not change the picture.
+    settings: dict[Any, Any] = {**matplotlib.rcParamsDefault, "svg.hashsalt": NAMES_IN_SVG}
+    settings |= {"image.cmap": SHADES, "axes.prop_cycle": cycler(color=CYCLE)}
+    with _SETTINGS, matplotlib.rc_context(settings):
         figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         draw(figure)
         file = BytesIO()
         figure.savefig(file, format=kind, metadata=METADATA[kind])
     return file.getvalue()
-
-
-def _settings() -> dict[Any, Any]:
-    """Return matplotlib's settings; a user's own must not change the picture."""
-    import matplotlib
-    from cycler import cycler
-
-    settings: dict[Any, Any] = {**matplotlib.rcParamsDefault}
-    settings |= {"svg.hashsalt": NAMES_IN_SVG, "image.cmap": SHADES}
-    return settings | {"axes.prop_cycle": cycler(color=CYCLE)}
 
 
 def legend_below(axes: "Axes") -> None:

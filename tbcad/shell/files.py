@@ -24,8 +24,8 @@ from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.mirrors.record import part_files
-from tbcad.core.optics.cells import Cells, cell_moments
-from tbcad.core.optics.pedestals.cells import PedestalCells, wall_moments
+from tbcad.core.optics.cells import CellMoments, Cells, cell_moments
+from tbcad.core.optics.pedestals.cells import PedestalCells, WallMoments, wall_moments
 from tbcad.records.design import MandrelRecord
 from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends, closing_envelope
 from tbcad.shell.mandrel import Mandrel, mandrel_of
@@ -142,14 +142,15 @@ def shell_properties(
     if not (cells.mirror_surfaces.curvature > 0).all():
         return properties(solid.shape)
     origin = mean_corner(solid.shape)
-    mirrors = cell_moments(cells, origin)
-    side = -1.0 if negative else 1.0  # of the material
-    area = float(mirrors.area.sum())
-    total = FaceIntegrals(origin, side * mirrors.volume, side * mirrors.volume_moment, area)
+    moments: list[CellMoments | WallMoments] = [cell_moments(cells, origin)]
     if isinstance(cells, PedestalCells):
-        walls = wall_moments(cells, origin)
-        area = float(walls.area.sum())
-        total += FaceIntegrals(origin, side * walls.volume, side * walls.volume_moment, area)
+        moments.append(wall_moments(cells, origin))
+    side = -1.0 if negative else 1.0  # of the material
+    first, *others = (
+        FaceIntegrals(origin, side * one.volume, side * one.volume_moment, float(one.area.sum()))
+        for one in moments
+    )
+    total = sum(others, first)
     for face in faces(solid.shape)[len(array) + len(wall_names(array.ids, cells)) :]:
         total += face_integrals(face, origin)
     return total.properties

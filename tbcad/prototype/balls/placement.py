@@ -1,9 +1,8 @@
 """Azimuths of the balls on the base with which the base swings least.
 
-Camera, object and ellipsoid look the same from every azimuth. So whether one ball touches another,
-or blocks its light, depends only on the difference of their azimuths, which must be at least one
-angle for each pair. What remains is to choose which of the two goes first in each pair: a mixed
-integer linear program.
+Whether one ball touches another, or blocks its light, depends only on the difference of their
+azimuths, which must be at least one angle for each pair. What remains is to choose which of the two
+goes first in each pair: a mixed integer linear program (docs/prototype.md).
 """
 
 from collections.abc import Iterator

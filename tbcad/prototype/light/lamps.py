@@ -2,9 +2,7 @@
 
 Four upright lamps are images of one another in the planes x = 0 and y = 0. Where they have no
 room, two level ones are each other's image by the half turn about z, on a bar across the uprights
-and on a bridge over the camera. That turn of the object leaves the light of either as it was.
-Above the horizon there is no such place: at some stop the base is between it and the object, or it
-is in the light of the mirrors.
+and on a bridge over the camera: decision 0014.
 """
 
 from collections.abc import Sequence

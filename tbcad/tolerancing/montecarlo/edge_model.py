@@ -17,7 +17,7 @@ from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.shell.cell_outlines import rows_and_columns
-from tbcad.tolerancing.montecarlo.draws import ShellDraws
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, WarpMaps, pivots, smooth_field, warp_map
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.form import (
     FIRST,
@@ -28,7 +28,6 @@ from tbcad.tolerancing.montecarlo.form import (
     SECOND,
     term_polynomials,
 )
-from tbcad.tolerancing.montecarlo.warp import WarpMaps, pivots, smooth_field, warp_map
 from tbcad.types import Bools, Floats, Ints
 
 # Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the
