@@ -12,7 +12,7 @@ from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.optics.ball_light import ball_poses, pixel_counts, used_outlines
 from tbcad.core.spec.design import Spec
-from tbcad.core.spec.prototype import MOST_BALLS, PrototypeSpec
+from tbcad.core.spec.prototype import MOST_BALLS
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
 from tbcad.prototype.balls.clearance import (
     allowed_azimuths,
@@ -28,7 +28,6 @@ from tbcad.prototype.balls.selection import (
     MirrorGroups,
     ball_candidates,
     choose_balls,
-    coverable,
     group_mirrors,
     max_groups,
 )
@@ -41,7 +40,7 @@ from tbcad.prototype.balls.stops import (
 )
 from tbcad.prototype.suitable import check_suitable
 from tbcad.records.prototype import Alternative
-from tbcad.types import Bools, Floats, Ints
+from tbcad.types import Floats, Ints
 
 SELECTION_RULES: dict[str, dict[str, Any]] = {
     f"{snap}, {name}": {"snap": snap, "caps": caps}
@@ -55,13 +54,10 @@ class BallFit:
     """How well balls replace mirrors, m mirrors."""
 
     ball: Ints  # that replaces the mirror, (m,)
-    polar_error: Floats  # polar angle of the ball less that of the mirror, radians, (m,)
     coverage: Floats  # coverage diameter within the mirror's cell moved with the ball, mm, (m,)
     # the same within the cell left in its place; zero where the ball shows the origin outside of
     # it, mm, (m,)
     coverage_fixed: Floats
-    # whether any ball on sale shows the whole target with the pictures as the spec has them, (m,)
-    coverable: Bools
     pixels_shell: Floats  # pixels of the capture sphere in the shell's picture, (m,)
     pixels: Floats  # the same in the ball's picture, (m,)
 
@@ -71,7 +67,7 @@ class BallFit:
         return float(self.pixels.sum() / self.pixels_shell.sum())
 
 
-def ball_fit(candidates: BallCandidates, balls: Balls, spec: PrototypeSpec) -> BallFit:
+def ball_fit(candidates: BallCandidates, balls: Balls) -> BallFit:
     """What the balls show in place of the mirrors."""
     array, groups = candidates.array, candidates.groups
     shell = used_outlines(
@@ -82,10 +78,8 @@ def ball_fit(candidates: BallCandidates, balls: Balls, spec: PrototypeSpec) -> B
     )
     return BallFit(
         ball=groups.group_of,
-        polar_error=groups.polar[groups.group_of] - array.polar,
         coverage=candidates.coverage(balls.radius, moved=True),
         coverage_fixed=candidates.coverage(balls.radius, moved=False),
-        coverable=coverable(candidates, balls.catalogue, spec.picture == "moved"),
         pixels_shell=_pixels(array, shell),
         pixels=_pixels(array, balls.outline[groups.group_of]),
     )
@@ -113,7 +107,7 @@ def ball_alternatives(
         ruled, chosen, shown = spec.prototype.model_copy(update=rule), balls, fit
         if ruled != spec.prototype:
             chosen = choose_balls(candidates, ruled, balls.catalogue)
-            shown = ball_fit(candidates, chosen, ruled)
+            shown = ball_fit(candidates, chosen)
         alternatives.append(
             Alternative(
                 name=name,
@@ -213,7 +207,7 @@ class BallChoices:
             limits, target = self.spec.prototype, self.spec.optics.capture_diameter_mm
             candidates = ball_candidates(self.array, self.groups(k), target, limits.ball_margin_mm)
             balls = choose_balls(candidates, limits, self._catalogue)
-            self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls, limits)
+            self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls)
         return self._chosen[k]
 
     @cached_property

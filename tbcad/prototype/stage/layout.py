@@ -89,15 +89,7 @@ def stage_layout(
         post_component(sizes, foot),
     )
     light, swept = _check_clearances(components, keep_out, spec.frame.clearance_mm)
-    return StageLayout(
-        sizes=sizes,
-        foot=foot,
-        led=led,
-        leds=leds,
-        components=components,
-        light=light,
-        swept=swept,
-    )
+    return StageLayout(sizes, foot, led, leds, components, light, swept)
 
 
 def led_poses(stage: StageLayout) -> list[tuple[str, Floats, Floats]]:

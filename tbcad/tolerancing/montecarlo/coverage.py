@@ -40,7 +40,8 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False
     """Coverage of each mirror of one half, for s builds; see `trace_cell_edges` for worst_only."""
     outlines = np.empty((len(draws), len(half), 3))
     surfaces, views = surface_tables(half, draws), view_tables(half, draws)
-    forms, pairs = form_tables(half, draws), half.pairs.arrays
+    forms, faces = form_tables(half, draws), half.pairs
+    pairs = faces.pair, faces.offset, faces.face, faces.reach
     mirrors, out = surfaces[:, : len(half)], draws.valley[:, None]
     mirrors[..., APEX] += out[..., None] * mirrors[..., NORMAL]
     mirrors[..., CURVATURE] /= 1 + out * mirrors[..., CURVATURE]

@@ -96,11 +96,6 @@ class WarpMap:
     wall_basis: Floats  # of the field in the middle of the edge at each wall of a pedestal, (K, w)
     wall_normal: Floats  # unit normals of the walls, (w, 3)
 
-    @property
-    def modes(self) -> int:
-        """Number of random numbers K for each axis."""
-        return len(self.basis)
-
     def walls_moved(self, numbers: Floats) -> Floats:
         """Displacements of the walls of one build by numbers (K, 3), along their normals, (w,)."""
         return dot(field_values(self.wall_basis, numbers).T, self.wall_normal)
@@ -216,7 +211,7 @@ def draw(
     """
     if warp is None and errors.warp.spread != 0 and errors.warp.length != 0:
         raise ValueError("the warp of these errors needs its maps")
-    shapes = shell_error_shapes(mirrors, warp[0].modes if warp else mirrors, walls)
+    shapes = shell_error_shapes(mirrors, len(warp[0].basis) if warp else mirrors, walls)
     drawn = draw_kinds(errors, seed, builds, shapes)
     maps = warp or (None, None)
     return _half(drawn, 0, maps[0]), _half(drawn, 1, maps[1])

@@ -52,11 +52,6 @@ class NeighbourPairs:
     reach: Floats  # maximum distance of the edge's points from its middle, mm, (e,)
     footed: Ints  # mirrors with a foot plane of their own, (r,): faces m + 2 onwards, then walls
 
-    @property
-    def arrays(self) -> PairArrays:
-        """All of them, for compiled code."""
-        return self.pair, self.offset, self.face, self.reach
-
 
 def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     """All pairs that are neighbours or share a neighbour as designed.
