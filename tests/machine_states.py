@@ -8,7 +8,7 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.records.exposure import Frame
+from tbcad.records.run import Frame
 from tbcad.rig.machine.designed import designed_prototype
 from tbcad.rig.machine.machine import Machine
 

@@ -15,8 +15,7 @@ from tbcad.light.simulate.prototype.ball_rays import photographed_pixels
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.records.exposure import LIT, PHOTOGRAPHS, Exposure, Frame, exposure_name
-from tbcad.records.run import RECORD, RunRecord
+from tbcad.records.run import LIT, PHOTOGRAPHS, RECORD, Exposure, Frame, RunRecord, exposure_name
 from tbcad.rig.machine.designed import machine_runs
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bytes

@@ -22,9 +22,8 @@ from tbcad.prototype.files import bom
 from tbcad.records.calibration import CalibrationRecord, MachineRecord
 from tbcad.records.design import DesignRecord
 from tbcad.records.document import Document, Manifest
-from tbcad.records.exposure import Exposure
 from tbcad.records.prototype import Prototype
-from tbcad.records.run import RunRecord
+from tbcad.records.run import Exposure, RunRecord
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow
 
 ROOT = Path(__file__).parents[2]

@@ -1,4 +1,7 @@
-"""Pictures and plots as bytes of files: one palette, legends beside the data, bytes that repeat."""
+"""Pictures and plots as bytes of files, which repeat, and their colours, with the curve of sRGB.
+
+Colours of plots are told apart by people with any colour vision.
+"""
 
 from collections.abc import Callable
 from io import BytesIO
@@ -8,19 +11,59 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.common.colours import CYCLE, SHADES
+from tbcad.types import Bytes, Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# M. Okabe and K. Ito, Color Universal Design, 2008; without yellow, which is faint on white.
+BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
+PURPLE, ORANGE, SKY, BLACK = "#cc79a7", "#e69f00", "#56b4e9", "#000000"
+CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+"""Colours of lines and points, in this order."""
+
+SHADES = "viridis"
+"""matplotlib's name of the map for shades of one quantity."""
+_VIRIDIS = (
+    *((68, 1, 84), (71, 45, 123), (59, 82, 139), (44, 114, 142), (33, 145, 140)),
+    *((40, 174, 128), (94, 201, 98), (173, 220, 48), (253, 231, 37)),
+)
+
+
+def shades(values: Floats) -> list[str]:
+    """Colours `#rrggbb` of values (m,), from the smallest to the largest, as of viridis.
+
+    Linear between nine of its colours, off by up to 0.07 of a channel, so that no plotting library
+    is needed.
+    """
+    span = float(np.ptp(values)) or 1.0
+    share = (values - values.min()) / span * (len(_VIRIDIS) - 1)
+    table = np.array(_VIRIDIS).T
+    channels = [np.interp(share, range(len(_VIRIDIS)), row) for row in table]
+    return ["#{:02x}{:02x}{:02x}".format(*map(round, rgb)) for rgb in zip(*channels, strict=True)]
+
+
+def srgb(light: Floats) -> Floats:
+    """Light, 0 to 1, as IEC 61966-2-1 encodes it, 0 to 1."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def srgb_light(values: Floats) -> Floats:
+    """The inverse of `srgb`."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def shown_colour(factor: Bytes) -> tuple[float, ...]:
+    """Red, green, blue (sRGB) and opacity of a factor of glTF: bytes of light and of opacity."""
+    *light, opacity = factor / 255
+    return (*srgb(np.array(light)).tolist(), float(opacity))
+
 
 def png_bytes(picture: NDArray[np.uint8] | NDArray[np.uint16], largest_px: int = 0) -> bytes:
-    """Return a picture as a PNG file, every k-th pixel where it is too large.
+    """Return a picture as a PNG file, every k-th pixel where its longer side is too large (0: any).
 
-    Args:
-        picture: red, green, blue, 0 to 255, (h, w, 3), or grey, of 8 or 16 bits, (h, w).
-        largest_px: of the longer side; 0: any.
+    Red, green, blue, 0 to 255, (h, w, 3), or grey, of 8 or 16 bits, (h, w).
     """
     from PIL import Image
 
@@ -48,34 +91,25 @@ NAMES_IN_SVG = "tbcad"  # in place of random ones
 def figure_file(
     draw: "Callable[[Figure], None]", inches: tuple[float, float], kind: PlotFormat = "png"
 ) -> bytes:
-    """Return the file of a figure; the same drawing gives the same bytes.
+    """Return the file of a figure of a width and height; the same drawing gives the same bytes.
 
-    Args:
-        draw: draws on an empty figure. "C0", "C1" ... are the colours of `palette.CYCLE`.
-        inches: width and height.
-        kind: of file.
+    What draws gets an empty figure, where "C0", "C1" ... are the colours of CYCLE.
     """
     import matplotlib
+    from cycler import cycler
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with _SETTINGS, matplotlib.rc_context(_settings()):
+    # A user's own settings must not change the picture.
+    settings: dict[Any, Any] = {**matplotlib.rcParamsDefault, "svg.hashsalt": NAMES_IN_SVG}
+    settings |= {"image.cmap": SHADES, "axes.prop_cycle": cycler(color=CYCLE)}
+    with _SETTINGS, matplotlib.rc_context(settings):
         figure = Figure(figsize=inches, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         draw(figure)
         file = BytesIO()
         figure.savefig(file, format=kind, metadata=METADATA[kind])
     return file.getvalue()
-
-
-def _settings() -> dict[Any, Any]:
-    """Return matplotlib's settings; a user's own must not change the picture."""
-    import matplotlib
-    from cycler import cycler
-
-    settings: dict[Any, Any] = {**matplotlib.rcParamsDefault}
-    settings |= {"svg.hashsalt": NAMES_IN_SVG, "image.cmap": SHADES}
-    return settings | {"axes.prop_cycle": cycler(color=CYCLE)}
 
 
 def legend_below(axes: "Axes") -> None:

@@ -1,4 +1,4 @@
-"""Units of work, run on the cores of this machine or on a Dask cluster: the same results.
+"""Work in other processes; units of work on the cores of this machine or on a Dask cluster.
 
 A unit's result may depend on the unit alone, never on its worker or on time; then the number of
 workers, their order and their deaths change nothing. (Another kind of processor may round a last
@@ -11,7 +11,7 @@ import pickle
 import platform
 import socket
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import cache, partial
 from hashlib import sha256
@@ -19,11 +19,42 @@ from importlib.metadata import PackageNotFoundError, version
 from operator import call
 from pathlib import Path
 from time import monotonic
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 from urllib.parse import urlsplit
 
-from tbcad.errors import InputError
+from tbcad_verify.run.processes import ProcessEnded, Processes
+
+from tbcad.errors import InputError, ProcessLost
 from tbcad.version import __version__
+
+Submit: TypeAlias = Callable[..., "Future[Any]"]
+"""Takes a function of a module and its arguments, which are copied; the result comes later."""
+
+
+@contextmanager
+def background_processes(number: int = 1) -> Iterator[Submit]:
+    """Do work in other processes, each a piece after the other, while the block runs.
+
+    At the block's end all of it is done. A block that fails, or is interrupted, ends it at once.
+
+    Raises:
+        Exception: the first that the work raised.
+        ProcessLost: a process ended before its work was done.
+    """
+    futures: list[Future[Any]] = []
+    with Processes(number) as processes:
+
+        def submit(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+            futures.append(processes.submit(work, *arguments))
+            return futures[-1]
+
+        try:
+            yield submit
+            for future in futures:
+                future.result()
+        except ProcessEnded as end:
+            raise ProcessLost(f"a process ended before its work was done: {end}") from None
+
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
@@ -55,16 +86,12 @@ def run_units(
     workers: int | None = None,
     patience: float = PATIENCE,
 ) -> list[Result]:
-    """Return the results of all units, in the order of the units.
+    """Return the results of all units, in the order of the units: put the longest in front.
 
-    Args:
-        work: makes a unit's result from the unit alone. With a scheduler, it and the results must
-            be picklable; closures and lambdas are.
-        units: the earlier ones are started first, so put the longest in front.
-        scheduler: address of a Dask scheduler ("tcp://host:8786"); None: threads of this process.
-        progress: called with each unit when it is done, in this thread.
-        workers: number of threads without a scheduler; None: one for each core.
-        patience: seconds to wait with no worker at the scheduler.
+    Work makes a unit's result from the unit alone, by a number of threads of this process (None:
+    one for each core), or with a Dask scheduler ("tcp://host:8786"); then it and the results must
+    be picklable, which closures and lambdas are, and patience is for seconds without any worker.
+    Progress is called with each unit when it is done, in this thread.
 
     Raises:
         InputError: no dask; no such scheduler, or it goes away; no worker, or one with another

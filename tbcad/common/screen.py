@@ -9,6 +9,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import accumulate
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,7 @@ class TimeLeft:
 
     def __init__(self, expected: Mapping[str, float], clock: Callable[[], float] = monotonic):
         """Take the expected seconds of all stages, in order, by title."""
-        self._begins = dict(zip(expected, _sums_before(expected), strict=True))
+        self._begins = dict(zip(expected, accumulate(expected.values(), initial=0.0), strict=False))
         self._expected, self._clock = expected, clock
         self.total = sum(expected.values())
         self._started = self._stage_started = clock()
@@ -70,21 +71,16 @@ class TimeLeft:
         return f"about {minutes}:{seconds:02d} left"
 
 
-def _sums_before(expected: Mapping[str, float]) -> list[float]:
-    sums = [0.0]
-    for seconds in expected.values():
-        sums.append(sums[-1] + seconds)
-    return sums[:-1]
-
-
 class Stages:
     """Stages of one command, shown on stderr."""
 
-    def __init__(self, bar: Progress | None, expected: Mapping[str, float] | int) -> None:
-        """Show stages on a bar, or in plain lines when there is none."""
+    def __init__(
+        self, bar: Progress | None, expected: Mapping[str, float] | int, silent: bool = False
+    ) -> None:
+        """Show stages on a bar, or in plain lines when there is none, or not at all."""
         self._left = None if isinstance(expected, int) else TimeLeft(expected)
         total = expected if isinstance(expected, int) else sum(expected.values())
-        self._bar = bar
+        self._bar, self._silent = bar, silent
         self._task = bar.add_task("", total=total, left=self._left or "") if bar else None
         self._started = monotonic()
         self._stage = ""
@@ -102,7 +98,8 @@ class Stages:
         self._stage = text
 
     def _print(self, text: str) -> None:
-        print(f"[{monotonic() - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
+        if not self._silent:
+            print(f"[{monotonic() - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
 
     def detail(self, text: str) -> None:
         """Show a step of the stage, on a terminal only."""
@@ -117,31 +114,18 @@ class Stages:
             self._print(text)
 
 
-class SilentStages(Stages):
-    """Stages that nobody is shown."""
-
-    def __init__(self) -> None:
-        """Show nothing."""
-        super().__init__(None, 0)
-
-    def _print(self, text: str) -> None:
-        del text
-
-
 @contextmanager
 def stages(expected: Mapping[str, float] | int, silent: bool = False) -> Iterator[Stages]:
-    """Show stages while the block runs.
+    """Show stages while the block runs, unless it is silent.
 
-    Args:
-        expected: seconds of each stage, in order, by title; or about the number of stages, and no
-            time left is shown.
-        silent: show nothing.
+    Expected are the seconds of each stage, in order, by title; or about the number of stages, and
+    no time left is shown.
     """
     from rich.console import Console
 
     console = Console(stderr=True)
     if silent or not console.is_terminal:
-        yield SilentStages() if silent else Stages(None, 0)
+        yield Stages(None, 0, silent)
         return
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 

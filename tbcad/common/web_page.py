@@ -45,18 +45,12 @@ def web_page(
     begin: str = BEGIN,
     images: str = "",
 ) -> str:
-    """A page.
+    """A page: its HTML from <body> on, with places {{name}}, and the blocks put in by these names.
 
-    Args:
-        body: HTML from <body> on, with places {{name}}.
-        blocks: what is put in, by the names of these places; the page's "style" (CSS) and "script"
-            (JavaScript). {{title}} is a place too.
-        title: text.
-        kind: what the browser shows behind the title.
-        data: what the script reads, as JSON.
-        begin: the first lines.
-        images: where pictures may come from, for a page that is opened from disk; empty for one of
-            a server, which sends a policy of its own.
+    Blocks are also the page's "style" (CSS) and "script" (JavaScript), which reads the data as
+    JSON; {{title}} is a place too. The browser shows the kind behind the title. Images say where
+    pictures may come from, for a page that is opened from disk; empty for one of a server, which
+    sends a policy of its own.
     """
     parts = {
         "begin": begin,
@@ -65,9 +59,6 @@ def web_page(
         "kind": escape(kind),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
-    return _filled(HEAD + body + FOOT, {**blocks, **parts})
-
-
-def _filled(template: str, blocks: Mapping[str, str]) -> str:
-    """The template with each {{name}} replaced; what is put in is not looked through again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: blocks[found[1]], template)
+    every, template = {**blocks, **parts}, HEAD + body + FOOT
+    # What is put in is not looked through again.
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: every[found[1]], template)

@@ -10,7 +10,7 @@ from typing import Any
 
 from tbcad.cad.drafting.sheet import Sheet, paper_name, scale_text
 from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
-from tbcad.common.background import background_processes
+from tbcad.common.schedule import background_processes
 from tbcad.drawings.export import DrawnExport, read_export
 from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
 from tbcad.errors import InputError

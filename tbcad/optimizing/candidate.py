@@ -14,7 +14,7 @@ from threading import Lock
 from typing import Literal, TypeAlias
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
@@ -51,7 +51,6 @@ CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
 Place = tuple[float, float, float, float, float]
 """Camera's x and z, and the semi-minor axis, mm; stretch of the directions along x and y."""
 SCHEMA = "tbcad-candidates/2"
-Record: TypeAlias = dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -114,6 +113,9 @@ class DesignCandidate:
     place: Place
     figures: Figures | None  # None where it cannot be made
     reason: str = ""  # why it cannot, in one line
+
+
+CANDIDATE = TypeAdapter(DesignCandidate)
 
 
 def place_of(spec: Spec) -> Place:
@@ -218,7 +220,7 @@ def read_store(store: Path, key: str) -> dict[Place, DesignCandidate]:
     try:
         head, *rows = map(parse_json, store.read_text(encoding="utf-8").splitlines())
         known = head["design"] == key
-        found = [_candidate(row) for row in rows]
+        found = [CANDIDATE.validate_python(row) for row in rows]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
     if not known:
@@ -226,18 +228,3 @@ def read_store(store: Path, key: str) -> dict[Place, DesignCandidate]:
             f"{store}: of another design or method: name another --out, or remove the file"
         )
     return {one.place: one for one in found}
-
-
-def _candidate(row: Record) -> DesignCandidate:
-    place, figures = row["place"], row["figures"]
-    x, z, semi_minor, along_x, along_y = np.array(place, dtype=float).tolist()
-    if figures is not None and not isinstance(figures, dict):
-        raise ValueError("figures are not an object")
-    numbers = {
-        name: None if number is None else float(number) for name, number in (figures or {}).items()
-    }
-    return DesignCandidate(
-        (x, z, semi_minor, along_x, along_y),
-        Figures(**numbers) if figures else None,  # type: ignore[arg-type]
-        str(row["reason"]),
-    )

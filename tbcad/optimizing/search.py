@@ -1,16 +1,22 @@
-"""Differential evolution over places, each judged once: the same on any number of cores."""
+"""Differential evolution over places, each judged once: the same on any number of cores.
+
+Its files: the better design, all candidates, and a plot.
+"""
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
 
+from tbcad.cad.formats.checked_files import toml_text
 from tbcad.common.atomic_files import replace_files
+from tbcad.common.results import PlotPanel, Record, Series, Table, csv_text, plot_file
 from tbcad.common.schedule import run_units
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import spec_dict
@@ -23,6 +29,7 @@ from tbcad.optimizing.candidate import (
     bounds,
     evaluate,
     place_of,
+    placed,
     read_store,
     rounded,
     store_bytes,
@@ -75,16 +82,17 @@ def search(spec: Spec, asked: OptimizeOptions, store: Path | None = None) -> Sea
         asked.max_size_mm or start.figures.size_mm,
         asked.max_view_angle_deg or start.figures.view_angle_deg,
     )
-    value = partial(_value, asked.aims, limits, start.figures)
+    losses = partial(_losses, asked.aims, limits, start.figures)
+    value = partial(_value, losses, limits)
     every = weightings(len(asked.aims)) if asked.front else [_even(len(asked.aims))]
     generations = max(1, asked.candidates // len(every) // POPULATION - 1)
     box = Bounds(*np.transpose(bounds(spec, limits.size_mm)))
     for weights in every:
         _evolve(box, start.place, generations, partial(judge, limits), partial(value, weights))
     candidates = tuple(judged.values())
-    losses = _losses(asked.aims, limits, start.figures, candidates)
     best = min(candidates, key=partial(value, _even(len(asked.aims))))
-    return SearchResult(start, limits, best, candidates, _front(losses))
+    on_front = _front(np.array([*map(losses, candidates)]))
+    return SearchResult(start, limits, best, candidates, on_front)
 
 
 def _key(spec: Spec, asked: OptimizeOptions) -> str:
@@ -137,25 +145,28 @@ def _never_called(place: Floats) -> float:
 
 
 def _value(
-    objectives: Sequence[Objective],
+    losses: Callable[[DesignCandidate], Floats],
     limits: MachineLimits,
-    start: Figures,
     weights: Floats,
     one: DesignCandidate,
 ) -> float:
     """What is minimised: the weighted mean of all objectives, relative to the first design."""
-    if one.figures is None:
-        return IMPOSSIBLE
-    if excess := limits.excess(one.figures):
+    if one.figures and (excess := limits.excess(one.figures)):
         return BEYOND + EXCESS * excess
-    if _lacks(objectives, one.figures):
-        return IMPOSSIBLE
-    return float(weights @ objective_losses(objectives, start, one.figures))
+    return min(float(weights @ losses(one)), IMPOSSIBLE)
 
 
-def objective_losses(objectives: Sequence[Objective], start: Figures, one: Figures) -> list[float]:
-    """By how much a design is worse than the first, for each objective: logarithms of ratios."""
-    return [float(LOSSES[name](one) - LOSSES[name](start)) for name in objectives]
+def _losses(
+    objectives: Sequence[Objective], limits: MachineLimits, start: Figures, one: DesignCandidate
+) -> Floats:
+    """By how much a candidate is worse than the first design, (objectives,): logarithms of ratios.
+
+    Infinite where it cannot be made, is beyond the limits or lacks a figure.
+    """
+    figures = one.figures
+    if figures is None or limits.excess(figures) > 0 or _lacks(objectives, figures):
+        return np.full(len(objectives), np.inf)
+    return np.array([LOSSES[name](figures) - LOSSES[name](start) for name in objectives])
 
 
 def _judge(
@@ -192,21 +203,6 @@ def _lacks(objectives: Sequence[Objective], figures: Figures) -> bool:
     return "ssim" in objectives and figures.ssim is None
 
 
-def _losses(
-    objectives: Sequence[Objective],
-    limits: MachineLimits,
-    start: Figures,
-    candidates: Sequence[DesignCandidate],
-) -> Floats:
-    """Losses of all candidates, (k, objectives); infinite beyond the limits."""
-    losses = np.full((len(candidates), len(objectives)), np.inf)
-    for row, one in zip(losses, candidates, strict=True):
-        figures = one.figures
-        if figures and limits.excess(figures) == 0 and not _lacks(objectives, figures):
-            row[:] = objective_losses(objectives, start, figures)
-    return losses
-
-
 def _front(losses: Floats) -> tuple[bool, ...]:
     """Which of k candidates are bettered by no other in all objectives, from losses (k, o)."""
     no_worse = np.all(losses[None] <= losses[:, None], axis=2)
@@ -214,3 +210,109 @@ def _front(losses: Floats) -> tuple[bool, ...]:
     dominated = np.any(no_worse & better, axis=1)
     on_front = np.isfinite(losses).all(axis=1) & ~dominated
     return tuple(bool(one) for one in on_front)
+
+
+FIGURES = tuple(field.name for field in fields(Figures))
+VARIABLES = ("camera_x_mm", "camera_z_mm", "semi_minor_mm", "stretch_x", "stretch_y")
+COLUMNS = (*VARIABLES, *FIGURES, "on_front", "reason")
+LABELS = {
+    "minimum_px": "pixels, minimum",
+    "median_px": "pixels, median",
+    "mean_log_px": "pixels, mean of logarithms",
+    "variation": "coefficient of variation",
+    "size_mm": "longest side, mm",
+    "view_angle_deg": "angle of view, deg",
+    "ssim": "SSIM of views",
+}
+
+
+Groups = dict[str, tuple[list[Figures], str]]
+"""By label: what is drawn, and in which style."""
+
+
+def search_files(result: SearchResult, spec: Spec, asked: OptimizeOptions) -> dict[str, bytes]:
+    """The files of a search by name: the same search gives the same bytes."""
+    contents = (
+        design_text(result, spec).encode(),
+        csv_text(candidate_table(result)).encode(),
+        plot_file(panels(result), asked.plot),
+    )
+    return {file.name: data for file, data in zip(asked.files, contents, strict=True)}
+
+
+def design_text(result: SearchResult, spec: Spec) -> str:
+    """The best design as TOML: every key that is not the default, under what it gives."""
+    found = f"{spec.name}, with other places and directions: what tbcad optimize found."
+    lines = [f"# {found}", "#", *(f"# {line}" for line in comparison(result))]
+    changed = placed(spec, result.best.place)
+    defaults = Spec.model_validate({"optics": {"n": spec.optics.n}})  # some follow from n
+    rest = _assignments(spec_dict(changed), spec_dict(defaults))
+    lines += ["", f"optics.n = {spec.optics.n}", *rest]
+    return "\n".join(lines) + "\n"
+
+
+def comparison(result: SearchResult) -> Iterator[str]:
+    """Every figure of the first design and of the best one, a line each."""
+    start, best = result.start.figures, result.best.figures
+    yield f"{'':28} {'before':>9} {'after':>9}"
+    for name, label in LABELS.items():
+        before, after = getattr(start, name), getattr(best, name)
+        if before is None or after is None:
+            continue
+        yield f"{label:28} {before:9.4g} {after:9.4g}"
+
+
+def candidate_table(result: SearchResult) -> Table:
+    """All candidates, in the order in which they were judged."""
+    records: list[Record] = [
+        {
+            **dict(zip(VARIABLES, one.place, strict=True)),
+            **{name: getattr(one.figures, name, None) for name in FIGURES},
+            **{"on_front": int(on_front), "reason": one.reason},
+        }
+        for one, on_front in zip(result.candidates, result.on_front, strict=True)
+    ]
+    return Table.of_records("candidates", records, columns=COLUMNS)
+
+
+def panels(result: SearchResult) -> tuple[PlotPanel, ...]:
+    """Candidates by pixels and evenness, by pixels and size, and by SSIM where it was measured."""
+    figures = [one.figures for one in result.candidates if one.figures]
+    kept = [one for one in figures if result.limits.excess(one) == 0]
+    front = zip(result.candidates, result.on_front, strict=True)
+    best = [one.figures for one, on_front in front if on_front and one.figures]
+    assert result.start.figures
+    assert result.best.figures
+    groups: Groups = {
+        "candidates": (figures, "C2."),
+        "within the limits": (kept, "C0."),
+        "not bettered by any other": (best, "C1o"),
+        "before": ([result.start.figures], "kx"),
+        "after": ([result.best.figures], "k+"),
+    }
+    axes = [
+        ("Pixels of the virtual cameras", "minimum_px", "variation"),
+        ("Pixels and size", "size_mm", "minimum_px"),
+    ]
+    if result.best.figures.ssim is not None:
+        axes.append(("Views and size", "size_mm", "ssim"))
+    return tuple(_panel(title, groups, (x, y)) for title, x, y in axes)
+
+
+def _panel(title: str, groups: Groups, axes: tuple[str, str]) -> PlotPanel:
+    (x, y), series = axes, []
+    for label, (some, style) in groups.items():
+        measured = [one for one in some if getattr(one, y) is not None]
+        places, values = (np.array([getattr(one, name) for one in measured]) for name in axes)
+        series.append(Series(label, places, values, style))
+    return PlotPanel(title, LABELS[x], LABELS[y], tuple(series), logarithmic="xy")
+
+
+def _assignments(values: dict[str, Any], defaults: dict[str, Any], name: str = "") -> Iterator[str]:
+    """Lines of TOML for what differs from the defaults, by dotted keys."""
+    for key, value in values.items():
+        default = defaults.get(key)
+        if isinstance(value, dict) and isinstance(default, dict):
+            yield from _assignments(value, default, f"{name}{key}.")
+        elif value != default:
+            yield f"{name}{key} = {toml_text(value)}"

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.common.background import Submit, at_once
+from tbcad.common.schedule import Submit
 from tbcad.core.camera.sheet import write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
@@ -27,7 +28,6 @@ from tbcad.shell.files import (
     write_shell_meshes,
     write_shell_solids,
 )
-from tbcad.shell.mandrel import Mandrel
 from tbcad.types import Progress
 
 
@@ -75,19 +75,16 @@ def write_export(
     for future in pending:
         future.result()
     if mandrel and mandrel.draft.angle < 0:
-        export = replace(export, note="; ".join(filter(None, (export.note, _undercut(mandrel)))))
+        undercut = (
+            f"mandrels: undercut by up to {-np.degrees(mandrel.draft.angle):.0f} degrees, so no "
+            "shell can be drawn off: dissolve them or melt them out, or set shell.edges to valley"
+        )
+        export = replace(export, note="; ".join(filter(None, (export.note, undercut))))
     mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
     write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
     progress("manifest")
     write_manifest(folder, "build")
     return export
-
-
-def _undercut(mandrel: Mandrel) -> str:
-    return (
-        f"mandrels: undercut by up to {-np.degrees(mandrel.draft.angle):.0f} degrees, so no shell "
-        "can be drawn off: dissolve them or melt them out, or set shell.edges to valley"
-    )
 
 
 def _write_parts(
@@ -107,19 +104,11 @@ def _write_parts(
         write_shell_solids(design, envelope, folder, progress)
         return Export(design.spec, (SHELL,))
     submit(write_shell_solids, design, envelope, folder)
-    export = _prototype_with_shells(design.spec, write_prototype, optional_prototype)
+    try:
+        export = Export(write_prototype(), PARTS)
+    except (SpecError, InvalidSolidError) as error:
+        if not optional_prototype:
+            raise (only_shell_remains(error) if isinstance(error, SpecError) else error) from None
+        export = Export(design.spec, (SHELL,), f"no prototype: {error}")
     progress("shells")
     return export
-
-
-def _prototype_with_shells(
-    spec: Spec, write_prototype: Callable[[], Spec], optional: bool
-) -> Export:
-    try:
-        return Export(write_prototype(), PARTS)
-    except (SpecError, InvalidSolidError) as error:
-        if optional:
-            return Export(spec, (SHELL,), f"no prototype: {error}")
-        if isinstance(error, SpecError):
-            raise only_shell_remains(error) from None
-        raise

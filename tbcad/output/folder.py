@@ -16,9 +16,14 @@ from pathlib import Path
 
 from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
-from tbcad.output.foreign_files import foreign_files, is_always_kept, keep_files
 from tbcad.output.manifest import is_file, refuse_other_content
-from tbcad.output.single_files import Source, refuse_inputs
+from tbcad.output.single_files import (
+    Source,
+    foreign_files,
+    is_always_kept,
+    keep_files,
+    refuse_inputs,
+)
 from tbcad.output.writers import clear, discard, locked, new_folder
 from tbcad.records.document import Kind
 

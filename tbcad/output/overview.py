@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.core.geometry.primitives import Component, volume
+from tbcad.core.geometry.primitives import volume
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.files.bom import PRINT_MATERIAL, ball_rows, by_currency
-from tbcad.prototype.purchased.parts import Prices, load_prices
+from tbcad.prototype.purchased.parts import load_prices
 from tbcad.shell.files import camera_a_mesh, design_mandrel
 from tbcad.types import Progress
 
@@ -122,7 +122,7 @@ def _prototype(arrangement: PrototypeModel) -> PrototypeOverview:
         minimum_coverage_mm=float(layout.fit.coverage.min()),
         kept_share=layout.fit.kept_share,
         ball_mass_g=layout.mass_g,
-        ball_price=by_currency(ball_rows(layout, _prices(arrangement.spec))),
+        ball_price=by_currency(ball_rows(layout, load_prices(arrangement.spec.prototype.prices))),
         turning_mass_g=arrangement.balance.mass_g,
         motor=arrangement.drive.motor.name,
         prints=_print_estimate(_printed_volume(arrangement), arrangement.spec),
@@ -134,22 +134,14 @@ def _printed_volume(arrangement: PrototypeModel) -> float:
     density = arrangement.spec.printer.density_g_cm3
     turning = arrangement.balance.mass_g - arrangement.layout.mass_g
     static = (*arrangement.stage.components, *arrangement.frame.printed)
-    return turning / density * MM3_PER_CM3 + sum(map(_component_volume, static))
-
-
-def _component_volume(component: Component) -> float:
-    """Volume when bodies did not overlap, mm^3."""
-    added, removed = (sum(map(volume, bodies)) for bodies in (component.added, component.removed))
-    return max(added - removed, 0.0)
+    # As if the bodies of a component did not overlap.
+    solid = (sum(map(volume, one.added)) - sum(map(volume, one.removed)) for one in static)
+    return turning / density * MM3_PER_CM3 + sum(max(one, 0.0) for one in solid)
 
 
 def _print_estimate(volume_mm3: float, spec: Spec) -> PrintEstimate:
     volume_cm3 = volume_mm3 / MM3_PER_CM3
     mass = volume_cm3 * FILLED * spec.printer.density_g_cm3
-    price = _prices(spec).of(PRINT_MATERIAL, mass)
+    price = load_prices(spec.prototype.prices).of(PRINT_MATERIAL, mass)
     money = {price.currency: price.amount} if price else {}
     return PrintEstimate(volume_cm3, mass, volume_cm3 * HOURS_PER_CM3, money)
-
-
-def _prices(spec: Spec) -> Prices:
-    return load_prices(spec.prototype.prices)

@@ -1,6 +1,12 @@
-"""What a command reads and what it writes are apart; single files that are written."""
+"""Files of the user: those a command reads stay, single ones it writes, foreign ones it keeps."""
 
+import os
+import re
+import shutil
+import zipfile
+import zlib
 from collections.abc import Iterable
+from itertools import chain, count
 from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
@@ -8,7 +14,18 @@ from typing import TypeAlias
 from tbcad.common.atomic_files import refuse_existing, write_errors_as_input_errors
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.output.manifest import MANIFEST, VERDICT, kind_of, read_manifest, refuse_inside, words
+from tbcad.output.manifest import (
+    MANIFEST,
+    REPORT,
+    VERDICT,
+    is_file,
+    is_listed,
+    is_report,
+    kind_of,
+    read_manifest,
+    refuse_inside,
+    words,
+)
 
 Source: TypeAlias = str | PathLike[str] | None
 """A file or folder that a command reads; None, and what is not there, are left out."""
@@ -57,12 +74,9 @@ def _places(path: Path) -> list[_Place]:
 
 
 def check_file(file: Path, force: bool, inputs: Iterable[Path | None] = ()) -> None:
-    """Refuse, before any work, a file that must not be replaced, or not unasked.
+    """Refuse, before any work, a file that must not be replaced, or without force one that exists.
 
-    Args:
-        file: to write.
-        force: whether a file that exists may be replaced.
-        inputs: files that the command reads, which stay even so.
+    Inputs are files that the command reads, which stay even so.
 
     Raises:
         InputError: as said, or the file belongs to what tbcad wrote, or is a folder.
@@ -95,3 +109,96 @@ def refuse_member(file: Path) -> None:
         names = {*manifest.files, MANIFEST, VERDICT} if manifest else set[str]()
         if place.relative_to(folder).as_posix() in names or (kind == "run" and place.exists()):
             raise InputError(f"{file} belongs to {folder}, {words(kind)}: choose another name")
+
+
+# Files that a checkout has in its folder of exports: no build writes them, and each keeps them.
+ALWAYS_KEPT = (".gitignore", "README.md")
+# What tbcad reconstruct writes beside a light field: of that alone, so it goes with it.
+LIGHT_FIELD, FIELD_SCHEMA = "lightfield.h5", "tbcad-field"
+_MAX_RECORD_BYTES = 100_000
+FIELD = re.compile(r"field(-\d+)?\.npz|\.field(-\d+)?\.npz\.part")
+
+
+def foreign_files(folder: Path) -> list[Path]:
+    """Return the files and folders that tbcad did not write, sorted.
+
+    tbcad wrote what manifest.json lists with the same size and sha256, manifest.json itself,
+    verify.json, and report.html if it begins as tbcad's does; beside a light field also the field
+    of it, under the name that it has by default, and its checkpoint. A folder all of whose files
+    are listed in the same way is tbcad's; any other is the user's, as a whole.
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    manifest = read_manifest(folder)
+    of_tbcad = {MANIFEST, VERDICT} if manifest else set()
+    if manifest and os.path.lexists(folder / REPORT) and is_report(folder / REPORT):
+        of_tbcad.add(REPORT)
+    listed = manifest.files if manifest else {}
+
+    def is_of_tbcad(path: Path) -> bool:
+        if path.is_dir() and not path.is_symlink() and not os.path.ismount(path):
+            inner = list(path.iterdir())
+            return bool(inner) and all(map(is_of_tbcad, inner))
+        name = path.relative_to(folder).as_posix()
+        if LIGHT_FIELD in listed and is_file(path) and _is_field(path):
+            return True
+        return is_file(path) and (name in of_tbcad or is_listed(path, listed.get(name)))
+
+    return [path for path in sorted(folder.iterdir()) if not is_of_tbcad(path)]
+
+
+def _is_field(path: Path) -> bool:
+    """Tell a field, or the checkpoint of one, from any other file."""
+    if not FIELD.fullmatch(path.name):
+        return False
+    member = "record.npy" if path.suffix == ".part" else "schema.npy"
+    try:
+        with zipfile.ZipFile(path) as packed, packed.open(member) as array:
+            text = array.read(_MAX_RECORD_BYTES)
+    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, RuntimeError, zlib.error):
+        return False
+    return FIELD_SCHEMA.encode("utf-32-le") in text
+
+
+def is_always_kept(path: Path) -> bool:
+    """Tell whether a user's file is kept unasked."""
+    return path.name in ALWAYS_KEPT and is_file(path)
+
+
+def keep_files(paths: list[Path], into: Path) -> None:
+    """Give files, links and folders a second place in another folder, as `.kept` where taken.
+
+    Raises:
+        InputError: a path is a mount point, or neither a file nor a link nor a folder.
+        OSError: a file can neither be linked nor copied.
+    """
+    for path in paths:
+        numbered = (f"{path.name}.kept{number}" for number in count(2))
+        names = chain([path.name, f"{path.name}.kept"], numbered)
+        to = next(into / name for name in names if not os.path.lexists(into / name))
+        if path.is_dir() and not path.is_symlink():
+            shutil.copytree(
+                path, to, symlinks=True, ignore=_refuse_mount_point, copy_function=_link_or_copy
+            )
+        else:
+            _link_or_copy(path, to)
+
+
+def _refuse_mount_point(folder: str, _: list[str]) -> list[str]:
+    """Ignore no file of a folder that is copied, but refuse to copy a mount point."""
+    if os.path.ismount(folder):
+        raise InputError(
+            f"{folder} is a mount point, which cannot be kept: unmount it or move it out"
+        )
+    return []
+
+
+def _link_or_copy(path: Path | str, to: Path | str) -> None:
+    """Give a file a second name: what a program still writes into it is not lost."""
+    try:
+        os.link(path, to, follow_symlinks=False)
+    except OSError:
+        if not (os.path.islink(path) or is_file(Path(path))):
+            raise InputError(f"{path} is no plain file and cannot be kept: move it out") from None
+        shutil.copy2(path, to, follow_symlinks=False)

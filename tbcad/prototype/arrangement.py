@@ -29,10 +29,15 @@ from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.mass import carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
-from tbcad.prototype.drive.balance import BaseBalance, PointMasses, ball_masses, sum_masses
-from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.drive.loads import base_torques, choose_drive
-from tbcad.prototype.drive.travel import OVERTRAVEL_DEG, home_angles
+from tbcad.prototype.drive.balance import (
+    OVERTRAVEL_DEG,
+    BaseBalance,
+    PointMasses,
+    ball_masses,
+    home_angles,
+    sum_masses,
+)
+from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
 from tbcad.prototype.electronics import Wiring, wiring_layout
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_gauge import CameraGauge

@@ -215,6 +215,9 @@ def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiri
         key, pins = "prototype.stage.leds_mm", WIRES * count
         connector = choose_part(parts, "connectors", key, hint, "pins", pins=pins)
         wire = _wire(section, stage, resistor.current_ma, parts)
+    # Of each LED's cable down to its groove, inward, down the post, to the controller.
+    length = norm(stage.leds[:, :2]) + stage.leds[:, 2] - spec.frame.floor_mm
+    length = length + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
     return Wiring(
         lights=lights(count, spec.motion),
         leds=count,
@@ -223,7 +226,7 @@ def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiri
         resistor=resistor,
         connector=connector,
         wire=wire,
-        lengths=_lengths(spec, stage),
+        lengths=tuple((CUT_MM * np.ceil(length / CUT_MM)).tolist()),
         trigger=spec.motion.trigger == "coolant",
         axis=spec.motion.axis,
     )
@@ -243,7 +246,7 @@ def wiring_rows(wiring: Wiring, lamps: LampLayout | None, drive: Drive) -> list[
     motor = {"part": drive.motor.name, "output": f"driver {wiring.axis}"}
     rows.append(HOME | {"output": f"limit {wiring.axis}"})
     # A rotary stage's current is its maker's.
-    rows += [MOTOR | motor | {"current_ma": drive.rated_current * MA_PER_A or None}, SUPPLY]
+    rows += [MOTOR | motor | {"current_ma": drive.of_motor("rated_a") * MA_PER_A or None}, SUPPLY]
     empty: Row = dict.fromkeys(COLUMNS)
     return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
 
@@ -305,10 +308,3 @@ def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Part
             "fewer LEDs in prototype.stage.leds_mm, or set it to []"
         )
     return max(fitting, key=lambda wire: wire["outer_mm"])
-
-
-def _lengths(spec: PrototypeSpec, stage: StageLayout) -> tuple[float, ...]:
-    """Length of each LED's cable: down to its groove, inward, down the post, to the controller."""
-    way = norm(stage.leds[:, :2]) + stage.leds[:, 2] - spec.frame.floor_mm
-    total = way + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
-    return tuple((CUT_MM * np.ceil(total / CUT_MM)).tolist())

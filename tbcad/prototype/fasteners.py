@@ -108,13 +108,8 @@ def _washer(part: PurchasedPart) -> Floats:
     return rectangle((-part["thickness_mm"], hole), (0.0, part["outer_mm"] / 2))
 
 
-def _insert(part: PurchasedPart) -> Floats:
-    return rectangle((0.0, part["thread_mm"] / 2), (part["length_mm"], part["hole_mm"] / 2))
-
-
-def _nut(part: PurchasedPart) -> Floats:
-    """Round, as wide as across its flats."""
-    return rectangle((0.0, part["thread_mm"] / 2), (part["height_mm"], part["width_mm"] / 2))
+def _threaded(part: PurchasedPart, length: float, outer: float) -> Floats:
+    return rectangle((0.0, part["thread_mm"] / 2), (length, outer / 2))
 
 
 def _led(part: PurchasedPart) -> Floats:
@@ -130,8 +125,9 @@ PROFILES: dict[str, Callable[[PurchasedPart], Floats]] = {
     "screws": _screw,
     "setscrews": lambda part: _rod(core_radius(part["thread_mm"]), part["length_mm"]),
     "washers": _washer,
-    "nuts": _nut,
-    "inserts": _insert,
+    # Round, as wide as across its flats.
+    "nuts": lambda part: _threaded(part, part["height_mm"], part["width_mm"]),
+    "inserts": lambda part: _threaded(part, part["length_mm"], part["hole_mm"]),
     "dowels": lambda part: _rod(part["diameter_mm"] / 2, part["length_mm"]),
     "magnets": lambda part: _rod(part["diameter_mm"] / 2, part["height_mm"]),
     "leds": _led,

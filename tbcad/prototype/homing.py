@@ -18,7 +18,7 @@ from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, PIN_MM, PIN_OUT_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.travel import HomeAngles
+from tbcad.prototype.drive.balance import HomeAngles
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.purchased import (
     ENGAGEMENT_MM,

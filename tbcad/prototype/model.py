@@ -8,9 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from OCP.Standard import Standard_Failure
 from OCP.StdFail import StdFail_NotDone
+from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.brep import InvalidSolidError
-from tbcad.common.background import Submit, at_once
+from tbcad.common.schedule import Submit
 from tbcad.core.camera.requirements import camera_requirements
 from tbcad.core.geometry.primitives import Component
 from tbcad.core.spec.design import Spec

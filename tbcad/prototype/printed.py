@@ -103,13 +103,8 @@ class PlacedSolid:
         self.__dict__.update(state, shape=from_bytes(state["_shape_bytes"]))
 
     @property
-    def on_bed(self) -> TopoDS_Solid:
-        """The part as it is printed: above z = 0, about the middle of the bed."""
-        return solids(moved(self.shape, self.axes, self.origin))[0]
-
-    @property
     def mesh_on_bed(self) -> Mesh:
-        """Its mesh in the pose in which it is printed."""
+        """Its mesh as it is printed: above z = 0, about the middle of the bed."""
         return Mesh(self.mesh.vertices @ self.axes + self.origin, self.mesh.triangles)
 
     @property

@@ -6,8 +6,7 @@ from pydantic import Field, model_validator
 
 from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.records.document import Document, RecordSection
-from tbcad.records.exposure import Frame
-from tbcad.records.run import Geometry
+from tbcad.records.run import Frame, Geometry
 
 Pair = tuple[Finite, Finite]
 Length = Annotated[Finite, Field(gt=0)]

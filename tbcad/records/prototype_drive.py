@@ -6,7 +6,7 @@ from pydantic import Field
 
 from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.records.document import RecordSection
-from tbcad.records.exposure import PhaseName
+from tbcad.records.run import PhaseName
 
 
 class Phase(RecordSection):

@@ -12,7 +12,7 @@ import numpy as np
 import pyvista
 import trimesh
 
-from tbcad.common.colours import shown_colour
+from tbcad.common.figure_files import shown_colour
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow
 from tbcad.types import Floats

@@ -24,8 +24,16 @@ from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, picture_of, read_pictur
 from tbcad.cad.formats.pixels import Picture
 from tbcad.common.atomic_files import InFolder
 from tbcad.errors import InputError
-from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, exposure_name
-from tbcad.records.run import JOURNAL, RECORD, RunRecord, read_record
+from tbcad.records.run import (
+    JOURNAL,
+    PHOTOGRAPHS,
+    RECORD,
+    Exposure,
+    Frame,
+    RunRecord,
+    exposure_name,
+    read_record,
+)
 
 Image16: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
 AGAIN = Exposure.MISSING

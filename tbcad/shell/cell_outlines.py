@@ -79,6 +79,7 @@ def cell_outlines(cells: Cells, segments: Ints) -> CellOutlines:
     inner = first_inner[arc] + np.where(backward, segments[arc] - k, k) - 1
     vertex = np.where(k == 0, np.where(backward, end[arc], start[arc]), inner)
     cell = np.repeat(np.arange(cells.mirrors), np.diff(offsets))[side]
+    last = np.append(cell[1:] != cell[:-1], True)  # place of its outline
     return CellOutlines(
         vertices,
         first_inner,
@@ -87,7 +88,7 @@ def cell_outlines(cells: Cells, segments: Ints) -> CellOutlines:
         end,
         cell,
         vertex,
-        following=_following(cell),
+        following=np.where(last, np.searchsorted(cell, cell), np.arange(len(cell)) + 1),
         corner=k == 0,
         last_segment=k == segments[arc] - 1,
     )
@@ -97,12 +98,6 @@ def rows_and_columns(counts: Ints) -> tuple[Ints, Ints]:
     """Row and column of every element of rows with these many elements each."""
     row = np.repeat(np.arange(len(counts)), counts)
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
-
-
-def _following(cell: Ints) -> Ints:
-    begins = np.searchsorted(cell, cell, side="left")
-    last = np.append(cell[1:] != cell[:-1], True)
-    return np.where(last, begins, np.arange(len(cell)) + 1)
 
 
 def strip_widths(ray_error: float, radius: Floats, distance: Floats, points: Floats) -> Floats:
@@ -130,7 +125,8 @@ def strip_points(
     """
     cell, edge = outlines.cell, outlines.points
     to_middle = middle[cell] - edge
-    nearest, farthest = _extremes(norm(to_middle), cell)
+    distance, first = norm(to_middle), np.unique(cell, return_index=True)[1]
+    nearest, farthest = (by.reduceat(distance, first) for by in (np.minimum, np.maximum))
     width = np.minimum(cell_width, MAX_STRIP_SHARE * nearest)
     strip = edge + width[cell, None] * _inward(outlines, outside)
     straight = edge + (width / farthest)[cell, None] * to_middle
@@ -139,12 +135,6 @@ def strip_points(
         leaning |= added
         strip = np.where(leaning[:, None], straight, strip)
     return strip
-
-
-def _extremes(values: Floats, cell: Ints) -> tuple[Floats, Floats]:
-    """Smallest and largest of the values (b,) in each cell, two of (m,)."""
-    first = np.unique(cell, return_index=True)[1]
-    return np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
 
 def _inward(outlines: CellOutlines, outside: Floats) -> Floats:

@@ -1,8 +1,9 @@
 """All files of both shells and of their negatives, from a design to a folder."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Face
@@ -23,9 +24,8 @@ from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.mirrors.record import part_files
-from tbcad.core.optics.cells import Cells, cell_moments
-from tbcad.core.optics.pedestals.cells import PedestalCells, wall_moments
-from tbcad.core.spec.design import Spec
+from tbcad.core.optics.cells import CellMoments, Cells, cell_moments
+from tbcad.core.optics.pedestals.cells import PedestalCells, WallMoments, wall_moments
 from tbcad.records.design import MandrelRecord
 from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends, closing_envelope
 from tbcad.shell.mandrel import Mandrel, mandrel_of
@@ -35,6 +35,7 @@ from tbcad.types import Floats, Ints, Progress
 
 X, Y, Z = np.eye(3)
 DRAFT_DIGITS = 6
+NamedFaces: TypeAlias = list[tuple[str, TopoDS_Face]]
 
 
 def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -> None:
@@ -99,12 +100,24 @@ def camera_solid(
     SpecError if flanges or holes do not fit, InvalidSolidError if the kernel finds camera a's
     invalid; b's is its mirror image.
     """
-    name, maker = part_files("shell", array)["name"], Maker(mirrored=array.camera_id == "b")
+    closing = envelope or shell_envelope(design)
+    return _half_solid("shell", design, array, lambda front: casing_faces(front, closing))
+
+
+def _half_solid(
+    kind: Literal["shell", "mandrel"],
+    design: MirrorDesign,
+    array: MirrorArray,
+    closing: Callable[[FrontEdges], NamedFaces],
+) -> Solid:
+    """Mirrors and walls, a mandrel's from behind, and the faces that close them."""
+    name, maker = part_files(kind, array)["name"], Maker(mirrored=array.camera_id == "b")
     cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
-    mirrors = front_edges(maker, cells)
-    casing = casing_faces(mirrors, envelope or shell_envelope(design))
-    walls = zip(wall_names(array.ids, cells), mirrors.walls(), strict=True)
-    faces = [*zip(array.ids, mirrors.faces(), strict=True), *walls, *casing]
+    front = front_edges(maker, cells)
+    own, closed = [*front.faces(), *front.walls()], closing(front)
+    names = [*array.ids, *wall_names(array.ids, cells)]
+    named = zip(names, own if kind == "shell" else reversed_faces(own), strict=True)
+    faces = [*named, *closed]
     solid = maker.solid([face for _, face in faces])
     # The kernel's check would find of the mirror image what it found of camera a's half.
     return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))
@@ -129,14 +142,15 @@ def shell_properties(
     if not (cells.mirror_surfaces.curvature > 0).all():
         return properties(solid.shape)
     origin = mean_corner(solid.shape)
-    mirrors = cell_moments(cells, origin)
-    side = -1.0 if negative else 1.0  # of the material
-    area = float(mirrors.area.sum())
-    total = FaceIntegrals(origin, side * mirrors.volume, side * mirrors.volume_moment, area)
+    moments: list[CellMoments | WallMoments] = [cell_moments(cells, origin)]
     if isinstance(cells, PedestalCells):
-        walls = wall_moments(cells, origin)
-        area = float(walls.area.sum())
-        total += FaceIntegrals(origin, side * walls.volume, side * walls.volume_moment, area)
+        moments.append(wall_moments(cells, origin))
+    side = -1.0 if negative else 1.0  # of the material
+    first, *others = (
+        FaceIntegrals(origin, side * one.volume, side * one.volume_moment, float(one.area.sum()))
+        for one in moments
+    )
+    total = sum(others, first)
     for face in faces(solid.shape)[len(array) + len(wall_names(array.ids, cells)) :]:
         total += face_integrals(face, origin)
     return total.properties
@@ -149,9 +163,13 @@ def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mes
     return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)
 
 
-def mandrel_mesh(spec: Spec, cells: Cells, mandrel: Mandrel, distance: Floats) -> Mesh:
-    """Mesh of the negative of camera a's half; its mirrors' facets are those of `shell_mesh`."""
-    builder, outlines = front_facets(spec, cells, distance)
+def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:
+    """Mesh of camera a's negative, whose mirrors have the facets of `shell_mesh`.
+
+    The mandrel is worked out (or SpecError) where it is not given.
+    """
+    cells, mandrel = design.arrays[0].modelled_cells, mandrel or design_mandrel(design)
+    builder, outlines = front_facets(design.spec, cells, design.arrays[0].apex_distance)
     builder.triangles = [triangles[:, ::-1] for triangles in builder.triangles]
     seam, foot = (
         outlines.along(boundary_chain(cells, plane)) for plane in (cells.seam, cells.foot)
@@ -171,7 +189,7 @@ def _meshed_plane(
         builder.plane(view, rim[::-1], [], away=True)
 
 
-def closing_faces(front: FrontEdges, mandrel: Mandrel) -> list[tuple[str, TopoDS_Face]]:
+def closing_faces(front: FrontEdges, mandrel: Mandrel) -> NamedFaces:
     """Names and faces of everything but the mirrors and the walls of their pedestals."""
     maker, cells = front.maker, front.cells
     low, high = chain_ends(cells, boundary_chain(cells, cells.seam))
@@ -193,7 +211,7 @@ def _plane_with_holes(
     ring: Ring,
     holes: Holes,
     axes: tuple[Floats, Floats],
-) -> list[tuple[str, TopoDS_Face]]:
+) -> NamedFaces:
     """A joining plane, which looks against the holes' direction, their walls and bottoms."""
     maker, outward = front.maker, -np.cross(*axes)
     near, far, walls = hole_faces(maker, *holes.sizes, *axes)
@@ -230,22 +248,8 @@ def mandrel_solid(
     design: MirrorDesign, array: MirrorArray, mandrel: Mandrel | None = None
 ) -> Solid:
     """Solid of one camera's negative, face by face; errors and the mandrel as of `camera_solid`."""
-    name, maker = part_files("mandrel", array)["name"], Maker(mirrored=array.camera_id == "b")
-    cells = design.arrays[0].modelled_cells  # the maker mirrors them for camera b
-    front = front_edges(maker, cells)
-    closing = closing_faces(front, mandrel or design_mandrel(design))
-    names = [*array.ids, *wall_names(array.ids, cells)]
-    mirrors_and_walls = reversed_faces([*front.faces(), *front.walls()])
-    faces = [*zip(names, mirrors_and_walls, strict=True), *closing]
-    solid = maker.solid([face for _, face in faces])
-    return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))
-
-
-def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:
-    """Mesh of camera a's negative; the mandrel is worked out (or SpecError) where not given."""
-    array = design.arrays[0]
-    mandrel = mandrel or design_mandrel(design)
-    return mandrel_mesh(design.spec, array.modelled_cells, mandrel, array.apex_distance)
+    closing = mandrel or design_mandrel(design)
+    return _half_solid("mandrel", design, array, lambda front: closing_faces(front, closing))
 
 
 def mandrel_record(array: MirrorArray, mandrel: Mandrel) -> MandrelRecord:

@@ -45,8 +45,9 @@ class Draft:
 
 def draft_of(cells: Cells) -> Draft:
     """The pull with the largest draft; where walls catch whatever it is, the mirrors' best pull."""
-    mirrors = _mirror_normals(cells)
-    every = np.concatenate([mirrors, _wall_normals(cells)])
+    every = mirrors = _mirror_normals(cells)
+    if isinstance(cells, PedestalCells):
+        every = np.concatenate([mirrors, -cells.surfaces.normal[cells.mirrors + PLANES :]])
     pull = best_pull(every)
     if pull is None:
         pull = best_pull(mirrors)
@@ -88,13 +89,6 @@ def _mirror_normals(cells: Cells) -> Floats:
         face = np.broadcast_to(side[mirror, None], (len(mirror), ARC_SAMPLES)).ravel()
         normals.append(-unit(cells.surfaces.gradient(face, points[mirror].reshape(-1, 3))))
     return np.concatenate(normals)
-
-
-def _wall_normals(cells: Cells) -> Floats:
-    """The negative's outward normals on the walls of grooves, (w, 3)."""
-    if not isinstance(cells, PedestalCells):
-        return np.zeros((0, 3))
-    return np.asarray(-cells.surfaces.normal[cells.mirrors + PLANES :])
 
 
 @dataclass(frozen=True)

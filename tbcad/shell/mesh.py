@@ -114,7 +114,8 @@ class MeshBuilder:
         for lower, upper in zip(lines, [*lines[1:], high], strict=True):
             self.strip(upper, lower)
             for k in (-2, -1):  # quads at the shared ends are triangles
-                self.triangles[k] = _proper(self.triangles[k])
+                a, b, c = self.triangles[k].T
+                self.triangles[k] = self.triangles[k][(a != b) & (b != c) & (c != a)]
 
     def holes(self, holes: Holes, axes: Floats) -> tuple[list[Ints], list[Ints]]:
         """Cylinders of holes; rings on the joining face and on the far one, turning right."""
@@ -182,8 +183,3 @@ def _edges(
     ends = {ARC_ENDS[name]: curves[name][[0, -1]] for name in ARC_ENDS}
     ends["front"] = curves["seam_front"][[0, -1]]
     return curves | casing_lines(lambda a, b, k: np.array([ends[a][k], ends[b][k]]))
-
-
-def _proper(triangles: Ints) -> Ints:
-    a, b, c = triangles.T
-    return np.asarray(triangles[(a != b) & (b != c) & (c != a)])

@@ -44,14 +44,12 @@ class FrontEdges:
     def faces(self) -> list[TopoDS_Face]:
         """One face for each cell, on its sphere or plane, in the order of the mirrors."""
         mirrors = self.cells.mirror_surfaces
-        poses = zip(mirrors.apex, mirrors.normal, mirrors.radius, self._rings(), strict=True)
-        return [self._face(*pose) for pose in poses]
-
-    def _rings(self) -> list[list[Side]]:
-        """Edges round each cell, counter-clockwise seen from the light, the solid's outer side."""
         offsets, sides = self.cells.rings
         every = self._edges(sides)
-        return [every[a:b][::-1] for a, b in pairwise(offsets.tolist())]
+        # Counter-clockwise seen from the light, the solid's outer side.
+        rings = (every[a:b][::-1] for a, b in pairwise(offsets.tolist()))
+        poses = zip(mirrors.apex, mirrors.normal, mirrors.radius, rings, strict=True)
+        return [self._face(*pose) for pose in poses]
 
     def walls(self) -> list[TopoDS_Face]:
         """Faces of the walls below mirrors on pedestals, none where neighbouring spheres meet."""

@@ -34,8 +34,12 @@ from tbcad.tolerancing.montecarlo.sensitivity import (
 )
 from tbcad.tolerancing.montecarlo.sharpness import Sharpness, reference_views, sharpness
 from tbcad.tolerancing.process.process import BUILT_IN, Process, load_process, process_errors
-from tbcad.tolerancing.prototype.draws import read_wind_up
-from tbcad.tolerancing.prototype.windows import PrototypeCase, PrototypeResult, prototype_model
+from tbcad.tolerancing.prototype.windows import (
+    PrototypeCase,
+    PrototypeResult,
+    prototype_model,
+    read_wind_up,
+)
 from tbcad.tolerancing.stages import (
     EVERY_PROCESS,
     MARGINS,

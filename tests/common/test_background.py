@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.checks import volume
 from tbcad.cad.kernel.solids import cylinder, fused
-from tbcad.common.background import at_once, background_processes
+from tbcad.common.schedule import background_processes
 from tbcad.core.spec.errors import SpecError
 
 

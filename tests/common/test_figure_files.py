@@ -4,8 +4,7 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 
-from tbcad.common.colours import CYCLE, SHADES
-from tbcad.common.figure_files import PlotFormat, figure_file, legend_below
+from tbcad.common.figure_files import CYCLE, SHADES, PlotFormat, figure_file, legend_below
 
 INCHES = (4.0, 3.0)
 BEGINNING = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}

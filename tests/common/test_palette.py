@@ -5,7 +5,7 @@ import pytest
 from matplotlib import colormaps
 from skimage.color import rgb2lab
 
-from tbcad.common.colours import CYCLE, SHADES, shades
+from tbcad.common.figure_files import CYCLE, SHADES, shades
 
 # Colour vision without one kind of cone: Machado and others, IEEE TVCG 15(6), 2009, severity 1,
 # for linear light.

@@ -15,8 +15,14 @@ from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.optimizing import search as search_module
 from tbcad.optimizing.candidate import STEP_MM, DesignCandidate, Figures, MachineLimits, Place
-from tbcad.optimizing.files import comparison, design_text, search_files
-from tbcad.optimizing.search import _front, search, weightings
+from tbcad.optimizing.search import (
+    _front,
+    comparison,
+    design_text,
+    search,
+    search_files,
+    weightings,
+)
 from tbcad.options.designs import OptimizeOptions
 
 SPEC = load_spec(None, ["n=4", "shell.wall_mm=4"])

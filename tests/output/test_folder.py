@@ -13,8 +13,8 @@ import pytest
 from tbcad.errors import InputError
 from tbcad.output import folder as folder_module
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.foreign_files import ALWAYS_KEPT
 from tbcad.output.manifest import fingerprint, is_file, write_manifest
+from tbcad.output.single_files import ALWAYS_KEPT
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("design.json", "mirrors.csv", "shell_a.stl")

@@ -9,7 +9,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.travel import (
+from tbcad.prototype.drive.balance import (
     MIN_BELOW_DEG,
     HomeAngles,
     free_base_angles,

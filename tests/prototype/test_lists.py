@@ -129,7 +129,9 @@ def test_circuits_that_there_are_not(spec: PrototypeSpec, stage: StageLayout) ->
 def test_the_supply_bears_motor_and_lights() -> None:
     """Heat of two phases with rated current, as much work, lamps and LEDs: of 24 V and 2 A."""
     lights = 4 * 2 * 0.05 * PARTS["STRIP-COB-24V"]["watt_m"] + 24 * 0.02 * 7
-    assert all(4 * one.rated_current**2 * one.resistance + lights < 24 * 2 for one in DRIVES)
+    for one in DRIVES:
+        heat = 4 * one.of_motor("rated_a") ** 2 * one.of_motor("resistance_ohm")
+        assert heat + lights < 24 * 2
 
 
 @settings(SHARED, max_examples=30)

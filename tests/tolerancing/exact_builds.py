@@ -32,8 +32,7 @@ from tbcad.core.optics.surfaces import Surfaces
 from tbcad.output.manifest import write_manifest
 from tbcad.shell.files import shell_envelope
 from tbcad.shell.mesh import shell_mesh
-from tbcad.tolerancing.montecarlo.draws import ShellDraws
-from tbcad.tolerancing.montecarlo.warp import SmoothField
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, SmoothField
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 Heights: TypeAlias = Callable[[int, np.ndarray], np.ndarray]

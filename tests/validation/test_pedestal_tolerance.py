@@ -13,11 +13,17 @@ from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
-from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw, draw_kinds, shell_error_shapes
+from tbcad.tolerancing.montecarlo.draws import (
+    ShellDraws,
+    draw,
+    draw_kinds,
+    pivots,
+    shell_error_shapes,
+    smooth_field,
+)
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sensitivity import scaled
-from tbcad.tolerancing.montecarlo.warp import pivots, smooth_field
 from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 from tests.pedestal_designs import pedestal_design
 from tests.tolerancing.exact_builds import (

@@ -152,7 +152,7 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
 
     The files are read back before they replace the old ones.
     """
-    from tbcad.common.background import background_processes
+    from tbcad.common.schedule import background_processes
     from tbcad.output.folder import replacing
 
     out, verify, progress = Path(options.out), options.verify, options.progress

@@ -84,8 +84,7 @@ def optimize(options: OptimizeOptions) -> SearchResult:
         InputError: the design is not allowed or cannot be made, or a file exists.
     """
     from tbcad.common.atomic_files import replace_files
-    from tbcad.optimizing.files import search_files
-    from tbcad.optimizing.search import search
+    from tbcad.optimizing.search import search, search_files
 
     options.check()
     spec = chosen_spec(options.design, None, options.settings)

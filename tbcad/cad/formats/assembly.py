@@ -37,7 +37,7 @@ from tbcad.cad.formats.step import (
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
 from tbcad.cad.kernel.solids import moved, solids
-from tbcad.common.colours import srgb_light
+from tbcad.common.figure_files import srgb_light
 from tbcad.types import Floats
 
 Colour: TypeAlias = tuple[float, float, float, float]

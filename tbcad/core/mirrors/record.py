@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tbcad.cad.formats.checked_files import Row, write_table
-from tbcad.common.colours import shades
+from tbcad.common.figure_files import shades
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import CameraRecord, DesignRecord, MandrelRecord, ShellFiles

@@ -23,7 +23,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from tbcad.cad.formats.assembly import UPRIGHT
-from tbcad.common.colours import srgb_light
+from tbcad.common.figure_files import srgb_light
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.field import Field
 from tbcad.light.reconstruction.marching import MATT, Singles

@@ -3,11 +3,10 @@
 A fastener belongs to the step that mounts the last body it goes through. What has no body (belt,
 wire, glue) belongs to the step that names its kind. Steps thus take exactly the parts of the list.
 
-A screw is as tight as what it presses on and is held by permit. The torque is K d F with K = 0.2
-for dry steel (Shigley's Mechanical Engineering Design). The force F is limited by what yields
-first. Printed PETG creeps, so heads press on it with at most 20 MPa, less than half of its yield
-(assumed 50 MPa), and inserts shear it with at most 8 MPa, less than a third of its yield in shear
-(50 MPa / sqrt 3). Screws 8.8 bear 0.75 of their proof stress, 580 MPa (ISO 898-1).
+The torque of a screw is K d F with K = 0.2 for dry steel (Shigley's Mechanical Engineering Design),
+the force F by what yields first. Printed PETG creeps: heads press on it with less than half of its
+yield (assumed 50 MPa), inserts shear it with less than a third of that in shear (50 MPa / sqrt 3).
+Screws 8.8 bear 0.75 of their proof stress, 580 MPa (ISO 898-1).
 """
 
 import math

@@ -43,7 +43,6 @@ class Catalogue:
     balls: tuple[StockBall, ...]
 
     def __len__(self) -> int:
-        """Number of sizes."""
         return len(self.balls)
 
     @cached_property

@@ -1,14 +1,16 @@
-"""The prototype in numbers: balls, their places on the base, its swing and its stops."""
+"""The prototype in numbers: balls, what they show, their places on the base, swing and stops."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from tbcad.core.geometry.rotations import rotated_about_x
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
+from tbcad.core.optics.ball_light import ball_poses, pixel_counts, used_outlines
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.prototype import MOST_BALLS
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
@@ -18,14 +20,17 @@ from tbcad.prototype.balls.clearance import (
     obstacles,
     seat_half_angles,
 )
-from tbcad.prototype.balls.fit import BallFit, ball_alternatives, ball_fit
-from tbcad.prototype.balls.groups import MirrorGroups, group_mirrors, max_groups
-from tbcad.prototype.balls.placement import (
-    Placement,
-    PlacementProblem,
-    min_swing_placement,
+from tbcad.prototype.balls.placement import Placement, PlacementProblem, min_swing_placement
+from tbcad.prototype.balls.selection import (
+    COVERAGE_ROUNDING_MM,
+    BallCandidates,
+    Balls,
+    MirrorGroups,
+    ball_candidates,
+    choose_balls,
+    group_mirrors,
+    max_groups,
 )
-from tbcad.prototype.balls.selection import Balls, ball_candidates, choose_balls
 from tbcad.prototype.balls.stops import (
     StopPlan,
     StopRequests,
@@ -36,6 +41,86 @@ from tbcad.prototype.balls.stops import (
 from tbcad.prototype.suitable import check_suitable
 from tbcad.records.prototype import Alternative
 from tbcad.types import Floats, Ints
+
+SELECTION_RULES: dict[str, dict[str, Any]] = {
+    f"{snap}, {name}": {"snap": snap, "caps": caps}
+    for snap in ("cover", "nearest")
+    for name, caps in (("with caps", True), ("balls only", False))
+}
+
+
+@dataclass(frozen=True)
+class BallFit:
+    """How well balls replace mirrors, m mirrors."""
+
+    ball: Ints  # that replaces the mirror, (m,)
+    coverage: Floats  # coverage diameter within the mirror's cell moved with the ball, mm, (m,)
+    # the same within the cell left in its place; zero where the ball shows the origin outside of
+    # it, mm, (m,)
+    coverage_fixed: Floats
+    pixels_shell: Floats  # pixels of the capture sphere in the shell's picture, (m,)
+    pixels: Floats  # the same in the ball's picture, (m,)
+
+    @property
+    def kept_share(self) -> float:
+        """Share of the shell's pixels that the balls keep."""
+        return float(self.pixels.sum() / self.pixels_shell.sum())
+
+
+def ball_fit(candidates: BallCandidates, balls: Balls) -> BallFit:
+    """What the balls show in place of the mirrors."""
+    array, groups = candidates.array, candidates.groups
+    shell = used_outlines(
+        ball_poses(array.ellipsoid, array.polar),
+        array.mirrors.radius,
+        2 * array.ellipsoid.linear_eccentricity,
+        candidates.target / 2,
+    )
+    return BallFit(
+        ball=groups.group_of,
+        coverage=candidates.coverage(balls.radius, moved=True),
+        coverage_fixed=candidates.coverage(balls.radius, moved=False),
+        pixels_shell=_pixels(array, shell),
+        pixels=_pixels(array, balls.outline[groups.group_of]),
+    )
+
+
+def _pixels(array: MirrorArray, outline: Floats) -> Floats:
+    """Pixels within outlines (m, s, 3); a mirror halved by the seam has half of them."""
+    share = np.where(array.u[:, 0] == 0, 0.5, 1.0)
+    return share * pixel_counts(array.camera, array.ellipsoid.frame(), outline, array.azimuth)
+
+
+def ball_alternatives(
+    spec: Spec, array: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
+) -> tuple[Alternative, ...]:
+    """What each rule costs for groups of camera a's mirrors; fit is by the spec's own rule.
+
+    pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
+    within the moved cells, and mirrors_below_target counts those whose coverage is less.
+    """
+    target = spec.optics.capture_diameter_mm
+    candidates = ball_candidates(array, groups, target, spec.prototype.ball_margin_mm)
+
+    alternatives = []
+    for name, rule in SELECTION_RULES.items():
+        ruled, chosen, shown = spec.prototype.model_copy(update=rule), balls, fit
+        if ruled != spec.prototype:
+            chosen = choose_balls(candidates, ruled, balls.catalogue)
+            shown = ball_fit(candidates, chosen)
+        alternatives.append(
+            Alternative(
+                name=name,
+                pixels=float(shown.pixels.sum()),
+                pixels_kept_share=shown.kept_share,
+                coverage_mm=float(shown.coverage.min()),
+                mirrors_below_target=int((shown.coverage < target - COVERAGE_ROUNDING_MM).sum()),
+                balls_mass_g=float(chosen.mass_g.sum()),
+                caps=int(chosen.cap.sum()),
+            )
+        )
+    return tuple(alternatives)
+
 
 # Length of the post in semi-major axes: it reaches down beyond all balls.
 POST_LENGTHS = 3
@@ -66,7 +151,6 @@ class PrototypeLayout:
     twin: Ints
 
     def __len__(self) -> int:
-        """Number of balls."""
         return len(self.balls)
 
     def on_base(self, points: Floats, angle: float = 0.0) -> Floats:
@@ -96,11 +180,6 @@ class PrototypeLayout:
         """Mass of the bought balls, grams."""
         return float(self.balls.mass_g.sum())
 
-    @property
-    def span(self) -> float:
-        """Azimuth between the outermost balls on the base, radians."""
-        return float(np.ptp(self.placement.azimuth))
-
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:
         """What each rule to choose the balls costs, as of `ball_alternatives`."""
@@ -128,7 +207,7 @@ class BallChoices:
             limits, target = self.spec.prototype, self.spec.optics.capture_diameter_mm
             candidates = ball_candidates(self.array, self.groups(k), target, limits.ball_margin_mm)
             balls = choose_balls(candidates, limits, self._catalogue)
-            self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls, limits)
+            self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls)
         return self._chosen[k]
 
     @cached_property

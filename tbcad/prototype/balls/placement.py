@@ -1,9 +1,8 @@
 """Azimuths of the balls on the base with which the base swings least.
 
-Camera, object and ellipsoid look the same from every azimuth. So whether one ball touches another,
-or blocks its light, depends only on the difference of their azimuths, which must be at least one
-angle for each pair. What remains is to choose which of the two goes first in each pair: a mixed
-integer linear program.
+Whether one ball touches another, or blocks its light, depends only on the difference of their
+azimuths, which must be at least one angle for each pair. What remains is to choose which of the two
+goes first in each pair: a mixed integer linear program (docs/prototype.md).
 """
 
 from collections.abc import Iterator
@@ -11,7 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import block_array, coo_array, csr_array, eye_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from tbcad.core.spec.errors import SpecError
@@ -45,7 +44,6 @@ class PlacementProblem:
     max_swing: float  # maximum angle that the base may turn through
 
     def __len__(self) -> int:
-        """Number of balls."""
         return len(self.served_low)
 
     def half_swing(self, azimuth: Floats) -> float:
@@ -241,37 +239,27 @@ def _constraints(
     problem: PlacementProblem, first: Ints, second: Ints, low: Floats, high: Floats
 ) -> tuple[coo_array, Floats]:
     """All constraints as rows: matrix and minimum of each row's product with the variables."""
-    k, ball, pair = len(problem), np.arange(len(problem)), np.arange(len(first))
-    half_swing, outermost, order = np.full(k, k), np.full(k, k + 1), k + 2 + pair
-    gap = problem.min_separation[first, second]
+    k, pairs, pair = len(problem), len(first), np.arange(len(first))
+    gap, each = problem.min_separation[first, second], np.ones(pairs)
     # With this much added or taken away a pair's row holds for all azimuths.
     loose = gap + np.maximum(high[first] - low[second], high[second] - low[first])
-    one, each = np.ones(k), np.ones(len(first))
+    ball, one = eye_array(k), np.ones((k, 1))
+    balls = np.concatenate([pair, pair]), np.concatenate([first, second])
+    apart = coo_array((np.concatenate([each, -each]), balls), shape=(pairs, k))
+    order = coo_array((loose, (pair, pair)), shape=(pairs, pairs))
     blocks = [
         # The swing reaches both ends of each group.
-        ([(ball, one), (half_swing, one)], problem.served_high),
-        ([(ball, -one), (half_swing, one)], -problem.served_low),
+        ([ball, one, None, None], problem.served_high),
+        ([-ball, one, None, None], -problem.served_low),
         # No ball leaves its allowed azimuths.
-        ([(ball, -one), (half_swing, -one)], -problem.max_azimuth),
-        ([(ball, one), (half_swing, -one)], problem.min_azimuth),
+        ([-ball, -one, None, None], -problem.max_azimuth),
+        ([ball, -one, None, None], problem.min_azimuth),
         # The outermost edge, to either side.
-        ([(ball, -one), (half_swing, -one), (outermost, one)], problem.seat_half_angle),
-        ([(ball, one), (half_swing, -one), (outermost, one)], problem.seat_half_angle),
+        ([-ball, -one, one, None], problem.seat_half_angle),
+        ([ball, -one, one, None], problem.seat_half_angle),
         # Of each pair one ball goes first; the other ball's row is then loose.
-        ([(first, each), (second, -each), (order, -loose)], gap - loose),
-        ([(first, -each), (second, each), (order, loose)], gap),
+        ([apart, None, None, -order], gap - loose),
+        ([-apart, None, None, order], gap),
     ]
-    return _matrix(blocks, k + 2 + len(first)), np.concatenate([minimum for _, minimum in blocks])
-
-
-def _matrix(blocks: list[tuple[list[tuple[Ints, Floats]], Floats]], columns: int) -> coo_array:
-    """The rows of all blocks below each other; a block is terms (column, factor) and minima."""
-    rows, cells, values, start = [], [], [], 0
-    for terms, minimum in blocks:
-        for column, factor in terms:
-            rows.append(start + np.arange(len(minimum)))
-            cells.append(column)
-            values.append(factor)
-        start += len(minimum)
-    places = (np.concatenate(rows), np.concatenate(cells))
-    return coo_array((np.concatenate(values), places), shape=(start, columns))
+    rows, minima = zip(*blocks, strict=True)
+    return block_array(rows, format="coo"), np.concatenate(minima)

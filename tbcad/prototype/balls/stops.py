@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.common.compiled import compiled_loop
-from tbcad.prototype.balls.groups import MirrorGroups
 from tbcad.prototype.balls.placement import PlacementProblem
+from tbcad.prototype.balls.selection import MirrorGroups
 from tbcad.types import Bools, Floats, Ints
 
 TRIES_PER_TOLERANCE = 4  # azimuths tried for a ball within its tolerance
@@ -59,7 +59,6 @@ class StopPlan:
     error: Floats  # angle between the ball's direction and the mirror's, radians, (m,)
 
     def __len__(self) -> int:
-        """Number of stops."""
         return len(self.angle)
 
     @property

@@ -135,16 +135,11 @@ def thinned(line: Floats, shortest: float) -> Floats:
         part = int(inner.argmin()) + 1
         if inner.min() >= shortest:
             break
-        corner = _intersection(line[part - 1 : part + 3])
-        line = np.vstack([line[:part], corner, line[part + 2 :]])
+        start, a, end, b = line[part - 1], line[part], line[part + 1], line[part + 2]
+        a, b = a - start, b - end
+        share = np.linalg.solve(np.stack([a, -b], axis=1), end - start)
+        line = np.vstack([line[:part], start + share[0] * a, line[part + 2 :]])
     return line
-
-
-def _intersection(four: Floats) -> Floats:
-    """Intersection of the lines through the first two and the last two of four points, (2,)."""
-    a, b = four[1] - four[0], four[3] - four[2]
-    share = np.linalg.solve(np.stack([a, -b], axis=1), four[2] - four[0])
-    return np.asarray(four[0] + share[0] * a)
 
 
 def distance_outside(line: Floats, points: Floats) -> Floats:

@@ -9,17 +9,16 @@ from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
 from tbcad.prototype.base.holding import base_motion
-from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.drive.loads import (
+from tbcad.prototype.drive.balance import BaseBalance, power_off, stop_sequence
+from tbcad.prototype.drive.drive import (
     HOLD_MARGIN,
     MAX_RISE_K,
     MAX_WIND_UP_DEG,
     SELF_LOCKING,
-    DriveLoads,
+    Drive,
     base_torques,
+    drive_loads,
 )
-from tbcad.prototype.drive.travel import power_off, stop_sequence
 from tbcad.prototype.electronics import phases
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import totals
@@ -125,7 +124,7 @@ def drive_record(
 ) -> DriveRecord:
     """What the drive must bear and does over a swing (radians), with its limits."""
     torques = base_torques(balance, swing, motion)
-    loads = DriveLoads(drive, torques)
+    loads = drive_loads(drive, torques)
     return DriveRecord(
         mass_g=balance.mass_g,
         centre_mm=(balance.centre + 0.0).tolist(),

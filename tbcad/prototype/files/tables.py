@@ -12,7 +12,7 @@ import numpy as np
 from tbcad.cad.formats.checked_files import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.drive.loads import DriveLoads
+from tbcad.prototype.drive.drive import DriveLoads
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.records.tables import BallRow, PictureRow, StopRow
 from tbcad.types import Floats
@@ -33,11 +33,9 @@ def ball_rows(layout: PrototypeLayout) -> list[Row]:
     mass: those depend on how it is made.
     """
     served = np.bincount(layout.fit.ball, minlength=len(layout)).tolist()
-    cells = zip(_pose(layout).tolist(), served, _shown(layout).tolist(), strict=True)
-    return _rows(
-        BALL_COLUMNS,
-        ([*_names(layout, j), *cell[0], cell[1], *cell[2]] for j, cell in enumerate(cells)),
-    )
+    cells = enumerate(zip(_pose(layout).tolist(), served, _shown(layout).tolist(), strict=True))
+    rows = ([*_names(layout, j), *pose, count, *shown] for j, (pose, count, shown) in cells)
+    return _rows(BALL_COLUMNS, rows)
 
 
 def _rows(columns: Iterable[str], cells: Iterable[Sequence[Cell]]) -> list[Row]:
@@ -99,16 +97,12 @@ def picture_rows(layout: PrototypeLayout) -> list[Row]:
     degrees = (np.degrees([stops.angle[stops.stop], *errors]) + 0.0).T.tolist()
     order = np.argsort(stops.stop, kind="stable").tolist()
     mirrors_b = [f"b{i + 1:04d}" for i in layout.twin.tolist()]
-    turns = (
-        (turn, ids, i) for turn, ids in ((0, layout.array.ids), (180, mirrors_b)) for i in order
+    cells = (
+        (turn, stop[i] + 1, degrees[i][0], ball[i], ids[i], *degrees[i][1:])
+        for turn, ids in ((0, layout.array.ids), (180, mirrors_b))
+        for i in order
     )
-    return _rows(
-        PICTURE_COLUMNS,
-        (
-            (number, turn, stop[i] + 1, degrees[i][0], ball[i], ids[i], *degrees[i][1:])
-            for number, (turn, ids, i) in enumerate(turns, 1)
-        ),
-    )
+    return _rows(PICTURE_COLUMNS, ((number, *row) for number, row in enumerate(cells, 1)))
 
 
 def stop_rows(layout: PrototypeLayout, balance: BaseBalance, loads: DriveLoads) -> list[Row]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.formats.assembly import (
     Colour,
@@ -21,7 +22,7 @@ from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.solids import pyramid, sphere
-from tbcad.common.background import Submit, at_once
+from tbcad.common.schedule import Submit
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
@@ -32,7 +33,7 @@ from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits
 from tbcad.prototype.drawings.caps import cap_sheet
 from tbcad.prototype.drawings.parts import listed, sheets
-from tbcad.prototype.drive.loads import DriveLoads, base_torques
+from tbcad.prototype.drive.drive import base_torques, drive_loads
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
@@ -129,7 +130,7 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:
     layout, motion = built.layout, built.spec.prototype.motion
-    loads = DriveLoads(built.drive, base_torques(built.balance, layout.stops.range, motion))
+    loads = drive_loads(built.drive, base_torques(built.balance, layout.stops.range, motion))
     for name, columns, rows in (
         (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),
         ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),
@@ -155,17 +156,26 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
     Coupons are tools and left out. What light passes through is included to be looked at, and
     transparent: the capture sphere, and what the camera sees.
     """
+    layout, centre = prototype.layout, prototype.layout.body_centres()
+    balls = (
+        ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(layout.balls.body_radius[k])), STEEL)
+        for k in (~layout.balls.cap).nonzero()[0].tolist()
+    )
+    card = (  # without flaps; transparent, so that the rig is seen
+        ColouredSolid(panel.name, component_solid(panel.component), CARD)
+        for panel in (prototype.shroud.panels if prototype.shroud else ())
+    )
     purchased = (
         ColouredSolid(component.name, component_solid(component), METAL)
         for component in prototype.frame.purchased
     )
     return (
         _printed("base", prototype, ("base", "cap")),
-        SolidGroup("balls", tuple(_balls(prototype))),
+        SolidGroup("balls", tuple(balls)),
         _printed("stage", prototype, ("stage",)),
         _printed("frame", prototype, ("frame",)),
         SolidGroup("bought", tuple(purchased)),
-        SolidGroup("shroud", tuple(_shroud(prototype))),
+        SolidGroup("shroud", tuple(card)),
         SolidGroup("fasteners", tuple(_fasteners(prototype.fasteners))),
         _views(prototype),
     )
@@ -190,18 +200,6 @@ def _fasteners(fasteners: Sequence[Fastener]) -> Iterator[ColouredSolid]:
             solid = component_solid(fastener_component(at_origin))
             originals[name] = ColouredSolid(name, solid, FASTENER, display_mesh(solid))
         yield originals[name].copy(one.name, fastener_axes(one.along), one.place)
-
-
-def _balls(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
-    balls, centre = prototype.layout.balls, prototype.layout.body_centres()
-    for k in (~balls.cap).nonzero()[0].tolist():
-        yield ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(balls.body_radius[k])), STEEL)
-
-
-def _shroud(prototype: PrototypeModel) -> Iterator[ColouredSolid]:
-    """The panels without flaps; transparent, so that the rig is seen."""
-    for panel in prototype.shroud.panels if prototype.shroud else ():
-        yield ColouredSolid(panel.name, component_solid(panel.component), CARD)
 
 
 def _views(prototype: PrototypeModel) -> SolidGroup:

@@ -14,8 +14,8 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.drive.balance import home_angles
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.drive.travel import home_angles
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
 from tbcad.prototype.frame.feet import stage_foot, upright_foot
@@ -166,17 +166,11 @@ def _slots(
 ) -> tuple[Primitive, ...]:
     """The four slots of an extrusion, simplified: as wide inside as at its face."""
     half, inner, outer = width / 2, EXTRUSION_MM / 2 - SLOT_DEPTH_MM, EXTRUSION_MM / 2 + THROUGH_MM
-    (x, y), (low, high) = middle, heights
-    sides = [((a, -half), (b, half)) for a, b in ((inner, outer), (-outer, -inner))]
-    sides += [((-half, a), (half, b)) for a, b in ((inner, outer), (-outer, -inner))]
-    return tuple(
-        box(
-            np.array([x + x0, y + y0, low - THROUGH_MM]),
-            np.array([x + x1, y + y1, high + THROUGH_MM]),
-            axes,
-        )
-        for (x0, y0), (x1, y1) in sides
-    )
+    low, high = (np.array([*middle, z]) for z in (heights[0] - THROUGH_MM, heights[1] + THROUGH_MM))
+    ends = ((inner, outer), (-outer, -inner))
+    sides = [((a, -half, 0.0), (b, half, 0.0)) for a, b in ends]
+    sides += [((-half, a, 0.0), (half, b, 0.0)) for a, b in ends]
+    return tuple(box(low + one, high + other, axes) for one, other in sides)
 
 
 def _plate(

@@ -1,7 +1,6 @@
 """The lamps as data: strips, places, bodies, and what holds them."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -160,6 +159,7 @@ class LampMounts:
     strip: PurchasedPart  # part
     face: float  # x of the uprights' front, mm
     sides: tuple[float, float]  # of a shining face, along y and along z, mm
+    level: bool  # whether strips lie level, else they are upright
 
     @property
     def half(self) -> float:
@@ -181,43 +181,55 @@ class LampMounts:
         """Y of the columns' middles, at either side."""
         return self.across + OUT_MM + COLUMN_OUT_MM
 
+    def screws(self, place: Floats) -> list[Floats]:
+        """Places of a holder's screws on the uprights' faces, the upper first."""
+        if self.level:
+            return [np.array([self.face, side * self.across, place[2]]) for side in (1, -1)]
+        y, end = np.sign(place[1]) * self.across, float(place[2]) - self.sides[1] / 2
+        return [np.array([self.face, y, end - down]) for down in TAIL_SCREWS_MM]
+
     def holder(self, number: int, place: Floats) -> Component:
-        """A plate on the front of an upright, with two screws below the strips."""
-        ends = self.across - EXTRUSION_MM / 2, abs(float(place[1])) + self.half
-        y = np.sort(np.sign(place[1]) * np.array(ends))
-        plate = self._plate(place, y, (self._end(place) - TAIL_MM, self._top(place)))
-        return _holder(number, "an upright", plate, self.holder_screws(place))
-
-    def holder_screws(self, place: Floats) -> list[Floats]:
-        """Places of a holder's screws on its upright's face, the upper first."""
-        y = np.sign(place[1]) * self.across
-        return [np.array([self.face, y, self._end(place) - down]) for down in TAIL_SCREWS_MM]
-
-    def bar(self, number: int, place: Floats) -> Component:
-        """A plate across both uprights, with a screw on each."""
-        end, half = self.across + EXTRUSION_MM / 2, self.half_height
-        heights = float(place[2]) - half, float(place[2]) + half
-        plate = self._plate(place, np.array([-end, end]), heights)
-        return _holder(number, "both uprights", plate, self.bar_screws(place))
-
-    def bar_screws(self, place: Floats) -> list[Floats]:
-        """Places of a bar's screws on the uprights' faces."""
-        return [np.array([self.face, side * self.across, float(place[2])]) for side in (1, -1)]
+        """A bar across both uprights, or a plate on one with its screws below the strips."""
+        where, y = "both uprights", np.array([-1, 1]) * (self.across + EXTRUSION_MM / 2)
+        if not self.level:
+            ends = self.across - EXTRUSION_MM / 2, abs(float(place[1])) + self.half
+            where, y = "an upright", np.sort(np.sign(place[1]) * np.array(ends))
+        plate = self._plate(place, y, self._heights(place, TAIL_MM))
+        holes = drilled_holes(self.screws(place), HOLDER_MM * LEVEL, CLEARANCE_HOLE_MM[SCREW_MM])
+        what = f"holder of lamp {number} on {where}"
+        return Component(f"lamp_holder_{number}", what, (plate,), tuple(holes), (-LEVEL,))
 
     def stand(self, number: int, place: Floats) -> Bracket:
-        """A plate on a column, on a foot with two screws."""
-        side, end = np.sign(place[1]), abs(float(place[1]))
-        y = np.sort(side * np.array([end - self.half, end + self.half]))
-        plate = self._plate(place, y, (self._end(place) - EDGE_MM, self._top(place)))
-        what = f"stand of lamp {number}"
-        return self._standing(number, what, place, (float(side),), self._top(place), plate)
-
-    def bridge(self, number: int, place: Floats) -> Bracket:
-        """A plate across two columns, past the camera on both sides."""
-        half, z = self.half_height, float(place[2])
-        plate = self._plate(place, np.array([-self.column, self.column]), (z - half, z + half))
-        what = f"bridge of lamp {number} over the camera"
-        return self._standing(number, what, place, (1.0, -1.0), z + half, plate)
+        """A bridge on two columns past the camera, or a plate on one; a foot has two screws."""
+        what, sides = f"bridge of lamp {number} over the camera", [1.0, -1.0]
+        y, heights = np.array([-self.column, self.column]), self._heights(place, EDGE_MM)
+        if not self.level:
+            side, end = float(np.sign(place[1])), abs(float(place[1]))
+            what, sides = f"stand of lamp {number}", [side]
+            y = np.sort(side * np.array([end - self.half, end + self.half]))
+        x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
+        floor, flange = self.frame.floor_mm, self.frame.flange_mm
+        feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
+        half, beside = np.array([COLUMN_MM / 2, FOOT_IN_MM]), np.array([[-1, 0], [1, 0]])
+        for side in sides:
+            middle = np.array([x, side * self.column])
+            out = np.sort(middle[1] + side * np.array([-FOOT_IN_MM, FOOT_OUT_MM]))
+            foot = np.array([[x - FOOT_HALF_MM, out[0]], [x + FOOT_HALF_MM, out[1]]])
+            column = (middle - half, middle + half)
+            for (low, high), top in ((foot, floor + flange), (column, heights[1])):
+                added.append(box(np.array([*low, floor]), np.array([*high, top]), np.eye(3)))
+            feet.append(foot)
+            holes.append(middle + SCREW_SIDE_MM * beside + [0.0, side * SCREW_OUT_MM])
+        places = np.vstack(holes)
+        starts = [np.array([*hole, floor]) for hole in places]
+        component = Component(
+            f"lamp_stand_{number}",
+            what,
+            (*added, self._plate(place, y, heights)),
+            tuple(drilled_holes(starts, flange * UP, CLEARANCE_HOLE_MM[SCREW_MM])),
+            (LEVEL, -UP),
+        )
+        return Bracket(component, places, np.vstack(feet))
 
     def strips(self, number: int, place: Floats, cut: str) -> Component:
         """The strips of a lamp, as one body."""
@@ -228,54 +240,15 @@ class LampMounts:
         what = f"{self.strip.what}, cut to {cut}"
         return Component(f"lamp_{number}", what, (box(low, high, np.eye(3)),), part=self.strip.name)
 
-    def _end(self, place: Floats) -> float:
-        return float(place[2]) - self.sides[1] / 2
-
-    def _top(self, place: Floats) -> float:
-        return float(place[2]) + self.sides[1] / 2 + EDGE_MM
+    def _heights(self, place: Floats, below: float) -> tuple[float, float]:
+        """Of a plate: alike about level strips, else so far below upright ones."""
+        z, half = float(place[2]), self.half_height
+        if self.level:
+            return z - half, z + half
+        return z - self.sides[1] / 2 - below, z + self.sides[1] / 2 + EDGE_MM
 
     def _plate(self, place: Floats, y: Floats, z: tuple[float, float]) -> Prism:
         """The plate behind the strips, between two places across and two heights."""
         near = abs(float(place[0])) + self.strip["thickness_mm"]
         x = np.sort(np.sign(place[0]) * np.array([near, near + HOLDER_MM]))
         return box(np.array([x[0], y[0], z[0]]), np.array([x[1], y[1], z[1]]), np.eye(3))
-
-    def _standing(
-        self,
-        number: int,
-        what: str,
-        place: Floats,
-        sides: tuple[float, ...],
-        top: float,
-        plate: Prism,
-    ) -> Bracket:
-        """A plate on a column at each of some sides, each on a foot with two screws."""
-        x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
-        floor, flange = self.frame.floor_mm, self.frame.flange_mm
-        feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
-        half = np.array([COLUMN_MM / 2, FOOT_IN_MM])
-        for side in sides:
-            middle = np.array([x, side * self.column])
-            y = np.sort(middle[1] + side * np.array([-FOOT_IN_MM, FOOT_OUT_MM]))
-            foot = np.array([[x - FOOT_HALF_MM, y[0]], [x + FOOT_HALF_MM, y[1]]])
-            for (low, high), end in ((foot, floor + flange), ((middle - half, middle + half), top)):
-                added.append(box(np.array([*low, floor]), np.array([*high, end]), np.eye(3)))
-            feet.append(foot)
-            beside = np.array([[-SCREW_SIDE_MM, 0], [SCREW_SIDE_MM, 0]])
-            holes.append(middle + beside + [0.0, side * SCREW_OUT_MM])
-        places = np.vstack(holes)
-        starts = [np.array([*hole, floor]) for hole in places]
-        component = Component(
-            f"lamp_stand_{number}",
-            what,
-            (*added, plate),
-            tuple(drilled_holes(starts, flange * UP, CLEARANCE_HOLE_MM[SCREW_MM])),
-            (LEVEL, -UP),
-        )
-        return Bracket(component, places, np.vstack(feet))
-
-
-def _holder(number: int, where: str, plate: Prism, screws: Sequence[Floats]) -> Component:
-    holes = tuple(drilled_holes(screws, HOLDER_MM * LEVEL, CLEARANCE_HOLE_MM[SCREW_MM]))
-    what = f"holder of lamp {number} on {where}"
-    return Component(f"lamp_holder_{number}", what, (plate,), holes, (-LEVEL,))

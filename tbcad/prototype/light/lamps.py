@@ -2,9 +2,7 @@
 
 Four upright lamps are images of one another in the planes x = 0 and y = 0. Where they have no
 room, two level ones are each other's image by the half turn about z, on a bar across the uprights
-and on a bridge over the camera. That turn of the object leaves the light of either as it was.
-Above the horizon there is no such place: at some stop the base is between it and the object, or it
-is in the light of the mirrors.
+and on a bridge over the camera: decision 0014.
 """
 
 from collections.abc import Sequence
@@ -117,7 +115,7 @@ class _LampSearch:
     def mounts(self) -> LampMounts:
         width = self.spec.light.strips * self.strip["width_mm"]
         sides = (self.length, width) if self.level else (width, self.length)
-        return LampMounts(self.spec.frame, self.strip, self.face, sides)
+        return LampMounts(self.spec.frame, self.strip, self.face, sides, self.level)
 
     def places(self, z: float) -> Floats:
         """Middles of the shining faces (l, 3), at a height."""
@@ -170,11 +168,6 @@ class _LampSearch:
         numbered = list(enumerate(places, 1))
         before = [one for one in numbered if one[1][0] > 0]
         behind = [one for one in numbered if one[1][0] < 0]
-        stand, holder, screws = (
-            (mounts.bridge, mounts.bar, mounts.bar_screws)
-            if self.level
-            else (mounts.stand, mounts.holder, mounts.holder_screws)
-        )
         return LampLayout(
             strip=self.strip,
             strips=self.spec.light.strips,
@@ -182,14 +175,14 @@ class _LampSearch:
             level=self.level,
             places=places,
             inward=-np.sign(places[:, :1]) * LEVEL,
-            stands=tuple(stand(number, place) for number, place in before),
-            holders=tuple(holder(number, place) for number, place in behind),
-            screws=tuple(dict.fromkeys(float(at[2]) for at in screws(behind[0][1]))),
+            stands=tuple(mounts.stand(number, place) for number, place in before),
+            holders=tuple(mounts.holder(number, place) for number, place in behind),
+            screws=tuple(dict.fromkeys(float(at[2]) for at in mounts.screws(behind[0][1]))),
             fasteners=tuple(
                 fastener
                 for number, place in behind
                 for fastener in on_uprights(
-                    f"lamp_holder_{number}", screws(place), -LEVEL, HOLDER_MM, self.parts
+                    f"lamp_holder_{number}", mounts.screws(place), -LEVEL, HOLDER_MM, self.parts
                 )
             ),
             bodies=tuple(

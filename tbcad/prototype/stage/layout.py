@@ -1,9 +1,8 @@
 """The object stage in numbers: a turning disc on a crown with LED pockets, and a hollow post.
 
-No mirror looks from below the horizon, so all light on its way from the object lies above the
-bottom of the capture sphere, or next to it. The crown therefore stays inside the sphere, where it
-is part of the scene, and goes through the sphere's bottom as a thin neck; below that there is no
-light and the post can be thick. The disc stands as low as LED pockets beside it still fit inside.
+All light on its way from the object lies above the bottom of the capture sphere, or next to it. So
+the crown stays inside the sphere, where it is part of the scene, and goes through its bottom as a
+thin neck; below that the post can be thick. The disc stands as low as LED pockets still fit inside.
 """
 
 from collections.abc import Iterator
@@ -90,15 +89,7 @@ def stage_layout(
         post_component(sizes, foot),
     )
     light, swept = _check_clearances(components, keep_out, spec.frame.clearance_mm)
-    return StageLayout(
-        sizes=sizes,
-        foot=foot,
-        led=led,
-        leds=leds,
-        components=components,
-        light=light,
-        swept=swept,
-    )
+    return StageLayout(sizes, foot, led, leds, components, light, swept)
 
 
 def led_poses(stage: StageLayout) -> list[tuple[str, Floats, Floats]]:

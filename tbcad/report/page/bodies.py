@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.common.colours import shown_colour
+from tbcad.common.figure_files import shown_colour
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces

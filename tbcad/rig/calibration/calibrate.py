@@ -8,9 +8,8 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.records.run import Geometry
+from tbcad.records.run import Frame, Geometry
 from tbcad.records.tables import StopRow
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.estimate.parameters import Block, Prior
@@ -22,7 +21,7 @@ from tbcad.rig.machine.designed import designed_prototype, is_cap
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.draws import read_wind_up
+from tbcad.tolerancing.prototype.windows import read_wind_up
 from tbcad.types import Bools, Ints, Progress
 
 MIN_HIGHLIGHTS = 10  # of a half

@@ -15,7 +15,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
-from tbcad.records.exposure import Frame
+from tbcad.records.run import Frame
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
 from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior, covariance

@@ -17,7 +17,7 @@ from PIL import Image
 from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, RAW_SUFFIXES
 from tbcad.cad.formats.pixels import TIFF_SIGNATURES
 from tbcad.errors import InputError
-from tbcad.records.exposure import Setting
+from tbcad.records.run import Setting
 from tbcad.rig.control.plan import CameraFault
 from tbcad.rig.runs import decoded_image
 

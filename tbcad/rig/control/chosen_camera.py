@@ -10,7 +10,7 @@ from time import monotonic, sleep
 
 from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
-from tbcad.records.exposure import PhaseTimes
+from tbcad.records.run import PhaseTimes
 from tbcad.rig.control.camera import RunCamera, Shot, image_facts, suffix_of
 from tbcad.rig.control.gphoto import GphotoCamera
 from tbcad.rig.control.plan import CameraFault

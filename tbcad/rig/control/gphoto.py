@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from tbcad.errors import InputError
-from tbcad.records.exposure import Setting
+from tbcad.records.run import Setting
 from tbcad.rig.control.camera import RunCamera, Shot, are_near, shutter_seconds, suffix_of
 from tbcad.rig.control.messages import INSTALL
 from tbcad.rig.control.plan import CameraFault

@@ -15,10 +15,10 @@ from tbcad.core.spec.prototype import MotionSpec
 from tbcad.errors import InputError, one_line
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import DesignRecord
-from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME as RECORD
 from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
+from tbcad.records.run import Frame
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
 from tbcad.types import Progress
 

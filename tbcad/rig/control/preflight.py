@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import label, maximum
 
 from tbcad.errors import InputError
-from tbcad.records.exposure import DARK, DARK_LIT, LIT
+from tbcad.records.run import DARK, DARK_LIT, LIT
 from tbcad.rig.control.camera import Shot
 from tbcad.rig.runs import Image16, decoded_image
 from tbcad.types import Floats, Progress

@@ -12,8 +12,7 @@ from tbcad.options.runs import Ask, RunOptions, Show
 from tbcad.options.shared import exposures
 from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs
-from tbcad.records.exposure import DARK_LIT, PhaseTimes
-from tbcad.records.run import RunRecord, read_record
+from tbcad.records.run import DARK_LIT, PhaseTimes, RunRecord, read_record
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.chosen_camera import (
     check_camera_name,

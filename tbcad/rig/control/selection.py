@@ -9,8 +9,8 @@ from pathlib import Path
 
 from tbcad.common.atomic_files import InFolder
 from tbcad.errors import InputError
-from tbcad.records.exposure import DARK_LIT, Frame, PhaseTimes, exposure_name
 from tbcad.records.prototype_drive import Phase
+from tbcad.records.run import DARK_LIT, Frame, PhaseTimes, exposure_name
 from tbcad.rig.control.base import travel_s
 from tbcad.rig.control.plan import ControlPlan
 

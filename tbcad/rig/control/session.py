@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tbcad.errors import InputError
 from tbcad.options.runs import Ask, Preflight, Show
-from tbcad.records.exposure import Frame, exposure_name
+from tbcad.records.run import Frame, exposure_name
 from tbcad.rig.control.camera import RunCamera, Shot
 from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault
 from tbcad.rig.control.selection import (

@@ -8,9 +8,8 @@ from datetime import UTC, datetime
 from time import monotonic
 
 from tbcad.errors import InputError
-from tbcad.records.exposure import Exposure, Frame, Setting, exposure_name
 from tbcad.records.prototype_drive import Phase
-from tbcad.records.run import PhaseExposure, RunRecord
+from tbcad.records.run import Exposure, Frame, PhaseExposure, RunRecord, Setting, exposure_name
 from tbcad.rig.control.camera import (
     ImageFacts,
     RunCamera,

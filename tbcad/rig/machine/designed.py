@@ -13,13 +13,12 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.records.exposure import Frame
 from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.run import Frame
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
-from tbcad.tolerancing.prototype.windows import tilted_centres
+from tbcad.tolerancing.prototype.windows import PrototypeDraws, draw_prototypes, tilted_centres
 from tbcad.types import Bools, Floats
 
 RUNS = 2  # of the base through its stops, the object turned by 180 degrees between both

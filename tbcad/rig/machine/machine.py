@@ -17,7 +17,7 @@ from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
 from tbcad.records.calibration import CalibratedCamera, MachineRecord, SphereRecord
-from tbcad.records.exposure import Frame
+from tbcad.records.run import Frame
 from tbcad.types import Floats, Ints
 
 RECORD = "machine.json"

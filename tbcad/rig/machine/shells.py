@@ -16,8 +16,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.calibration import NAME, CalibrationRecord
-from tbcad.records.exposure import Frame
-from tbcad.records.run import Geometry
+from tbcad.records.run import Frame, Geometry
 from tbcad.rig.machine.designed import (
     TURNS,
     BuiltPrototype,

@@ -18,7 +18,7 @@ from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, ball_reflecto
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import MergeOptions
-from tbcad.records.exposure import LIT, Frame, exposure_name
+from tbcad.records.run import LIT, Frame, exposure_name
 from tbcad.records.tables import RayRow
 from tbcad.rig.machine.designed import TURNS, machine_run, stops_known
 from tbcad.rig.machine.machine import RECORD, Machine, read_machine

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.common.colours import srgb, srgb_light
+from tbcad.common.figure_files import srgb, srgb_light
 from tbcad.core.optics.camera import LensCamera, vignetting
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import between_pixels
 from tbcad.options.machines import MergeOptions
 from tbcad.options.shared import AnyPath
-from tbcad.records.exposure import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
+from tbcad.records.run import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
 from tbcad.rig.runs import Image16, Run, read_image, read_photograph
 from tbcad.types import Bytes, Floats, Ints
 

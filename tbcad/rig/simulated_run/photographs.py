@@ -14,7 +14,7 @@ from tbcad.light.simulate.capture.photograph import row_bands
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.ray_casting import Scene
-from tbcad.records.exposure import DARK, DARK_LIT, LIT, Frame, PhaseTimes
+from tbcad.records.run import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.simulated_run.led_light import (
     DOME_MM,

@@ -27,8 +27,16 @@ from tbcad.options.machines import SimulateRunOptions
 from tbcad.options.shared import exposures
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.single_files import Source, refuse_inputs
-from tbcad.records.exposure import PHOTOGRAPHS, Exposure, Frame, PhaseTimes, exposure_name
-from tbcad.records.run import RECORD, Geometry, RunRecord
+from tbcad.records.run import (
+    PHOTOGRAPHS,
+    RECORD,
+    Exposure,
+    Frame,
+    Geometry,
+    PhaseTimes,
+    RunRecord,
+    exposure_name,
+)
 from tbcad.rig.machine.designed import (
     BuiltPrototype,
     designed_build,
@@ -49,7 +57,7 @@ from tbcad.rig.simulated_run.photographs import (
 )
 from tbcad.rig.simulated_run.sensor import Image16, SimulatedSensor
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.draws import read_wind_up
+from tbcad.tolerancing.prototype.windows import read_wind_up
 from tbcad.types import Progress
 
 CAMERA = "simulated"

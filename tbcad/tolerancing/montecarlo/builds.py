@@ -13,10 +13,9 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import chunks, in_threads
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.coverage import coverage, pointing
-from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, WarpMaps, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.montecarlo.warp import WarpMaps
 from tbcad.tolerancing.process.process import BUILT_IN, Process, load_process, process_errors
 from tbcad.types import Floats, Ints, Progress
 

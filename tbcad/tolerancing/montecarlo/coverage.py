@@ -40,8 +40,11 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False
     """Coverage of each mirror of one half, for s builds; see `trace_cell_edges` for worst_only."""
     outlines = np.empty((len(draws), len(half), 3))
     surfaces, views = surface_tables(half, draws), view_tables(half, draws)
-    forms, pairs = form_tables(half, draws), half.pairs.arrays
-    _move_out(surfaces[:, : len(half)], draws.valley)
+    forms, faces = form_tables(half, draws), half.pairs
+    pairs = faces.pair, faces.offset, faces.face, faces.reach
+    mirrors, out = surfaces[:, : len(half)], draws.valley[:, None]
+    mirrors[..., APEX] += out[..., None] * mirrors[..., NORMAL]
+    mirrors[..., CURVATURE] /= 1 + out * mirrors[..., CURVATURE]
     if worst_only:  # pictures do not count: cameras that only turn see the same
         views[:, RIGHT:] = views[:1, RIGHT:]
     for build in range(len(draws)):
@@ -56,12 +59,6 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False
     area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
     crossings = outlines[..., CROSSINGS].astype(np.int64)
     return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
-
-
-def _move_out(mirrors: Floats, by: Floats) -> None:
-    """Move surfaces (s, m, 7) along their normals by mm of each build (s,), in place."""
-    mirrors[..., APEX] += by[:, None, None] * mirrors[..., NORMAL]
-    mirrors[..., CURVATURE] /= 1 + by[:, None] * mirrors[..., CURVATURE]
 
 
 def virtual_camera_numbers(halved: Bools) -> Ints:
@@ -81,13 +78,9 @@ def coverage(
     """Exact coverage diameter (mm) and pixels of v virtual cameras in s builds, two of (s, v).
 
     The halves of a mirror on the seam count together: the smaller diameter, all pixels. A mirror
-    without a cell, or whose image does not surround the object's centre, covers nothing.
-
-    Args:
-        edge_models: both halves as designed.
-        draws: errors of each half.
-        worst_only: only the minimum diameter of each build is exact, the others are not below
-            theirs; and no pixels. It takes less time.
+    without a cell, or whose image does not surround the object's centre, covers nothing. With
+    worst_only, which takes less time, only the minimum diameter of each build is exact, the others
+    are not below theirs; and no pixels.
     """
     camera = virtual_camera_numbers(edge_models[1].halved)
     shape = (len(draws[0]), int(camera.max()) + 1)
@@ -107,12 +100,9 @@ def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
 
     The centre pixel shows the apex, and its designed ray goes through the object's centre, for a
     mirror on the seam past it. A pixel is a fixed place on the sensor: moved and tilted cameras and
-    wrong focal lengths count.
-
-    Returns:
-        Angle between the designed and the built ray after the mirror, radians, and distance of the
-        built ray from the point where the designed one is nearest to the object's centre, mm,
-        (s, m) each; NaN where it misses the sphere.
+    wrong focal lengths count. The errors are the angle between the designed and the built ray after
+    the mirror, radians, and the distance of the built ray from the point where the designed one is
+    nearest to the object's centre, mm, (s, m) each; NaN where it misses the sphere.
     """
     pinhole, middle, scale, *axes = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
     ray = _pixel_rays(edge_model, draws, axes)

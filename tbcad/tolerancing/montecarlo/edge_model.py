@@ -17,7 +17,7 @@ from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.shell.cell_outlines import rows_and_columns
-from tbcad.tolerancing.montecarlo.draws import ShellDraws
+from tbcad.tolerancing.montecarlo.draws import ShellDraws, WarpMaps, pivots, smooth_field, warp_map
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.form import (
     FIRST,
@@ -28,7 +28,6 @@ from tbcad.tolerancing.montecarlo.form import (
     SECOND,
     term_polynomials,
 )
-from tbcad.tolerancing.montecarlo.warp import ShellShape, WarpMaps, warp_maps
 from tbcad.types import Bools, Floats, Ints
 
 # Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the
@@ -52,11 +51,6 @@ class NeighbourPairs:
     face: Ints  # mirrors and planes, in the order of their distance from both of the pair
     reach: Floats  # maximum distance of the edge's points from its middle, mm, (e,)
     footed: Ints  # mirrors with a foot plane of their own, (r,): faces m + 2 onwards, then walls
-
-    @property
-    def arrays(self) -> PairArrays:
-        """All of them, for compiled code."""
-        return self.pair, self.offset, self.face, self.reach
 
 
 def neighbour_pairs(cells: Cells) -> NeighbourPairs:
@@ -195,8 +189,13 @@ def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
 
 @lru_cache(maxsize=1)  # processes of one material share the length
 def _warp_maps(a: EdgeModel, b: EdgeModel, length: float) -> WarpMaps:
-    shapes = [ShellShape(one.table, one.cell_radius, one.walls) for one in (a, b)]
-    return warp_maps((shapes[0], shapes[1]), length)
+    chosen = pivots(a.apex, length)  # of both halves the same mirrors
+    fields = (smooth_field(one.apex, length, chosen) for one in (a, b))
+    first, second = (
+        warp_map(one.table, one.cell_radius, one.walls, field)
+        for one, field in zip((a, b), fields, strict=True)
+    )
+    return first, second
 
 
 def surface_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:

@@ -103,15 +103,11 @@ def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
 def reflect_sample(
     gradient: Vector, scale: Vector, middle: Vector, samples: Floats, s: int
 ) -> None:
-    """Fill in the ray that is reflected at a sample, its moment and distance.
+    """Fill in the ray that is reflected at a sample with point and ray, its moment and distance.
 
-    Args:
-        gradient: of the surface there, before its shell is scaled; of any length.
-        scale: of the shell, along each axis. It and the middle are no arrays, which what is filled
-            in might change: loops over samples would not become vectors.
-        middle: the object's centre.
-        samples: with the points and rays.
-        s: number of the sample.
+    The gradient, of any length, is of the surface before its shell is scaled along each axis; the
+    middle is the object's centre. Scale and middle are no arrays, which what is filled in might
+    change: loops over samples would not become vectors.
     """
     across = (gradient[0] / scale[0], gradient[1] / scale[1], gradient[2] / scale[2])
     ray = get_sample(samples, RAY, s)

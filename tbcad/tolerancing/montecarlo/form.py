@@ -14,7 +14,7 @@ whose spheres have the unit normals g and g' at a point is thus displaced by a g
 to first order in the heights, and a mirror's normal is turned by its height's gradient.
 """
 
-from math import factorial, sqrt
+from math import comb, factorial, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -65,7 +65,8 @@ def term_shares() -> Floats:
 
 def term_polynomials() -> Floats:
     """Coefficients of each term, (t, monomials)."""
-    return np.array([_row(_term(n, m)) for n, m in TERMS])
+    tables = (_term(n, m) for n, m in TERMS)
+    return np.array([[table[powers] for powers in MONOMIALS] for table in tables])
 
 
 def monomials(x: Floats, y: Floats) -> Floats:
@@ -78,7 +79,7 @@ def _term(n: int, m: int) -> Floats:
     size, result = abs(m), np.zeros((DEGREE + 1, DEGREE + 1))
     around = np.zeros_like(result)
     for j in range(size + 1):  # real or imaginary part of (x + i y)^|m|
-        power = factorial(size) // (factorial(j) * factorial(size - j)) * 1j**j
+        power = comb(size, j) * 1j**j
         around[size - j, j] = power.real if m >= 0 else power.imag
     for k in range((n - size) // 2 + 1):
         radial = (-1) ** k * factorial(n - k) / factorial(k)
@@ -97,50 +98,16 @@ def _times_radius(polynomial: Floats, times: int) -> Floats:
     return polynomial
 
 
-def _row(table: Floats) -> Floats:
-    return np.array([table[i, j] for i, j in MONOMIALS])
-
-
 def mean_square_slope() -> float:
     """Mean over the unit disc of the squared slope of a waviness whose root mean square is 1.
 
-    Of one term it is 2 pi times the integral of (R' r)^2 / r ..., summed in closed form: the mean
-    of x^i y^j over the disc is (i - 1)!! (j - 1)!! 2 / ((i + j + 2) (i + j)!!) for even i and j.
+    Of a term it is (n + 1) (n (n + 2) - m^2), by Green's first identity: the term's Laplacian is
+    orthogonal to it, and its radial part is 1 at the rim, with a slope of (n (n + 2) - m^2) / 2.
+    Each of the n + 1 terms of an order has the same share of the order's variance.
     """
-    total = 0.0
-    for share, row in zip(term_shares(), term_polynomials(), strict=True):
-        for axis in range(2):
-            total += share * _mean_square(_derivative(row, axis))
-    return total
-
-
-def _derivative(row: Floats, axis: int) -> dict[tuple[int, int], float]:
-    result: dict[tuple[int, int], float] = {}
-    for powers, factor in zip(MONOMIALS, row, strict=True):
-        if powers[axis]:
-            lower = (powers[0] - 1, powers[1]) if axis == 0 else (powers[0], powers[1] - 1)
-            result[lower] = float(powers[axis] * factor)
-    return result
-
-
-def _mean_square(polynomial: dict[tuple[int, int], float]) -> float:
-    return sum(
-        a * b * _mean_power(i + k, j + n)
-        for (i, j), a in polynomial.items()
-        for (k, n), b in polynomial.items()
-    )
-
-
-def _mean_power(i: int, j: int) -> float:
-    """Mean of x^i y^j over the unit disc."""
-    if i % 2 or j % 2:
-        return 0.0
-    double = _double_factorial(i - 1) * _double_factorial(j - 1) / _double_factorial(i + j)
-    return 2 * double / (i + j + 2)
-
-
-def _double_factorial(n: int) -> int:
-    return 1 if n < 2 else n * _double_factorial(n - 2)
+    variance = {n: VARIANCE_RATIO ** (n - ORDERS[0]) for n in ORDERS}
+    total = sum(variance[n] * (n * (n + 2) - m * m) for n, m in TERMS)
+    return total / sum(variance.values())
 
 
 def ray_spread(waviness: float, cell_radius: Floats, distance: Floats, incidence: Floats) -> Floats:

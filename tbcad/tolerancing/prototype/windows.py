@@ -8,23 +8,27 @@ move the balls under the windows. In a calibrated build the software moves the w
 Both runs are described in the frame of the prototype, with the object turned in the second.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.optics.windows import cell_windows
+from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
-from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
+from tbcad.records.tables import StopRow
 from tbcad.tolerancing.montecarlo.builds import CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
+from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.edge_model import ASYMMETRIC
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerancing.prototype.rays import (
     SIDE_SAMPLES,
     coarse_directions,
@@ -33,7 +37,82 @@ from tbcad.tolerancing.prototype.rays import (
 )
 from tbcad.types import Bools, Floats, Ints
 
-HALVES = (0, 1)
+FIRST_STREAM = 1000  # random streams of a build begin here, beyond those of its shells
+
+
+@dataclass(frozen=True)
+class PrototypeDraws:
+    """Errors of s prototypes of k balls and t stops, in the order of the builds.
+
+    The base goes through its stops twice, for camera a's mirrors and for camera b's. A point x of
+    the designed base is moved to R(tilt) R(axis, stop's angle + angle) x + runout.
+    """
+
+    radius: Floats  # by which balls are too large, mm, (s, k)
+    seat: Floats  # of the balls' centres on the base, mm, (s, k, 3)
+    cap_tilt: Floats  # of caps about two axes across their own, radians, (s, k, 2)
+    angle: Floats  # of the base at stops of both runs, with gravity, radians, (s, 2, t)
+    runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
+    tilt: Floats  # of the axis about azimuth zero and across, at the object, radians, (s, 2)
+    camera_shift: Floats  # of the pinhole, mm, (s, 3)
+    camera_tilt: Floats  # rotation vectors about the pinhole, radians, (s, 3)
+    focal: Floats  # focal length over the designed one, (s,)
+
+    def __len__(self) -> int:
+        return len(self.focal)
+
+
+def draw_prototypes(
+    errors: Errors, seed: int, builds: Sequence[int], is_cap: Bools, wind_up: Floats
+) -> PrototypeDraws:
+    """Errors of some prototypes; see tbcad.tolerancing.montecarlo.draws.draw_kinds.
+
+    Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
+    its own (`Errors.whole_radius`), each with its centre unchanged. Gravity turns the base at the
+    t stops of one run by the wind-up, radians, (t,).
+    """
+    k, t = len(is_cap), len(wind_up)
+    shapes: dict[str, Shape] = {  # in the order of the random streams; only append to it
+        "ball_radius": (k,),
+        "sphere_radius": (k,),
+        "seat": (k, 3),
+        "rotation_angle": (2, t),
+        "axis_runout": (2, t, 2),
+        "axis_tilt": (2,),
+        "camera_shift": (3,),
+        "camera_tilt": (3,),
+        "camera_focal": (),
+        "cap_tilt": (k, 2),
+        "wind_up": (),
+    }
+    errors = replace(errors, sphere_radius=errors.whole_radius)
+    drawn = draw_kinds(errors, seed, builds, shapes, FIRST_STREAM)
+    return PrototypeDraws(
+        radius=np.where(is_cap, drawn["sphere_radius"], drawn["ball_radius"]),
+        seat=drawn["seat"],
+        cap_tilt=np.where(is_cap[:, None], drawn["cap_tilt"], 0.0),
+        angle=drawn["rotation_angle"] + drawn["wind_up"][:, None, None] * wind_up,
+        runout=drawn["axis_runout"],
+        tilt=drawn["axis_tilt"],
+        camera_shift=drawn["camera_shift"],
+        camera_tilt=drawn["camera_tilt"],
+        focal=1 + drawn["camera_focal"],
+    )
+
+
+def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
+    """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
+
+    Motor and belt yield to the base's weight: see tbcad.prototype.drive.drive. InputError if the
+    file is missing, malformed, or of another plan.
+    """
+    path = export.folder / StopRow.FILE
+    rows = StopRow.read(export.folder)
+    if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
+        raise InputError(
+            f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"
+        )
+    return np.radians([row.wind_up_deg for row in rows])
 
 
 @dataclass(frozen=True)
@@ -77,8 +156,7 @@ def prototype_model(
     reflectors: tuple[Reflector, Reflector], plan: Plan, wind_up: Floats
 ) -> PrototypeWindows:
     """The fast model of both cameras, the plan, and the base's turn under gravity at its stops."""
-    a, b = prototype_runs(reflectors, plan)
-    view = reflectors[0].camera
+    (a, b), view = prototype_runs(reflectors, plan), reflectors[0].camera
     axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
     virtual = virtual_camera_numbers(both[1].halved)
@@ -159,7 +237,9 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     centre = tilt.apply(rotated(on_base, plan.frame[0], angle)) + runout
     radius = plan.radius[run.ball] + draws.radius[build, run.ball]
     pinhole = model.pinhole + draws.camera_shift[build]
-    lens = _lens(model, draws.camera_tilt[build], float(draws.focal[build]))
+    # A longer focal length makes pictures larger: a pixel's ray is nearer to the axis.
+    nearer = np.array([[1 / draws.focal[build]], [1 / draws.focal[build]], [1.0]])
+    lens = nearer * Rotation.from_rotvec(draws.camera_tilt[build]).apply(model.axes)
     lenses = np.repeat(lens[None], len(radius), axis=0)
     return RunPose(pinhole, lenses, centre, radius, highlights(pinhole, centre, radius))
 
@@ -172,12 +252,6 @@ def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
     """
     about = Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
     return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
-
-
-def _lens(model: PrototypeWindows, tilt: Floats, focal: float) -> Floats:
-    """A longer focal length makes pictures larger: a pixel's ray is nearer to the axis."""
-    nearer = np.array([[1 / focal], [1 / focal], [1.0]])
-    return np.asarray(nearer * Rotation.from_rotvec(tilt).apply(model.axes))
 
 
 def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
@@ -205,26 +279,25 @@ def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> Prototyp
     v, m = int(model.virtual.max()) + 1, len(model.virtual)
     result = PrototypeResult(*(np.empty((len(draws), size)) for size in (v, m, v, m)))
     for build in range(len(draws)):
-        poses = [run_pose(model, draws, build, half) for half in HALVES]
-        known = [calibrated_pose(model, half, poses[half]) for half in HALVES]
+        poses = [run_pose(model, draws, build, half) for half in (0, 1)]
+        known = [calibrated_pose(model, half, pose) for half, pose in enumerate(poses)]
         result.coverage[build], result.offset[build] = _seen(model, poses)
         result.calibrated_coverage[build], result.calibrated_offset[build] = _seen(model, known)
     return result
 
 
 def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:
-    pairs = list(zip(model.runs, poses, strict=True))
+    misses = [
+        minimum_miss_distances(
+            *((run.side, run.coarse, run.first), run.outward),
+            *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius),
+        )
+        for run, pose in zip(model.runs, poses, strict=True)
+    ]
     diameter = np.full(int(model.virtual.max()) + 1, np.inf)
-    np.minimum.at(diameter, model.virtual, np.concatenate([_coverage(*pair) for pair in pairs]))
+    np.minimum.at(diameter, model.virtual, 2 * np.concatenate(misses))
     rays = zip(map(_middle_rays, model.runs, poses), model.designed_rays, strict=True)
     return diameter, np.concatenate([_offsets(*pair) for pair in rays])
-
-
-def _coverage(run: RunWindows, pose: RunPose) -> Floats:
-    return 2 * minimum_miss_distances(
-        *((run.side, run.coarse, run.first), run.outward),
-        *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius),
-    )
 
 
 def _middle_rays(run: RunWindows, pose: RunPose) -> tuple[Floats, Floats]:

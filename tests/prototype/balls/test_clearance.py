@@ -13,8 +13,7 @@ from tbcad.prototype.balls.clearance import (
     min_separations,
     obstacles,
 )
-from tbcad.prototype.balls.groups import group_mirrors
-from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii
+from tbcad.prototype.balls.selection import Balls, ball_candidates, balls_with_radii, group_mirrors
 from tests.helpers import segment_distances
 
 LIMITS = load_spec(None).prototype

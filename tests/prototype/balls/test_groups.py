@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.balls.groups import group_mirrors
+from tbcad.prototype.balls.selection import group_mirrors
 
 
 def test_one_group_is_the_mean_and_many_are_bands_or_refused(paper_array: MirrorArray) -> None:

@@ -8,11 +8,12 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.array import design as mirror_design
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.prototype.balls.fit import BallFit, ball_fit
 from tbcad.prototype.balls.layout import (
     MORE_BALLS,
+    BallFit,
     PrototypeLayout,
     ball_counts,
+    ball_fit,
     prototype_layout,
 )
 from tbcad.prototype.balls.placement import greedy_placement, min_swing_placement
@@ -22,6 +23,7 @@ from tbcad.prototype.balls.selection import (
     Balls,
     ball_candidates,
     choose_balls,
+    coverable,
 )
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
 
@@ -49,7 +51,7 @@ class TestBalls:
         self, prototype: PrototypeLayout, candidates: BallCandidates
     ) -> None:
         assert prototype.fit.coverage.min() > 60
-        assert prototype.fit.coverable.all()
+        assert coverable(candidates, prototype.balls.catalogue, moved=True).all()
         balls, catalogue = prototype.balls, prototype.balls.catalogue
         next_size = np.minimum(balls.stock + 1, len(catalogue) - 1)
         larger = np.where(balls.cap, balls.radius + 0.11, catalogue.diameter[next_size] / 2)
@@ -82,7 +84,7 @@ class TestBalls:
         def fitted(**rule: object) -> tuple[Balls, BallFit]:
             limits = LIMITS.model_copy(update=rule)
             balls = choose_balls(candidates, limits, catalogue)
-            return balls, ball_fit(candidates, balls, limits)
+            return balls, ball_fit(candidates, balls)
 
         balls, _ = fitted(caps=False)
         assert balls.radius.max() == 30
@@ -93,8 +95,9 @@ class TestBalls:
         assert off[~balls.cap] == pytest.approx(distance[~balls.cap])
         assert fit.coverage.min() < 60
         _, fit = fitted(picture="fixed")
-        assert not fit.coverable.all()
-        assert (fit.coverage_fixed[fit.coverable] >= 60 - COVERAGE_ROUNDING_MM).all()
+        seen = coverable(candidates, catalogue, moved=False)
+        assert not seen.all()
+        assert (fit.coverage_fixed[seen] >= 60 - COVERAGE_ROUNDING_MM).all()
         assert fit.kept_share < 0.05
 
     def test_cost_of_each_choice(self, small_design: MirrorDesign) -> None:
@@ -166,7 +169,7 @@ class TestAsked:
 
         def within(k: int) -> bool:
             layout = small(small_design, f"prototype.k={k}")
-            error = np.degrees(np.abs(layout.fit.polar_error))
+            error = np.degrees(np.abs(layout.stops.polar_error))
             return bool(
                 error.max() <= limits.auto_direction_max_deg
                 and np.median(error) <= limits.auto_direction_median_deg

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tbcad.prototype.balls.groups import MirrorGroups
+from tbcad.prototype.balls.selection import MirrorGroups
 from tbcad.prototype.balls.stops import (
     angle_between,
     min_stabbing_points,

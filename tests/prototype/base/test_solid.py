@@ -9,7 +9,7 @@ import trimesh
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.cad.kernel.checks import check_pads, check_volume, plane_faces, properties, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height, loops, relief
-from tbcad.cad.kernel.solids import cut, cylinder, fused, one_solid
+from tbcad.cad.kernel.solids import cut, cylinder, fused, moved, one_solid
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import PrinterSpec
@@ -93,7 +93,7 @@ class TestCarrier:
         assert abs(part.mesh.volume - part.volume) < MESH_MM * part.properties.area / 10
         on_bed = part.mesh_on_bed
         assert on_bed.volume == pytest.approx(part.mesh.volume)
-        low, high = bounds(part.on_bed)
+        low, high = bounds(moved(part.shape, part.axes, part.origin))
         assert on_bed.vertices[:, 2].min() == pytest.approx(0, abs=1e-9)
         assert on_bed.vertices.min(axis=0) == pytest.approx(low, abs=MESH_MM)
         assert on_bed.vertices.max(axis=0) == pytest.approx(high, abs=MESH_MM)
@@ -180,7 +180,7 @@ def test_caps(base: BaseLayout, prototype: PrototypeLayout) -> None:
         spigots = np.pi * spigot**2 * (end - behind)
         assert cap.volume == pytest.approx(lens + zone + spigots - np.pi * wide**2 * deep)
         # Printed front up.
-        low, high = bounds(cap.on_bed)
+        low, high = bounds(moved(cap.shape, cap.axes, cap.origin))
         assert [low[2], high[2]] == pytest.approx([0, end + balls.body_depth[k]], abs=1e-6)
         # Tilted by cap_tilt the spigot's edge just touches the pocket, and nothing behind it.
         sine, cosine = np.sin(cap_tilt(base, k)), np.cos(cap_tilt(base, k))

@@ -14,7 +14,7 @@ from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.checks import plane_faces, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height
 from tbcad.cad.kernel.meshing import volume_by_meshes
-from tbcad.cad.kernel.solids import fused, solids
+from tbcad.cad.kernel.solids import fused, moved, solids
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
@@ -244,7 +244,7 @@ class TestPieces:
             assert mesh.is_watertight
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=1e-3)
-            low, high = bounds(part.on_bed)
+            low, high = bounds(moved(part.shape, part.axes, part.origin))
             assert (high - low <= np.array(PRINTER.bed_mm) - [6, 6, 3]).all()
             assert low[2] == pytest.approx(0, abs=0.5)
             points = np.vstack([mesh.vertices, mesh.triangles_center])

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.conics import Ellipsoid
+from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
     GRAVITY,
@@ -13,6 +14,7 @@ from tbcad.prototype.drive.balance import (
     cap_volume,
     sum_masses,
 )
+from tbcad.prototype.drive.drive import base_torques
 
 # The paper's: w leans 45 degrees below the horizon.
 FRAME = Ellipsoid(np.array([100.0, 0.0, -100.0]), 100.0).frame()
@@ -60,9 +62,11 @@ class TestTorque:
     def test_required_torque(self) -> None:
         balance = sum_masses(FRAME, at(0, 100, 0))
         inertia = 0.1 * 0.1**2  # kg m^2
-        assert balance.required_torque(-2, 2, 3.0, 2.0) == pytest.approx(
-            2 * (balance.torque_amplitude + 1e3 * inertia * 3)
-        )
+        motion = MotionSpec(acceleration_deg_s2=np.degrees(3.0), safety=2.0)
+        torques = base_torques(balance, (-2, 2), motion)
+        assert torques.gravity == balance.torque_amplitude
+        assert torques.peak == pytest.approx(balance.torque_amplitude + 1e3 * inertia * 3)
+        assert torques.required == 2 * torques.peak
 
 
 class TestBalls:

@@ -10,13 +10,17 @@ from hypothesis import strategies as st
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.drive.drive import (
     DRIVE_COLUMNS,
+    HOLD_MARGIN,
+    BaseTorques,
     Drive,
+    DriveLoads,
     belt_length,
     centre_distance,
+    choose_drive,
+    drive_loads,
     load_drives,
     pitch_diameter,
 )
-from tbcad.prototype.drive.loads import HOLD_MARGIN, BaseTorques, DriveLoads, choose_drive
 from tbcad.prototype.purchased.parts import load_parts
 
 PARTS = load_parts()
@@ -33,7 +37,7 @@ def twice(gravity: float) -> BaseTorques:
 
 
 def loads(drive: Drive, gravity: float = 500.0) -> DriveLoads:
-    return DriveLoads(drive, twice(gravity))
+    return drive_loads(drive, twice(gravity))
 
 
 class TestDrives:
@@ -87,8 +91,8 @@ class TestDrives:
     def test_the_chosen_one_is_the_first_without_a_fault(self, torque: float) -> None:
         drive = choose_drive("nema17-belt", twice(torque), DRIVES)
         before = DRIVES[: DRIVES.index(drive)]
-        assert not list(DriveLoads(drive, twice(torque)).faults())
-        assert all(list(DriveLoads(one, twice(torque)).faults()) for one in before)
+        assert not list(drive_loads(drive, twice(torque)).faults())
+        assert all(list(drive_loads(one, twice(torque)).faults()) for one in before)
 
 
 class TestLoads:
@@ -119,7 +123,7 @@ class TestLoads:
         assert some.hold_loss == pytest.approx(2 * 1.1 * (2 * share) ** 2)
         assert some.motor_rise == pytest.approx(80 * share**2)
         # A small safety factor leaves a motor that must have much of its current at rest.
-        hot = DriveLoads(belt(), BaseTorques(1200.0, 1210.0, 1210.0))
+        hot = drive_loads(belt(), BaseTorques(1200.0, 1210.0, 1210.0))
         assert any("warmer by" in fault for fault in hot.faults())
         worm = loads(next(d for d in DRIVES if d.name == "stage-60"))
         assert worm.self_locking

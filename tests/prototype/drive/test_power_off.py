@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tbcad.prototype.base.hub import PIN_OUT_MM
-from tbcad.prototype.drive.balance import GRAVITY, BaseBalance
-from tbcad.prototype.drive.travel import power_off
+from tbcad.prototype.drive.balance import GRAVITY, BaseBalance, power_off
 from tbcad.records.prototype_drive import PowerOff
 
 # The axis is level along y; one kilogram 100 mm above it at base angle zero.

@@ -6,9 +6,8 @@ from hypothesis import settings as tries
 from hypothesis import strategies as st
 
 from tbcad.core.spec.prototype import MotionSpec
-from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.drive.loads import BaseTorques, choose_drive
-from tbcad.prototype.drive.travel import HomeAngles
+from tbcad.prototype.drive.balance import HomeAngles
+from tbcad.prototype.drive.drive import BaseTorques, choose_drive, load_drives
 from tbcad.prototype.electronics import lights
 from tbcad.prototype.files.controllers import klipper_config, klipper_program, settings
 from tbcad.prototype.purchased.parts import load_parts

@@ -13,11 +13,10 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
-from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.drive.loads import BaseTorques, choose_drive
-from tbcad.prototype.drive.travel import free_base_angles, home_angles, stop_sequence
+from tbcad.prototype.drive.balance import free_base_angles, home_angles, stop_sequence
+from tbcad.prototype.drive.drive import BaseTorques, Drive, choose_drive, load_drives
 from tbcad.prototype.electronics import phases
-from tbcad.prototype.files.gcode import DECIMALS, duration_minutes, gcode_program
+from tbcad.prototype.files.controllers import DECIMALS, duration_minutes, gcode_program
 from tbcad.prototype.purchased.parts import load_parts
 
 LEDS, TRUNCATED = 4, 10.0**-DECIMALS

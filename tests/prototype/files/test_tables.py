@@ -9,8 +9,7 @@ from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
-from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.drive.loads import DriveLoads, base_torques
+from tbcad.prototype.drive.drive import base_torques, drive_loads, load_drives
 from tbcad.prototype.files.tables import (
     BALL_COLUMNS,
     STOP_COLUMNS,
@@ -40,7 +39,7 @@ def test_stops_sum_up_the_plan_and_tell_what_gravity_does(
 ) -> None:
     """The sum of r x F along the axis, and what motor and belt yield beyond angle zero."""
     torques = base_torques(BALANCE, layout.stops.range, load_spec(None).prototype.motion)
-    loads = DriveLoads(load_drives(load_parts())[0], torques)
+    loads = drive_loads(load_drives(load_parts())[0], torques)
     stops = stop_rows(layout, BALANCE, loads)
     assert tuple(stops[0]) == STOP_COLUMNS
     for stop in stops:

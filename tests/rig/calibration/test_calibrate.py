@@ -16,7 +16,7 @@ from tbcad.common.screen import WIDTH
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import MIN_SEEN
-from tbcad.records.exposure import DARK, exposure_name
+from tbcad.records.run import DARK, exposure_name
 from tbcad.rig.calibration.calibrate import (
     Halves,
     MachineCalibration,

@@ -11,9 +11,8 @@ from tbcad.app.cli import run as tbcad
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.drive.loads import BaseTorques, choose_drive
-from tbcad.prototype.drive.travel import home_angles
+from tbcad.prototype.drive.balance import home_angles
+from tbcad.prototype.drive.drive import BaseTorques, Drive, choose_drive, load_drives
 from tbcad.prototype.electronics import phases
 from tbcad.prototype.files.controllers import controller_files
 from tbcad.prototype.purchased.parts import load_parts

@@ -21,8 +21,8 @@ from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.prototype.balls.layout import prototype_layout
+from tbcad.prototype.drive.balance import home_angles
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.drive.travel import home_angles
 from tbcad.rig.machine.designed import designed_prototype
 from tbcad.rig.machine.machine import Machine, read_machine
 from tbcad.rig.runs import read_photograph, read_run

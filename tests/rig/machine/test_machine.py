@@ -14,7 +14,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import trace_balls
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, prototype_runs
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.records.exposure import Frame
+from tbcad.records.run import Frame
 from tbcad.rig.machine.designed import (
     BuiltPrototype,
     draw_other_errors,

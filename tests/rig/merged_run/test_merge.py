@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tbcad.app.api import merge
-from tbcad.common.colours import srgb, srgb_light
+from tbcad.common.figure_files import srgb, srgb_light
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
 from tbcad.light.simulate.prototype.merge import merge_run
@@ -19,7 +19,7 @@ from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
-from tbcad.records.exposure import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
+from tbcad.records.run import DARK, DARK_LIT, LIT, PHOTOGRAPHS, Frame, exposure_name
 from tbcad.rig.machine.machine import Machine, write_machine
 from tests.exported_files import edit_json
 from tests.machine_states import frames_of, machine_of

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tbcad.records.exposure import Exposure, Frame, exposure_name
-from tbcad.records.run import RunRecord
+from tbcad.records.run import Exposure, Frame, RunRecord, exposure_name
 from tbcad.rig.runs import RunWriter, check_new, new_run, read_run, resumed_run
 from tests.exported_files import contents
 

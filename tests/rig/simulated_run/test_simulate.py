@@ -16,7 +16,7 @@ from tbcad.rig.runs import read_photograph, read_run
 from tbcad.rig.simulated_run import simulate
 from tbcad.rig.simulated_run.photographs import SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.prototype.draws import read_wind_up
+from tbcad.tolerancing.prototype.windows import read_wind_up
 from tests.exported_files import contents
 from tests.prototype_records import printed_part, write_prototype
 from tests.simulated_runs import Small, fdm_errors, small_run

@@ -12,10 +12,17 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import (
+    MISSING_VARIANCE,
+    RING_SHARE,
     ShellDraws,
+    SmoothField,
+    WarpMap,
     draw,
     draw_kinds,
+    mirror_points,
+    pivots,
     shell_error_shapes,
+    smooth_field,
 )
 from tbcad.tolerancing.montecarlo.edge_model import (
     EdgeModel,
@@ -24,15 +31,6 @@ from tbcad.tolerancing.montecarlo.edge_model import (
     warp_maps_of,
 )
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.warp import (
-    MISSING_VARIANCE,
-    RING_SHARE,
-    SmoothField,
-    WarpMap,
-    mirror_points,
-    pivots,
-    smooth_field,
-)
 from tests.tolerancing.exact_builds import displaced_coverage
 
 SLA = Errors(warp=Error(0.0346, length=50.0))

@@ -15,11 +15,12 @@ from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.tolerancing.montecarlo.builds import simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.prototype.draws import PrototypeDraws, draw_prototypes
 from tbcad.tolerancing.prototype.windows import (
     PrototypeCase,
+    PrototypeDraws,
     PrototypeResult,
     PrototypeWindows,
+    draw_prototypes,
     prototype_model,
     prototype_result,
 )

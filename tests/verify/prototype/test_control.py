@@ -19,8 +19,8 @@ from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.record.export import read_export
 
 from tbcad.core.spec.prototype import MotionSpec
+from tbcad.prototype.drive.balance import HomeAngles
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.drive.travel import HomeAngles
 from tbcad.prototype.electronics import lights
 from tbcad.prototype.files.controllers import (
     klipper_config,

@@ -90,7 +90,9 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
 
 
-@pytest.mark.parametrize("as_made", [None, AsMade(), AsMade(50, (ProcessYield("cnc", 1, 60.1),))])
+@pytest.mark.parametrize(
+    "as_made", [None, AsMade(), AsMade(50, (ProcessYield("cnc", 1, 60.1, 50),))]
+)
 def test_solids_without_fillets_are_told(shell_report: Report, as_made: AsMade | None) -> None:
     valleys, grooves = (replace(shell_report, valleys=v, as_made=as_made) for v in (True, False))
     assert "fillets" in "".join(line for line in fits(shown(valleys)) if "solids" in line)

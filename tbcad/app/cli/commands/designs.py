@@ -115,7 +115,7 @@ def _record(result: "SearchResult", files: tuple[Path, ...]) -> dict[str, object
 
 
 def _show(result: "SearchResult", out: Path, *others: Path) -> None:
-    from tbcad.optimizing.files import comparison
+    from tbcad.optimizing.search import comparison
 
     if result.best.place == result.start.place:
         typer.echo(f"No better one among {len(result.candidates)} candidates within the limits.")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tbcad.cad.formats.pictures import picture_of
 from tbcad.cad.formats.pixels import Picture
-from tbcad.common.colours import srgb
+from tbcad.common.figure_files import srgb
 from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats, Ints
 

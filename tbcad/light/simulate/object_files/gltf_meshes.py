@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.common.colours import srgb, srgb_light
+from tbcad.common.figure_files import srgb, srgb_light
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import (
     ObjectPart,

@@ -8,7 +8,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import THREADS
-from tbcad.records.exposure import DARK, Frame, dark_factor, exposure_name
+from tbcad.records.run import DARK, Frame, dark_factor, exposure_name
 from tbcad.rig.calibration.detection.detection import (
     Detection,
     Rejected,

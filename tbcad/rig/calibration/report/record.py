@@ -16,7 +16,7 @@ from tbcad.records.calibration import (
     PulledParameter,
     RayFigures,
 )
-from tbcad.records.exposure import exposure_name
+from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
 from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from tbcad.common.screen import WIDTH
-from tbcad.records.exposure import exposure_name
+from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.detection.detection import Detection, Rejection
 from tbcad.rig.calibration.estimate.parameters import Block, Prior

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.records.exposure import exposure_name
+from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.detection.detect import detect
 from tbcad.rig.calibration.detection.detection import Detection, Rejection, no_highlights
 from tbcad.rig.calibration.detection.matching import (
