@@ -20,8 +20,7 @@ class InFolder:
 def replace_files(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
     """Write files by name into a folder that exists, each replaced as a whole; others stay.
 
-    Raises:
-        InputError: the folder cannot be written; no temporary file is left in it.
+    InputError: the folder cannot be written; no temporary file is left in it.
     """
     with (
         write_errors_as_input_errors(folder),

@@ -202,8 +202,7 @@ class Study:
 def check_study_folder(out: Path) -> None:
     """Check, before any work, that files can be written into a folder, which need not exist.
 
-    Raises:
-        InputError: they cannot.
+    InputError: they cannot.
     """
     with write_errors_as_input_errors(out):
         absolute = out.absolute()
@@ -219,8 +218,7 @@ def write_study(
 ) -> list[Path]:
     """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
 
-    Raises:
-        InputError: the folder cannot be written.
+    InputError: the folder cannot be written.
     """
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)

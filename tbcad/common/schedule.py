@@ -37,9 +37,8 @@ def background_processes(number: int = 1) -> Iterator[Submit]:
 
     At the block's end all of it is done. A block that fails, or is interrupted, ends it at once.
 
-    Raises:
-        Exception: the first that the work raised.
-        ProcessLost: a process ended before its work was done.
+    Exception: the first that the work raised; ProcessLost: a process ended before its work was
+    done.
     """
     futures: list[Future[Any]] = []
     with Processes(number) as processes:
@@ -93,10 +92,8 @@ def run_units(
     be picklable, which closures and lambdas are, and patience is for seconds without any worker.
     Progress is called with each unit when it is done, in this thread.
 
-    Raises:
-        InputError: no dask; no such scheduler, or it goes away; no worker, or one with another
-            version; a unit that kills its workers.
-        Exception: what work raises.
+    InputError: no dask; no such scheduler, or it goes away; no worker, or one with another version;
+    a unit that kills its workers; Exception: what work raises.
     """
     if scheduler is None:
         return _in_threads(work, units, progress, workers or cores())

@@ -144,8 +144,7 @@ class AssemblyJob:
 def assembly_job(export: DrawnExport, machine: AssembledMachine) -> AssemblyJob:
     """What is needed to draw the assembly.
 
-    Raises:
-        InputError: its file is missing, or not as it was written.
+    InputError: its file is missing, or not as it was written.
     """
     path = export.file(machine.record.assembly.glb)
     fasteners = {one.name: one.part for one in machine.fasteners}

@@ -45,11 +45,7 @@ class DrawnExport:
         return {one.name: one for one in self.machine.record.parts} if self.machine else {}
 
     def row(self, part: PrintedPartRecord) -> Row:
-        """A printed part's row in the parts list.
-
-        Raises:
-            InputError: it has none.
-        """
+        """A printed part's row in the parts list. InputError: it has none."""
         name = part.listed_name
         rows = self.machine.rows if self.machine else ()
         row = next((one for one in rows if one["part"] == name), None)
@@ -58,11 +54,7 @@ class DrawnExport:
         return row
 
     def file(self, name: str) -> Path:
-        """A file of the export as it was written.
-
-        Raises:
-            InputError: it is missing, or another.
-        """
+        """A file of the export as it was written. InputError: it is missing, or another."""
         return _written(self.folder, self.manifest, name)
 
     def digest(self, name: str) -> str:
@@ -73,8 +65,7 @@ class DrawnExport:
 def read_export(folder: Path) -> DrawnExport:
     """The export in a folder.
 
-    Raises:
-        InputError: there is none, or a file is missing or not as it was written.
+    InputError: there is none, or a file is missing or not as it was written.
     """
     manifest = read_manifest(folder)
     if manifest is None:

@@ -114,11 +114,7 @@ def layout_sheet(design: DesignRecord, rows: Sequence[MirrorRow], title: str) ->
 
 
 def layout_rows(export: DrawnExport) -> list[MirrorRow]:
-    """Rows of the export's mirrors.csv.
-
-    Raises:
-        InputError: it is not as it was written.
-    """
+    """Rows of the export's mirrors.csv. InputError: it is not as it was written."""
     export.file(MirrorRow.FILE)
     return MirrorRow.read(export.folder)
 

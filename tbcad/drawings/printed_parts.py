@@ -49,8 +49,7 @@ class PartJob:
 def part_job(export: DrawnExport, part: PrintedPartRecord) -> PartJob:
     """What is needed to draw a printed part.
 
-    Raises:
-        InputError: its file is missing or not as it was written; it is not in the parts list.
+    InputError: its file is missing or not as it was written; it is not in the parts list.
     """
     assert export.machine is not None
     record, path = export.machine.record, export.file(part.step)

@@ -43,11 +43,7 @@ class ShellJob:
 
 
 def shell_job(export: DrawnExport, name: str) -> ShellJob:
-    """What is needed to draw a shell.
-
-    Raises:
-        InputError: its file is missing, or not as it was written.
-    """
+    """What is needed to draw a shell. InputError: its file is missing, or not as it was written."""
     wall, camera = export.design.spec.shell.wall_mm, name[-1]
     text = (
         f"Wall {wall:g} mm behind the deepest valley of the mirrors.",
@@ -61,8 +57,7 @@ def shell_job(export: DrawnExport, name: str) -> ShellJob:
 def mandrel_job(export: DrawnExport, name: str) -> ShellJob:
     """What is needed to draw a shell's negative.
 
-    Raises:
-        InputError: its file is missing, or not as it was written.
+    InputError: its file is missing, or not as it was written.
     """
     coat, camera = export.design.spec.mirrors.coating_um, name[-1]
     record = next(one for one in export.design.mandrels if one.name == name)

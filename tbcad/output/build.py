@@ -53,9 +53,8 @@ def write_export(
 
     An optional prototype is left out where it cannot be made, instead of refusing.
 
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-        InvalidSolidError: when the kernel fails.
+    SpecError when something does not fit; it says what to change; InvalidSolidError when the kernel
+    fails.
     """
     pending: list[Future[Any]] = []
 

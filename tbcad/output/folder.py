@@ -38,8 +38,7 @@ def check_replaceable(out: Path, kind: Kind, force: bool, inputs: Iterable[Sourc
     With force also content that costs hours, and among files that tbcad did not write. Inputs are
     files and folders that are read for it.
 
-    Raises:
-        InputError: it cannot; the text says why and what to do.
+    InputError: it cannot; the text says why and what to do.
     """
     with write_errors_as_input_errors(out):
         target = _target(out)
@@ -57,8 +56,7 @@ def replacing(out: Path, kind: Kind, force: bool, inputs: Iterable[Source] = ())
     Missing parents are made. With force content that costs hours is replaced, and files that tbcad
     did not write are kept; without, both are refused. Inputs are read for it.
 
-    Raises:
-        InputError: out cannot be replaced; it is then as before.
+    InputError: out cannot be replaced; it is then as before.
     """
     with ExitStack() as undo:
         with write_errors_as_input_errors(out):

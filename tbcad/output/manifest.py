@@ -124,8 +124,7 @@ def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> No
 
     out is the folder as the user names it, target its path with links resolved.
 
-    Raises:
-        InputError: as said, or the folder is inside a folder that tbcad wrote, or above one.
+    InputError as said, or the folder is inside a folder that tbcad wrote, or above one.
     """
     refuse_inside(out, target)
     present = kind_of(target)

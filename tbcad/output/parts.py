@@ -14,8 +14,7 @@ PARTS = (SHELL, PROTOTYPE)
 def parse_parts(text: str) -> tuple[str, ...]:
     """The parts that a list with commas names, in the order they are built.
 
-    Raises:
-        InputError: it names none, or one that there is not.
+    InputError: it names none, or one that there is not.
     """
     named = {name.strip() for name in text.split(",") if name.strip()}
     if odd := sorted(named - {*PARTS}):
@@ -31,11 +30,7 @@ def default_parts(spec: Spec) -> tuple[str, ...]:
 
 
 def check_parts(spec: Spec, parts: Sequence[str]) -> None:
-    """Refuse a prototype where the spec alone says that none can be made.
-
-    Raises:
-        SpecError: as said.
-    """
+    """Refuse a prototype where the spec alone says that none can be made; SpecError as said."""
     if PROTOTYPE not in parts:
         return
     try:
@@ -47,8 +42,7 @@ def check_parts(spec: Spec, parts: Sequence[str]) -> None:
 def check_lists(spec: Spec, parts: Sequence[str]) -> None:
     """Refuse lists of balls and prices that cannot be read: no reason to leave a prototype out.
 
-    Raises:
-        SpecError: as said; it names line and column.
+    SpecError as said; it names line and column.
     """
     if PROTOTYPE in parts:
         from tbcad.prototype.balls.catalogue import load_catalogue

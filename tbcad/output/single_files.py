@@ -78,8 +78,7 @@ def check_file(file: Path, force: bool, inputs: Iterable[Path | None] = ()) -> N
 
     Inputs are files that the command reads, which stay even so.
 
-    Raises:
-        InputError: as said, or the file belongs to what tbcad wrote, or is a folder.
+    InputError as said, or the file belongs to what tbcad wrote, or is a folder.
     """
     with write_errors_as_input_errors(file):
         if file.is_dir():
@@ -127,8 +126,7 @@ def foreign_files(folder: Path) -> list[Path]:
     of it, under the name that it has by default, and its checkpoint. A folder all of whose files
     are listed in the same way is tbcad's; any other is the user's, as a whole.
 
-    Raises:
-        OSError: the folder cannot be read.
+    OSError: the folder cannot be read.
     """
     manifest = read_manifest(folder)
     of_tbcad = {MANIFEST, VERDICT} if manifest else set()
@@ -169,9 +167,8 @@ def is_always_kept(path: Path) -> bool:
 def keep_files(paths: list[Path], into: Path) -> None:
     """Give files, links and folders a second place in another folder, as `.kept` where taken.
 
-    Raises:
-        InputError: a path is a mount point, or neither a file nor a link nor a folder.
-        OSError: a file can neither be linked nor copied.
+    InputError: a path is a mount point, or neither a file nor a link nor a folder; OSError: a file
+    can neither be linked nor copied.
     """
     for path in paths:
         numbered = (f"{path.name}.kept{number}" for number in count(2))

@@ -36,8 +36,7 @@ def new_folder(target: Path) -> Path:
 def clear(out: Path, target: Path) -> None:
     """Remove what killed writers left in the locked parent of a target, and repair a half exchange.
 
-    Raises:
-        InputError: another one is writing it.
+    InputError: another one is writing it.
     """
     hidden = [path for path in _hidden(target.parent) if path.name.startswith(_prefix(target))]
     if any(_is_written(path) for path in hidden):

@@ -102,9 +102,8 @@ class PrototypeModel:
 def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
     """Every arrangement that has room, the preferred first.
 
-    Raises:
-        SpecError: at the end, when there was none; it names the cause in the preferred one, and
-            what was tried.
+    SpecError at the end, when there was none; it names the cause in the preferred one, and what was
+    tried.
     """
     tried, arranged, errors = list[int](), False, list[SpecError]()
     for spec, outcome in _attempts(design):
@@ -128,8 +127,7 @@ def balance_and_drive(
 ) -> tuple[BaseBalance, Drive]:
     """The balance of balls and carrier, and the drive that turns them.
 
-    Raises:
-        SpecError: no drive is strong enough.
+    SpecError: no drive is strong enough.
     """
     balance = sum_masses(base.frame, ball_masses(layout, spec.printer.density_g_cm3), carrier)
     torques = base_torques(balance, layout.stops.range, spec.prototype.motion)
@@ -271,11 +269,7 @@ def _arranged(
 def shroud_round(
     spec: Spec, stage: StageLayout, frame: FrameLayout, keep_out: KeepOut, parts: Parts
 ) -> ShroudLayout | None:
-    """The shroud round stage, frame and base.
-
-    Raises:
-        SpecError: when no sheet is large enough.
-    """
+    """The shroud round stage, frame and base; SpecError when no sheet is large enough."""
     static = (*stage.components, *frame.printed, *frame.purchased)
     floor = spec.prototype.frame.floor_mm - frame.plate["thickness_mm"]
     return shroud_layout(spec.prototype.light, static, keep_out, floor, parts)

@@ -82,8 +82,7 @@ SUPPLY: Row = ON_CABLE | {
 def lights(leds: int, motion: MotionSpec) -> dict[str, int]:
     """Digital outputs of lamp and LEDs, rising; none with GRBL 1.1, which cannot switch them.
 
-    Raises:
-        SpecError: when no controller has so many outputs.
+    SpecError when no controller has so many outputs.
     """
     if motion.controller == "grbl":
         return {}
@@ -101,8 +100,7 @@ def phases(leds: int, motion: MotionSpec) -> tuple[Phase, ...]:
 
     Without outputs there is one, with the lamp on all the time.
 
-    Raises:
-        SpecError: when no controller has so many outputs.
+    SpecError when no controller has so many outputs.
     """
     if not (switched := lights(leds, motion)):
         return (Phase(name=LIT, output=None),)
@@ -133,8 +131,7 @@ def series_resistor(
 ) -> SeriesResistor:
     """The resistor with which an LED gets a current (mA), or a little less, from a supply (V).
 
-    Raises:
-        SpecError: when the LED bears less, the supply is too low, or no resistor is large enough.
+    SpecError when the LED bears less, the supply is too low, or no resistor is large enough.
     """
     forward = led["forward_v"]
     if max_ma > led["max_ma"]:
@@ -204,8 +201,7 @@ class Wiring:
 def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiring:
     """The electronics of a stage.
 
-    Raises:
-        SpecError: when LEDs are too many, or not to be had with this current, supply or bore.
+    SpecError when LEDs are too many, or not to be had with this current, supply or bore.
     """
     count, section = len(stage.leds), spec.stage
     resistor = connector = wire = None

@@ -99,8 +99,7 @@ def homing_layout(
 ) -> HomingLayout:
     """Disc, bracket and switch for a base and the plate behind it.
 
-    Raises:
-        SpecError: when the swing leaves no room for the tab.
+    SpecError when the swing leaves no room for the tab.
     """
     place = _SwitchPlace.beside(base, plate)
     length = base.hub.face - plate.back + PIN_GRIP_MM

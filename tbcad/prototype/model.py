@@ -54,9 +54,8 @@ def build_prototype_model(
     Where the kernel fails with the preferred one, other pads and numbers of balls are tried:
     another hub's boss would leave the same faces grazing each other.
 
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-        InvalidSolidError: when the kernel fails.
+    SpecError when something does not fit; it says what to change; InvalidSolidError when the kernel
+    fails.
     """
     progress("prototype: balls, their places, stops")
     errors: dict[tuple[int, float], Exception] = {}
@@ -152,9 +151,7 @@ def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> 
 def parts_of(outcome: FutureParts) -> list[PlacedSolid]:
     """The parts that were built meanwhile.
 
-    Raises:
-        SpecError: when something does not fit.
-        InvalidSolidError: when the kernel fails.
+    SpecError when something does not fit; InvalidSolidError when the kernel fails.
     """
     parts = outcome.result()
     if isinstance(parts, Exception):

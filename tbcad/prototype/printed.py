@@ -133,8 +133,7 @@ def placed_on_bed(
     its own, whose axes in the frame of the shell are rows; a move keeps it valid. Directions that
     may point down are unit vectors (3,) of that frame, as are the normals of pads, (n, 3).
 
-    Raises:
-        SpecError: when it fits in no orientation.
+    SpecError when it fits in no orientation.
     """
     corners = mesh.vertices[ConvexHull(mesh.vertices).vertices]
     opening = opening_up(pads)
@@ -206,8 +205,7 @@ def primitive_solid(body: Primitive) -> TopoDS_Shape:
 def component_solid(component: Component) -> TopoDS_Solid:
     """The one solid of a component, in the frame of the shell.
 
-    Raises:
-        InvalidSolidError: when the kernel fails, or its volume is not what meshes give.
+    InvalidSolidError when the kernel fails, or its volume is not what meshes give.
     """
     if len(component.added) == 1 and not component.removed:  # no boolean that could go wrong
         return one_solid(component.name, primitive_solid(component.added[0]))
@@ -223,9 +221,7 @@ def component_solid(component: Component) -> TopoDS_Solid:
 def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float) -> PlacedSolid:
     """A component placed on the printer's bed, its mesh within a distance of the surface.
 
-    Raises:
-        SpecError: when it does not fit.
-        InvalidSolidError: when the kernel fails.
+    SpecError when it does not fit; InvalidSolidError when the kernel fails.
     """
     solid, name = component_solid(component), component.name
     mesh, downs = closed_mesh(name, solid, mesh_mm), component.downs

@@ -9,8 +9,7 @@ def check_suitable(spec: Spec) -> None:
 
     One camera photographs both halves only if a half turn of the object swaps the cameras.
 
-    Raises:
-        SpecError: as said.
+    SpecError as said.
     """
     if spec.mirrors.radius_rule == "flat":
         raise SpecError(

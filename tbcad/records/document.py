@@ -30,8 +30,7 @@ class Document(RecordSection):
     def read(cls, path: Path) -> Self:
         """Read a file.
 
-        Raises:
-            InputError: it is missing, too large, not JSON, of another schema, or does not fit.
+        InputError: it is missing, too large, not JSON, of another schema, or does not fit.
         """
         return read_json(path, cls, cls.schema_of(), cls.MISSING)
 

@@ -210,9 +210,5 @@ class RunRecord(Document):
 
 
 def read_record(folder: Path) -> RunRecord:
-    """The record of a run's folder.
-
-    Raises:
-        InputError: there is none, or it does not fit.
-    """
+    """The record of a run's folder. InputError: there is none, or it does not fit."""
     return RunRecord.read(folder / RECORD)

@@ -32,11 +32,7 @@ class TableRow(Record):
 
     @classmethod
     def read(cls, folder: Path) -> list[Self]:
-        """All rows of the table in a folder.
-
-        Raises:
-            InputError: it is missing, or a row does not fit.
-        """
+        """All rows of the table in a folder. InputError: it is missing, or a row does not fit."""
         return read_csv(folder / cls.FILE, cls, cls.MISSING)
 
 

@@ -92,8 +92,7 @@ class AssembledMachine:
 def read_machine(folder: Path) -> AssembledMachine:
     """The prototype of an export.
 
-    Raises:
-        InputError: a file is missing or broken, or was written by an earlier version.
+    InputError: a file is missing or broken, or was written by an earlier version.
     """
     rows = read_parts_list(folder).rows
     record = Prototype.read(folder / NAME)

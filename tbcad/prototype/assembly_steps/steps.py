@@ -86,8 +86,7 @@ class Step:
 def assembly_steps(machine: AssembledMachine) -> tuple[Step, ...]:
     """All steps that a prototype needs, in order.
 
-    Raises:
-        InputError: a body or part belongs to no step, or the list has fewer than are mounted.
+    InputError: a body or part belongs to no step, or the list has fewer than are mounted.
     """
     plans, mounting = mounting_steps(machine)
     parts = machine.bodies | {one.name: one.part for one in machine.fasteners}
@@ -103,8 +102,7 @@ def assembly_steps(machine: AssembledMachine) -> tuple[Step, ...]:
 def mounting_steps(machine: AssembledMachine) -> tuple[list[StepPlan], dict[str, str]]:
     """The steps that a prototype needs, and which of them mounts each body and fastener.
 
-    Raises:
-        InputError: a body belongs to no step.
+    InputError: a body belongs to no step.
     """
     plans = [plan for plan in PLANS if plan.needed(machine)]
     bodies = {

@@ -70,8 +70,7 @@ def bom_rows(
     Balls come first, by size, then the drive, other purchased parts by their quantity, and last
     what is printed of a material of a density (g/cm^3).
 
-    Raises:
-        SpecError: when a part is in no list.
+    SpecError when a part is in no list.
     """
     counts = Counter(ALWAYS) + Counter(purchased)
     if unknown := [name for name in counts if name not in parts]:
@@ -204,8 +203,7 @@ class PartsList:
 def read_parts_list(folder: Path, prices: Prices | None = None) -> PartsList:
     """The parts list of a build, with other prices where these have one.
 
-    Raises:
-        InputError: no such list, or a broken one; it names the line.
+    InputError: no such list, or a broken one; it names the line.
     """
     path = folder / NAME
     if not path.is_file():

@@ -210,8 +210,7 @@ def gcode_program(
 ) -> list[str]:
     """Lines of the program for the stops of a prototype, each shorter than 80 characters.
 
-    Raises:
-        SpecError: when the base cannot be where the program starts, for post or camera.
+    SpecError when the base cannot be where the program starts, for post or camera.
     """
     sequence, lit = stop_sequence(prototype, motion), phases(leds, motion)
     lines = [

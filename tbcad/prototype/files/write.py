@@ -74,9 +74,8 @@ def export_prototype(
 
     Returns the design's spec with what was chosen for the prototype.
 
-    Raises:
-        SpecError: when something does not fit; it says what to change.
-        InvalidSolidError: when the kernel fails.
+    SpecError when something does not fit; it says what to change; InvalidSolidError when the kernel
+    fails.
     """
     prices = load_prices(design.spec.prototype.prices)
     built = build_prototype_model(arrangements(design), progress, submit)

@@ -57,9 +57,8 @@ def lamp_layout(
     The face is x of the uprights' front, mm. The camera must not see lamps or stands, and these
     must not meet the static parts beside them.
 
-    Raises:
-        SpecError: when lamps cannot be where the spec has them, or take too much current; it says
-            what to change.
+    SpecError when lamps cannot be where the spec has them, or take too much current; it says what
+    to change.
     """
     section = spec.light
     strip, short = parts[STRIP], parts[SHORT_STRIP]

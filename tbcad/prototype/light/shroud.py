@@ -68,8 +68,7 @@ def shroud_layout(
 
     None without, also where "auto" finds no sheet large enough.
 
-    Raises:
-        SpecError: when the spec asks for one and no sheet is large enough.
+    SpecError when the spec asks for one and no sheet is large enough.
     """
     if light.shroud is False:
         return None

@@ -92,8 +92,7 @@ def package_lists() -> Traversable:
 def load_parts(folder: Traversable | None = None) -> Parts:
     """All purchased parts by name, from a folder with a CSV file for each kind, or tbcad's own.
 
-    Raises:
-        SpecError: when a file is wrong; it names line and column.
+    SpecError when a file is wrong; it names line and column.
     """
     folder, names, parts = folder or package_lists(), set[str](), []
     for kind, sizes in SIZES.items():
@@ -129,9 +128,8 @@ def choose_part(
 ) -> PurchasedPart:
     """The smallest purchased part of a kind that has all sizes, and at least the size in order.
 
-    Raises:
-        SpecError: when the list has none; it names the key of the spec that asks for it, and the
-            hint what to change.
+    SpecError when the list has none; it names the key of the spec that asks for it, and the hint
+    what to change.
     """
     exact = {size: value for size, value in sizes.items() if size != order}
     candidates = [
@@ -196,8 +194,7 @@ def load_prices(names: Iterable[str]) -> Prices:
 
     A list is "estimates", or the path of a CSV file (from the current folder) with PRICE_FIELDS.
 
-    Raises:
-        SpecError: a list that cannot be read, or is wrong; it names line and column.
+    SpecError: a list that cannot be read, or is wrong; it names line and column.
     """
     return Prices(tuple(rule for name in names for rule in _rules(_file(name), name)))
 

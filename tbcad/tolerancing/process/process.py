@@ -134,8 +134,7 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
     kind of error that it has replaces the whole kind there, so that no figure keeps the source of
     another.
 
-    Raises:
-        SpecError: anything that cannot be read, is unknown, or is not allowed.
+    SpecError: anything that cannot be read, is unknown, or is not allowed.
     """
     name = f"built-in process {which}" if which in BUILT_IN else which
     table = _built_in(which) if which in BUILT_IN else _own(Path(which))

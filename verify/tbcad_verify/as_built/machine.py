@@ -130,8 +130,7 @@ class AsBuilt(Strict):
 def read_machine(folder: Path) -> AsBuilt:
     """Read machine.json of a folder that `tbcad calibrate` wrote.
 
-    Raises:
-        BadExport: anything missing, malformed, not finite or absurd.
+    BadExport: anything missing, malformed, not finite or absurd.
     """
     try:
         value = parse_json(read(open_folder(folder), NAME, MAX_TEXT_BYTES), SCHEMA)

@@ -163,8 +163,7 @@ def verify_as_built(
 
     `progress`: called with the name of each stage.
 
-    Raises:
-        BadExport: one cannot be read, or they do not belong together. Nothing is written.
+    BadExport: one cannot be read, or they do not belong together. Nothing is written.
     """
     progress("record and calibration")
     machine, export = read_machine(calibration), read_export(folder)

@@ -64,8 +64,7 @@ class RealTransfer:
 def halves(context: PrototypeContext, machine: AsBuilt) -> list[Half]:
     """Both runs: that for the prototype's camera, and that for the other, the object turned.
 
-    Raises:
-        BadExport: another number of balls, or the plan leaves a mirror out.
+    BadExport: another number of balls, or the plan leaves a mirror out.
     """
     if len(machine.balls) != len(context.prototype.balls):
         raise BadExport(

@@ -39,11 +39,7 @@ def read_facets(folder: Path, name: str) -> tuple[Facets, FileBytes]:
 
 
 def parse(blob: FileBytes) -> Facets:
-    """Facets of a binary STL.
-
-    Raises:
-        BadExport: as `read_facets`.
-    """
+    """Facets of a binary STL; BadExport as `read_facets`."""
     _refuse_foreign(blob.name, blob.data.size, blob.data[:HEAD].tobytes())
     table = blob.data[HEAD:].view(FACET)
     corners = np.ascontiguousarray(table["corners"])

@@ -184,8 +184,7 @@ def _member(file: str, archive: zipfile.ZipFile, name: str) -> bytes:
 def _without_lists(model: bytes) -> bytes:
     """The model's text without vertices and triangles, which are nothing else than those.
 
-    Raises:
-        ValueError: there is more in the text, or less.
+    ValueError: there is more in the text, or less.
     """
     spans = {name: _list_span(model, name) for name in LISTS}
     starts, ends = zip(*sorted(spans.values()), strict=True)
@@ -213,8 +212,7 @@ def are_counted(items: bytes, item: bytes, attributes: tuple[bytes, ...]) -> boo
 def _list_span(model: bytes, name: str) -> tuple[int, int]:
     """Where a list's items begin and end in the model's text.
 
-    Raises:
-        ValueError: there is no such list, or a second one.
+    ValueError: there is no such list, or a second one.
     """
     opened, closed = b"<%s>" % name.encode(), b"</%s>" % name.encode()
     start = model.find(opened) + len(opened)
@@ -227,8 +225,7 @@ def _list_span(model: bytes, name: str) -> tuple[int, int]:
 def _check_element(element: ElementTree.Element, name: str) -> None:
     """Refuse an element whose name, attributes or children are others than tbcad writes.
 
-    Raises:
-        ValueError: what is not allowed.
+    ValueError: what is not allowed.
     """
     if element.tag != CORE + name:
         raise ValueError(f"{_plain(element.tag)} is not allowed, {name} is")

@@ -124,8 +124,7 @@ def own_print_checks(
 ) -> list[Check]:
     """Whether a prototype's part can be printed: a cap in resin, any other by FDM on a bed.
 
-    Raises:
-        Unknown: it was not measured, for the reason `lost`.
+    Unknown: it was not measured, for the reason `lost`.
     """
     bed = {"bed_mm": tuple(printer.bed_mm), "clearance_mm": printer.bed_margin_mm}
     resin = part.role == "cap"

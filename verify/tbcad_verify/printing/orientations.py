@@ -55,11 +55,7 @@ def _view(points: Floats, down: Floats) -> HullView:
 
 
 def part_hull(points: Floats) -> PartHull:
-    """The hull of points (V, 3), and the directions to try.
-
-    Raises:
-        Unknown: all points lie in a plane.
-    """
+    """The hull of points (V, 3), and the directions to try. Unknown: all points lie in a plane."""
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError) as error:

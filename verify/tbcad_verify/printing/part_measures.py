@@ -84,8 +84,7 @@ def measure(
     `edges`: of the mesh, if they are measured.
     `scene`: of the mesh, if there is one.
 
-    Raises:
-        Unknown: all points lie in a plane: there is nothing to measure.
+    Unknown: all points lie in a plane: there is nothing to measure.
     """
     hull = part_hull(mesh.points)
     # Facets without area have edges without an angle; those are uncertain, and left out.

@@ -99,11 +99,7 @@ def load(name_or_path: str) -> Profile:
 
 
 def parse(where: str, text: str) -> Profile:
-    """A profile from TOML text.
-
-    Raises:
-        BadProfile: as `load`.
-    """
+    """A profile from TOML text; BadProfile as `load`."""
     try:
         profile = Profile.model_validate(tomllib.loads(text))
     except ValidationError as error:

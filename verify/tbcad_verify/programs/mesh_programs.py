@@ -60,8 +60,7 @@ def find_prusa() -> Command:
 def ask_info(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """Manifold without repair, one part, the mesh's volume.
 
-    Raises:
-        Unknown: the program gives no answer.
+    Unknown: the program gives no answer.
     """
     lines = _lines(
         text_of(sandbox.run("--datadir", sandbox.folder / "home", "--info", sandbox.copy))
@@ -73,8 +72,7 @@ def ask_info(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -
 def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """The print's volume is the mesh's; filament and time inform.
 
-    Raises:
-        Unknown: the program gives no answer.
+    Unknown: the program gives no answer.
     """
     slices, filament, time = names
     length, hours = _sliced(sandbox)
@@ -172,11 +170,7 @@ PRUSA_SLICES = ProgramQuery(
 
 
 def ask_admesh(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
-    """Nothing to repair, one part, the mesh's volume.
-
-    Raises:
-        Unknown: the program gives no answer.
-    """
+    """Nothing to repair, one part, the mesh's volume. Unknown: the program gives no answer."""
     report = _admesh_figures(text_of(sandbox.run(sandbox.copy)))
     flaws = {key: report[key] for key in FLAWS}
     repairs = ", ".join(f"{key} {count:.0f}" for key, count in flaws.items() if count)

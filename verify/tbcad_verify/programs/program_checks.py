@@ -34,8 +34,7 @@ def check_with_programs(
     `folder`: the export; its files should have been compared with the manifest before.
     `progress`: called with program and file before each run, from several threads.
 
-    Raises:
-        BadExport: the folder is missing or is no folder.
+    BadExport: the folder is missing or is no folder.
     """
     limits = Limits(seconds)
     root = open_folder(folder)

@@ -104,8 +104,7 @@ def sandbox(
 ) -> Iterator[Sandbox]:
     """A sandbox that is deleted afterwards.
 
-    Raises:
-        BadExport: the file is no regular file inside the export.
+    BadExport: the file is no regular file inside the export.
     """
     original = locate(folder, file)
     with tempfile.TemporaryDirectory(prefix="tbcad-", ignore_cleanup_errors=True) as name:
@@ -162,11 +161,7 @@ def solid_checks(
 
 
 def text_of(outcome: Outcome) -> str:
-    """The output of a program that ended without error.
-
-    Raises:
-        Unknown: it did not.
-    """
+    """The output of a program that ended without error. Unknown: it did not."""
     if outcome.reason:
         raise Unknown(outcome.reason)
     if outcome.code != 0:
@@ -177,8 +172,7 @@ def text_of(outcome: Outcome) -> str:
 def script_figures(outcome: Outcome, folder: Path, keys: Sequence[str]) -> dict[str, float]:
     """The numbers that a script of ours wrote inside a program, as a JSON object.
 
-    Raises:
-        Unknown: it crashed, broke or left no such answer.
+    Unknown: it crashed, broke or left no such answer.
     """
     answer = _object(folder / "answer.json") if outcome.code is not None else {}
     if outcome.code and isinstance(answer.get("error"), str):

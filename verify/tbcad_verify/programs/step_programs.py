@@ -106,8 +106,7 @@ def find_gmsh() -> Command:
 def ask_gmsh(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """One solid with the mirrors' faces and the mesh's volume.
 
-    Raises:
-        Unknown: the program gives no answer.
+    Unknown: the program gives no answer.
     """
     is_package = len(sandbox.command) > 1
     if is_package:
@@ -143,8 +142,7 @@ GMSH = ProgramQuery(
 def ask_freecad(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """One valid, closed solid with the mirrors' faces and the mesh's volume.
 
-    Raises:
-        Unknown: the program gives no answer.
+    Unknown: the program gives no answer.
     """
     script = sandbox.folder / "look.py"
     script.write_text(FREECAD_SCRIPT + SCRIPT_END, encoding="utf-8")

@@ -53,8 +53,7 @@ LEDS = {"LED-3": (3.8 / 2 + 0.1, 5.4 - 1.5), "LED-5": (5.9 / 2 + 0.1, 8.7 - 2.5)
 def assembly_meshes(context: PrototypeContext) -> dict[str, Shape]:
     """Shapes of all bodies by name, in the frame of the shell.
 
-    Raises:
-        Unknown: there is no GLB, or it cannot be read.
+    Unknown: there is no GLB, or it cannot be read.
     """
     name = context.prototype.assembly.glb
     if not name:
@@ -75,19 +74,14 @@ def _welded(points: Floats, faces: NDArray[np.int64]) -> Shape:
 
 
 def assembly_solids(context: PrototypeContext) -> dict[str, TextSolid]:
-    """Solids of the STEP assembly, by name.
-
-    Raises:
-        Unknown: there is none, or it cannot be read.
-    """
+    """Solids of the STEP assembly, by name. Unknown: there is none, or it cannot be read."""
     return _solids(context, context.prototype.assembly.step)
 
 
 def part_solids(context: PrototypeContext) -> dict[str, TextSolid]:
     """Solids of the STEP files of all parts that are in the assembly, by name.
 
-    Raises:
-        Unknown: a file has no solid of its part's name, or cannot be read.
+    Unknown: a file has no solid of its part's name, or cannot be read.
     """
     found: dict[str, TextSolid] = {}
     for part in context.prototype.parts:
@@ -218,19 +212,14 @@ def _balls(context: PrototypeContext) -> Iterator[tuple[str, Floats, float]]:
 def all_solids(parts: list[MeasuredPart], drawn: Mapping[str, Shape]) -> dict[str, Any]:
     """All bodies of the assembly by name as manifold3d has them; printed ones are their meshes'.
 
-    Raises:
-        Unknown: one is no closed solid, or a part has no mesh.
+    Unknown: one is no closed solid, or a part has no mesh.
     """
     solids = {name: closed_solid(name, drawn) for name in sorted(drawn) if name not in VIEWS}
     return solids | {part.part.name: part.solid for part in parts if part.part.name in solids}
 
 
 def closed_solid(name: str, drawn: Mapping[str, Shape]) -> Any:
-    """One body as manifold3d has it.
-
-    Raises:
-        Unknown: it is missing, or no closed solid.
-    """
+    """One body as manifold3d has it. Unknown: it is missing, or no closed solid."""
     if name not in drawn:
         raise Unknown(f"the assembly lacks {name}")
     solid = manifold(*drawn[name])

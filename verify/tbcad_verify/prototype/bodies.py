@@ -196,8 +196,7 @@ def measure_prototype(
 ) -> MeasuredPrototype:
     """Put balls on their pads, and caps as they were measured; what is bought is as drawn.
 
-    Raises:
-        Unknown: a centre, a cap or a mesh is not known.
+    Unknown: a centre, a cap or a mesh is not known.
     """
     balls = context.prototype.balls
     if missing := [seat.reason for seat in seats if seat.reason]:

@@ -33,11 +33,7 @@ CHECKS = {"camera gauge": "faults"}
 def checks(
     names: list[CheckName], context: PrototypeContext, parts: list[MeasuredPart]
 ) -> list[Check]:
-    """Marks, sight and clearance of the gauge.
-
-    Raises:
-        Unknown: there is no mesh of it.
-    """
+    """Marks, sight and clearance of the gauge. Unknown: there is no mesh of it."""
     if context.export.spec.prototype.camera_diameter_mm == 0:
         return [informative(names[0], 0, "no camera")]
     place = require(context.prototype.camera_place, "there is no camera_place")

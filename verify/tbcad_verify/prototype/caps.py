@@ -46,11 +46,7 @@ class MeasuredCap:
 
 
 def measure_cap(context: PrototypeContext, part: MeasuredPart) -> MeasuredCap:
-    """Fit both spheres of a cap.
-
-    Raises:
-        Unknown: there is no such surface, or no mesh.
-    """
+    """Fit both spheres of a cap. Unknown: there is no such surface, or no mesh."""
     balls, k, mesh = context.prototype.balls, part.part.ball, part.placed_mesh
     front, body = (
         fit_sphere(mesh, balls.columns(centre, 3)[:, k], float(radius[k]))
@@ -64,8 +60,7 @@ def fit_sphere(mesh: Mesh, centre: Floats, radius: float) -> FittedSphere:
 
     Facets beyond the rim, where both surfaces run close together, drop out round after round.
 
-    Raises:
-        Unknown: fewer than `MIN_VERTICES` vertices lie there.
+    Unknown: fewer than `MIN_VERTICES` vertices lie there.
     """
     sphere, inverse = np.append(centre, radius), np.zeros((4, 4))
     candidates: list[Floats] = []

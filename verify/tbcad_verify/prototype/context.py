@@ -71,8 +71,7 @@ class PrototypeContext:
     def plan_rows(self) -> Ints:
         """(m,) row of the plan that shows each of this camera's mirrors, the object at 0 degrees.
 
-        Raises:
-            Unknown: a mirror has none, or a row names a ball that does not exist.
+        Unknown: a mirror has none, or a row names a ball that does not exist.
         """
         plan, ids = self.prototype.plan, self.mirror_ids
         row = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == 0).tolist()}

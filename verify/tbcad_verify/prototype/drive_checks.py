@@ -123,8 +123,7 @@ def balance_of(context: PrototypeContext, parts: list[MeasuredPart]) -> Balance:
 def gear_of(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Gear:
     """Wheels of the assembly, whose teeth are in their names.
 
-    Raises:
-        Unknown: wheels that are not known, or not as drawn.
+    Unknown: wheels that are not known, or not as drawn.
     """
     drive = context.export.spec.prototype.base.drive
     if drive != "nema17-belt":

@@ -71,8 +71,7 @@ class FlatDrawing(NamedTuple):
 def read_dxf(blob: FileBytes) -> FlatDrawing:
     """All that is to be cut and folded.
 
-    Raises:
-        Unknown: it is no DXF, or has something that tbcad does not write.
+    Unknown: it is no DXF, or has something that tbcad does not write.
     """
     try:
         entities = _entities(blob.text())
@@ -107,9 +106,7 @@ def _numbers(some: list[Entity], codes: tuple[int, ...]) -> Floats:
 def _entities(text: str) -> list[Entity]:
     """Entities of the drawing itself, the values of each by group code.
 
-    Raises:
-        ValueError: something is not allowed, or no DXF.
-        KeyError: a group is missing.
+    ValueError: something is not allowed, or no DXF; KeyError: a group is missing.
     """
     lines = [line.strip() for line in text.splitlines()]
     pairs = list(zip(map(int, lines[::2]), lines[1::2], strict=True))

@@ -114,11 +114,7 @@ class DrawnBody(NamedTuple):
 
 
 def read_glb(blob: FileBytes) -> dict[str, DrawnBody]:
-    """Bodies by name.
-
-    Raises:
-        Unknown: it is no GLB, or has something that tbcad does not write.
-    """
+    """Bodies by name. Unknown: it is no GLB, or has something that tbcad does not write."""
     try:
         text, binary = _chunks(blob.data.tobytes())
         document = Document.model_validate(json.loads(text, object_pairs_hook=refuse_doubles))

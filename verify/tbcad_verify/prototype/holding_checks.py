@@ -137,8 +137,7 @@ def _hold(
 def _require_magnet(context: PrototypeContext, k: int, radius: float, height: float) -> None:
     """Refuse a pocket that no magnet of its size is put in.
 
-    Raises:
-        Unknown: there is none on the ball's axis.
+    Unknown: there is none on the ball's axis.
     """
     balls, name = context.prototype.balls, f"MAGNET-{round(2 * radius, 4):g}x{round(height, 4):g}"
     centre, axis = balls.columns("bx", 3)[:, k], balls.columns("nx", 3)[:, k]

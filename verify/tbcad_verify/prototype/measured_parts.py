@@ -57,19 +57,14 @@ class MeasuredPart:
 
     @property
     def placed_mesh(self) -> Mesh:
-        """The placed mesh.
-
-        Raises:
-            Unknown: there is none.
-        """
+        """The placed mesh. Unknown: there is none."""
         return require(self.placed, self.reason)
 
     @cached_property
     def solid(self) -> Any:
         """The placed mesh as manifold3d has it, built once for all checks.
 
-        Raises:
-            Unknown: there is no mesh.
+        Unknown: there is no mesh.
         """
         return manifold(self.placed_mesh.points, self.placed_mesh.faces)
 
@@ -122,8 +117,7 @@ def of_roles(parts: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
 def joined_meshes(parts: list[MeasuredPart]) -> tuple[Mesh, Ints]:
     """Placed meshes as one, and the part that each facet belongs to.
 
-    Raises:
-        Unknown: one could not be measured.
+    Unknown: one could not be measured.
     """
     meshes = [part.placed_mesh for part in parts]
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])

@@ -117,8 +117,7 @@ def twins(context: PrototypeContext) -> Ints:
 
     Rotated by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
 
-    Raises:
-        Unknown: there is no mirror in that direction.
+    Unknown: there is no mirror in that direction.
     """
     rows = context.export.mirrors
     u = rows.columns("ux", 3)

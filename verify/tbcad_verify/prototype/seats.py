@@ -123,8 +123,7 @@ def _seat(context: PrototypeContext, base: Mesh, boxes: Boxes, k: int) -> Measur
 def touching_sphere(normals: list[Floats], offsets: list[float], radius: float) -> Floats:
     """(3,) centre of the sphere that lies on three planes n.x = d, on the sides n points to.
 
-    Raises:
-        Unknown: the planes do not meet in a point.
+    Unknown: the planes do not meet in a point.
     """
     matrix = np.array(normals)
     if abs(float(np.linalg.det(matrix))) < MIN_DETERMINANT:
@@ -145,8 +144,7 @@ def _pad(mesh: Mesh, near: Ints, contact: Floats, normal: Floats, radius: float)
     The record gives only the starting point: the largest facet there that faces the ball. All
     facets in its plane that are connected with it are the pad.
 
-    Raises:
-        Unknown: nothing there faces the ball.
+    Unknown: nothing there faces the ball.
     """
     normals = unit(mesh.area[:, near])
     offset = mesh.points[mesh.faces[near]].mean(axis=1) - contact

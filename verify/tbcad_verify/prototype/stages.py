@@ -86,11 +86,7 @@ class Once(Generic[T]):
         self.attempt = cache(lambda: attempt(work))
 
     def __call__(self) -> T:
-        """The value.
-
-        Raises:
-            Unknown: it could not be worked out.
-        """
+        """The value. Unknown: it could not be worked out."""
         return require(*self.attempt())
 
 

@@ -212,8 +212,7 @@ class Export:
 def listed_names(folder: Path) -> frozenset[str]:
     """Names of all files that belong to an export, by its manifest alone.
 
-    Raises:
-        BadExport: the folder is no export, which is told at once however much is in it.
+    BadExport: the folder is no export, which is told at once however much is in it.
     """
     root = open_folder(folder)
     _refuse_other_folders(root)
@@ -225,8 +224,7 @@ def listed_names(folder: Path) -> frozenset[str]:
 def _refuse_other_folders(root: Path) -> None:
     """Refuse what is no build by the first files that there would be.
 
-    Raises:
-        BadExport: it is something else that tbcad wrote, or nothing of tbcad.
+    BadExport: it is something else that tbcad wrote, or nothing of tbcad.
     """
     there = {name for name in (DESIGN, MANIFEST, *OTHER_RECORDS) if os.path.lexists(root / name)}
     if {DESIGN, MANIFEST} <= there:
@@ -243,8 +241,7 @@ def _refuse_other_folders(root: Path) -> None:
 def read_export(folder: Path) -> Export:
     """Read design.json, mirrors.csv, manifest.json and what describes a prototype, strictly.
 
-    Raises:
-        BadExport: anything missing, foreign, malformed, not finite or absurd.
+    BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
     root = open_folder(folder)
     _refuse_other_folders(root)

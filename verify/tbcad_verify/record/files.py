@@ -35,11 +35,7 @@ class FileBytes:
         return self.data.size, self.sha256
 
     def text(self) -> str:
-        """The bytes as UTF-8 text.
-
-        Raises:
-            BadExport: the file is not UTF-8.
-        """
+        """The bytes as UTF-8 text. BadExport: the file is not UTF-8."""
         try:
             return self.data.tobytes().decode("utf-8")
         except UnicodeDecodeError as error:
@@ -49,11 +45,7 @@ class FileBytes:
 
 
 def open_folder(folder: Path) -> Path:
-    """The folder itself, resolved.
-
-    Raises:
-        BadExport: it is missing or is no folder.
-    """
+    """The folder itself, resolved. BadExport: it is missing or is no folder."""
     if not folder.exists():
         raise BadExport(f"{folder}: no such folder; give the folder that `tbcad build` wrote")
     if not folder.is_dir():
@@ -64,8 +56,7 @@ def open_folder(folder: Path) -> Path:
 def locate(folder: Path, name: str) -> Path:
     """The path of a regular file inside the export, and never of anything outside it.
 
-    Raises:
-        BadExport: the name leaves the folder, or the file is missing, no regular file or too big.
+    BadExport: the name leaves the folder, or the file is missing, no regular file or too big.
     """
     refuse_unsafe(name)
     path = folder / name
@@ -86,8 +77,7 @@ def locate(folder: Path, name: str) -> Path:
 def refuse_other_kinds(folder: Path, names: Iterable[str]) -> None:
     """Refuse folders, pipes and devices where files are listed; what is missing is found later.
 
-    Raises:
-        BadExport: it names the first.
+    BadExport: it names the first.
     """
     for name in names:
         with contextlib.suppress(OSError, ValueError):
@@ -110,8 +100,7 @@ def read(
     `limit`: largest size allowed, bytes.
     `expect`: called with name, size and the first bytes before the rest is read; may refuse.
 
-    Raises:
-        BadExport: as `locate`, over the limit, or the file changed while it was read.
+    BadExport as `locate`, over the limit, or the file changed while it was read.
     """
     path = locate(folder, name)
     try:
@@ -131,11 +120,7 @@ def read(
 
 
 def digest(folder: Path, name: str) -> tuple[int, str]:
-    """Size in bytes and sha256 of a file that is not parsed.
-
-    Raises:
-        BadExport: as `locate`.
-    """
+    """Size in bytes and sha256 of a file that is not parsed; BadExport as `locate`."""
     path = locate(folder, name)
     with path.open("rb") as stream:
         return os.fstat(stream.fileno()).st_size, hashlib.file_digest(stream, "sha256").hexdigest()
@@ -167,8 +152,7 @@ def listing(folder: Path) -> frozenset[str]:
 def refuse_unsafe(name: str) -> None:
     """Refuse names that lead, or might lead, out of the export.
 
-    Raises:
-        BadExport: absolute, with `..`, a drive, or another system's separators.
+    BadExport: absolute, with `..`, a drive, or another system's separators.
     """
     parts = PurePosixPath(name).parts
     bad = not parts or name.startswith("/") or ".." in parts or "\\" in name or "\0" in name

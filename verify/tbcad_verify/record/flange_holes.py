@@ -57,8 +57,7 @@ def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flan
 
     `beyond`: by how much the back's semi-axes exceed the ellipsoid's, mm.
 
-    Raises:
-        Unknown: the back does not reach the flanges.
+    Unknown: the back does not reach the flanges.
     """
     seam, foot = export.spec.shell.seam_flange, export.spec.shell.foot_flange
     low, across = export.foot_z_mm, seam.thickness_mm
@@ -94,8 +93,7 @@ def hole_faults(holes: Sequence[Hole], wanted: Sequence[Flange], limits: HoleLim
 def _section(semi_axes: Floats, pinhole: Floats, axis: int, at: float) -> Floats:
     """(S, 2) a spheroid's section at x or z: y and the other coordinate, up and down again.
 
-    Raises:
-        Unknown: the plane misses it.
+    Unknown: the plane misses it.
     """
     major, minor = semi_axes
     major_axis, centre = pinhole / np.linalg.norm(pinhole), pinhole / 2
@@ -116,8 +114,7 @@ def _section(semi_axes: Floats, pinhole: Floats, axis: int, at: float) -> Floats
 def _even(section: Floats, lowest: float, end: float, count: int) -> Floats:
     """(H, 2) places at even distances along the part of a section above a coordinate.
 
-    Raises:
-        Unknown: nothing is above it.
+    Unknown: nothing is above it.
     """
     above = np.flatnonzero(section[:, 1] > lowest)
     if not above.size or above[0] == 0 or above[-1] == len(section) - 1:

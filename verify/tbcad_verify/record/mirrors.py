@@ -40,9 +40,8 @@ class Columns(BaseModel):
     def read(cls, blob: FileBytes) -> Self:
         """The table in a file.
 
-        Raises:
-            BadExport: broken or truncated CSV, other columns, too few or too many rows, or a cell
-                that is not allowed.
+        BadExport: broken or truncated CSV, other columns, too few or too many rows, or a cell that
+        is not allowed.
         """
         header, *rows = cls._rows(blob)
         cells = dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))

@@ -126,8 +126,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
 
     `cameras`: ids that the design has.
 
-    Raises:
-        BadExport: anything missing, foreign, malformed, not finite or absurd.
+    BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
     names = (RECORD, BALLS, PLAN, STOPS, PROGRAM, SETTINGS)
     optional = [name for name in OPTIONAL if (folder / name).exists()]

@@ -111,8 +111,7 @@ class PartFiles(Strict):
 def parse_json(blob: FileBytes, schema: str) -> dict[str, Any]:
     """The JSON object in a file.
 
-    Raises:
-        BadExport: broken JSON, NaN or infinities, a key twice, no object, or another schema.
+    BadExport: broken JSON, NaN or infinities, a key twice, no object, or another schema.
     """
     try:
         value = json.loads(
@@ -131,11 +130,7 @@ def parse_json(blob: FileBytes, schema: str) -> dict[str, Any]:
 
 
 def validated(file: str, model: type[Model], value: Any) -> Model:
-    """The value as the model has it.
-
-    Raises:
-        BadExport: the value does not fit.
-    """
+    """The value as the model has it. BadExport: the value does not fit."""
     try:
         return model.model_validate(value)
     except ValidationError as error:

@@ -167,11 +167,7 @@ def attempt(work: Callable[[], T]) -> tuple[T | None, str]:
 
 
 def require(value: T | None, reason: str) -> T:
-    """A value that may be missing.
-
-    Raises:
-        Unknown: it is missing, for this reason.
-    """
+    """A value that may be missing. Unknown: it is missing, for this reason."""
     if value is None:
         raise Unknown(reason)
     return value

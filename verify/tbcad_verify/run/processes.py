@@ -85,9 +85,7 @@ class Processes(ThreadPoolExecutor):
         `heard`: is called with each value that the function reports: by another function, its
         last argument.
 
-        Raises:
-            ProcessEnded: the process ended before.
-            Exception: that the function raised.
+        ProcessEnded: the process ended before; Exception: that the function raised.
         """
         try:
             process = self._idle.pop() if self._idle else self._started()

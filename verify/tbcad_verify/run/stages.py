@@ -77,8 +77,7 @@ def run_stages(
     `printers`: profiles that every part must suit; without any, the built-in ones inform only.
     `cutter_mm`: radius of a ball that is put on all mirrors; None: no ball is.
 
-    Raises:
-        BadExport: the folder is not a readable export, or a profile cannot be used.
+    BadExport: the folder is not a readable export, or a profile cannot be used.
     """
     profiles = [load(name) for name in printers or built_in()]
     sink(Results(stages=[READING]))

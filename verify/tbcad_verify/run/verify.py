@@ -78,9 +78,7 @@ def verify(
 
     `progress`: called with the name of each stage before it starts.
 
-    Raises:
-        BadExport: the folder is not a readable export, or cannot be written to; nothing is
-            written.
+    BadExport: the folder is not a readable export, or cannot be written to; nothing is written.
     """
     for name in options.printers:
         load(name)
@@ -136,8 +134,7 @@ def watch(
 
     `stages`: function of a module; takes the arguments, and what receives results.
 
-    Raises:
-        BadExport: the folder is not a readable export.
+    BadExport: the folder is not a readable export.
     """
     with Processes(1, seconds) as processes:
         try:

@@ -84,8 +84,7 @@ def mandrel_reach_check(
 
     `own`: (F,) mirror of each of the negative's facets, negative for none.
 
-    Raises:
-        Unknown: the negative has no mirror.
+    Unknown: the negative has no mirror.
     """
     if not (own >= 0).any():
         raise Unknown("it has no mirror of the shell's")

@@ -89,11 +89,7 @@ def _is_cased(export: Export, part: Part) -> bool:
 
 
 def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
-    """Valleys and back of one part.
-
-    Raises:
-        Unknown: no mirrors meet, or no ray leaves through a back.
-    """
+    """Valleys and back of one part. Unknown: no mirrors meet, or no ray leaves through a back."""
     export = setup.export
     camera = export.cameras[export.parts[number].camera]
     focal = float(np.linalg.norm(camera.pinhole)) / 2

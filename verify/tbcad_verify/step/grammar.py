@@ -40,8 +40,7 @@ class Form(NamedTuple):
 def refuse_foreign(table: StepTable) -> None:
     """Refuse a file that has an entity, a reference or a header that no build writes.
 
-    Raises:
-        ValueError: it says which, and what is allowed.
+    ValueError: it says which, and what is allowed.
     """
     rules = _rules()
     if not _form("", rules["header"]).pattern.fullmatch("".join(table.head.split())):

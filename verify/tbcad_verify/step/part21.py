@@ -51,8 +51,7 @@ class StepTable:
     def __init__(self, text: str) -> None:
         """Find all entities.
 
-        Raises:
-            ValueError: the text is no STEP file, or two entities have one number.
+        ValueError: the text is no STEP file, or two entities have one number.
         """
         start = _data_start(text)
         self.head, self.entities = text[:start], _entities(text, start)
@@ -82,11 +81,7 @@ class StepTable:
         return self._references[number]
 
     def numbers(self, number: int) -> list[float]:
-        """Decimal numbers in an entity.
-
-        Raises:
-            ValueError: one is beyond all floats.
-        """
+        """Decimal numbers in an entity. ValueError: one is beyond all floats."""
         values = [float(digits) for digits in NUMBER.findall(self.bodies[number])]
         if not all(map(math.isfinite, values)):
             raise ValueError(f"a number in {self.bodies[number][:SHOWN]!r} is too large")
@@ -115,11 +110,7 @@ class StepTable:
         return self._topology[number]
 
     def triple(self, number: int) -> Floats:
-        """(3,) of a point or direction.
-
-        Raises:
-            ValueError: it is neither.
-        """
+        """(3,) of a point or direction. ValueError: it is neither."""
         values = self.numbers(number)
         if self.kinds[number] not in TRIPLES or len(values) != 3:
             raise ValueError(f"{self.kinds[number]} where a point or direction must be")

@@ -31,11 +31,7 @@ class PartComparison:
 
     @property
     def masses(self) -> tuple[MassProperties, MassProperties]:
-        """Of mesh and file.
-
-        Raises:
-            Unknown: the mesh could not be measured.
-        """
+        """Of mesh and file. Unknown: the mesh could not be measured."""
         if self.mesh_mass is None:
             raise Unknown("the mesh could not be measured")
         return self.mesh_mass, self.file.mass

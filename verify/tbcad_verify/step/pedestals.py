@@ -78,8 +78,7 @@ def read_grooves(table: StepTable, faces: StepFaces, ids: Sequence[str]) -> Groo
 
     A wall has the names of its mirror and of the one across its groove.
 
-    Raises:
-        Unknown: there are none.
+    Unknown: there are none.
     """
     number = {one: k for k, one in enumerate(ids)}
     row = {one: k for k, one in enumerate(faces.names)}

@@ -55,8 +55,7 @@ class TextSolid:
 def read_solids(text: str) -> dict[str, TextSolid]:
     """Solids by the name of their product, where the file itself puts them.
 
-    Raises:
-        Unknown: a solid is moved by the assembly, has no product, or two have the same name.
+    Unknown: a solid is moved by the assembly, has no product, or two have the same name.
     """
     try:
         table = StepTable(text)
@@ -212,8 +211,7 @@ class Casing:
 def read_casing(table: StepTable, mirrors: frozenset[str]) -> Casing:
     """Find the back, the mirrors' corners and all round holes.
 
-    Raises:
-        Unknown: there is no back, more than one, or no spheroid.
+    Unknown: there is no back, more than one, or no spheroid.
     """
     backs = table.of("SURFACE_OF_REVOLUTION")
     if len(backs) != 1:
@@ -241,8 +239,7 @@ def bores(table: StepTable, mirrors: frozenset[str]) -> tuple[Hole, ...]:
 def wall(casing: Casing, camera: Camera, semi_minor: float) -> float:
     """Least material behind the deepest valley, mm.
 
-    Raises:
-        Unknown: the back is not the spheroid that belongs to the camera.
+    Unknown: the back is not the spheroid that belongs to the camera.
     """
     focal = camera.pinhole / 2
     semi_axes = np.array([float(np.hypot(semi_minor, np.linalg.norm(focal))), semi_minor])

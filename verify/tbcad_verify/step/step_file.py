@@ -82,8 +82,7 @@ class StepFile:
 def load(folder: Path, name: str) -> FileBytes:
     """The bytes of a STEP file.
 
-    Raises:
-        BadExport: as `files.read`; it does not begin or end as ISO 10303-21 requires.
+    BadExport as `files.read`; it does not begin or end as ISO 10303-21 requires.
     """
     blob = read(folder, name, MAX_STEP_BYTES)
     if not blob.data[:HEAD].tobytes().lstrip().startswith(START):
@@ -96,8 +95,7 @@ def load(folder: Path, name: str) -> FileBytes:
 def read_step_files(export: Export, processes: Processes) -> dict[str, StepFile | Unknown]:
     """The STEP files of all parts, or why one is not known, by part.
 
-    Raises:
-        BadExport: a file is missing, foreign or truncated.
+    BadExport: a file is missing, foreign or truncated.
     """
     parts = [part for part in (*export.parts, *export.mandrels, *export.printed) if part.step]
     files = examine_all([load(export.folder, part.step) for part in parts], processes)
@@ -121,11 +119,7 @@ def examine_all(blobs: Sequence[FileBytes], processes: Processes) -> list[StepFi
 
 
 def read_file(file: Path) -> tuple[Row, Row]:
-    """Text and solid of one file.
-
-    Raises:
-        ValueError: why it cannot be read.
-    """
+    """Text and solid of one file. ValueError: why it cannot be read."""
     from tbcad_verify.step.kernel.reading import read_solid
 
     return read_text(file), read_solid(file)
@@ -144,8 +138,7 @@ def _answer(asked: Future[tuple[Row, Row]]) -> StepFile | Unknown:
 def read_text(path: Path) -> Row:
     """Named faces with their spheres and planes, solids by name, and validation properties; mm.
 
-    Raises:
-        ValueError: the text is no STEP file, or an entity lacks what its kind must have.
+    ValueError: the text is no STEP file, or an entity lacks what its kind must have.
     """
     try:
         # Names are ASCII, and the standard writes all other characters so too.
@@ -193,11 +186,7 @@ def _properties(table: StepTable) -> Row:
 
 
 def known(found: Found | Unknown) -> Found:
-    """What was found.
-
-    Raises:
-        Unknown: nothing was.
-    """
+    """What was found. Unknown: nothing was."""
     if isinstance(found, Unknown):
         raise found
     return found

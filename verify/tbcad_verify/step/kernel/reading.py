@@ -29,8 +29,7 @@ MAXIMUM = 1  # of all tolerances: a mode of the kernel
 def read_solid(path: Path) -> Row:
     """Counts, measures and faces of a STEP file, as plain numbers and texts; mm.
 
-    Raises:
-        ValueError: the kernel cannot read it, or finds no shape in it.
+    ValueError: the kernel cannot read it, or finds no shape in it.
     """
     shape = transferred(path)
     corners = corners_of(shape)
@@ -52,11 +51,7 @@ def read_solid(path: Path) -> Row:
 
 
 def transferred(path: Path) -> TopoDS_Shape:
-    """The shape in a file.
-
-    Raises:
-        ValueError: the kernel cannot read it, or finds no shape in it.
-    """
+    """The shape in a file. ValueError: the kernel cannot read it, or finds no shape in it."""
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Alarm)
     os.environ[f"CSF_{REPAIRS.name}Defaults"] = str(REPAIRS.parent)
