@@ -218,9 +218,10 @@ SAMPLE = ROOT / "docs" / "sample"
 
 @pytest.fixture(scope="module")
 def whole_export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Both parts of a small design, with few pixels and balls."""
+    """Both parts and the mandrels of a small design, with few pixels and balls."""
     out = tmp_path_factory.mktemp("documentation") / "exports"
-    words = ["build", "--n", "3", *SMALL_SENSOR, *FEW_BALLS, "--no-verify", "--out", str(out)]
+    words = ["build", "--n", "3", *SMALL_SENSOR, *FEW_BALLS, "--set", "shell.negative=true"]
+    words += ["--no-verify", "--out", str(out)]
     assert run(words) == 0
     return out
 

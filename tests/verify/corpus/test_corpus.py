@@ -32,10 +32,6 @@ def meshes_written_anew(folder: Path) -> None:
         write(folder, half, read(folder, half))
 
 
-def a_part_out_of_the_light(folder: Path) -> None:
-    part(folder, "stand", tetrahedron(np.array([0.0, 0.0, 300.0]), 10))
-
-
 def a_link_inside(folder: Path) -> None:
     (folder / "shell_a.stl").rename(folder / "real.stl")
     (folder / "shell_a.stl").symlink_to("real.stl")
@@ -61,7 +57,6 @@ HARMLESS = {
     ),
     "mirrors in another order": mirrors(lambda rows, _: rows.reverse()),
     "a further column": lambda folder: change(folder, "mirrors.csv", a_further_column),
-    "a part out of the light": a_part_out_of_the_light,
     "a file that is not listed": lambda folder: put(folder, "notes.txt", b"mine"),
     "a link inside": a_link_inside,
 }

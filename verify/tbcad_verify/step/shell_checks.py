@@ -173,9 +173,7 @@ def _traced(export: Export) -> Bools:
     beyond = mirrors.coverage_mm - (export.target_mm + margin)
     # Where spheres of the largest radius would not meet, tbcad makes them flatter still.
     at_largest = mirrors.radius_mm >= largest * (1 - RULE_SHARE)
-    by_coverage = np.abs(beyond) <= RULE_MM
-    within = mirrors.radius_mm <= largest * (1 + RULE_SHARE)
-    good = np.where(by_coverage, within, at_largest & (beyond >= -RULE_MM))
+    good = (np.abs(beyond) <= RULE_MM) | (at_largest & (beyond >= -RULE_MM))
     return np.asarray(good & (margin >= export.spec.mirrors.margin_mm))
 
 
