@@ -6,13 +6,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tbcad_verify import main, verify
 
 from tests.verify.corpus import part21
 from tests.verify.corpus.broken_files import gone
-from tests.verify.corpus.broken_meshes import MESHES, dented, mesh, part, tetrahedron
+from tests.verify.corpus.broken_meshes import MESHES, dented, mesh
 from tests.verify.corpus.broken_records import RECORDS, design, mirrors
 from tests.verify.corpus.copies import change, copy, load, put, sign
 from tests.verify.corpus.facets import HALVES, read, write, write_stl
