@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-COMMAND = "tbcad tolerance FOLDER"
 NOT_MODELLED = "sag 1.8 mm, lens 2 mm, shadows, caps"
 """Figures of the paper's design: docs/tolerance.md has them all."""
 MOST, NEAREST = 3, 2  # processes that can, and that cannot, of which the verdict tells
 GOOD = 0.95  # share of few builds that stands for a process that can make a design
-NOT_SIMULATED = f"Can be made: {COMMAND} simulates builds with manufacturing errors"
+NOT_SIMULATED = "Can be made: tbcad tolerance FOLDER simulates builds with manufacturing errors"
 
 
 @dataclass(frozen=True)

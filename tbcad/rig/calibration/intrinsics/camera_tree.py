@@ -77,15 +77,10 @@ def _cameras(node: Tree, label: str) -> Iterator[tuple[str, Node, str, str]]:
         return
     for key, value in node.items():
         found = MATRIX.fullmatch(key)
-        if found and _is_matrix(value):
+        if found and (isinstance(value, list) or (isinstance(value, dict) and "data" in value)):
             yield label or key, node, key, found["side"] or ""
         else:
             yield from _cameras(value, key)
-
-
-def _is_matrix(value: Tree) -> bool:
-    """Whether it may be numbers: a list, or a mapping with data."""
-    return isinstance(value, list) or (isinstance(value, dict) and "data" in value)
 
 
 def _models(node: Tree, name: str, key: str = "") -> Iterator[str]:
