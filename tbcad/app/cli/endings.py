@@ -4,8 +4,9 @@ import errno
 import os
 import re
 import signal
+import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
@@ -60,9 +61,11 @@ def signals_as_interrupt() -> Iterator[None]:
     again: list[threading.Timer] = []
     for number in taken:
         signal.signal(number, partial(_interrupt, again))
+    unraisable, sys.unraisablehook = sys.unraisablehook, partial(_kept, again, sys.unraisablehook)
     try:
         yield
     finally:
+        sys.unraisablehook = unraisable
         for timer in again:  # the command has ended: its caller is not to be stopped
             timer.cancel()
         for number, handler in taken.items():
@@ -73,12 +76,23 @@ def _interrupt(again: list[threading.Timer], number: int, frame: FrameType | Non
     """Stop, but after an import: native modules that are stopped while they load hide the cause."""
     while frame:
         if frame.f_code.co_filename == IMPORTING:
-            timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
-            again.append(timer)
-            timer.start()
+            _send_again(again, number)
             return
         frame = frame.f_back
     raise KeyboardInterrupt
+
+
+def _kept(again: list[threading.Timer], others: Callable[[Any], Any], lost: Any) -> None:
+    """Stop later when native code that had called Python has dropped the interrupt."""
+    if lost.exc_type is KeyboardInterrupt:
+        _send_again(again, signal.SIGINT)
+    else:
+        others(lost)
+
+
+def _send_again(again: list[threading.Timer], number: int) -> None:
+    again.append(threading.Timer(AGAIN_S, os.kill, (os.getpid(), number)))
+    again[-1].start()
 
 
 # The typer library keeps the classes of its errors to itself: they differ in what they hold.

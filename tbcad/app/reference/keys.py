@@ -180,7 +180,8 @@ def _key_lines(key: Key, values: Table, remarks: list[str]) -> Iterator[str]:
     yield from _comment(f"Allowed: {key.allowed}{unit}. Default: {key.default}.")
     yield from (f"# {line}" for line in remarks)
     value = toml_text(values[key.name]) if key.name in values else key.default
-    mark = "" if key.name in values or _is_main(key.name) else "# "
+    main = any(f"{key.name}.".startswith(f"{one}.") for one in MAIN)
+    mark = "" if key.name in values or main else "# "
     yield from _fitting(f"{mark}{key.name.rpartition('.')[2]} = {value}")
 
 
@@ -195,10 +196,6 @@ def _fitting(line: str) -> Iterator[str]:
         items.removesuffix("]"), WIDTH, initial_indent="    ", subsequent_indent="    "
     )
     yield "]"
-
-
-def _is_main(key: str) -> bool:
-    return any(key == main or key.startswith(main + ".") for main in MAIN)
 
 
 def _comment(text: str) -> list[str]:

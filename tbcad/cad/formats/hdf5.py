@@ -135,7 +135,8 @@ def opened_hdf5(
     with ExitStack() as refused:
         refused.enter_context(store)
         try:
-            _check_schema(store, schema)
+            if (named := store.attrs.get("schema")) != schema:
+                raise ValueError(f"its schema is {str(named)[:80]!r}, allowed is {schema!r}")
             found = read(StoredGroup(store, partial(_damaged, file, what, again)))
         except UNREADABLE as error:
             raise _damaged(file, what, again, error) from error
@@ -145,11 +146,6 @@ def opened_hdf5(
 
 def _damaged(file: Path, what: str, again: str, error: BaseException) -> InputError:
     return InputError(f"{file} is a damaged {what}: {_line(error)}: {again}")
-
-
-def _check_schema(store: h5py.File, schema: str) -> None:
-    if (named := store.attrs.get("schema")) != schema:
-        raise ValueError(f"its schema is {str(named)[:80]!r}, allowed is {schema!r}")
 
 
 def _refused(data: h5py.Dataset) -> str:

@@ -1,5 +1,6 @@
 """The command as a user meets it: exit codes, one line of error, nothing half done."""
 
+import ctypes
 import json
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 from tbcad_verify.report.summary import MAX_LINES
 
 from tbcad.app.cli import run
+from tbcad.app.cli.endings import signals_as_interrupt
 from tests.exported_files import read_csv
 
 STOPPED = "tbcad: stopped; nothing was changed"
@@ -113,6 +115,13 @@ def test_a_broken_process_is_found_before_anything_begins(
 def _accept_interrupts() -> None:
     """A background job of a shell, and all that it starts, would ignore them."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def test_an_interrupt_that_native_code_drops_comes_again() -> None:
+    """Compilers and event loops call Python, and forget what it raises."""
+    from_native = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt), signals_as_interrupt():
+        print(from_native(), time.sleep(60))
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 0.15])

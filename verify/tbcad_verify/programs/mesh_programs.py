@@ -91,11 +91,6 @@ def _sliced(sandbox: Sandbox) -> tuple[float, float]:
     return _print(_tail(code))
 
 
-def _volume(length: float) -> float:
-    """Of filament of a length, mm^3."""
-    return length * math.pi / 4 * FILAMENT_MM**2
-
-
 def _lines(text: str) -> list[tuple[str, str]]:
     """Key and value of every line; keys repeat for each object of the file."""
     return re.findall(r"^(\w{1,40}) = +?(\S{1,40}) *$", text, flags=re.MULTILINE)
@@ -128,7 +123,7 @@ def _sum(lines: list[tuple[str, str]], key: str) -> float:
 def _slices(name: CheckName, length: float, mesh: float) -> Check:
     if not math.isfinite(mesh) or mesh <= 0:
         return unknown(name, "the mesh's volume is unknown")
-    printed = _volume(length)
+    printed = length * math.pi / 4 * FILAMENT_MM**2  # mm^3
     detail = f"a solid print takes {printed:.6g} mm^3, but the mesh has {mesh:.6g}"
     return at_most(name, 100 * abs(printed / mesh - 1), SOLID_PERCENT, detail)
 

@@ -104,14 +104,11 @@ def numbers(least: float, most: float) -> Any:
     return column(Annotated[float, Field(ge=least, le=most)], float)
 
 
-def _none_if_empty(cell: object) -> object:
-    return None if cell == "" else cell
-
-
 def numbers_or_empty(least: float, most: float) -> Any:
     """A column of numbers in a range, NaN where the cell is empty."""
     cell = Annotated[float, Field(ge=least, le=most)] | None
-    return column(Annotated[cell, BeforeValidator(_none_if_empty)], float)
+    empty = BeforeValidator(lambda text: None if text == "" else text)
+    return column(Annotated[cell, empty], float)
 
 
 Counts = Annotated[
