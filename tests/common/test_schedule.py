@@ -255,7 +255,7 @@ class TestCluster:
         with pytest.raises(KeyboardInterrupt):
             run_units(marks.work(0.1), range(1000), standing.address, interrupted)
         until(marks.are_quiet)
-        assert len(marks.of("begun")) < 50
+        assert len(marks.of("begun")) < 500  # of 1000, however busy the machine
 
     def test_what_work_raises_is_raised_here(self, standing: Cluster) -> None:
         def work(unit: int) -> None:
