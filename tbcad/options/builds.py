@@ -35,53 +35,26 @@ class BuildOptions(Call):
     spec: Design[AnyDesign] = None
     out: OutReplaced[AnyPath] = Path("exports")
     _: KW_ONLY
-    n: Annotated[
-        int | str | None,
-        typer.Option(
-            metavar="N",
-            help="Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared.",
-        ),
-    ] = None
-    radius_rule: Annotated[
-        Literal["traced", "paper", "flat"] | None,
-        typer.Option(
-            help="traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 "
-            "and 2 of the paper; flat: planar mirrors."
-        ),
-    ] = None
-    settings: Annotated[
-        Changes,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."
-        ),
-    ] = ()
-    parts: Annotated[
-        str | Sequence[str] | None,
-        typer.Option(
-            help="What to build: shell, prototype, or shell,prototype. By default both, but no "
-            "prototype of planar mirrors."
-        ),
-    ] = None
+    n: Annotated[int | str | None, typer.Option(metavar="N")] = None
+    """Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared."""
+    radius_rule: Literal["traced", "paper", "flat"] | None = None
+    """traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 and 2 of the paper;
+    flat: planar mirrors."""
+    settings: Annotated[Changes, typer.Option("--set", metavar="KEY=VALUE")] = ()
+    """Change any key of the design; repeatable."""
+    parts: str | Sequence[str] | None = None
+    """What to build: shell, prototype, or shell,prototype. By default both, but no prototype of
+    planar mirrors."""
     for_process: Annotated[
-        str | None,
-        typer.Option(
-            "--for-process",
-            "--process",
-            metavar="NAME|FILE",
-            help="Choose edges and coverage margins for a manufacturing process, and say what they "
-            "cost: nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance. A design that "
-            "names its edges keeps them.",
-        ),
+        str | None, typer.Option("--for-process", "--process", metavar="NAME|FILE")
     ] = None
-    wanted_yield: Annotated[
-        float | None,
-        typer.Option(
-            "--yield",
-            help="With --for-process: share of simulated builds that must reach the target; by "
-            f"default {DEFAULT_YIELD:g}.",
-        ),
-    ] = None
-    verify: Annotated[bool, typer.Option(help="Verify the files after they are written.")] = True
+    """Choose edges and coverage margins for a manufacturing process, and say what they cost:
+    nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance. A design that names its edges
+    keeps them."""
+    wanted_yield: Annotated[float | None, typer.Option("--yield")] = None
+    """With --for-process: share of simulated builds that must reach the target; by default 0.99."""
+    verify: bool = True
+    """Verify the files after they are written."""
     force: Force = False
 
 
@@ -91,41 +64,19 @@ class VerificationOptions(Call):
 
     exports: Exports[AnyPath]
     _: KW_ONLY
-    printers: Annotated[
-        Sequence[str],
-        typer.Option(
-            "--printer",
-            metavar="NAME|FILE",
-            help="Fail unless every part can be made by this printer: fdm, sls, sla, cnc, or "
-            "a TOML file; repeatable.",
-        ),
-    ] = ()
-    clients: Annotated[
-        bool,
-        typer.Option(
-            "--clients", help="Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."
-        ),
-    ] = False
-    time_limit: Annotated[
-        float,
-        typer.Option(metavar="S", help="Time limit for each stage, file or program, seconds."),
-    ] = 600.0
-    strict: Annotated[
-        bool,
-        typer.Option(
-            "--strict",
-            help="Fail also where a file was changed that only people read, such as a parts list.",
-        ),
-    ] = False
+    printers: Annotated[Sequence[str], typer.Option("--printer", metavar="NAME|FILE")] = ()
+    """Fail unless every part can be made by this printer: fdm, sls, sla, cnc, or a TOML file;
+    repeatable."""
+    clients: bool = False
+    """Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."""
+    time_limit: Annotated[float, typer.Option(metavar="S")] = 600.0
+    """Time limit for each stage, file or program, seconds."""
+    strict: bool = False
+    """Fail also where a file was changed that only people read, such as a parts list."""
 
-    cutter: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MM",
-            help="Fail unless a ball cutter of this radius reaches all mirrors of a mandrel; of "
-            "shells, say what it does not reach.",
-        ),
-    ] = None
+    cutter: Annotated[float | None, typer.Option(metavar="MM")] = None
+    """Fail unless a ball cutter of this radius reaches all mirrors of a mandrel; of shells, say
+    what it does not reach."""
 
     def check(self) -> None:
         """Refuse what cannot be, before heavy libraries are loaded."""
@@ -144,28 +95,14 @@ class ReportOptions(Call):
     """An export, and what its page shows."""
 
     exports: Exports[AnyPath]
-    out: Annotated[
-        AnyPath | None,
-        typer.Option(
-            "--out", "-o", help="HTML file to write; by default report.html in the folder."
-        ),
-    ] = None
+    out: Annotated[AnyPath | None, typer.Option("--out", "-o")] = None
+    """HTML file to write; by default report.html in the folder."""
     _: KW_ONLY
-    capture: Annotated[
-        AnyPath | None,
-        typer.Option(
-            "--capture",
-            metavar="FOLDER",
-            help="Folder written by tbcad capture or merge for this export: shows the photograph "
-            "in each mirror.",
-        ),
-    ] = None
-    force: Annotated[
-        bool,
-        typer.Option(
-            "--force", help="Replace a file that tbcad did not write, instead of refusing."
-        ),
-    ] = False
+    capture: Annotated[AnyPath | None, typer.Option(metavar="FOLDER")] = None
+    """Folder written by tbcad capture or merge for this export: shows the photograph in each
+    mirror."""
+    force: bool = False
+    """Replace a file that tbcad did not write, instead of refusing."""
 
 
 def check_yield(wanted_yield: float) -> None:
@@ -180,20 +117,10 @@ class OrderOptions(Call):
 
     exports: Exports[AnyPath]
     _: KW_ONLY
-    chain: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="How they are made: nickel-diamond, cnc, sla ... or a TOML file; see tbcad "
-            "tolerance.",
-        ),
-    ] = "nickel-diamond"
-    wanted: Annotated[
-        float,
-        typer.Option(
-            "--yield", help="Share of the shells that must be good with the standard deviations."
-        ),
-    ] = 0.99
+    chain: Annotated[str, typer.Option(metavar="NAME|FILE")] = "nickel-diamond"
+    """How they are made: nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance."""
+    wanted: Annotated[float, typer.Option("--yield")] = 0.99
+    """Share of the shells that must be good with the standard deviations."""
     out: OutReplaced[AnyPath] = Path("order")
     force: Force = False
 
@@ -203,44 +130,24 @@ class ToleranceOptions(Call):
     """An export, a process that makes it, and how its yield is simulated."""
 
     exports: Exports[AnyPath]
-    process: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="How it is made: nickel-diamond, cnc, sla ... or a TOML file. By default sla, and "
-            "the yields of all of them are compared.",
-        ),
-    ] = None
+    process: Annotated[str | None, typer.Option(metavar="NAME|FILE")] = None
+    """How it is made: nickel-diamond, cnc, sla ... or a TOML file. By default sla, and the yields
+    of all of them are compared."""
     object_file: ObjectFile[AnyPath] = None
     _: KW_ONLY
     up: UpOption = None
     unit: UnitOption = None
-    margins: Annotated[
-        bool,
-        typer.Option(
-            "--margins",
-            help="Also search for the minimum margin on the coverage with which each process "
-            "reaches the yield, as tbcad build --for-process does; some 10 s a process.",
-        ),
-    ] = False
-    settings: Annotated[
-        Changes,
-        typer.Option(
-            "--set", metavar="KIND=VALUE", help="Change any error of the process; repeatable."
-        ),
-    ] = ()
-    builds: Annotated[
-        int, typer.Option(min=1, max=1_000_000, help="Number of simulated builds.")
-    ] = 1000
-    wanted_yield: Annotated[
-        float,
-        typer.Option("--yield", help="Share of the simulated builds that must reach the target."),
-    ] = 0.99
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all random errors.")] = 1
-    calibrated_mrad: Annotated[
-        float,
-        typer.Option(
-            min=0, max=100, help="Error of each mirror's direction after calibration, mrad."
-        ),
-    ] = 0.5
+    margins: bool = False
+    """Also search for the minimum margin on the coverage with which each process reaches the yield,
+    as tbcad build --for-process does; some 10 s a process."""
+    settings: Annotated[Changes, typer.Option("--set", metavar="KIND=VALUE")] = ()
+    """Change any error of the process; repeatable."""
+    builds: Annotated[int, typer.Option(min=1, max=1_000_000)] = 1000
+    """Number of simulated builds."""
+    wanted_yield: Annotated[float, typer.Option("--yield")] = 0.99
+    """Share of the simulated builds that must reach the target."""
+    seed: Annotated[int, typer.Option(min=0)] = 1
+    """Seed of all random errors."""
+    calibrated_mrad: Annotated[float, typer.Option(min=0, max=100)] = 0.5
+    """Error of each mirror's direction after calibration, mrad."""
     scheduler: Scheduler = None

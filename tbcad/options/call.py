@@ -1,9 +1,14 @@
 """Records of calls, and what follows from them: Python's keywords and the command's options."""
 
+import ast
+import inspect
+import sys
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cache, wraps
 from inspect import Parameter, Signature, signature
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
@@ -22,6 +27,7 @@ from typing import (
     overload,
 )
 
+from typer import Option
 from typer.models import ParameterInfo
 
 from tbcad.common.progress import Progress
@@ -41,7 +47,7 @@ def silent(_: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Call:
-    """What a public function is called with; fields with a help text are a command's options."""
+    """What a public function is called with; fields with a text below are a command's options."""
 
     progress: Progress = silent  # called with the name of each stage
     detail: Progress = silent  # called with the state of a stage
@@ -99,14 +105,53 @@ def declared(record: type) -> dict[str, Any]:
     }
 
 
+@cache
 def _annotated(record: type) -> dict[str, Any]:
-    """Types of the fields that have an option, or a text: those are keywords of Python alone."""
-    kinds = get_type_hints(record, include_extras=True)
+    """Types of the fields with an option, or with a text alone: those are keywords of Python."""
+    kinds, texts = get_type_hints(record, include_extras=True), field_texts(record)
     return {
-        one.name: kinds[one.name]
+        one.name: _optional(one.name, kinds[one.name], one.default, texts.get(one.name))
         for one in fields(record)
-        if get_origin(kinds[one.name]) is Annotated
+        if get_origin(kinds[one.name]) is Annotated or one.name in texts
     }
+
+
+def _optional(name: str, kind: Any, default: object, text: str | None) -> Any:
+    """A field's type with its option, whose help is the text below the field."""
+    if text is None:
+        return kind
+    kind, option = get_args(kind) if get_origin(kind) is Annotated else (kind, Option())
+    option = copy(option)
+    option.help = text
+    if kind is bool and default is False and not option.param_decls:
+        option.param_decls = (f"--{name.replace('_', '-')}",)  # alone, without its --no
+    return Annotated[kind, option]
+
+
+def field_texts(record: type) -> dict[str, str]:
+    """The texts below the fields of a class and of those that it is derived from."""
+    texts: dict[str, str] = {}
+    for one in reversed(record.__mro__):
+        if one.__module__.partition(".")[0] not in ("builtins", "pydantic"):
+            texts |= _texts_by_class(one.__module__).get(one.__name__, {})
+    return texts
+
+
+@cache
+def _texts_by_class(module: str) -> dict[str, dict[str, str]]:
+    """The texts below the fields of all classes of a module, from its source."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    classes = [one for one in tree.body if isinstance(one, ast.ClassDef)]
+    return {one.name: dict(_texts(one)) for one in classes}
+
+
+def _texts(section: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    for key, text in pairwise(section.body):
+        match key, text:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
+                value=ast.Constant(value=str(words))
+            ):
+                yield name, " ".join(words.split())
 
 
 def parameters(function: Callable[..., int]) -> Iterator[Parameter]:

@@ -33,43 +33,21 @@ class ExportOptions(Call):
     """A capture, for which program it is written, and what of it."""
 
     capture: Capture[AnyPath]
-    to: Annotated[
-        Target | None,
-        typer.Option(
-            help="nerfstudio, colmap: virtual cameras as pinholes, with masks; ngp-rays: crops "
-            "with the ray of every pixel for instant-ngp; rays: all rays as numpy arrays and HDF5; "
-            "mitsuba: the machine itself as scenes for Mitsuba and Blender."
-        ),
-    ] = None
+    to: Target | None = None
+    """nerfstudio, colmap: virtual cameras as pinholes, with masks; ngp-rays: crops with the ray of
+    every pixel for instant-ngp; rays: all rays as numpy arrays and HDF5; mitsuba: the machine
+    itself as scenes for Mitsuba and Blender."""
     _: KW_ONLY
     out: OutReplaced[AnyPath] = Path("data")
-    every: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="One virtual camera of N, spread evenly."),
-    ] = 1
-    size: Annotated[
-        int | None,
-        typer.Option(
-            metavar="PIXELS",
-            help="Width and height of the pictures; by default as fine as the finest tenth of the "
-            "virtual cameras.",
-        ),
-    ] = None
-    cameras: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="a, b, or mirrors by name, as a0001,b0007; by default all.",
-        ),
-    ] = None
-    exports: Annotated[
-        AnyPath | None,
-        typer.Option(
-            "--exports",
-            metavar="FOLDER",
-            help="Folder written by tbcad build, with the shells; for --to mitsuba.",
-        ),
-    ] = None
+    every: Annotated[int, typer.Option(min=1, metavar="N")] = 1
+    """One virtual camera of N, spread evenly."""
+    size: Annotated[int | None, typer.Option(metavar="PIXELS")] = None
+    """Width and height of the pictures; by default as fine as the finest tenth of the virtual
+    cameras."""
+    cameras: Annotated[str | None, typer.Option(metavar="NAMES")] = None
+    """a, b, or mirrors by name, as a0001,b0007; by default all."""
+    exports: Annotated[AnyPath | None, typer.Option(metavar="FOLDER")] = None
+    """Folder written by tbcad build, with the shells; for --to mitsuba."""
     force: Force = False
 
     def check(self) -> Target:
@@ -105,101 +83,37 @@ class ExportOptions(Call):
 class ReconstructOptions(Call):
     """A light field, how one object is fitted to it, and the files to write."""
 
-    capture: Annotated[
-        AnyPath,
-        typer.Argument(
-            metavar="FOLDER", help="Folder written by tbcad capture or merge, or its lightfield.h5."
-        ),
-    ]
+    capture: Annotated[AnyPath, typer.Argument(metavar="FOLDER")]
+    """Folder written by tbcad capture or merge, or its lightfield.h5."""
     _: KW_ONLY
-    out: Annotated[
-        AnyPath | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="The field to write (.npz); by default field.npz beside the light field, which "
-            "view, show and turntables then show.",
-        ),
-    ] = None
-    nodes: Annotated[
-        int,
-        typer.Option(
-            min=16, max=512, metavar="N", help="Nodes along each edge of the finest grid."
-        ),
-    ] = 144
-    epochs: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=100,
-            metavar="N",
-            help="How often each ray is used on the finest grid; on the coarser grids in "
-            "proportion.",
-        ),
-    ] = 5
-    order: Annotated[
-        Literal["0", "1", "auto"],
-        typer.Option(
-            help="How colours depend on the direction they are seen from: 0: not; 1: linearly, for "
-            "gloss; auto: by which of both mirrors that are left out are shown better."
-        ),
-    ] = "auto"
-    rays: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=64,
-            metavar="K",
-            help="Rays of a pixel on the finest grid: 1, its central ray, or 12 and more, which "
-            "take its area and the lens' spread into account, in K times the time.",
-        ),
-    ] = 1
-    blur_px: Annotated[
-        float | None,
-        typer.Option(
-            "--blur",
-            min=0,
-            max=5,
-            metavar="PX",
-            help="With --rays: standard deviation of the lens' spread, pixels of the photograph, "
-            "besides the pixel's own area; by default what the light field says, else 0.",
-        ),
-    ] = None
-    frame: Annotated[
-        int | Literal["all"] | None,
-        typer.Option(
-            min=0, metavar="K", help="Frame of tbcad capture --frames to show, from 0 on."
-        ),
-    ] = None
-    meshes: Annotated[
-        Sequence[AnyPath],
-        typer.Option(
-            "--mesh",
-            metavar="FILE",
-            help="Also write the surface with its colours (.glb, .ply) or without (.stl); "
-            "repeatable.",
-        ),
-    ] = ()
-    volume: Annotated[
-        AnyPath | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also write density and colours on the whole lattice, for ParaView and PyVista "
-            "(.vti).",
-        ),
-    ] = None
-    preview: Annotated[
-        AnyPath | None,
-        typer.Option(metavar="FILE", help="A picture (.png) that is written after each epoch."),
-    ] = None
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Of all that is random.")] = 0
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Go on with what was interrupted; with a field, make what is missing."
-        ),
-    ] = False
+    out: Annotated[AnyPath | None, typer.Option("--out", "-o", metavar="FILE")] = None
+    """The field to write (.npz); by default field.npz beside the light field, which view, show and
+    turntables then show."""
+    nodes: Annotated[int, typer.Option(min=16, max=512, metavar="N")] = 144
+    """Nodes along each edge of the finest grid."""
+    epochs: Annotated[int, typer.Option(min=1, max=100, metavar="N")] = 5
+    """How often each ray is used on the finest grid; on the coarser grids in proportion."""
+    order: Literal["0", "1", "auto"] = "auto"
+    """How colours depend on the direction they are seen from: 0: not; 1: linearly, for gloss; auto:
+    by which of both mirrors that are left out are shown better."""
+    rays: Annotated[int, typer.Option(min=1, max=64, metavar="K")] = 1
+    """Rays of a pixel on the finest grid: 1, its central ray, or 12 and more, which take its area
+    and the lens' spread into account, in K times the time."""
+    blur_px: Annotated[float | None, typer.Option("--blur", min=0, max=5, metavar="PX")] = None
+    """With --rays: standard deviation of the lens' spread, pixels of the photograph, besides the
+    pixel's own area; by default what the light field says, else 0."""
+    frame: Annotated[int | Literal["all"] | None, typer.Option(min=0, metavar="K")] = None
+    """Frame of tbcad capture --frames to show, from 0 on."""
+    meshes: Annotated[Sequence[AnyPath], typer.Option("--mesh", metavar="FILE")] = ()
+    """Also write the surface with its colours (.glb, .ply) or without (.stl); repeatable."""
+    volume: Annotated[AnyPath | None, typer.Option(metavar="FILE")] = None
+    """Also write density and colours on the whole lattice, for ParaView and PyVista (.vti)."""
+    preview: Annotated[AnyPath | None, typer.Option(metavar="FILE")] = None
+    """A picture (.png) that is written after each epoch."""
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1)] = 0
+    """Of all that is random."""
+    resume: bool = False
+    """Go on with what was interrupted; with a field, make what is missing."""
     force: ForceFile = False
 
 
@@ -212,52 +126,29 @@ class CaptureOptions(Call):
     _: KW_ONLY
     up: UpOption = None
     unit: UnitOption = None
-    out: Annotated[
-        AnyPath | None,
-        typer.Option(
-            "--out",
-            "-o",
-            help="Folder for all files; replaced as a whole or not at all. By default captures/ "
-            "with the name of the object, such as captures/knot; from Python none.",
-        ),
-    ] = None
-    fit: Annotated[
-        bool, typer.Option("--fit", help="Move and scale the object into the capture sphere.")
-    ] = False
+    out: Annotated[AnyPath | None, typer.Option("--out", "-o")] = None
+    """Folder for all files; replaced as a whole or not at all. By default captures/ with the name
+    of the object, such as captures/knot; from Python none."""
+    fit: bool = False
+    """Move and scale the object into the capture sphere."""
     paint: PaintOption = "own"
-    samples: Annotated[
-        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
-    ] = 1
+    samples: Annotated[int, typer.Option(min=1, max=8)] = 1
+    """Anti-aliasing: a pixel is the mean of N x N rays."""
     geometry: Annotated[
         Geometry,
         "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
         "stop by stop.",
     ] = "spheres"
-    lights: Annotated[
-        AnyPath | None,
-        typer.Option(
-            metavar="FILE",
-            help="Also write a reflectance field, a photograph for each lamp: FILE is a table with "
-            "the columns x_mm,y_mm,z_mm; the word mirrors is a lamp in the place of each virtual "
-            "camera, projectors what each mirror throws of a projector in its camera's place.",
-        ),
-    ] = None
-    every: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="One lamp of N, of --lights mirrors or projectors."),
-    ] = 1
-    frames: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            max=10_000,
-            help="Also photograph the object N times while it turns about z, as one file.",
-            metavar="N",
-        ),
-    ] = None
-    turn: Annotated[
-        float, typer.Option(help="How far the object turns during all frames, degrees.")
-    ] = 360.0
+    lights: Annotated[AnyPath | None, typer.Option(metavar="FILE")] = None
+    """Also write a reflectance field, a photograph for each lamp: FILE is a table with the columns
+    x_mm,y_mm,z_mm; the word mirrors is a lamp in the place of each virtual camera, projectors what
+    each mirror throws of a projector in its camera's place."""
+    every: Annotated[int, typer.Option(min=1, metavar="N")] = 1
+    """One lamp of N, of --lights mirrors or projectors."""
+    frames: Annotated[int | None, typer.Option(min=1, max=10_000, metavar="N")] = None
+    """Also photograph the object N times while it turns about z, as one file."""
+    turn: float = 360.0
+    """How far the object turns during all frames, degrees."""
     force: Force = False
 
     def check(self) -> None:

@@ -26,68 +26,32 @@ OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 class OptimizeOptions(Call):
     """The design to begin from, what is to be better, and what a better one must keep."""
 
-    design: Annotated[
-        AnyDesign | None,
-        typer.Argument(
-            metavar="DESIGN",
-            help="TOML file or name of the design to begin from; by default that of the paper.",
-        ),
-    ] = None
+    design: Annotated[AnyDesign | None, typer.Argument(metavar="DESIGN")] = None
+    """TOML file or name of the design to begin from; by default that of the paper."""
     _: KW_ONLY
-    settings: Annotated[
-        Sequence[str],
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."
-        ),
-    ] = ()
-    objectives: Annotated[
-        Sequence[str],
-        typer.Option(
-            "--for",
-            metavar="AIM",
-            help="What to make better; repeatable, and then all count alike. minimum: pixels of "
-            "the virtual camera with fewest; pixels: mean of the logarithms of the pixels; "
-            "evenness: their coefficient of variation; ssim: of 24 views of a knot, by --method, "
-            "which takes several times as long; size: of the machine. By default the first "
-            "three.",
-        ),
-    ] = ()
-    out: Annotated[
-        AnyPath, typer.Option("--out", "-o", help="TOML file to write; table and plot beside it.")
-    ] = Path("better.toml")
-    max_size_mm: Annotated[
-        float | None,
-        typer.Option(
-            help="Longest side of the box round mirrors and pinholes, mm; by default that of the "
-            "design."
-        ),
-    ] = None
-    max_view_angle_deg: Annotated[
-        float | None,
-        typer.Option(help="Angle of view of the lens, degrees; by default that of the design."),
-    ] = None
-    method: Annotated[
-        Literal["nearest", "field"] | None,
-        typer.Option(
-            help="Of the views that ssim compares. nearest, the default: by nearest rays; field: "
-            "by a coarse field that is fitted to all rays, some seconds a candidate."
-        ),
-    ] = None
-    front: Annotated[
-        bool,
-        typer.Option(
-            "--front",
-            help="With several aims: search also where each of them counts most, so that more "
-            "candidates are found that no other betters (the Pareto front).",
-        ),
-    ] = False
-    candidates: Annotated[
-        int,  # at least two generations, and what nobody waits for
-        typer.Option(min=80, max=100_000, help="Number of candidates, about."),
-    ] = 480
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with a search that was stopped.")
-    ] = False
+    settings: Annotated[Sequence[str], typer.Option("--set", metavar="KEY=VALUE")] = ()
+    """Change any key of the design; repeatable."""
+    objectives: Annotated[Sequence[str], typer.Option("--for", metavar="AIM")] = ()
+    """What to make better; repeatable, and then all count alike. minimum: pixels of the virtual
+    camera with fewest; pixels: mean of the logarithms of the pixels; evenness: their coefficient of
+    variation; ssim: of 24 views of a knot, by --method, which takes several times as long; size: of
+    the machine. By default the first three."""
+    out: Annotated[AnyPath, typer.Option("--out", "-o")] = Path("better.toml")
+    """TOML file to write; table and plot beside it."""
+    max_size_mm: float | None = None
+    """Longest side of the box round mirrors and pinholes, mm; by default that of the design."""
+    max_view_angle_deg: float | None = None
+    """Angle of view of the lens, degrees; by default that of the design."""
+    method: Literal["nearest", "field"] | None = None
+    """Of the views that ssim compares. nearest, the default: by nearest rays; field: by a coarse
+    field that is fitted to all rays, some seconds a candidate."""
+    front: bool = False
+    """With several aims: search also where each of them counts most, so that more candidates are
+    found that no other betters (the Pareto front)."""
+    candidates: Annotated[int, typer.Option(min=80, max=100_000)] = 480
+    """Number of candidates, about."""
+    resume: bool = False
+    """Go on with a search that was stopped."""
     force: ForceFile = False
     plot: PlotFormatOption = "png"
     scheduler: Scheduler = None

@@ -27,77 +27,34 @@ class RunOptions(Call):
     """What is photographed of a prototype, by which controller and camera."""
 
     exports: Exports[AnyPath]
-    out: Annotated[
-        AnyPath, typer.Option("--out", "-o", help="Folder of the run, which must be new.")
-    ] = Path("runs/first")
+    out: Annotated[AnyPath, typer.Option("--out", "-o")] = Path("runs/first")
+    """Folder of the run, which must be new."""
     _: KW_ONLY
-    port: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PORT",
-            help="Serial port of the controller, such as /dev/ttyUSB0; Klipper: "
-            "moonraker:http://HOST:7125.",
-        ),
-    ] = None
-    camera: Annotated[
-        str,
-        typer.Option(
-            metavar="CAMERA",
-            help="gphoto2: the camera on USB; command:PROGRAM ARGUMENTS, with {output} for the "
-            "image's path without suffix and {exposure_s}, {exposure_ms} or {exposure_us} for the "
-            "exposure; folder:PATH, where another program puts photographs.",
-        ),
-    ] = "gphoto2"
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the run in the folder of --out.")
-    ] = False
-    phases: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Photographs at each stop: dark, led_1, led_2 ..., lit, with commas between; leds "
-            "for all LEDs. By default all.",
-        ),
-    ] = None
-    stops: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="Stops to photograph, such as 1-10,40. By default all."),
-    ] = None
-    runs: Annotated[
-        str | None,
-        typer.Option(
-            metavar="a|b|ab",
-            help="a: object straight; b: turned by 180 degrees; ab: both, the default.",
-        ),
-    ] = None
-    size_px: Annotated[
-        tuple[int, int] | str | None,
-        typer.Option(
-            "--size",
-            metavar="WxH",
-            help="Pixels of a photograph, such as 4160x3104. By default those of the design.",
-        ),
-    ] = None
+    port: Annotated[str | None, typer.Option(metavar="PORT")] = None
+    """Serial port of the controller, such as /dev/ttyUSB0; Klipper: moonraker:http://HOST:7125."""
+    camera: Annotated[str, typer.Option(metavar="CAMERA")] = "gphoto2"
+    """gphoto2: the camera on USB; command:PROGRAM ARGUMENTS, with {output} for the image's path
+    without suffix and {exposure_s}, {exposure_ms} or {exposure_us} for the exposure; folder:PATH,
+    where another program puts photographs."""
+    resume: bool = False
+    """Go on with the run in the folder of --out."""
+    phases: Annotated[str | None, typer.Option(metavar="NAMES")] = None
+    """Photographs at each stop: dark, led_1, led_2 ..., lit, with commas between; leds for all
+    LEDs. By default all."""
+    stops: Annotated[str | None, typer.Option(metavar="LIST")] = None
+    """Stops to photograph, such as 1-10,40. By default all."""
+    runs: Annotated[str | None, typer.Option(metavar="a|b|ab")] = None
+    """a: object straight; b: turned by 180 degrees; ab: both, the default."""
+    size_px: Annotated[tuple[int, int] | str | None, typer.Option("--size", metavar="WxH")] = None
+    """Pixels of a photograph, such as 4160x3104. By default those of the design."""
     timeout_s: Annotated[
-        float,
-        typer.Option(
-            "--time-limit",
-            "--timeout",
-            metavar="S",
-            min=1,
-            max=3600,
-            help="Seconds that command: and folder: may take for one photograph.",
-        ),
+        float, typer.Option("--time-limit", "--timeout", metavar="S", min=1, max=3600)
     ] = 30.0
+    """Seconds that command: and folder: may take for one photograph."""
     exposure_leds_s: ExposureLeds[str | float] = None
     exposure_lit_s: ExposureLit[str | float] = None
-    send_settings: Annotated[
-        bool,
-        typer.Option(
-            "--send-settings",
-            help="Send the controller the settings of grbl_settings.txt that differ.",
-        ),
-    ] = False
+    send_settings: bool = False
+    """Send the controller the settings of grbl_settings.txt that differ."""
     preflight: Annotated[
         Preflight,
         "first: one stop is looked at under each light before a new run; only: and nothing is "

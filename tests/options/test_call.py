@@ -31,8 +31,10 @@ class Polish(Call):
 
     mirror: Annotated[AnyPath, typer.Argument(help="File of the mirror.")]
     _: KW_ONLY
-    passes: Annotated[int, typer.Option(min=1, max=9, help="How often.")] = 2
-    grits: Annotated[tuple[float, ...], typer.Option(help="One after the other.")] = ()
+    passes: Annotated[int, typer.Option(min=1, max=9)] = 2
+    """How often."""
+    grits: tuple[float, ...] = ()
+    """One after the other."""
     side: Annotated[Literal["back", "front"], "Which is polished."] = "front"
 
 

@@ -1,14 +1,11 @@
 """The keys of a design with type, default, range and text, and a design file with all of them."""
 
-import ast
 import inspect
 import re
-import sys
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import pairwise
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
@@ -19,6 +16,7 @@ from tbcad.core.spec.csv_rows import Table, read_text, read_toml
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import allowed_text, section_of
 from tbcad.core.spec.load import PAPER, shipped_designs
+from tbcad.options.call import field_texts
 
 # Of a key, by the last word of its name, or its last two.
 UNITS = {
@@ -68,7 +66,7 @@ def key_sections() -> tuple[KeySection, ...]:
 
 def _sections(model: type[BaseModel], name: str, description: str) -> Iterator[KeySection]:
     prefix = f"{name}." if name else ""
-    texts = _descriptions(model)
+    texts = field_texts(model)
     fields = {info.alias or own: (own, info) for own, info in model.model_fields.items()}
     keys = [
         _key(prefix + key, info, texts[own])
@@ -102,32 +100,6 @@ def _type(kind: Any) -> str:
         texts = all(isinstance(choice, str) for choice in get_args(kind))
         return "one of several words" if texts else "whole number"
     return TYPES.get(kind, "whole number or word")
-
-
-def _descriptions(model: type[BaseModel]) -> dict[str, str]:
-    """The texts below the keys of a model and of those that it is derived from."""
-    texts: dict[str, str] = {}
-    for one in reversed(model.__mro__):
-        if one is not BaseModel and issubclass(one, BaseModel):
-            texts |= _texts_by_class(one.__module__).get(one.__name__, {})
-    return texts
-
-
-@cache
-def _texts_by_class(module: str) -> dict[str, dict[str, str]]:
-    """The texts below the fields of all classes of a module, from its source."""
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
-    classes = [one for one in tree.body if isinstance(one, ast.ClassDef)]
-    return {one.name: dict(_texts(one)) for one in classes}
-
-
-def _texts(section: ast.ClassDef) -> Iterator[tuple[str, str]]:
-    for key, text in pairwise(section.body):
-        match key, text:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
-                value=ast.Constant(value=str(words))
-            ):
-                yield name, " ".join(words.split())
 
 
 WIDTH = 100
