@@ -40,14 +40,6 @@ from tbcad.tolerancing.prototype.windows import (
     prototype_model,
     read_wind_up,
 )
-from tbcad.tolerancing.stages import (
-    EVERY_PROCESS,
-    MARGINS,
-    PICTURES,
-    PROTOTYPES,
-    SINGLE_ERRORS,
-    builds_stage,
-)
 from tbcad.types import Floats
 
 SEARCH_BUILDS = 100  # in each step of a search; the process itself has as many as asked for
@@ -104,10 +96,10 @@ def analyse(
         )
     errors = process_errors(process, export.spec.mirrors.coating_um)
     simulator = _Simulator(export, options, edge_models(export.reflectors))
-    options.progress(builds_stage(options.builds, process.name))
+    options.progress(f"{options.builds} simulated builds by {process.name}")
     result = simulator.all_builds(MonteCarloCase(simulator.edge_models, errors, options.seed))
     options.answer(yield_sentence(process, result.worst, export.capture_mm))
-    options.progress(SINGLE_ERRORS)
+    options.progress("each kind of error by itself")
     # All searches share the builds without errors, and each begins with the builds of its loss.
     worst = cache(simulator.worst_coverage)
     single_errors = _single_errors(simulator, errors, worst)
@@ -117,13 +109,13 @@ def analyse(
     process_options = _process_options(simulator, chosen, worst)
     own_margin = None
     if options.margins:
-        options.progress(MARGINS)
+        options.progress("the margins needed")
         process_options, own_margin = _margins(simulator, process, process_options)
-    options.progress(PICTURES)
+    options.progress("pictures")
     sharp = _sharpness(simulator, errors, scene_object)
     prototype = None
     if (export.folder / "prototype.json").is_file():
-        options.progress(PROTOTYPES)
+        options.progress("prototypes")
         plan = read_plan(export)
         model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
         prototype = simulator.all_builds(PrototypeCase(model, errors, options.seed))
@@ -180,7 +172,7 @@ def _process_options(
     """Every process with its yield, or the one that was asked for."""
     if simulator.options.process is not None:
         return (chosen,)
-    simulator.options.progress(EVERY_PROCESS)
+    simulator.options.progress("every process")
     export, options = simulator.export, []
     for name in BUILT_IN:
         simulator.options.detail(name)

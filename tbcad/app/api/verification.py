@@ -92,9 +92,8 @@ def tolerance(options: ToleranceOptions) -> Analysis:
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.analysis import analyse as analyse_export
-    from tbcad.tolerancing.stages import RECORD
 
-    options.progress(RECORD)
+    options.progress("record of the export")
     export = read_export(exports)
     taken = ObjectOptions(up=options.up, unit=options.unit)
     subject = load_or_built_in(options.object_file, export.capture_mm, taken, options.answer)

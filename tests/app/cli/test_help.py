@@ -18,7 +18,7 @@ from tbcad_verify.report.methods import method_of
 
 import tbcad.app.cli  # noqa: F401 - adds all commands
 from tbcad.app.cli import run
-from tbcad.app.cli.help_texts import EXAMPLES, HEADINGS
+from tbcad.app.cli.help_texts import HEADINGS, examples
 from tests.app.cli.commands import Words, commands, leaves, long_name, options
 
 WIDE = "2000"  # columns: no line of help is broken
@@ -55,7 +55,7 @@ def test_screen_shows_every_word_and_the_examples(
         for paragraph in (text or "").split("\n\n"):
             assert plain(paragraph) in shown
     command = " ".join(words)
-    for example, about in EXAMPLES.get(command, ()):
+    for example, about in examples().get(command, {}).items():
         assert about
         ALL[words].make_context("tbcad", shlex.split(example))
         assert f"{f'tbcad {command} {example}'.strip()} - {about}" in shown.partition("Examples")[2]
@@ -71,7 +71,7 @@ def test_commands_are_under_headings_in_the_order_of_the_work(
     assert {name for names in HEADINGS.values() for name in names} == {
         words[0] for words in ALL if words
     }
-    assert {tuple(name.split()) for name in EXAMPLES} == leaves().keys()
+    assert {tuple(name.split()) for name in examples()} == leaves().keys()
 
 
 def test_an_option_is_called_and_takes_the_same_everywhere() -> None:

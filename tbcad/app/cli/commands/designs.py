@@ -165,12 +165,11 @@ def tolerance(
     checked_process(options)  # before heavy libraries are loaded
     from tbcad.common.results import check_study_folder, write_study
     from tbcad.tolerancing.report import json_text, summary_text, tolerance_study
-    from tbcad.tolerancing.stages import TABLES
 
     check_study_folder(out)
     with stages(6 + (options.process is None) + options.margins) as screen:
         analysis = analyse(options.on(screen))
-        screen.stage(TABLES)
+        screen.stage("tables and plots")
         more = {"tolerance.json": json_text(analysis).encode()}
         files = write_study(tolerance_study(analysis), out, more, plot)
     if json:
