@@ -26,7 +26,7 @@ from tbcad.light.simulate.views.viewpoints import (
     viewpoints_over_hemisphere,
     views_by,
 )
-from tbcad.studies.paper import MAX_N, try_design, with_lens_of_table_i
+from tbcad.studies.paper import MAX_N, notes, try_design, with_lens_of_table_i
 from tbcad.types import Bools, Bytes, Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
@@ -37,16 +37,6 @@ BEST_COLUMNS = (
     "ssim_on_object",
 )
 COLUMNS = ("n", "virtual_cameras", "pixels", "surface", "radius_mm", "ssim_on_object", "reason")
-NOTES = (
-    "ssim_on_object: mean of the local SSIM where the truth shows the object, over all views of "
-    "640 x 480 pixels, evenly over the hemisphere. pixels: mean number that a virtual camera has "
-    "on the capture sphere.",
-    "The sensor is that of the design, n is varied: more virtual cameras have fewer pixels each. "
-    "Lens of Table I for the paper's design.",
-    "radius_mm: of a ball about the origin with the built-in pattern; its surface is as far from "
-    "the reference plane as its radius. glossy: with highlights of both lamps (Phong, exponent "
-    "40).",
-)
 
 
 @dataclass(frozen=True)
@@ -91,7 +81,7 @@ def balance(
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
     seen = subjects(spec.optics.capture_diameter_mm, cameras, progress)
     records = [one for n in ns for one in _of_n(spec, n, seen, cameras, method, progress)]
-    table = Table.of_records("balance", records, (f"Method: {method}.", *NOTES), COLUMNS)
+    table = Table.of_records("balance", records, (f"Method: {method}.", *notes("balance")), COLUMNS)
     best = [one for subject in seen for one in _best(table, subject)]
     panels = (_panel(table, seen, method),)
     figures = (Figure(f"{one['object']}: best n", "", one["n"], where="section 6") for one in best)

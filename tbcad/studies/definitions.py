@@ -20,24 +20,12 @@ from tbcad.studies.paper import (
     BalancedSensor,
     balanced_sensors,
     is_table_i,
+    notes,
     try_design,
     with_lens_of_table_i,
 )
 from tbcad.types import Floats, Progress
 
-NOTES = (
-    "Table II heads its columns 'Number of virtual camera' and 'Average of virtual camera "
-    "resolution'. value: what a definition gives for that row's n and sensor. "
-    "rms_from_..._percent: root mean square over the four rows of value / column - 1.",
-    "Only the second column grows with n as a number of mirrors does: 5 n^2 + 4 n + 2 mirrors of "
-    "both arrays, those on the seam counted for both, less 6, 6, 12 and 24. The headings stand in "
-    "the wrong order.",
-    "Mirrors whose apex is in the frame: of a camera that is turned about y so that its optical "
-    "axis leaves the vertical by pitch_deg, toward the object. The paper does not state where its "
-    "cameras look; the pitch is the one whose counts come nearest to the second column.",
-    "seeing: pixels whose ray meets the capture sphere after the mirror; disc: of these the ones "
-    "in the largest cone about the apex that fits in the flat mirror (2 theta_0, Fig. 3).",
-)
 # What radii are called: their keys of the design.
 RADII: dict[str, dict[str, object]] = {
     "traced": {"radius_rule": "traced"},
@@ -75,7 +63,9 @@ def definitions(
     )
     records = [record for row in rows for record in _mirror_records(spec, row, pitch)]
     records += [record for by_sensor in reversed(counted) for record in by_sensor]
-    table = Table.of_records("resolution-definitions", records, NOTES, COLUMNS)
+    table = Table.of_records(
+        "resolution-definitions", records, notes("resolution-definitions"), COLUMNS
+    )
     fits = _fits(table, known=is_table_i(spec))
     return table, Table.of_records("resolution-table-ii", fits, columns=FIT_COLUMNS)
 

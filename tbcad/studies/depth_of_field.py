@@ -19,7 +19,7 @@ from tbcad.core.camera.requirements import (
 )
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
-from tbcad.studies.paper import claimed, claims, try_design, with_lens_of_table_i
+from tbcad.studies.paper import claimed, claims, notes, try_design, with_lens_of_table_i
 from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")
@@ -28,27 +28,6 @@ NUMBERS = (
     *("polar_deg", "radius_mm", "incidence_deg", "to_mirror_mm"),
     *(f"{point}_mm" for point in POINTS),
     *(f"{point}_depth_mm" for point in POINTS),
-)
-NOTES = (
-    "Distances are from the camera's pinhole to the virtual image of a point of the capture "
-    "sphere on the mirror's principal ray: the nearest to the mirror, the centre, the farthest. "
-    "Coddington's equations; tangential and sagittal fans have images of their own.",
-    "_depth_: the same along the camera's optical axis, which is what a lens focuses on. The "
-    "camera is turned as the design turns it.",
-    "Mirrors of camera a; b's mirror them. Section 6 has 'the range of 150-250 mm from the camera' "
-    "in the paper's experiments, with its prototype, whose dimensions it does not state; read as "
-    "distances.",
-)
-LENS_NOTES = (
-    "A thin lens without aberrations or field curvature, stop at the lens, whose angle of view is "
-    "the design's; focused on the harmonic mean of the range's ends, where their blur is equal.",
-    "blur_px: geometric blur circle at both ends. airy_px: Airy disc of 550 nm on the axis; it is "
-    "larger off the axis. total_px: root of the sum of their squares.",
-    "blur limited: the largest pupil within --blur-px. sharpest: minimum total_px. light: relative "
-    "to the lens wide open (--wide-open); stops_lost: in factors of two. No stop is wider than "
-    "wide open.",
-    "The paper states neither aperture nor focal length: only that the aperture must be smaller "
-    "than with planar mirrors, and 100 ms of exposure.",
 )
 CONSTANT = "camera to images of the centre, flat radii: farthest less nearest"
 PAPER_RANGE = "the paper's distances"
@@ -101,8 +80,8 @@ def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda
     ranges = _ranges(by_rule)
     stops = _stop_records(ranges, lens, options.blur_px)
     tables = (
-        _mirror_table(by_rule, (*NOTES, *refusals)),
-        Table.of_records("depth-of-field-stops", stops, LENS_NOTES),
+        _mirror_table(by_rule, (*notes("depth-of-field"), *refusals)),
+        Table.of_records("depth-of-field-stops", stops, notes("depth-of-field-stops")),
     )
     figures = (*_image_figures(by_rule), *_flat_figures(by_rule, ranges), *_stop_figures(stops))
     panels = (_image_panel(by_rule), _blur_panel(ranges, lens))

@@ -15,7 +15,14 @@ from tbcad.light.simulate.capture.photograph import (
     count_pixels,
     virtual_cameras,
 )
-from tbcad.studies.paper import DesignAttempt, claims, for_each_n, try_design, with_lens_of_table_i
+from tbcad.studies.paper import (
+    DesignAttempt,
+    claims,
+    for_each_n,
+    notes,
+    try_design,
+    with_lens_of_table_i,
+)
 from tbcad.types import Floats, Progress
 
 RULES = ("flat", "paper", "traced")
@@ -31,35 +38,11 @@ AREA_CURVES = {
     "paper_claim_flat_mm": ("the paper: flat", "k+"),
     "paper_claim_convex_mm": ("the paper: convex", "kx"),
 }
-AREA_NOTES = (
-    "flat_closed_form_mm: 2 d sin(min theta_0), the largest sphere that every flat mirror sees "
-    "whole when its neighbours bound it on all sides.",
-    "Other figures: exact coverage diameter, twice the minimum distance from the centre of the "
-    "rays off a mirror's edge, of all mirrors of a half. Edges at the foot count, at the seam only "
-    "for mirrors that it does not halve. mirrors_short: number of mirrors below the capture "
-    "diameter.",
-    "Radii: flat: none; paper: eqs. 1 and 2; traced: exact coverage of the capture diameter and "
-    "mirrors.margin_mm, or more where a mirror is nearly flat.",
-    "Of the paper's curve of flat mirrors we know n = 4 and n = 18.",
-)
 CURVES = {"traced": ("exact rays", "C0."), "paper": ("eqs. 1 and 2", "C1.")}
 RADIUS_PLACE = "section 5.1"
 PIXELS_PLACE = "section 4.2, Fig. 7b"
 UNEVEN_PLACE = "section 6"
 BAND_DEG = 15.0
-NOTES = (
-    "polar_deg: about w, the axis from the object to the camera, on which the prototype's base "
-    "rotates; the elevation of section 5.1. azimuth 0 is the zenith's side. elevation_deg: of the "
-    "virtual camera above the plane z = 0; the elevation of sections 4.2 and 4.4. Mirrors of "
-    "camera a; b's mirror them.",
-    "Radii: paper: eqs. 1 and 2; traced: exact coverage of the capture diameter and "
-    "mirrors.margin_mm. nearly_flat: traced radius set by mirrors.max_radius_widths.",
-    "seeing_px: pixels whose ray, off the mirror with its traced radius, meets the capture sphere; "
-    "mirrors that the seam halves count with both halves. area_mm2, to_camera_mm, to_object_mm: "
-    "of the mirror's cell and apex.",
-    "Correlation: Pearson's coefficient over all mirrors. The paper states correlations, no "
-    "coefficient.",
-)
 
 
 def capture_area(
@@ -67,7 +50,7 @@ def capture_area(
 ) -> Study:
     """The study: coverage of flat and convex mirrors for every n."""
     records = for_each_n(partial(_area_record, spec), ns, progress, scheduler)
-    table = Table.of_records("capture-area", records, AREA_NOTES)
+    table = Table.of_records("capture-area", records, notes("capture-area"))
     n = table.numbers("n")
     curves = (
         Series(label, n, table.numbers(c), style) for c, (label, style) in AREA_CURVES.items()
@@ -177,7 +160,7 @@ def _mirrors(
         "to_camera_mm": norm(traced.mirrors.apex - traced.camera.pinhole),
         "to_object_mm": traced.apex_distance,
     }
-    return Table.of_columns("elevation", columns, NOTES)
+    return Table.of_columns("elevation", columns, notes("elevation"))
 
 
 def _correlations(rule: str, array: MirrorArray) -> list[Record]:

@@ -30,7 +30,7 @@ from tbcad.light.simulate.views.viewpoints import (
     view_quality,
 )
 from tbcad.options.captures import Geometry
-from tbcad.studies.paper import claimed
+from tbcad.studies.paper import claimed, notes
 from tbcad.types import Bytes, Floats, Progress
 
 WHERE = "section 5.3, Fig. 11"
@@ -41,18 +41,6 @@ LENS_SIZE = (320, 240)  # pixels of the pictures with the large aperture
 TRUTH_RAYS = 64  # a pixel of their ground truth
 LENS_RAYS = 9  # over the blur circle, times samples x samples
 MAX_SPREAD_PX = 16.0
-NOTES = (
-    "filter: a birefringent low-pass filter splits every point of the photograph into four, at "
-    "the corners of a square of this side; 0.75 and 1 pixel are what cameras have. lens: an even "
-    "blur circle of this diameter.",
-    "pinhole: views of 640 x 480 pixels from --distance by the nearest captured ray. aperture: "
-    "the mean of 69 pinholes all over an aperture of 80 mm at 160 mm (Fig. 11), 320 x 240 pixels, "
-    "against a ray-traced thin lens. blur_mm: standard deviation, at the object, of the Gaussian "
-    "with which the truth comes nearest to the view.",
-    "photograph_contrast: root mean square difference of neighbouring pixels of the same mirror, "
-    "relative to the same photograph without a filter.",
-    "Without noise, with exact poses, one colour a pixel without a mosaic of colour filters.",
-)
 
 
 @dataclass(frozen=True)
@@ -130,7 +118,7 @@ def low_pass(
         for kind, quality in _views(MirrorTiles(light_field), targets, progress).items():
             for row in Table.of_columns("", {**viewpoints.angles(), **quality}).records():
                 records.append({**head, "view": kind, **row, "photograph_contrast": relative})
-    table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *NOTES))
+    table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *notes("low-pass")))
     means = Table.of_records("low-pass-means", _means(table))
     return Study("low-pass", _figures(means), (table, means), _panels(means))
 

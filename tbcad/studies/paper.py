@@ -1,6 +1,7 @@
 """What the paper states (paper.csv, paper_table_ii.csv), and designs that differ in a few keys."""
 
 import csv
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -104,6 +105,13 @@ def has_optics_of_table_i(spec: Spec) -> bool:
         and optics.stretch == UNSTRETCHED
         and optics.capture_diameter_mm == claimed("capture_diameter")
     )
+
+
+@cache
+def notes(table: str) -> tuple[str, ...]:
+    """What the figures of a study's table mean and assume."""
+    text = (files("tbcad.studies") / "notes.toml").read_text(encoding="utf-8")
+    return tuple(tomllib.loads(text)[table])
 
 
 def _rows(name: str) -> list[dict[str, str]]:

@@ -18,19 +18,11 @@ from tbcad.light.simulate.views.viewpoints import (
     view_quality,
 )
 from tbcad.options.captures import Geometry
+from tbcad.studies.paper import notes
 from tbcad.types import Floats, Progress
 
 LEVEL = 0.95
 WHERE = "section 5.1"
-NOTES = (
-    "Difference: the prototype's SSIM less the shell's, view by view against the same ray-traced "
-    "truth. Interval: Student's t at 95 % over the views; neighbouring views share captured rays "
-    "and are not wholly independent, so the true interval is somewhat wider.",
-    "blur: standard deviation, at the object, of the Gaussian with which the truth comes nearest "
-    "to the view.",
-    "The prototype's picture is merged from photographs of every stop, as the prototype takes "
-    "them, both runs; the same number of rays a pixel for both.",
-)
 
 
 def mean_difference_interval(one: Floats, other: Floats) -> tuple[float, float]:
@@ -72,7 +64,7 @@ def prototype_vs_shell(
         },
         "ssim_difference": prototype["ssim"] - shell["ssim"],
     }
-    table = Table.of_columns("prototype", columns, (facts, *NOTES))
+    table = Table.of_columns("prototype", columns, (facts, *notes("prototype")))
     return Study("prototype", _figures(table), (table,), _panels(table))
 
 

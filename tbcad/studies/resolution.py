@@ -23,6 +23,7 @@ from tbcad.studies.paper import (
     balanced_sensors,
     for_each_n,
     megapixels,
+    notes,
     try_design,
     with_lens_of_table_i,
 )
@@ -36,20 +37,6 @@ COUNTED = (
 # Definitions that agree with Table II, and with which of its columns.
 AGREEING = ((IN_FRAME, RESOLUTION), (f"{DISC}, camera", NUMBER))
 KINDS = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
-NOTES = (
-    "Virtual cameras: directions with z >= 0; mirrors that the seam halves count once.",
-    "Seeing pixels: those of both cameras whose ray, off its exact mirror, meets the capture "
-    "sphere. Pixels on mirrors: all whose ray meets a mirror. Average: divided by virtual cameras.",
-    "The lens is that of Table I, 89 degrees, where the design leaves its angle open.",
-    "frame_filled is 1 when the outermost mirror is at the frame's edge; beyond 1 the frame of "
-    "this sensor and lens does not hold all mirrors, and the rest have no pixels.",
-    "rays_traced less than the sensor's pixels: one ray stood for a block of them.",
-)
-BALANCE_NOTES = (
-    "Balanced n: where virtual cameras : average pixels is the ratio, between whole n on a "
-    "straight line of the logarithms; nearest_n is the n of the sweep that comes nearest to it.",
-    "paper_n: Table II, which has the ratio 1:1 only (section 6), so other cells are empty.",
-)
 
 
 @dataclass(frozen=True)
@@ -122,9 +109,11 @@ def resolution(
     """
     spec = with_lens_of_table_i(spec)
     by_n = for_each_n(partial(_counts, spec, sensors), ns, progress, scheduler)
-    counts = Table.of_records("resolution", [row for rows in by_n for row in rows], NOTES)
+    counts = Table.of_records(
+        "resolution", [row for rows in by_n for row in rows], notes("resolution")
+    )
     balances = [_balance(counts, s, r, kind) for s in sensors for r in ratios for kind in KINDS]
-    balanced = Table.of_records("resolution-balance", balances, BALANCE_NOTES)
+    balanced = Table.of_records("resolution-balance", balances, notes("resolution-balance"))
     progress("definitions")
     rows = tuple(r for r in balanced_sensors() if Sensor(r.width_px, r.height_px) in sensors)
     defined, fits = definitions(spec, rows, progress)

@@ -32,6 +32,7 @@ from tbcad.studies.paper import (
     balanced_sensors,
     claims,
     megapixels,
+    notes,
     try_design,
     with_lens_of_table_i,
 )
@@ -41,19 +42,6 @@ MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim
 FITS = ("elevation_deg", "sensors", "slope", "intercept", "r2")
 ALL = "all"  # in the place of an elevation: views at all of them
 WHERE = "section 4.4, Fig. 9"
-NOTES = (
-    "SSIM and PSNR of views of 640 x 480 pixels, over the whole frame, against ray-traced "
-    "pictures of the same object (4 x 4 rays a pixel). ssim_on_object: mean of the local SSIM "
-    "where the truth shows the object; object_share: of the frame.",
-    "blur: standard deviation, at the object's centre, of the Gaussian with which the truth comes "
-    "nearest to the view, by least squares. The paper's 'apparent resolution' is read as its "
-    "inverse.",
-    "Each sensor has the n of Table II where the design's own sensor and n are in it; else n is "
-    "that of the design times the fourth root of how many times the pixels it has, rounded, which "
-    "keeps virtual cameras and pixels of one in proportion.",
-    "Fit: least squares of the mean SSIM over log10 of a sensor's pixels; r2 is the square of the "
-    "correlation. The paper's text states that SSIM is linear, no slope and no R^2.",
-)
 
 
 def sensor_n(spec: Spec, sensor: Sensor) -> int:
@@ -84,7 +72,9 @@ def ssim(
     truths = ground_truths(scene, viewpoints.cameras(spec.optics.capture_diameter_mm), progress)
     compared = partial(_compared, spec, scene, viewpoints, truths, method, progress)
     records = [record for sensor in sensors for record in compared(sensor)]
-    table = Table.of_records("ssim", records, (f"Object: {subject.name}; {method}.", *NOTES))
+    table = Table.of_records(
+        "ssim", records, (f"Object: {subject.name}; {method}.", *notes("ssim"))
+    )
     means = Table.of_records(
         "ssim-means", [mean for sensor in sensors for mean in _means(table, sensor)], columns=MEANS
     )

@@ -1,11 +1,14 @@
 """Designs: one to begin with, and the search for a better one."""
 
+from collections.abc import Iterator
+from dataclasses import asdict
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command, print_json, print_result
+from tbcad.app.cli.app import app, command, print_result
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import ToleranceOptions
@@ -88,46 +91,36 @@ def optimize(options: OptimizeOptions, json: JsonResult = False) -> int:
 
     with stages(2) as screen:
         result = searched(options.on(screen))
-    if json:
-        print_json(_record(result, options.files))
-        return 0
-    _show(result, *options.files)
+    print_result(_record(result, options.files), _told(result, *options.files), json)
     return 0
 
 
 def _record(result: "SearchResult", files: tuple[Path, ...]) -> dict[str, object]:
     """What was found, for other programs."""
-    from dataclasses import asdict
-
     return {
         "schema": "tbcad-optimize/1",
         "before": asdict(result.start),
         "after": asdict(result.best),
         "limits": asdict(result.limits),
         "candidates": len(result.candidates),
-        "front": [
-            asdict(one)
-            for one, kept in zip(result.candidates, result.on_front, strict=True)
-            if kept
-        ],
+        "front": [*map(asdict, compress(result.candidates, result.on_front))],
         "files": [str(file) for file in files],
     }
 
 
-def _show(result: "SearchResult", out: Path, *others: Path) -> None:
+def _told(result: "SearchResult", out: Path, *others: Path) -> Iterator[str]:
     from tbcad.optimizing.search import comparison
 
     if result.best.place == result.start.place:
-        typer.echo(f"No better one among {len(result.candidates)} candidates within the limits.")
-    for line in comparison(result):
-        typer.echo(line)
+        yield f"No better one among {len(result.candidates)} candidates within the limits."
+    yield from comparison(result)
     x, z, semi_minor, *stretch = result.best.place
-    typer.echo(
+    yield (
         f"camera at x = {x:g}, z = {z:g} mm; semi-minor axis {semi_minor:g} mm; "
         f"directions stretched by {stretch[0]:g} and {stretch[1]:g}"
     )
     beside = ", ".join(file.name for file in others)
-    typer.echo(f"{out}: written, with {beside}; build and verify it by tbcad build {out}")
+    yield f"{out}: written, with {beside}; build and verify it by tbcad build {out}"
 
 
 @command()
@@ -172,10 +165,14 @@ def tolerance(
         screen.stage("tables and plots")
         more = {"tolerance.json": json_text(analysis).encode()}
         files = write_study(tolerance_study(analysis), out, more, plot)
+    return _show_files(json_text(analysis), summary_text(analysis), out, files, json)
+
+
+def _show_files(record: str, summary: str, out: Path, files: list[Path], json: bool) -> int:
     if json:
-        typer.echo(json_text(analysis), nl=False)
+        typer.echo(record, nl=False)
         return 0
-    typer.echo(paragraph(summary_text(analysis)))
+    typer.echo(paragraph(summary))
     typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
     return 0
 
@@ -206,9 +203,4 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
         "as-built.csv": csv_text(tolerance_table(found)).encode(),
     }
     files = replace_files(out, contents)
-    if json:
-        typer.echo(record, nl=False)
-        return 0
-    typer.echo(paragraph(summary(found)))
-    typer.echo(paragraph(f"{out}: {', '.join(file.name for file in files)}"))
-    return 0
+    return _show_files(record, summary(found), out, files, json)

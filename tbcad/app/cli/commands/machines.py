@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command, print_json, print_result
+from tbcad.app.cli.app import command, print_result
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.machines import (
@@ -65,13 +66,10 @@ def calibrate(options: CalibrateOptions, json: JsonResult = False) -> int:
 
     with stages(4) as screen:
         written = calibrated(options.on(screen))
-    if json:
-        found = [{"folder": str(one.folder), **one.record} for one in written.every]
-        print_json({"schema": "tbcad-calibrations/1", "calibrations": found})
+    found = [{"folder": str(one.folder), **one.record} for one in written.every]
     process = options.process or "fdm (the default)"
-    for one in written.every if not json else ():
-        typer.echo(one.text)
-        typer.echo(f"process: {process}; files: {one.folder}")
+    told = (f"{one.text}\nprocess: {process}; files: {one.folder}" for one in written.every)
+    print_result({"schema": "tbcad-calibrations/1", "calibrations": found}, told, json)
     return FAILED if any(one.verdict.answer == "not good" for one in written.every) else 0
 
 
@@ -83,34 +81,34 @@ def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
     with their standard deviations, for tbcad calibrate --intrinsics.
     """
     from tbcad.app.api import intrinsics as solve_intrinsics
-    from tbcad.rig.calibration.intrinsics.checkerboard import EDGE_SHARE
 
     out = Path(options.out)
     with stages(1) as screen:
         solved = solve_intrinsics(options.on(screen))
-    if json:
-        print_json(_lens_record(solved, out))
-        return 0
+    print_result(_lens_record(solved, out), _lens_lines(solved, out), json)
+    return 0
+
+
+def _lens_lines(solved: "SolvedLens", file: Path) -> Iterator[str]:
+    from tbcad.rig.calibration.intrinsics.checkerboard import EDGE_SHARE
+
     lens, sigma = solved.lens, solved.sigma
-    typer.echo(
+    yield (
         f"{solved.boards} boards, {solved.corners} corners ({solved.outliers} outliers left out), "
         f"RMS {solved.rms_px:.3f} px; focal length {lens.focal[0]:.2f} +- {sigma[0]:.2f} px"
     )
-    typer.echo(
+    yield (
         f"principal point {lens.principal[0]:.2f} +- {sigma[2]:.2f}, {lens.principal[1]:.2f} +- "
         f"{sigma[3]:.2f} px; k1 {lens.distortion[0]:.5f} +- {sigma[4]:.5f}"
     )
     if solved.unused:
-        typer.echo(paragraph(f"no board found in: {', '.join(solved.unused)}"))
+        yield paragraph(f"no board found in: {', '.join(solved.unused)}")
     if solved.reach < EDGE_SHARE:
-        typer.echo(
-            paragraph(
-                f"corners reach {solved.reach:.0%} of the way to the picture's corners: photograph "
-                "boards there too, the distortion is not known beyond"
-            )
+        yield paragraph(
+            f"corners reach {solved.reach:.0%} of the way to the picture's corners: photograph "
+            "boards there too, the distortion is not known beyond"
         )
-    typer.echo(f"{out}: give it to tbcad calibrate --intrinsics")
-    return 0
+    yield f"{file}: give it to tbcad calibrate --intrinsics"
 
 
 def _lens_record(solved: "SolvedLens", file: Path) -> dict[str, object]:
@@ -236,10 +234,7 @@ def run(
         from tbcad.rig.control.selection import dry_run_lines, dry_run_record
 
         found = planned(options)
-        if json:
-            print_json(dry_run_record(found))
-        for line in dry_run_lines(found) if not json else ():
-            typer.echo(line)
+        print_result(dry_run_record(found), dry_run_lines(found), json)
         return 0
     if json:
         raise InputError("--json is about --dry-run: leave it out, or add --dry-run")

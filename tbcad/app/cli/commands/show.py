@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
-from tbcad.app.cli.app import app, print_json
+from tbcad.app.cli.app import app, print_result
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.checks import DESIGN_FILE, FIELD_FILE, LIGHT_FIELD_FILE
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.viewer.page import Query
     from tbcad.light.viewer.render import MethodAtRest, ViewRenderer
-    from tbcad.light.viewer.server import ViewServer
 
 REPORT_FILE = "report.html"
 MAX_PORT = 65535
@@ -157,10 +156,7 @@ def _show_report(folder: Path, open_page: bool, json: bool) -> int:
         raise InputError(
             f"{page} is not by tbcad: move it, and write the report with `tbcad report {folder}`"
         )
-    if json:
-        print_json({"report": str(page.resolve())})
-    else:
-        typer.echo(str(page.resolve()))
+    print_result({"report": str(page.resolve())}, [str(page.resolve())], json)
     if open_page:
         _open(page.resolve().as_uri())
     return 0
@@ -170,13 +166,15 @@ def _show_views(shown: _Shown, start: "Query", port: int, open_page: bool, json:
     from tbcad.light.viewer.server import ViewServer
 
     with ViewServer(_renderer(shown), _title(shown.file), start, port) as server:
-        if json:
-            print_json({"address": server.address})
-        else:
-            typer.echo(f"{server.address} shows {shown.file} by method {shown.how}; Ctrl-C ends it")
+        told = f"{server.address} shows {shown.file} by method {shown.how}; Ctrl-C ends it"
+        print_result({"address": server.address}, [told], json)
         if open_page:
             _open(server.address)
-        return _serve(server)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            typer.echo("ended", err=True)
+    return 0
 
 
 def _renderer(shown: _Shown) -> "ViewRenderer":
@@ -188,15 +186,6 @@ def _renderer(shown: _Shown) -> "ViewRenderer":
     with stages(1) as screen:
         screen.stage("pictures of the virtual cameras")
         return Renderer(shown.pictured.source, shown.method, screen.detail)
-
-
-def _serve(server: "ViewServer") -> int:
-    """Answer until Ctrl-C."""
-    try:
-        server.serve_forever()
-    except KeyboardInterrupt:
-        typer.echo("ended", err=True)
-    return 0
 
 
 def _write_turntable(
@@ -211,10 +200,8 @@ def _write_turntable(
     with stages(1) as screen:
         screen.stage("turntable")
         size = write_turntable(out, shown.pictured, table, _title(shown.file), screen.detail)
-    if json:
-        print_json({"turntable": str(out), "bytes": size, "views": columns * rows})
-    else:
-        typer.echo(f"{out}: {columns * rows} views by method {shown.how}, {size / 1e6:.1f} MB")
+    told = f"{out}: {columns * rows} views by method {shown.how}, {size / 1e6:.1f} MB"
+    print_result({"turntable": str(out), "bytes": size, "views": columns * rows}, [told], json)
     return 0
 
 

@@ -1,5 +1,6 @@
 """Synthesise views from a light field."""
 
+from functools import partial
 from math import isnan, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
@@ -8,15 +9,16 @@ import typer
 
 from tbcad.app.cli.app import app
 from tbcad.app.cli.commands.picture_files import (
-    ViewFiles,
+    Beside,
+    check_beside,
     check_pictures,
     field_view,
     has_object,
     scene_of,
     true_picture,
     viewpoint_of,
+    write_beside,
     write_compared,
-    write_depth,
 )
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
@@ -132,9 +134,11 @@ def view(
     PSNR and SSIM.
     """
     check_is_capture(capture_folder)
-    files = ViewFiles(tuple(depth_files or ()), normals_file, opacity_file)
+    of_field = [("normals", normals_file)] if normals_file else []
+    of_field += [("opacity", opacity_file)] if opacity_file else []
+    beside = [*(("depth", file) for file in depth_files or ()), *of_field]
     by_default = method is None and surface is None and light is None
-    choice = _choice("field" if by_default and files.of_field else method, surface)
+    choice = _choice("field" if by_default and of_field else method, surface)
     from tbcad.light.reconstruction.field import wanted_field
     from tbcad.light.reflectance.environment import read_environment
     from tbcad.light.simulate.capture.light_field import LightField
@@ -143,7 +147,7 @@ def view(
     from tbcad.light.simulate.views.viewpoints import image_quality
 
     check_pictures(capture_folder, out, force, light)
-    files.check(out, choice.method, force, (capture_folder, light))
+    check_beside(beside, out, choice.method, force, (capture_folder, light))
     _check_light(light, light_turn, light_format, choice)
     if frame is not None and (light is not None or surface == "object"):
         raise InputError("--frame has its own light and place: leave out --light and --surface")
@@ -157,21 +161,17 @@ def view(
         scene, tiles = scene_of(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)
-        asked = None if by_default and not files.of_field else choice.method
+        asked = None if by_default and not of_field else choice.method
         made = wanted_field(asked, capture_folder, source, frame)
         choice = BY_DEFAULT if made is not None and asked is None else choice
         screen.stage("view")
         if made is not None:
-            picture = field_view(made, at, files)
+            picture = field_view(made, at, beside)
         else:
-            picture = _view((tiles, shown), at, choice, scene, files, screen.detail)
+            picture = _view((tiles, shown), at, choice, scene, beside, screen.detail)
         screen.stage("truth")
-        truth, same_lamps = None, None
-        if scene is not None and relit is not None and wanted is not None:
-            truth, same_lamps = _lit_truths(scene, at, relit, wanted)
-        elif scene is not None:
-            where = (scene, at) if frame is None else _turned(scene, at, capture_folder, frame)
-            truth = true_picture(*where)
+        turned = None if frame is None else (capture_folder, frame)
+        truth, same_lamps = _truths(scene, at, turned, relit, wanted)
     typer.echo(f"method {choice.method}: {choice.reason}")
     if relit is not None:
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
@@ -180,8 +180,23 @@ def view(
         ssim = image_quality(same_lamps, picture).ssim
         if not isnan(ssim):
             typer.echo(f"SSIM {ssim:.4f} against one lit by the same lamps")
-    files.tell()
+    typer.echo("".join(f"{file}: {what}\n" for what, file in beside), nl=False)
     return 0
+
+
+def _truths(
+    scene: "Scene | None",
+    at: "Camera",
+    turned: tuple[Path, int] | None,
+    relit: "Relit | None",
+    wanted: "Environment | None",
+) -> tuple["Bytes | None", "Bytes | None"]:
+    """The ray-traced pictures, and in the light of the same lamps, where they are known."""
+    if scene is None:
+        return None, None
+    if relit is not None and wanted is not None:
+        return _lit_truths(scene, at, relit, wanted)
+    return true_picture(*(_turned(scene, at, *turned) if turned else (scene, at))), None
 
 
 def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
@@ -252,7 +267,7 @@ def _view(
     at: "Camera",
     choice: _Choice,
     scene: "Scene | None",
-    files: ViewFiles,
+    beside: Beside,
     progress: "Progress",
 ) -> "Bytes":
     """The picture by nearest rays or blended, and files of the depth that is found for it.
@@ -268,7 +283,8 @@ def _view(
         return synthesise(shown, at).image
     if choice.surface == "depth":
         picture, found = depth_views(tiles, progress=progress).of(at, shown)
-        write_depth(files.depth, found.png, lambda: found.ply(picture.image))
+        ply = partial(found.ply, picture.image)
+        write_beside(beside, {"depth.png": found.png, "depth.ply": ply})
         return picture.image
     on_object = scene is not None and choice.surface == "object"
     depth = depth_along_rays(scene) if scene is not None and on_object else None
