@@ -1,6 +1,6 @@
 """Effect of a manufacturing process on a design: yield, sensitivity, and the margin needed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
@@ -12,7 +12,7 @@ from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.options.builds import ToleranceOptions
-from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
+from tbcad.tolerancing.margin import NOT_SEARCHED, Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,
     Case,
@@ -52,7 +52,7 @@ class ProcessOption:
 
     name: str
     estimate: YieldEstimate  # yield with the design as it is
-    margin: Margin | None  # that it needs for the wanted yield; None where it was not searched for
+    margin: Margin = NOT_SEARCHED  # that it needs for the wanted yield
     builds: int = SEARCH_BUILDS
 
 
@@ -68,7 +68,7 @@ class Analysis:
     result: ShellResult
     single_errors: tuple[SingleErrorEffect, ...]  # each kind by itself, the largest loss first
     process_options: tuple[ProcessOption, ...]  # every built-in process, or this one alone
-    margin: Margin | None  # that this process needs; None where it was not searched for
+    margin: Margin  # that this process needs
     sharpness: Sharpness
     prototype: PrototypeResult | None  # None where the export has none
 
@@ -94,25 +94,33 @@ def analyse(
             f"{export.folder} has planar mirrors, whose tolerances cannot be analysed: build it "
             "with --radius-rule traced"
         )
-    errors = process_errors(process, export.spec.mirrors.coating_um)
     simulator = _Simulator(export, options, edge_models(export.reflectors))
+    errors, target = simulator.errors_of(process), export.capture_mm
     options.progress(f"{options.builds} simulated builds by {process.name}")
-    result = simulator.all_builds(MonteCarloCase(simulator.edge_models, errors, options.seed))
-    options.answer(yield_sentence(process, result.worst, export.capture_mm))
+    case = MonteCarloCase(simulator.edge_models, errors, options.seed)
+    result = simulator.all_builds(case)
+    options.answer(yield_sentence(process, result.worst, target))
     options.progress("each kind of error by itself")
     # All searches share the builds without errors, and each begins with the builds of its loss.
     worst = cache(simulator.worst_coverage)
-    single_errors = _single_errors(simulator, errors, worst)
-    chosen = ProcessOption(
-        process.name, estimate_yield(result.worst, export.capture_mm), None, options.builds
-    )
-    process_options = _process_options(simulator, chosen, worst)
-    own_margin = None
+    effects = sorted(simulator.single_errors(errors, worst), key=lambda one: -one.loss)
+    estimate = estimate_yield(result.worst, target)
+    compared = [ProcessOption(process.name, estimate, builds=options.builds)]
+    if options.process is None:
+        options.progress("every process")
+        compared = [*simulator.every_process(worst)]
+    own = NOT_SEARCHED
     if options.margins:
         options.progress("the margins needed")
-        process_options, own_margin = _margins(simulator, process, process_options)
+        margin_of = cache(partial(simulator.margin, solved_designs()))
+        own = margin_of(process)
+        asked = options.process is not None
+        compared = [
+            replace(one, margin=margin_of(process if asked else load_process(one.name)))
+            for one in compared
+        ]
     options.progress("pictures")
-    sharp = _sharpness(simulator, errors, scene_object)
+    sharp = simulator.sharpness(case, scene_object)
     prototype = None
     if (export.folder / "prototype.json").is_file():
         options.progress("prototypes")
@@ -120,8 +128,8 @@ def analyse(
         model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
         prototype = simulator.all_builds(PrototypeCase(model, errors, options.seed))
     return Analysis(
-        process, options, export.capture_mm, export.reflectors, simulator.edge_models, result,
-        single_errors, process_options, own_margin, sharp, prototype,
+        process, options, target, export.reflectors, simulator.edge_models, result,
+        tuple(effects), tuple(compared), own, sharp, prototype,
     )  # fmt: skip
 
 
@@ -132,6 +140,10 @@ class _Simulator:
     export: ExportedDesign
     options: ToleranceOptions
     edge_models: EdgeModels
+
+    def errors_of(self, process: Process) -> Errors:
+        """Errors of a process, but for the coating that the design allows for."""
+        return process_errors(process, self.export.spec.mirrors.coating_um)
 
     def all_builds(self, case: Case[AnyResult]) -> AnyResult:
         """Result of as many builds as asked for."""
@@ -154,63 +166,33 @@ class _Simulator:
     ) -> list[Any]:
         return schedule.run_units(case, batches, self.options.scheduler, report)
 
+    def single_errors(self, errors: Errors, worst: WorstCoverage) -> Iterator[SingleErrorEffect]:
+        """What each kind of error costs by itself."""
+        wanted, target = self.options.wanted_yield, self.export.capture_mm
+        for kind in shell_kinds(errors, len(self.edge_models[0].walls)):
+            self.options.detail(kind)
+            yield one_at_a_time(errors, kind, wanted, target, worst)
 
-def _single_errors(
-    simulator: _Simulator, errors: Errors, worst: WorstCoverage
-) -> tuple[SingleErrorEffect, ...]:
-    wanted, target = simulator.options.wanted_yield, simulator.export.capture_mm
-    effects = []
-    for kind in shell_kinds(errors, len(simulator.edge_models[0].walls)):
-        simulator.options.detail(kind)
-        effects.append(one_at_a_time(errors, kind, wanted, target, worst))
-    return tuple(sorted(effects, key=lambda one: -one.loss))
+    def every_process(self, worst: WorstCoverage) -> Iterator[ProcessOption]:
+        """Every built-in process with its yield."""
+        for name in BUILT_IN:
+            self.options.detail(name)
+            seen = worst(self.errors_of(load_process(name)))
+            yield ProcessOption(name, estimate_yield(seen, self.export.capture_mm))
 
+    def margin(self, designs: SolvedDesigns, process: Process) -> Margin:
+        """The margin that a process needs."""
+        return margin(
+            self.export.spec, self.errors_of(process), self.options.wanted_yield,
+            self.worst_coverage, lambda text: self.options.detail(f"{process.name}: {text}"),
+            designs,
+        )  # fmt: skip
 
-def _process_options(
-    simulator: _Simulator, chosen: ProcessOption, worst: WorstCoverage
-) -> tuple[ProcessOption, ...]:
-    """Every process with its yield, or the one that was asked for."""
-    if simulator.options.process is not None:
-        return (chosen,)
-    simulator.options.progress("every process")
-    export, options = simulator.export, []
-    for name in BUILT_IN:
-        simulator.options.detail(name)
-        errors = process_errors(load_process(name), export.spec.mirrors.coating_um)
-        options.append(ProcessOption(name, estimate_yield(worst(errors), export.capture_mm), None))
-    return tuple(options)
-
-
-def _margins(
-    simulator: _Simulator, process: Process, compared: Sequence[ProcessOption]
-) -> tuple[tuple[ProcessOption, ...], Margin]:
-    """The same processes with the margins that they need, and the margin of the one asked for."""
-    asked, designs = simulator.options.process is not None, solved_designs()
-    own = _margin(simulator, process, designs)
-
-    def margin_of(name: str) -> Margin:
-        one = process if asked else load_process(name)
-        return own if one == process else _margin(simulator, one, designs)
-
-    return tuple(replace(option, margin=margin_of(option.name)) for option in compared), own
-
-
-def _margin(simulator: _Simulator, process: Process, designs: SolvedDesigns) -> Margin:
-    spec, wanted = simulator.export.spec, simulator.options.wanted_yield
-    errors = process_errors(process, spec.mirrors.coating_um)
-    return margin(
-        spec, errors, wanted, simulator.worst_coverage,
-        lambda text: simulator.options.detail(f"{process.name}: {text}"), designs,
-    )  # fmt: skip
-
-
-def _sharpness(simulator: _Simulator, errors: Errors, scene_object: SceneObject) -> Sharpness:
-    export, options = simulator.export, simulator.options
-    scene = prepared_scene(scene_object)
-    reference = reference_views(scene, export.capture_mm, options.detail)
-    case = MonteCarloCase(simulator.edge_models, errors, options.seed)
-    builds = case.draws(range(PHOTOGRAPHED_BUILDS))
-    residual = options.calibrated_mrad / 1000
-    return sharpness(
-        export.reflectors, builds, scene, reference, residual, options.seed, progress=options.detail
-    )
+    def sharpness(self, case: MonteCarloCase, scene_object: SceneObject) -> Sharpness:
+        """Sharpness of a few builds' pictures."""
+        export, options, scene = self.export, self.options, prepared_scene(scene_object)
+        reference = reference_views(scene, export.capture_mm, options.detail)
+        builds, residual = case.draws(range(PHOTOGRAPHED_BUILDS)), options.calibrated_mrad / 1000
+        return sharpness(
+            export.reflectors, builds, scene, reference, residual, options.seed, options.detail
+        )

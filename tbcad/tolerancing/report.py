@@ -2,29 +2,32 @@
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from tbcad.common.results import Figure, Record, Study, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.tolerancing.analysis import Analysis
-from tbcad.tolerancing.margin import Margin
+from tbcad.tolerancing.margin import NOT_SEARCHED
 from tbcad.tolerancing.montecarlo.builds import (
     CoverageResult,
     estimate_yield,
     percent,
     yield_sentence,
 )
+from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModel
+from tbcad.tolerancing.montecarlo.form import ray_spread
 from tbcad.tolerancing.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
-from tbcad.tolerancing.plots import directions, in_words, panels, spread_dict, spread_sentence
-from tbcad.tolerancing.process.kinds import ErrorSpec
-from tbcad.tolerancing.process.process import Process
+from tbcad.tolerancing.process.kinds import MICROMETRE, ErrorSpec
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"
-NOT_SEARCHED = "not searched for: add --margins"
 QUANTILES = (0.01, 0.05, 0.5)
+LOW_SHARE = 0.05  # share of the builds whose coverage lies below what table and map show
 NOTES = (
     "Coverage of a virtual camera: twice the minimum distance from the object's centre of all rays "
     "camera -> edge of its mirror -> reflected. A build is good when every virtual camera covers "
@@ -34,14 +37,9 @@ NOTES = (
     "Tolerable factor: factor on one kind of error, without any other, that still gives the wanted "
     "yield.",
 )
-
 UNITS = {
-    "um": "micrometres",
-    "mm": "mm",
-    "permille": "per mille",
-    "percent": "%",
-    "mrad": "mrad",
-    "deg": "degrees",
+    **{"um": "micrometres", "mm": "mm", "permille": "per mille", "percent": "%"},
+    **{"mrad": "mrad", "deg": "degrees"},
 }
 ERROR_COLUMNS = (
     *("kind", "magnitude", "mean", "loss_mm", "loss_at_yield_mm"),
@@ -51,24 +49,47 @@ ERROR_COLUMNS = (
 
 def summary_text(analysis: Analysis) -> str:
     """The result in one paragraph."""
-    sentences = (
-        yield_sentence(analysis.process, analysis.result.worst, analysis.target),
-        _largest_loss_sentence(analysis),
-        _margin_sentence(analysis),
-        _processes_sentence(analysis),
-        _sharpness_sentence(analysis),
-        spread_sentence(analysis),
-        _prototype_sentence(analysis),
+    return " ".join(_sentences(analysis))
+
+
+def _sentences(analysis: Analysis) -> Iterator[str]:
+    yield yield_sentence(analysis.process, analysis.result.worst, analysis.target)
+    for largest in analysis.single_errors[:1]:
+        lost = f"{in_words(largest.kind)}: {largest.loss:.2f} mm by itself"
+        yield f"Largest loss by {lost}; {_limit_text(analysis, largest)}."
+    searched, needed = analysis.margin != NOT_SEARCHED, analysis.margin
+    if needed.mm is not None:
+        yield (
+            f"A margin of {needed.mm:.2f} mm (tbcad build --radius-rule traced --set "
+            f"mirrors.margin_mm={needed.mm:.2f}) makes {needed.share:.1%} good."
+        )
+    elif searched:
+        yield f"No margin was found that is enough: {needed.reason}."
+    if len(options := analysis.process_options) > 1:
+        yields = (f"{one.name} {one.estimate.share:.1%}" for one in options)
+        yield f"Good builds, of {options[0].builds} each: {', '.join(yields)}."
+        if searched:
+            yield _margins_sentence(analysis)
+    ssim = {name: values.mean() for name, values in vars(analysis.sharpness).items()}
+    yield (
+        f"Pictures: SSIM {ssim['designed']:.3f} as designed, {ssim['uncalibrated']:.3f} "
+        f"without calibration, {ssim['calibrated']:.3f} with it."
     )
-    return " ".join(filter(None, sentences))
+    if analysis.process.waviness_um.magnitude:
+        spread = spread_dict(analysis)
+        yield (
+            f"Waviness displaces a mirror's rays by {spread['median']:.2g} mm at the object (RMS, "
+            f"median of the mirrors), where a pixel is {spread['pixel_width_median']:.2g} mm wide."
+        )
+    if analysis.prototype is not None:
+        both = analysis.prototype.uncalibrated, analysis.prototype.calibrated
+        plain, known = (percent(estimate_yield(one.worst, analysis.target)) for one in both)
+        yield f"Prototype: {plain} good without calibration, {known} with it."
 
 
-def _largest_loss_sentence(analysis: Analysis) -> str:
-    if not analysis.single_errors:
-        return ""
-    largest = analysis.single_errors[0]
-    limit = _limit_text(analysis, largest)
-    return f"Largest loss by {in_words(largest.kind)}: {largest.loss:.2f} mm by itself; {limit}."
+def in_words(kind: str) -> str:
+    """A kind of error in words."""
+    return kind.replace("_", " ")
 
 
 def _limit_text(analysis: Analysis, effect: SingleErrorEffect) -> str:
@@ -78,77 +99,33 @@ def _limit_text(analysis: Analysis, effect: SingleErrorEffect) -> str:
         return "the design itself falls short even without errors"
     if not math.isfinite(factor):
         return "harmless"
-    key = _keys(analysis.process)[effect.kind]
-    error: ErrorSpec = getattr(analysis.process, key)
-    size, unit = error.magnitude or error.mean, UNITS[key.rpartition("_")[2]]
+    key, error = _error_of(analysis, effect)
+    size, unit_name = error.magnitude or error.mean, UNITS[key.rpartition("_")[2]]
     few = f"fewer than {_wanted(analysis)} of the builds are good"
     if abs(factor - 1) <= FACTOR_TOLERANCE:
-        return f"at {size:g} {unit} it is at its limit: with more, and no other error, {few}"
+        return f"at {size:g} {unit_name} it is at its limit: with more, and no other error, {few}"
     return (
-        f"with no other error, {few} above {factor * size:.3g} {unit} "
+        f"with no other error, {few} above {factor * size:.3g} {unit_name} "
         f"({analysis.process.name} has {size:g})"
     )
 
 
-def _keys(process: Process) -> dict[str, str]:
-    """The process's key of each kind of error, which ends in its unit."""
-    return {key.rpartition("_")[0]: key for key, _ in process}
+def _error_of(analysis: Analysis, effect: SingleErrorEffect) -> tuple[str, ErrorSpec]:
+    """The process's key of a kind of error, which ends in its unit, and its figures."""
+    kinds = ((k, v) for k, v in analysis.process if k.rpartition("_")[0] == effect.kind)
+    return next(kinds)
 
 
 def _wanted(analysis: Analysis) -> str:
     return f"{100 * analysis.options.wanted_yield:.6g}%"
 
 
-def _margin_sentence(analysis: Analysis) -> str:
-    needed = analysis.margin
-    if needed is None:
-        return ""
-    if needed.mm is None:
-        return f"No margin was found that is enough: {needed.reason}."
-    return (
-        f"A margin of {needed.mm:.2f} mm (tbcad build --radius-rule traced --set "
-        f"mirrors.margin_mm={needed.mm:.2f}) makes {needed.share:.1%} good."
-    )
-
-
-def _processes_sentence(analysis: Analysis) -> str:
-    """Of all processes the yields, and the margins if they were searched for."""
-    if len(analysis.process_options) < 2:
-        return ""
-    yields = (f"{one.name} {one.estimate.share:.1%}" for one in analysis.process_options)
-    text = f"Good builds, of {analysis.process_options[0].builds} each: {', '.join(yields)}."
-    return text if analysis.margin is None else f"{text} {_margins_sentence(analysis)}"
-
-
 def _margins_sentence(analysis: Analysis) -> str:
-    margins = {option.name: _margin(option.margin)[0] for option in analysis.process_options}
+    margins = {option.name: option.margin.mm for option in analysis.process_options}
     enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
     none = [name for name, mm in margins.items() if mm is None]
     text = f"Margins needed for {_wanted(analysis)}: {', '.join(enough) or 'none found'}"
     return text + (f"; none was found for {' and '.join(none)}." if none else ".")
-
-
-def _margin(margin: Margin | None) -> tuple[float | None, str]:
-    """Margin, mm, and why there is none."""
-    return (None, NOT_SEARCHED) if margin is None else (margin.mm, margin.reason)
-
-
-def _sharpness_sentence(analysis: Analysis) -> str:
-    ssim = analysis.sharpness
-    return (
-        f"Pictures: SSIM {ssim.designed.mean():.3f} as designed, {ssim.uncalibrated.mean():.3f} "
-        f"without calibration, {ssim.calibrated.mean():.3f} with it."
-    )
-
-
-def _prototype_sentence(analysis: Analysis) -> str:
-    if analysis.prototype is None:
-        return ""
-    without, with_it = (
-        percent(estimate_yield(result.worst, analysis.target))
-        for result in (analysis.prototype.uncalibrated, analysis.prototype.calibrated)
-    )
-    return f"Prototype: {without} good without calibration, {with_it} with it."
 
 
 def json_text(analysis: Analysis) -> str:
@@ -158,31 +135,27 @@ def json_text(analysis: Analysis) -> str:
 
 def report_dict(analysis: Analysis) -> dict[str, Any]:
     """tolerance.json."""
-    sharp, prototype = analysis.sharpness, analysis.prototype
+    prototype, options, target = analysis.prototype, analysis.options, analysis.target
+    ssim = {name: float(values.mean()) for name, values in vars(analysis.sharpness).items()}
     return {
         "schema": SCHEMA,
         "summary": summary_text(analysis),
         "process": analysis.process.model_dump(mode="json", by_alias=True),
         "builds": len(analysis.result),
-        "seed": analysis.options.seed,
-        "target_mm": analysis.target,
-        "wanted_yield": analysis.options.wanted_yield,
-        **_result_dict(analysis.result, analysis.target),
+        "seed": options.seed,
+        "target_mm": target,
+        "wanted_yield": options.wanted_yield,
+        **_result_dict(analysis.result, target),
         "single_errors": _error_table(analysis).records(),
-        "margin_needed_mm": _margin(analysis.margin)[0],
-        "margin_reason": _margin(analysis.margin)[1],
+        "margin_needed_mm": analysis.margin.mm,
+        "margin_reason": analysis.margin.reason,
         "processes": _process_table(analysis).records(),
-        "ssim": {
-            "designed": float(sharp.designed.mean()),
-            "uncalibrated": float(sharp.uncalibrated.mean()),
-            "calibrated": float(sharp.calibrated.mean()),
-            "calibration_residual_mrad": analysis.options.calibrated_mrad,
-        },
+        "ssim": {**ssim, "calibration_residual_mrad": options.calibrated_mrad},
         "ray_spread_mm": spread_dict(analysis),
         "prototype": prototype
         and {
-            "uncalibrated": _result_dict(prototype.uncalibrated, analysis.target),
-            "calibrated": _result_dict(prototype.calibrated, analysis.target),
+            "uncalibrated": _result_dict(prototype.uncalibrated, target),
+            "calibrated": _result_dict(prototype.calibrated, target),
         },
     }
 
@@ -200,67 +173,87 @@ def _result_dict(result: CoverageResult, target: float) -> dict[str, Any]:
     }
 
 
+def _rms(offset: Floats) -> float:
+    """Root mean square, mm, of the rays that meet their mirror; 0 where none does."""
+    met = offset[np.isfinite(offset)]
+    return float(np.sqrt((met**2).mean())) if met.size else 0.0
+
+
+def spread_dict(analysis: Analysis) -> dict[str, Any]:
+    """The spread of rays by waviness, for tolerance.json; pixels share the target's disc."""
+    waviness = analysis.process.waviness_um.magnitude * MICROMETRE
+    spread = np.concatenate([_mirror_spreads(model, waviness) for model in analysis.edge_models])
+    pixels = np.median(analysis.result.pixels)
+    return {
+        "median": float(np.median(spread)),
+        "largest": float(spread.max()),
+        "pixel_width_median": (
+            float(analysis.target * np.sqrt(np.pi / 4 / pixels)) if pixels else 0.0
+        ),
+    }
+
+
+def _mirror_spreads(model: EdgeModel, waviness: float) -> Floats:
+    """RMS displacement at the object of the rays of each mirror of a half, mm, (m,)."""
+    away = unit(model.view.pinhole - model.apex)
+    incidence = np.arccos(np.clip(dot(away, model.normal), -1, 1))
+    return ray_spread(waviness, model.cell_radius, norm(model.apex), incidence)
+
+
 def tolerance_study(analysis: Analysis) -> Study:
     """Tables and plots."""
-    tables = (
-        _builds_table(analysis),
-        _error_table(analysis),
-        _process_table(analysis),
-        _cameras_table(analysis),
-    )
-    notes = (summary_text(analysis), *NOTES)
-    return Study("tolerance", _figures(analysis), tables, panels(analysis), notes)
-
-
-def _figures(analysis: Analysis) -> tuple[Figure, ...]:
-    worst = analysis.result.worst
-    losses = [
-        Figure(f"loss by {in_words(effect.kind)} alone", "mm", effect.loss)
-        for effect in analysis.single_errors
-    ]
-    yields = [
-        Figure(f"good builds by {option.name}", "%", 100 * option.estimate.share)
-        for option in analysis.process_options
-    ]
-    return (
-        Figure("good builds", "%", 100 * analysis.estimate.share),
-        Figure("worst camera, median", "mm", float(np.median(worst))),
-        Figure("worst camera, 1 % cover less", "mm", float(np.quantile(worst, 0.01))),
-        *([Figure("margin needed", "mm", analysis.margin.mm)] if analysis.margin else []),
-        *losses,
-        *yields,
-    )
-
-
-def _builds_table(analysis: Analysis) -> Table:
-    result = analysis.result
-    columns = {
+    result, u = analysis.result, directions(analysis)
+    low, middle = result.quantiles((LOW_SHARE, 0.5))
+    builds = {
         "build": np.arange(len(result)),
         "worst_coverage_mm": result.worst,
         "worst_camera": result.worst_camera,
         "pointing_rms_mm": np.array([_rms(offset) for offset in result.offset]),
     }
-    return Table.of_columns("tolerance-builds", columns)
+    cameras = {
+        "virtual_camera": np.arange(len(u)),
+        **dict(zip(("ux", "uy", "uz"), u.T, strict=True)),
+        "median_mm": middle,
+        "five_percent_mm": low,
+        "share_short": (result.coverage < analysis.target).mean(axis=0),
+    }
+    tables = (
+        Table.of_columns("tolerance-builds", builds),
+        _error_table(analysis),
+        _process_table(analysis),
+        Table.of_columns("tolerance-cameras", cameras),
+    )
+    panels = (_yield_curve(analysis), _loss_bars(analysis), _coverage_map(u, low))
+    notes = (summary_text(analysis), *NOTES)
+    return Study("tolerance", tuple(_figures(analysis)), tables, panels, notes)
+
+
+def _figures(analysis: Analysis) -> Iterator[Figure]:
+    worst = analysis.result.worst
+    yield Figure("good builds", "%", 100 * analysis.estimate.share)
+    yield Figure("worst camera, median", "mm", float(np.median(worst)))
+    yield Figure("worst camera, 1 % cover less", "mm", float(np.quantile(worst, 0.01)))
+    if analysis.margin != NOT_SEARCHED:
+        yield Figure("margin needed", "mm", analysis.margin.mm)
+    for effect in analysis.single_errors:
+        yield Figure(f"loss by {in_words(effect.kind)} alone", "mm", effect.loss)
+    for option in analysis.process_options:
+        yield Figure(f"good builds by {option.name}", "%", 100 * option.estimate.share)
 
 
 def _error_table(analysis: Analysis) -> Table:
-    process, effects = analysis.process, analysis.single_errors
-    records = [_error_record(effect, _keys(process)[effect.kind], process) for effect in effects]
+    """Each kind of error; magnitudes and means are in the unit of the process's key."""
+    records: list[Record] = []
+    for effect in analysis.single_errors:
+        key, error = _error_of(analysis, effect)
+        factor = effect.tolerable_factor if math.isfinite(effect.tolerable_factor) else None
+        most = [None if factor is None else factor * x for x in (error.magnitude, error.mean)]
+        if effect.kind == "coating":
+            most[1] = None  # the design allows for a part of its mean
+        losses = effect.loss, effect.loss_at_yield
+        cells = (key, error.magnitude, error.mean, *losses, factor, *most)
+        records.append(dict(zip(ERROR_COLUMNS, cells, strict=True)))
     return Table.of_records("tolerance-sensitivity", records, columns=ERROR_COLUMNS)
-
-
-def _error_record(effect: SingleErrorEffect, key: str, process: Process) -> Record:
-    """One kind of error; magnitudes and means are in the unit of the process's key."""
-    error: ErrorSpec = getattr(process, key)
-    factor = effect.tolerable_factor if math.isfinite(effect.tolerable_factor) else None
-    tolerable = [None if factor is None else factor * x for x in (error.magnitude, error.mean)]
-    if effect.kind == "coating":
-        tolerable[1] = None  # the design allows for a part of its mean
-    cells = (
-        *(key, error.magnitude, error.mean, effect.loss, effect.loss_at_yield),
-        *(factor, *tolerable),
-    )
-    return dict(zip(ERROR_COLUMNS, cells, strict=True))
 
 
 def _process_table(analysis: Analysis) -> Table:
@@ -271,30 +264,46 @@ def _process_table(analysis: Analysis) -> Table:
             "yield": option.estimate.share,
             "yield_low": option.estimate.low,
             "yield_high": option.estimate.high,
-            "margin_needed_mm": _margin(option.margin)[0],
-            "reason": _margin(option.margin)[1],
+            "margin_needed_mm": option.margin.mm,
+            "reason": option.margin.reason,
         }
         for option in analysis.process_options
     ]
     return Table.of_records("tolerance-processes", records)
 
 
-def _cameras_table(analysis: Analysis) -> Table:
-    coverage, u = analysis.result.coverage, directions(analysis)
-    low, middle = analysis.result.quantiles((0.05, 0.5))
-    columns = {
-        "virtual_camera": np.arange(len(u)),
-        "ux": u[:, 0],
-        "uy": u[:, 1],
-        "uz": u[:, 2],
-        "median_mm": middle,
-        "five_percent_mm": low,
-        "share_short": (coverage < analysis.target).mean(axis=0),
-    }
-    return Table.of_columns("tolerance-cameras", columns)
+def directions(analysis: Analysis) -> Floats:
+    """Directions of the virtual cameras, (v, 3)."""
+    number = virtual_camera_numbers(analysis.edge_models[1].halved)
+    of_mirrors = np.concatenate([camera.u for camera in analysis.cameras])
+    result = np.zeros((int(number.max()) + 1, 3))
+    result[number[::-1]] = of_mirrors[::-1]  # the first mirror of a camera counts
+    return result
 
 
-def _rms(offset: Floats) -> float:
-    """Root mean square, mm, of the rays that meet their mirror; 0 where none does."""
-    met = offset[np.isfinite(offset)]
-    return float(np.sqrt((met**2).mean())) if met.size else 0.0
+def _yield_curve(analysis: Analysis) -> PlotPanel:
+    worst = np.sort(analysis.result.worst)
+    share = 1 - np.arange(len(worst)) / len(worst)
+    target = np.array([analysis.target, analysis.target])
+    series = (
+        Series(analysis.process.name, worst, 100 * share, "C0-"),
+        Series(f"{analysis.target:g} mm", target, np.array([0.0, 100.0]), "k--"),
+    )
+    return PlotPanel("Yield", "minimum coverage of a build, mm", "builds that reach it, %", series)
+
+
+def _loss_bars(analysis: Analysis) -> PlotPanel:
+    loss = np.array([effect.loss for effect in analysis.single_errors])
+    names = tuple(in_words(effect.kind) for effect in analysis.single_errors)
+    bars = (Series("", loss, np.arange(len(loss), dtype=np.float64), "bars"),)
+    title = "Loss by each kind of error alone"
+    return PlotPanel(title, "loss of coverage, mm", "", bars, names=names)
+
+
+def _coverage_map(u: Floats, low: Floats) -> PlotPanel:
+    from_zenith = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
+    horizontal = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
+    x, y = from_zenith * u[:, 0] / horizontal, from_zenith * u[:, 1] / horizontal
+    dots = Series("", x, y, ".", low, f"coverage that {LOW_SHARE:.0%} do not reach, mm")
+    labels = (f"angle from the zenith along {axis}, degrees" for axis in "xy")
+    return PlotPanel("Virtual cameras, the zenith in the middle", *labels, (dots,))

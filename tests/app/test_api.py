@@ -81,16 +81,6 @@ def test_printed_parts_are_valid_and_assembled() -> None:
     )
 
 
-def test_python_m_tbcad_is_the_command() -> None:
-    run = subprocess.run(
-        [sys.executable, "-m", "tbcad", "--version"],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
-    assert (run.returncode, run.stdout.strip()) == (0, f"tbcad {tbcad.__version__}")
-
-
 def test_bad_input_is_one_line() -> None:
     with pytest.raises(InputError, match=r"n and settings go with a design file"):
         tbcad.design(tbcad.load_spec(None), n=4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -60,30 +60,34 @@ def reconstruct(options: ReconstructOptions) -> Field:
     Raises:
         InputError: the light field cannot be read or shows nothing, or a file cannot be written.
     """
-    return reconstruct_files(options)[-1].field
+    return reconstruct_files(options, checked_frames(options))[-1].field
 
 
-def reconstruct_files(options: ReconstructOptions) -> list[Reconstructed]:
-    """Reconstruct and write all that is asked for."""
-    numbers = checked_frames(options)
-    from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.capture.sequence import sequence_frame
+@dataclass(frozen=True)
+class FrameFiles:
+    """The files of one frame, or of the capture itself."""
 
-    done: list[Reconstructed] = []
-    with LightField.open(Path(options.capture)) as stored:
-        check_memory(stored, options)
-        for number in numbers:
-            source = stored if number is None else sequence_frame(stored, _folder(options), number)
-            last = done[-1].field if done else None
-            done.append(_reconstructed(source, _staged(options, number), number, last))
-    return done
+    number: int | None  # of the frame
+    field: Path
+    part: Path  # checkpoint of the field
+    meshes: tuple[Path, ...]
+    volumes: tuple[Path, ...]  # one, if it is asked for
 
+    @classmethod
+    def of(cls, options: ReconstructOptions, number: int | None) -> FrameFiles:
+        """Those that are asked for; of all frames, each with its number."""
+        from tbcad.light.reconstruction.field import field_file
+        from tbcad.light.reconstruction.start import part_file
 
-def _staged(options: ReconstructOptions, number: int | None) -> ReconstructOptions:
-    """The options, with the frame's number before the names of stages."""
-    if options.frame != EVERY:
-        return options
-    return replace(options, progress=lambda stage: options.progress(f"frame {number}: {stage}"))
+        end = f"-{number}" if options.frame == EVERY else ""
+
+        def numbered(file: AnyPath) -> Path:
+            return Path(file).with_stem(Path(file).stem + end)
+
+        field = numbered(options.out) if options.out else field_file(_folder(options), number)
+        volumes = tuple(numbered(file) for file in (options.volume,) if file is not None)
+        meshes = tuple(map(numbered, options.meshes))
+        return cls(number, field, part_file(field), meshes, volumes)
 
 
 def _folder(options: ReconstructOptions) -> Path:
@@ -92,34 +96,31 @@ def _folder(options: ReconstructOptions) -> Path:
     return capture if capture.is_dir() else capture.parent
 
 
-def field_of(options: ReconstructOptions, number: int | None) -> Path:
-    """Where the field of a frame is written, or that of the capture itself."""
-    from tbcad.light.reconstruction.field import field_file
+def reconstruct_files(options: ReconstructOptions, frames: list[FrameFiles]) -> list[Reconstructed]:
+    """Reconstruct and write all that is asked for."""
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.sequence import sequence_frame
 
-    if options.out is None:
-        return field_file(_folder(options), number)
-    return _numbered(options, number, [options.out])[0]
+    done: list[Reconstructed] = []
+    with LightField.open(Path(options.capture)) as stored:
+        check_memory(stored, options)
+        for frame in frames:
+            source, staged = stored, options
+            if frame.number is not None:
+                source = sequence_frame(stored, _folder(options), frame.number)
+            if options.frame == EVERY:
+                staged = replace(options, progress=partial(_tell, options, frame))
+            last = done[-1].field if done else None
+            done.append(_reconstructed(source, staged, frame, last))
+    return done
 
 
-def part_of(options: ReconstructOptions, number: int | None) -> Path:
-    """The checkpoint of that field."""
-    from tbcad.light.reconstruction.start import part_file
-
-    return part_file(field_of(options, number))
-
-
-def _numbered(
-    options: ReconstructOptions, number: int | None, files: Sequence[AnyPath | None]
-) -> list[Path]:
-    """Files of a frame, or of the capture itself."""
-    paths = [Path(file) for file in files if file is not None]
-    if options.frame != EVERY:
-        return paths
-    return [path.with_stem(f"{path.stem}-{number}") for path in paths]
+def _tell(options: ReconstructOptions, frame: FrameFiles, stage: str) -> None:
+    options.progress(f"frame {frame.number}: {stage}")
 
 
 def _reconstructed(
-    source: LightField, options: ReconstructOptions, number: int | None, last: Field | None
+    source: LightField, options: ReconstructOptions, frame: FrameFiles, last: Field | None
 ) -> Reconstructed:
     from tbcad.common.atomic_files import replace_files
     from tbcad.light.reconstruction.field import read_field, write_field
@@ -128,26 +129,25 @@ def _reconstructed(
     from tbcad.light.reconstruction.picture import write_preview
     from tbcad.light.reconstruction.start import check_same
 
-    file, part = field_of(options, number), part_of(options, number)
-    kept = options.resume and file.exists()
+    kept = options.resume and frame.field.exists()
     show = partial(write_preview, Path(options.preview)) if options.preview else lambda _: None
     if kept:
-        made = read_field(file)
-        check_same(file, made.facts, asked_for(source, options, last))
+        made = read_field(frame.field)
+        check_same(frame.field, made.facts, asked_for(source, options, last))
     else:
         if not options.resume:
-            part.unlink(missing_ok=True)
-        made = reconstruction(source, options, part, last, show)
-        write_field(file, made)
-    part.unlink(missing_ok=True)
-    for volume in _numbered(options, number, [options.volume]):
+            frame.part.unlink(missing_ok=True)
+        made = reconstruction(source, options, frame.part, last, show)
+        write_field(frame.field, made)
+    frame.part.unlink(missing_ok=True)
+    for volume in frame.volumes:
         if options.force or not volume.exists():
             replace_files(volume.parent, {volume.name: volume_file(made)})
-    return Reconstructed(file, made, kept, _meshes(made, source, options, number))
+    return Reconstructed(frame.field, made, kept, _meshes(made, source, options, frame))
 
 
-def checked_frames(options: ReconstructOptions) -> list[int | None]:
-    """Refuse, before any work, what cannot be read or written; the frames, None for the capture."""
+def checked_frames(options: ReconstructOptions) -> list[FrameFiles]:
+    """Refuse, before any work, what cannot be read or written; the files of each frame."""
     capture, folder = Path(options.capture), _folder(options)
     check_is_capture(capture)
     if options.blur_px and options.rays == 1:
@@ -161,26 +161,24 @@ def checked_frames(options: ReconstructOptions) -> list[int | None]:
     from tbcad.light.simulate.image_files import check_image_path
     from tbcad.output.single_files import check_file
 
-    numbers: list[int | None] = (
-        [*range(frame_count(folder))] if options.frame == "all" else [options.frame]
-    )
+    numbers = range(frame_count(folder)) if options.frame == EVERY else (options.frame,)
+    frames = [FrameFiles.of(options, number) for number in numbers]
     light_field = folder / LIGHT_FIELD_FILE if capture.is_dir() else capture
     taken: set[Path] = set()
-    for file, suffixes, may_be in _files(options, numbers):
+    for file, suffixes, may_be in _files(options, frames):
         check_image_path(file, True, suffixes)
         check_file(file, may_be, (light_field, folder / NAME))
         if (place := file.parent.resolve() / file.name) in taken:
             raise InputError(f"{file} is named twice: choose another name")
         taken.add(place)
-    for number in numbers:
-        part = part_of(options, number)
+    for part in (frame.part for frame in frames):
         if part.exists() and not (options.resume or options.force):
             raise InputError(f"{part} exists: go on with --resume, or begin anew with --force")
-    return numbers
+    return frames
 
 
 def _files(
-    options: ReconstructOptions, numbers: list[int | None]
+    options: ReconstructOptions, frames: list[FrameFiles]
 ) -> Iterator[tuple[Path, tuple[str, ...], bool]]:
     """Each file to write, its suffixes, and whether it may exist."""
     from tbcad.light.reconstruction.field import SUFFIX
@@ -189,17 +187,14 @@ def _files(
     may_be = options.force or options.resume
     if options.preview is not None:
         yield Path(options.preview), (".png",), may_be
-    for number in numbers:
-        made = field_of(options, number)
-        yield made, (SUFFIX,), may_be
-        done = options.force or (options.resume and made.exists())
-        for mesh in _numbered(options, number, options.meshes):
-            yield mesh, MESH_SUFFIXES, done
-        for volume in _numbered(options, number, [options.volume]):
-            yield volume, (VOLUME_SUFFIX,), done
+    for frame in frames:
+        yield frame.field, (SUFFIX,), may_be
+        done = options.force or (options.resume and frame.field.exists())
+        yield from ((mesh, MESH_SUFFIXES, done) for mesh in frame.meshes)
+        yield from ((volume, (VOLUME_SUFFIX,), done) for volume in frame.volumes)
 
 
-def expected_seconds(options: ReconstructOptions, numbers: list[int | None]) -> dict[str, float]:
+def expected_seconds(options: ReconstructOptions, frames: list[FrameFiles]) -> dict[str, float]:
     """About how long each stage takes, by its title, on two cores."""
     from tbcad.light.reconstruction.fitted import CHOICE, READING, level_name, levels
     from tbcad.light.simulate.capture.light_field import LightField
@@ -207,22 +202,18 @@ def expected_seconds(options: ReconstructOptions, numbers: list[int | None]) -> 
     with LightField.open(Path(options.capture)) as source:
         count = pixels(source)
     of_fit = {level_name(one): EPOCH_S * count * one.nodes * one.epochs for one in levels(options)}
-    *_, finest = of_fit
+    coarsest, *_, finest = [*of_fit] * 2
     of_fit[finest] *= options.rays
-    of_frame = {
-        READING: READ_S * count,
-        CHOICE: CHOICE_EPOCHS * next(iter(of_fit.values())),
-        **of_fit,
-    }
+    of_frame = {READING: READ_S * count, CHOICE: CHOICE_EPOCHS * of_fit[coarsest], **of_fit}
     if options.meshes:
         of_frame[SURFACE] = SURFACE_S
     if options.frame != EVERY:
         return of_frame
     return {
         f"frame {number}: {stage}": seconds
-        for number in numbers
+        for number in range(len(frames))
         for stage, seconds in of_frame.items()
-        if number == 0 or stage not in (CHOICE, next(iter(of_fit)))
+        if number == 0 or stage not in (CHOICE, coarsest)
     }
 
 
@@ -246,11 +237,10 @@ def check_memory(source: LightField, options: ReconstructOptions) -> None:
 
 
 def _meshes(
-    made: Field, source: LightField, options: ReconstructOptions, number: int | None
+    made: Field, source: LightField, options: ReconstructOptions, frame: FrameFiles
 ) -> dict[str, Any]:
     """Write the files of the surface that are not there yet; what is known of them."""
-    wanted = _numbered(options, number, options.meshes)
-    files = [file for file in wanted if options.force or not file.exists()]
+    files = [file for file in frame.meshes if options.force or not file.exists()]
     if not files:
         return {}
     from tbcad.common.atomic_files import replace_files
@@ -259,14 +249,12 @@ def _meshes(
 
     options.progress(SURFACE)
     if (level := made.facts["surface_level"]) is None:
-        raise InputError(
-            f"{field_of(options, number)} is empty, without a surface: leave out --mesh"
-        )
+        raise InputError(f"{frame.field} is empty, without a surface: leave out --mesh")
     surface = field_mesh(made, level, made.facts["resolved_mm"])
     for file in files:
         replace_files(file.parent, {file.name: mesh_file(surface, file.suffix)})
     known = {"triangles": len(surface.faces)}
-    if number is None:
+    if frame.number is None:
         known |= _distances(surface, source, _folder(options))
     return {str(file): known for file in files}
 

@@ -3,8 +3,6 @@
 import ctypes
 import json
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,8 +13,6 @@ from tbcad.app.cli import run
 from tbcad.app.cli.endings import signals_as_interrupt
 from tests.exported_files import read_csv
 
-STOPPED = "tbcad: stopped; nothing was changed"
-COMMAND = [sys.executable, "-m", "tbcad"]
 SHELL = ["--parts", "shell"]
 # A quarter of the pixels, all of which a verification traces.
 SENSOR = ["--set", "camera.width_px=1040", "--set", "camera.height_px=776"]
@@ -82,39 +78,21 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x = [", ["not valid TOML", "correct that line"]),
-        ('based_on = "slaa"', ["based_on is 'slaa'", "sla or cnc"]),
-        ('based_on = "sla"\nball_grade = "G7"', ["ball_grade is 'G7'", "G10"]),
-    ],
-    ids=["TOML", "base", "grade"],
-)
-@pytest.mark.parametrize(
     "command", [["build", "--for-process"], ["tolerance", "no-such-folder", "--process"]]
 )
 def test_a_broken_process_is_found_before_anything_begins(
     command: list[str],
-    text: str,
-    words: list[str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Before stages, a missing export, and a folder that cannot be replaced."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.toml").write_text(text)
-    out = ["--out", "mine.toml/out"]
-    assert run([*command, "mine.toml", *out]) == 2
-    shown = capsys.readouterr()
-    assert shown.err.startswith("tbcad: mine.toml: ")
-    assert shown.err.count("\n") == 1
-    assert all(word in shown.err for word in words)
-
-
-def _accept_interrupts() -> None:
-    """A background job of a shell, and all that it starts, would ignore them."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    (tmp_path / "mine.toml").write_text('based_on = "sla"\nball_grade = "G7"')
+    assert run([*command, "mine.toml", "--out", "mine.toml/out"]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("tbcad: mine.toml: ball_grade is 'G7'")
+    assert line.count("\n") == 1
 
 
 def test_an_interrupt_that_native_code_drops_comes_again() -> None:
@@ -122,24 +100,3 @@ def test_an_interrupt_that_native_code_drops_comes_again() -> None:
     from_native = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt), signals_as_interrupt():
         print(from_native(), time.sleep(60))
-
-
-@pytest.mark.parametrize("delay_s", [0.0, 0.15])
-def test_interrupt_is_reported_in_one_line(tmp_path: Path, delay_s: float) -> None:
-    """At any moment, also while native libraries are loaded, which is after the first line."""
-    build = subprocess.Popen(
-        [*COMMAND, "build", "--n", "12", "--out", str(tmp_path / "exports")],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        encoding="utf-8",
-        preexec_fn=_accept_interrupts,  # noqa: PLW1509 - no threads here
-    )
-    assert build.stderr is not None
-    build.stderr.readline()
-    time.sleep(delay_s)
-    build.send_signal(signal.SIGINT)
-    _, errors = build.communicate(timeout=60)
-    assert build.returncode == 130
-    assert errors.splitlines()[-1] == STOPPED
-    assert "Traceback" not in errors
-    assert list(tmp_path.iterdir()) == []

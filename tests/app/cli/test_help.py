@@ -134,31 +134,22 @@ def test_a_symbol(capsys: pytest.CaptureFixture[str], name: str) -> None:
         assert part in text
 
 
-@pytest.mark.parametrize("name", ["mirrors.margin_mm", "margin_mm"])
-def test_a_key(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    key = found(capsys, name)["key mirrors.margin_mm"]
+def test_keys_sections_and_checks_by_all_their_names(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, expected in {
+        "margin_mm": {"key mirrors.margin_mm"},
+        "stage": {"term stage", "section prototype.stage"},
+        "bolts": {"key shell.seam_flange.bolts", "key shell.foot_flange.bolts"},
+        "coverage facets": {"check coverage, facets"},
+        "mirrors off": {"check centre error"},  # as the summary calls it
+    }.items():
+        assert found(capsys, name).keys() == expected
+    key = found(capsys, "mirrors.margin_mm")["key mirrors.margin_mm"]
     assert (key["type"], key["default"], key["unit"]) == ("number", "0.6", "mm")
     assert key["allowed"] == "a number from 0 to 20"
-
-
-def test_one_name_of_several_things(capsys: pytest.CaptureFixture[str]) -> None:
-    assert set(found(capsys, "stage")) == {"term stage", "section prototype.stage"}
-    assert set(found(capsys, "bolts")) == {
-        "key shell.seam_flange.bolts",
-        "key shell.foot_flange.bolts",
-    }
-
-
-@pytest.mark.parametrize("name", ["coverage, facets", "coverage facets"])
-def test_a_check(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    check = found(capsys, name)["check coverage, facets"]
+    check = found(capsys, "coverage, facets")["check coverage, facets"]
     assert "pinhole -> outline" in str(check["compares"])
     assert check["tolerance"] == "target"
     assert check["if it fails"]
-
-
-def test_a_check_by_its_name_in_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
-    assert list(found(capsys, "mirrors off")) == ["check centre error"]
 
 
 def every_check() -> set[str]:
@@ -186,20 +177,13 @@ def test_alone_it_lists_what_there_is(capsys: pytest.CaptureFixture[str]) -> Non
         assert found(capsys, name)
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("mirrors.margn_mm", "mirrors.margin_mm"),
-        ("coverage facet", "coverage, facets"),
-        ("tetha1", "theta_1"),
-        ("xyzzy", "tbcad explain lists what there is"),
-        ("\N{SNOWMAN}\n", "tbcad explain lists what there is"),
-        ("", "tbcad explain lists what there is"),
-    ],
-)
-def test_an_unknown_name(capsys: pytest.CaptureFixture[str], name: str, hint: str) -> None:
-    assert run(["explain", name]) == 2
-    shown = capsys.readouterr()
-    assert not shown.out
-    assert shown.err.count("\n") == 1
-    assert hint in shown.err
+def test_an_unknown_name(capsys: pytest.CaptureFixture[str]) -> None:
+    nothing = "tbcad explain lists what there is"
+    for name, hint in {
+        **{"mirrors.margn_mm": "mirrors.margin_mm", "coverage facet": "coverage, facets"},
+        **{"tetha1": "theta_1", "xyzzy": nothing, "\N{SNOWMAN}\n": nothing, "": nothing},
+    }.items():
+        assert run(["explain", name]) == 2
+        shown = capsys.readouterr()
+        assert (shown.out, shown.err.count("\n")) == ("", 1)
+        assert hint in shown.err

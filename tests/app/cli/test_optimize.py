@@ -96,24 +96,17 @@ def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    assert run(["init", *words]) == 2
+def test_init_writes_the_papers_design_over_nothing_else(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("my.toml").write_text("mine", encoding="utf-8")
+    assert run(["init", "my.toml"]) == 2
     shown = capsys.readouterr()
     assert (shown.out, shown.err.count("\n")) == ("", 1)
-    return shown.err
-
-
-def test_writes_the_papers_design() -> None:
-    assert run(["init", "my.toml"]) == 0
-    assert load_spec(Path("my.toml")) == load_spec(None)
-
-
-def test_does_not_overwrite_unless_told_to(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("my.toml").write_text("mine", encoding="utf-8")
-    assert "my.toml exists" in refusal(capsys, "my.toml")
+    assert "my.toml exists" in shown.err
     assert Path("my.toml").read_text(encoding="utf-8") == "mine"
     assert run(["init", "my.toml", "--force"]) == 0
-    assert "[optics]" in Path("my.toml").read_text(encoding="utf-8")
+    assert load_spec(Path("my.toml")) == load_spec(None)
 
 
 def test_lists_the_designs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ FILES = {
     "tolerance.json", "tolerance.png",
 }  # fmt: skip
 # Of ten machines in each step of a search, nine are to be good.
+LOSS = itemgetter("loss_mm")
 FEW = ["--builds", "20", "--yield", "0.9"]
 
 
@@ -73,10 +75,8 @@ def written(export: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 class TestWritten:
-    def test_files(self, written: Path) -> None:
-        assert {path.name for path in written.iterdir()} == FILES
-
     def test_json_agrees_with_tables(self, written: Path) -> None:
+        assert {path.name for path in written.iterdir()} == FILES
         read = json.loads((written / "tolerance.json").read_text())
         worst = np.array(
             [float(row["worst_coverage_mm"]) for row in read_csv(written / "tolerance-builds.csv")]
@@ -85,7 +85,7 @@ class TestWritten:
         assert read["yield"]["share"] == (worst >= 60).mean()
         assert read["worst_camera_mm"]["0.5"] == np.median(worst)
         losses = [float(row["loss_mm"]) for row in read_csv(written / "tolerance-sensitivity.csv")]
-        assert losses == [one["loss_mm"] for one in read["single_errors"]]
+        assert losses == [*map(LOSS, read["single_errors"])]
         assert losses == sorted(losses, reverse=True)
 
     def test_what_is_known_of_the_figures(self, written: Path) -> None:
@@ -98,12 +98,8 @@ class TestWritten:
         assert alone["facets_mm"]["tolerable_factor"] == pytest.approx(0.6 / 0.36, rel=0.02)
         assert alone["camera_tilt_mrad"]["tolerable_factor"] is None
         # Together they cost more than the worst of them, less than all after one another.
-        lost = 60.6 - read["worst_camera_mm"]["0.5"]
-        assert (
-            read["single_errors"][0]["loss_mm"]
-            < lost
-            < sum(a["loss_mm"] for a in read["single_errors"])
-        )
+        lost, losses = 60.6 - read["worst_camera_mm"]["0.5"], [*map(LOSS, read["single_errors"])]
+        assert losses[0] < lost < sum(losses)
         sla, diamond = read["processes"]
         assert (sla["process"], diamond["process"]) == ("sla", "diamond")
         assert sla["margin_needed_mm"] > diamond["margin_needed_mm"] > 0.36
@@ -142,18 +138,8 @@ class TestWritten:
 
     def test_other_process_and_seed(self, bare: Path, tmp_path: Path) -> None:
         """A process of one's own: with a change it is no longer the built-in one."""
-        arguments = [
-            "tolerance",
-            str(bare),
-            *FEW,
-            "--process",
-            "diamond",
-            "--seed",
-            "7",
-            "--margins",
-        ]
-        arguments += ["--set", "facets_mm.mean=1", "--calibrated-mrad", "0"]
-        assert run([*arguments, "--out", str(tmp_path)]) == 0
+        words = "--process diamond --seed 7 --margins --set facets_mm.mean=1 --calibrated-mrad 0"
+        assert run(["tolerance", str(bare), *FEW, *words.split(), "--out", str(tmp_path)]) == 0
         read = json.loads((tmp_path / "tolerance.json").read_text())
         assert read["process"]["facets_mm"]["mean"] == 1
         assert read["process"]["facets_mm"]["source"] == "set by an option"

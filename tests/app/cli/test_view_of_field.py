@@ -57,33 +57,21 @@ def test_by_its_path_in_python(folder: Path, captured: Path) -> None:
         tbcad.view(folder.parent)
 
 
-@pytest.mark.parametrize(
-    ("more", "line"),
-    [
-        ([], "method field: its file is in the capture's folder"),
-        (["--method", "field"], "method field: as --method says"),
-    ],
-)
-def test_a_field_beside_the_capture(
-    folder: Path, capsys: pytest.CaptureFixture[str], more: list[str], line: str
-) -> None:
-    assert viewed(folder, *more) == 0
-    printed = capsys.readouterr()
-    assert line in printed.out.splitlines()
-    assert "PSNR" in printed.out
-    assert "warning" not in printed.err
-    assert middle(folder) == COLOUR_8
-
-
-@pytest.mark.parametrize(
-    "more", [["--method", "depth"], ["--method", "nearest"], ["--surface", "plane"]]
-)
-def test_other_methods_leave_the_field_alone(
-    folder: Path, capsys: pytest.CaptureFixture[str], more: list[str]
-) -> None:
-    assert viewed(folder, *more) == 0
-    assert "method field" not in capsys.readouterr().out
-    assert middle(folder) != COLOUR_8
+def test_a_field_beside_the_capture(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Shown by default and where it is asked for; other methods leave it alone."""
+    for words, line in (
+        ("", "method field: its file is in the capture's folder"),
+        ("--method field", "method field: as --method says"),
+        ("--method depth", "method depth: as --method says"),
+        ("--method nearest", "method nearest: as --method says"),
+        ("--surface plane", "method blend: --surface plane is for a blend"),
+    ):
+        assert viewed(folder, *words.split()) == 0
+        printed = capsys.readouterr()
+        assert line in printed.out.splitlines()
+        assert "PSNR" in printed.out
+        assert "warning" not in printed.err
+        assert (middle(folder) == COLOUR_8) == ("method field" in line)
 
 
 def test_depth_normals_and_opacity(folder: Path) -> None:

@@ -146,16 +146,15 @@ def reconstruct(
     """
     if options.frame is not None and all_frames:
         raise InputError("--frame and --all-frames exclude each other: leave one out")
-    from tbcad.app.api.reconstructions import checked_frames, expected_seconds, part_of
-    from tbcad.app.api.reconstructions import reconstruct_files as reconstructed
+    from tbcad.app.api.reconstructions import checked_frames, expected_seconds, reconstruct_files
 
     asked = replace(options, frame="all") if all_frames else options
-    numbers = checked_frames(asked)
+    frames = checked_frames(asked)
     try:
-        with stages(expected_seconds(asked, numbers)) as screen:
-            done = reconstructed(asked.on(screen))
+        with stages(expected_seconds(asked, frames)) as screen:
+            done = reconstruct_files(asked.on(screen), frames)
     except KeyboardInterrupt:
-        parts = [str(part) for n in numbers if (part := part_of(asked, n)).exists()]
+        parts = [str(frame.part) for frame in frames if frame.part.exists()]
         if not parts:
             raise
         kept = f"{parts[0]} keeps what is done: go on with the same options and --resume"
