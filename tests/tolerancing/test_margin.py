@@ -1,9 +1,10 @@
 """The margin a process needs: with made-up losses, by brute force, and with real designs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from statistics import NormalDist
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -49,16 +50,9 @@ class OnlySpec:
 
 @pytest.fixture
 def without_mirrors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "tbcad.tolerancing.margin.design", lambda spec: OnlySpec(spec.mirrors.margin_mm)
-    )
-    as_model(monkeypatch)
-
-
-def as_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Take a made-up design for its fast model."""
-    for name in ("reflectors", "edge_models"):
-        monkeypatch.setattr(f"tbcad.tolerancing.margin.{name}", lambda made: made)
+    """Take the spec for its fast model."""
+    only = lambda: lambda spec: OnlySpec(spec.mirrors.margin_mm)  # noqa: E731
+    monkeypatch.setattr("tbcad.tolerancing.margin.solved_designs", only)
 
 
 def losing(loss: Loss) -> Callable[[Errors, EdgeModels], np.ndarray]:
@@ -131,39 +125,33 @@ class TestMadeUpLosses:
         assert found.reason
 
 
-def test_mirrors_that_cannot_be_made(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refusing(spec: Spec) -> OnlySpec:
-        if spec.mirrors.margin_mm > 1:
+def test_mirrors_that_cannot_be_made(spec: Spec) -> None:
+    def refusing(made: Spec) -> OnlySpec:
+        if made.mirrors.margin_mm > 1:
             raise SpecError("mirrors overlap")
-        return OnlySpec(spec.mirrors.margin_mm)
+        return OnlySpec(made.mirrors.margin_mm)
 
-    monkeypatch.setattr("tbcad.tolerancing.margin.design", refusing)
-    as_model(monkeypatch)
-    found = margin(spec, Errors(), 0.99, losing(steady(np.array([0.5, 2.0, 2.0, 2.0]))))
+    lost = losing(steady(np.array([0.5, 2.0, 2.0, 2.0])))
+    found = margin(spec, Errors(), 0.99, lost, designs=refusing)  # type: ignore[arg-type]
     assert (found.mm, found.share) == (None, 0.25)
     assert found.reason == "mirrors of margin 2.00 mm: mirrors overlap"
 
 
-class TestRealDesigns:
+@pytest.mark.slow
+def test_margin_gives_the_yield(spec: Spec) -> None:
     """Made anew with the margin that was found, and with builds of the same numbers."""
+    made, wanted = process_errors(load_process("sla")), 0.9
 
-    @staticmethod
     def worst(errors: Errors, models: EdgeModels) -> np.ndarray:
         return simulate(MonteCarloCase(models, errors, 1), 40).worst
 
-    @pytest.mark.slow
-    def test_margin_gives_the_yield(self, spec: Spec) -> None:
-        made, wanted = process_errors(load_process("sla")), 0.9
-        found = margin(spec, made, wanted, self.worst)
-        assert found.mm is not None
+    def share(mm: float) -> float:
+        return float((worst(made, models_of("n=4", f"margin_mm={mm:.2f}")) >= TARGET).mean())
 
-        def share(mm: float) -> float:
-            options = ["n=4", f"mirrors.margin_mm={mm:.2f}"]
-            models = edge_models(reflectors(design(load_spec(None, options))))
-            return float((self.worst(made, models) >= TARGET).mean())
-
-        assert share(found.mm) == found.share >= wanted
-        assert share(found.mm - 2 * STEP_MM) < wanted
+    found = margin(spec, made, wanted, worst)
+    assert found.mm is not None
+    assert share(found.mm) == found.share >= wanted
+    assert share(found.mm - 2 * STEP_MM) < wanted
 
 
 def unsymmetric(loss: np.ndarray) -> MirrorLosses:
@@ -218,25 +206,19 @@ class TestKnownLosses:
         up, down = needed_margins(unsymmetric(2 + drawn), 0.9) - 2
         assert up / down == pytest.approx(sqrt(2 / (np.e - 2)), rel=0.03)
 
-    def test_gains_need_nothing(self) -> None:
-        assert needed_margins(unsymmetric(np.full((10, 2, 3), -1.0)), 0.99).tolist() == [0, 0, 0]
-
-    def test_images_have_the_same(self) -> None:
+    def test_images_have_the_same_and_gains_need_nothing(self) -> None:
         loss = normal_losses(100, np.array([1.0, 1, 2]), np.array([0.3, 0.3, 0.3]), seed=4)
-        partner = np.array([1, 0, 2])
-        margins = needed_margins(MirrorLosses(loss, np.full(3, -np.inf), partner), 0.9)
+        margins = needed_margins(replace(unsymmetric(loss), partner=np.array([1, 0, 2])), 0.9)
         assert margins[0] == margins[1] < margins[2]
+        assert needed_margins(unsymmetric(np.full((10, 2, 3), -1.0)), 0.99).tolist() == [0, 0, 0]
 
     def test_nearly_flat_mirrors_need_none(self) -> None:
         """Nor do they drive the level of the others, unless they lose all that they have spare."""
         loss = normal_losses(500, np.array([1.0, 1.0]), np.array([0.1, 2.0]), seed=5)
-        spare = np.array([-np.inf, 50.0])
-        margins = needed_margins(MirrorLosses(loss, spare, np.arange(2)), 0.9)
-        alone = needed_margins(unsymmetric(loss[..., :1]), 0.9)
-        assert margins.tolist() == [alone[0], 0]
-        tight = np.array([-np.inf, 1.0])
-        both = needed_margins(MirrorLosses(loss, tight, np.arange(2)), 0.9)
-        assert both == pytest.approx(needed_margins(unsymmetric(loss), 0.9))
+        alone, both = (needed_margins(unsymmetric(loss[..., :k]), 0.9) for k in (1, 2))
+        for spare, expected in ((50.0, [alone[0], 0]), (1.0, both)):
+            flat = replace(unsymmetric(loss), spare=np.array([-np.inf, spare]))
+            assert needed_margins(flat, 0.9) == pytest.approx(expected)
 
 
 def models_of(*options: str) -> EdgeModels:
@@ -303,23 +285,16 @@ class TestRealOwnMargins:
         assert set(found.mm.tolist()) <= {0.0, 0.51}
         assert found.average_mm == pytest.approx(0.51)
 
-    def test_too_large_margins_are_none(self) -> None:
-        errors = Errors(facets=Error(0, 21.0))
-        spec = load_spec(None, ["n=4"])
+    def test_margins_that_cannot_be_are_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Too large ones, and those of mirrors that cannot be made."""
+        errors, spec = Errors(facets=Error(0, 21.0)), load_spec(None, ["n=4"])
         assert own_margins(spec, errors, 0.99, 1.0, self.coverage) is None
-
-    def test_mirrors_that_cannot_be_made_are_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        designs = solved_designs()
-        spec = load_spec(None, ["n=4"])
-        designs(with_margin(spec, 1.0))
-
-        def refusing(_: Spec) -> None:
-            raise SpecError("mirrors overlap")
-
-        monkeypatch.setattr("tbcad.tolerancing.margin.design", refusing)
+        (designs := solved_designs())(with_margin(spec, 1.0))
+        overlap = Mock(side_effect=SpecError("mirrors overlap"))
+        monkeypatch.setattr("tbcad.tolerancing.margin.design", overlap)
         errors = process_errors(load_process("sla"))
-        found = own_margins(spec, errors, 0.9, 1.0, self.coverage, designs=designs)
-        assert found is None
+        assert own_margins(spec, errors, 0.9, 1.0, self.coverage, designs=designs) is None
+        assert overlap.called
 
 
 def test_spec_with_margins_of_single_mirrors() -> None:
