@@ -20,9 +20,11 @@ from tbcad.mirror_limits.files import (
     write_solid,
     write_table_of,
 )
-from tbcad.mirror_limits.held import TWO_SIGMA, Chain, chain_of
-from tbcad.mirror_limits.measuring import (
+from tbcad.mirror_limits.held import (
     GOOD,
+    TWO_SIGMA,
+    Chain,
+    chain_of,
     confidence,
     measurements,
     sampled,

@@ -73,32 +73,27 @@ def search(spec: Spec, asked: OptimizeOptions, store: Path | None = None) -> Sea
     generation, so that a search that was stopped goes on. InputError if the first design cannot be
     made, or the store is of another design.
     """
-    judged = read_store(store, _key(spec, asked)) if store else {}
-    judge = partial(_judge, spec, asked, judged, store)
-    start = judge(ANY_SIZE, [place_of(spec)])[0]
+    judges = _Judges(spec, asked, store)
+    start = judges.judge([place_of(spec)], ANY_SIZE)[0]
     if start.figures is None:
         raise InputError(f"the design to begin from cannot be made: {start.reason}")
-    limits = MachineLimits(
-        asked.max_size_mm or start.figures.size_mm,
-        asked.max_view_angle_deg or start.figures.view_angle_deg,
+    judges.start, judges.limits = (
+        start.figures,
+        MachineLimits(
+            asked.max_size_mm or start.figures.size_mm,
+            asked.max_view_angle_deg or start.figures.view_angle_deg,
+        ),
     )
-    losses = partial(_losses, asked.aims, limits, start.figures)
-    value = partial(_value, losses, limits)
-    every = weightings(len(asked.aims)) if asked.front else [_even(len(asked.aims))]
+    even, *most = weightings(len(asked.aims))
+    every = [even, *most] if asked.front else [even]
     generations = max(1, asked.candidates // len(every) // POPULATION - 1)
-    box = Bounds(*np.transpose(bounds(spec, limits.size_mm)))
+    box = Bounds(*np.transpose(bounds(spec, judges.limits.size_mm)))
     for weights in every:
-        _evolve(box, start.place, generations, partial(judge, limits), partial(value, weights))
-    candidates = tuple(judged.values())
-    best = min(candidates, key=partial(value, _even(len(asked.aims))))
-    on_front = _front(np.array([*map(losses, candidates)]))
-    return SearchResult(start, limits, best, candidates, on_front)
-
-
-def _key(spec: Spec, asked: OptimizeOptions) -> str:
-    """What judgements depend on: those of another design are of no use."""
-    text = json.dumps(spec_dict(spec), sort_keys=True)
-    return sha256((text + ("field" if asked.method == "field" else "")).encode()).hexdigest()
+        judges.evolve(box, start.place, generations, weights)
+    candidates = tuple(judges.judged.values())
+    best = min(candidates, key=partial(judges.value, even))
+    on_front = _front(np.array([*map(judges.losses, candidates)]))
+    return SearchResult(start, judges.limits, best, candidates, on_front)
 
 
 def weightings(objectives: int) -> list[Floats]:
@@ -107,100 +102,87 @@ def weightings(objectives: int) -> list[Floats]:
     First all alike, then one after the other most: places between the extremes of a Pareto front,
     and near them.
     """
-    even = _even(objectives)
-    if objectives == 1:
-        return [even]
-    return [even, *(even * (1 - MOST) + MOST * np.eye(objectives))]
+    even = np.full(objectives, 1 / objectives)
+    most = even * (1 - MOST) + MOST * np.eye(objectives)
+    return [even, *(most if objectives > 1 else ())]
 
 
-def _even(objectives: int) -> Floats:
-    return np.full(objectives, 1 / objectives)
+class _Judges:
+    """Candidates of a design with their figures, each worked out once, and what they are worth."""
 
+    def __init__(self, spec: Spec, asked: OptimizeOptions, store: Path | None) -> None:
+        """Read what an earlier search judged; judgements of another design are of no use."""
+        self._spec, self._asked, self._store = spec, asked, store
+        text = json.dumps(spec_dict(spec), sort_keys=True)
+        method = "field" if asked.method == "field" else ""
+        self._key = sha256((text + method).encode()).hexdigest()
+        self.judged = read_store(store, self._key) if store else {}
+        self.start: Figures | None = None
+        self.limits = ANY_SIZE
 
-def _evolve(
-    box: Bounds,
-    start: Place,
-    generations: int,
-    judge: Callable[[Sequence[Place]], list[DesignCandidate]],
-    value: Callable[[DesignCandidate], float],
-) -> None:
-    """Judge generations of places, each nearer to the lowest value."""
-    differential_evolution(
-        _never_called,
-        box,
-        x0=np.array(start),
-        maxiter=generations,
-        popsize=POPULATION // len(start),
-        tol=0,
-        rng=np.random.default_rng(SEED),
-        polish=False,
-        updating="deferred",
-        workers=lambda _, places: [*map(value, judge([rounded(np.array(p)) for p in places]))],
-    )
+    def judge(
+        self, places: Sequence[Place], limits: MachineLimits | None = None
+    ) -> list[DesignCandidate]:
+        """Candidates at places, of which only those are worked out that the store does not have."""
+        asked, limits = self._asked, limits or self.limits
+        new = [p for p in dict.fromkeys(places) if self._is_open(limits, self.judged.get(p))]
+        wanted, method = limits if "ssim" in asked.aims else None, asked.method or "nearest"
+        work = partial(evaluate, self._spec, wanted, method=method)
+        for one in run_units(work, new, asked.scheduler):
+            self.judged[one.place] = one
+        if (store := self._store) and new:
+            replace_files(store.parent, {store.name: store_bytes(self._key, self.judged)})
+        asked.detail(f"{len(self.judged)} of about {asked.candidates} candidates")
+        return [self.judged[place] for place in places]
+
+    def _is_open(self, limits: MachineLimits, known: DesignCandidate | None) -> bool:
+        """Whether a candidate has to be judged, or judged again."""
+        if known is None or known.figures is None:
+            return known is None
+        return self._lacks(known.figures) and limits.excess(known.figures) == 0
+
+    def _lacks(self, figures: Figures) -> bool:
+        """Whether an earlier search, of other aims, did not measure what is an aim now."""
+        return "ssim" in self._asked.aims and figures.ssim is None
+
+    def evolve(self, box: Bounds, start: Place, generations: int, weights: Floats) -> None:
+        """Judge generations of places, each nearer to the lowest value by some weights."""
+        value = partial(self.value, weights)
+        differential_evolution(
+            _never_called,
+            box,
+            x0=np.array(start),
+            maxiter=generations,
+            popsize=POPULATION // len(start),
+            tol=0,
+            rng=np.random.default_rng(SEED),
+            polish=False,
+            updating="deferred",
+            workers=lambda _, places: [
+                value(one) for one in self.judge([rounded(np.array(place)) for place in places])
+            ],
+        )
+
+    def value(self, weights: Floats, one: DesignCandidate) -> float:
+        """What is minimised: the weighted mean of all objectives, relative to the first design."""
+        if one.figures and (excess := self.limits.excess(one.figures)):
+            return BEYOND + EXCESS * excess
+        return min(float(weights @ self.losses(one)), IMPOSSIBLE)
+
+    def losses(self, one: DesignCandidate) -> Floats:
+        """By how much one is worse than the first design, (objectives,): logarithms of ratios.
+
+        Infinite where it cannot be made, is beyond the limits or lacks a figure.
+        """
+        figures, start, aims = one.figures, self.start, self._asked.aims
+        if not (figures and start) or self.limits.excess(figures) > 0 or self._lacks(figures):
+            return np.full(len(aims), np.inf)
+        return np.array([LOSSES[name](figures) - LOSSES[name](start) for name in aims])
 
 
 def _never_called(place: Floats) -> float:
     """A generation is judged as a whole, by `workers`."""
     raise AssertionError(place)
-
-
-def _value(
-    losses: Callable[[DesignCandidate], Floats],
-    limits: MachineLimits,
-    weights: Floats,
-    one: DesignCandidate,
-) -> float:
-    """What is minimised: the weighted mean of all objectives, relative to the first design."""
-    if one.figures and (excess := limits.excess(one.figures)):
-        return BEYOND + EXCESS * excess
-    return min(float(weights @ losses(one)), IMPOSSIBLE)
-
-
-def _losses(
-    objectives: Sequence[Objective], limits: MachineLimits, start: Figures, one: DesignCandidate
-) -> Floats:
-    """By how much a candidate is worse than the first design, (objectives,): logarithms of ratios.
-
-    Infinite where it cannot be made, is beyond the limits or lacks a figure.
-    """
-    figures = one.figures
-    if figures is None or limits.excess(figures) > 0 or _lacks(objectives, figures):
-        return np.full(len(objectives), np.inf)
-    return np.array([LOSSES[name](figures) - LOSSES[name](start) for name in objectives])
-
-
-def _judge(
-    spec: Spec,
-    asked: OptimizeOptions,
-    judged: dict[Place, DesignCandidate],
-    store: Path | None,
-    limits: MachineLimits,
-    places: Sequence[Place],
-) -> list[DesignCandidate]:
-    """Candidates at places, of which only those are worked out that the store does not have."""
-    wanted = limits if "ssim" in asked.aims else None
-    new = [p for p in dict.fromkeys(places) if _is_open(asked.aims, limits, judged.get(p))]
-    work = partial(evaluate, spec, wanted, method=asked.method or "nearest")
-    for one in run_units(work, new, asked.scheduler):
-        judged[one.place] = one
-    if store and new:
-        replace_files(store.parent, {store.name: store_bytes(_key(spec, asked), judged)})
-    asked.detail(f"{len(judged)} of about {asked.candidates} candidates")
-    return [judged[place] for place in places]
-
-
-def _is_open(
-    objectives: Sequence[Objective], limits: MachineLimits, known: DesignCandidate | None
-) -> bool:
-    """Whether a candidate has to be judged, or judged again."""
-    if known is None or known.figures is None:
-        return known is None
-    return _lacks(objectives, known.figures) and limits.excess(known.figures) == 0
-
-
-def _lacks(objectives: Sequence[Objective], figures: Figures) -> bool:
-    """Whether an earlier search, of other aims, did not measure what is an aim now."""
-    return "ssim" in objectives and figures.ssim is None
 
 
 def _front(losses: Floats) -> tuple[bool, ...]:

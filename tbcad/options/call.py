@@ -105,7 +105,6 @@ def declared(record: type) -> dict[str, Any]:
     }
 
 
-@cache
 def _annotated(record: type) -> dict[str, Any]:
     """Types of the fields with an option, or with a text alone: those are keywords of Python."""
     kinds, texts = get_type_hints(record, include_extras=True), field_texts(record)
@@ -142,16 +141,25 @@ def _texts_by_class(module: str) -> dict[str, dict[str, str]]:
     """The texts below the fields of all classes of a module, from its source."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     classes = [one for one in tree.body if isinstance(one, ast.ClassDef)]
-    return {one.name: dict(_texts(one)) for one in classes}
+    return {"": dict(_texts(tree)), **{one.name: dict(_texts(one)) for one in classes}}
 
 
-def _texts(section: ast.ClassDef) -> Iterator[tuple[str, str]]:
+def _texts(section: ast.Module | ast.ClassDef) -> Iterator[tuple[str, str]]:
     for key, text in pairwise(section.body):
         match key, text:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
-                value=ast.Constant(value=str(words))
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)) | ast.Assign(targets=[ast.Name(id=name)]),
+                ast.Expr(value=ast.Constant(value=str(words))),
             ):
                 yield name, " ".join(words.split())
+
+
+def tell_options(module: str) -> None:
+    """Give each option that a module declares the text below it as its help."""
+    for name, text in _texts_by_class(module)[""].items():
+        for option in get_args(getattr(sys.modules[module], name)):
+            if isinstance(option, ParameterInfo):
+                option.help = text
 
 
 def parameters(function: Callable[..., int]) -> Iterator[Parameter]:

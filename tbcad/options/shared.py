@@ -9,112 +9,64 @@ from typing import Annotated, Literal, TypeVar
 import typer
 
 from tbcad.errors import InputError
+from tbcad.options.call import tell_options
 
 Place = TypeVar("Place")
 Changes = Mapping[str, str] | Sequence[str]
 AnyPath = Path | str | PathLike[str]  # such as a build, a run, a calibration
 
-Design = Annotated[
-    Place | None,
-    typer.Argument(
-        metavar="DESIGN",
-        help="Design file (TOML), or the name of a design that comes with tbcad (tbcad init "
-        "--list); by default the design of the paper.",
-    ),
-]
-Exports = Annotated[Place, typer.Argument(metavar="FOLDER", help="Folder written by tbcad build.")]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change any key of the design; repeatable."),
-]
-Out = Annotated[
-    Place, typer.Option("--out", "-o", help="Folder for the files; other files in it stay.")
-]
-OutReplaced = Annotated[
-    Place,
-    typer.Option("--out", "-o", help="Folder for all files; replaced as a whole or not at all."),
-]
-OutPicture = Annotated[Place, typer.Option("--out", "-o", help="PNG file to write.")]
-JsonResult = Annotated[
-    bool, typer.Option("--json", help="Print what is found as JSON, for other programs.")
-]
-Force = Annotated[
-    bool,
-    typer.Option(
-        "--force",
-        help="Replace what may have cost hours (a capture, a merged run, a calibration, a build "
-        "that a run photographed), and keep files in the folder that tbcad did not write, instead "
-        "of refusing.",
-    ),
-]
-ForceFile = Annotated[
-    bool, typer.Option("--force", help="Replace files that exist, instead of refusing.")
-]
-Capture = Annotated[
-    Place, typer.Argument(metavar="FOLDER", help="Folder written by tbcad capture.")
-]
-RunFolder = Annotated[
-    Place, typer.Argument(metavar="RUN", help="Folder written by tbcad run or simulate-run.")
-]
-ExportsOption = Annotated[
-    Place | None,
-    typer.Option(
-        "--exports",
-        metavar="FOLDER",
-        help="Folder written by tbcad build; by default the one that the calibration names.",
-    ),
-]
-CalibrationFolder = Annotated[
-    Place,
-    typer.Option("--calibration", metavar="FOLDER", help="Folder written by tbcad calibrate."),
-]
-Azimuth = Annotated[float, typer.Option(help="Azimuth of the camera about z, from x, degrees.")]
-Elevation = Annotated[float, typer.Option(help="Elevation of the camera, 0 to 90 degrees.")]
-Distance = Annotated[
-    float, typer.Option(help="Distance of the camera from the centre of the object, mm.")
-]
-Width = Annotated[int, typer.Option(min=16, max=8192, help="Width of the picture, pixels.")]
-Height = Annotated[int, typer.Option(min=16, max=8192, help="Height of the picture, pixels.")]
-Fov = Annotated[
-    float | None,
-    typer.Option(
-        help="Horizontal angle of view, degrees; by default the capture sphere fills the picture."
-    ),
-]
-PaintOption = Annotated[
-    Literal["own", "pattern", "plain"],
-    typer.Option(
-        help="own: colours or texture of the file, or a pattern where it has none; pattern: always "
-        "the pattern; plain: grey."
-    ),
-]
-ObjectFile = Annotated[
-    Place | None,
-    typer.Option(
-        "--object",
-        metavar="FILE",
-        help="Triangle mesh (PLY, STL, OBJ, OFF, GLB, glTF, 3MF) about the origin, with its "
-        "colours or textures; by default a built-in knot.",
-    ),
-]
-UpOption = Annotated[
-    Literal["y", "z"] | None,
-    typer.Option(
-        "--up",
-        help="The axis of the object's file that points up; by default y for GLB and glTF, else z.",
-    ),
-]
-UnitOption = Annotated[
-    Literal["mm", "cm", "m", "in"] | None,
-    typer.Option(
-        "--unit",
-        help="Of the object's file; by default m for GLB and glTF, what a 3MF says, else mm.",
-    ),
-]
-PlotFormatOption = Annotated[
-    Literal["png", "svg", "pdf"],
-    typer.Option("--format", help="Of plots: png, or svg and pdf for papers."),
-]
+Design = Annotated[Place | None, typer.Argument(metavar="DESIGN")]
+"""Design file (TOML), or the name of a design that comes with tbcad (tbcad init --list); by default
+the design of the paper."""
+Exports = Annotated[Place, typer.Argument(metavar="FOLDER")]
+"""Folder written by tbcad build."""
+Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE")]
+"""Change any key of the design; repeatable."""
+Out = Annotated[Place, typer.Option("--out", "-o")]
+"""Folder for the files; other files in it stay."""
+OutReplaced = Annotated[Place, typer.Option("--out", "-o")]
+"""Folder for all files; replaced as a whole or not at all."""
+OutPicture = Annotated[Place, typer.Option("--out", "-o")]
+"""PNG file to write."""
+JsonResult = Annotated[bool, typer.Option("--json")]
+"""Print what is found as JSON, for other programs."""
+Force = Annotated[bool, typer.Option("--force")]
+"""Replace what may have cost hours (a capture, a merged run, a calibration, a build that a run
+photographed), and keep files in the folder that tbcad did not write, instead of refusing."""
+ForceFile = Annotated[bool, typer.Option("--force")]
+"""Replace files that exist, instead of refusing."""
+Capture = Annotated[Place, typer.Argument(metavar="FOLDER")]
+"""Folder written by tbcad capture."""
+RunFolder = Annotated[Place, typer.Argument(metavar="RUN")]
+"""Folder written by tbcad run or simulate-run."""
+ExportsOption = Annotated[Place | None, typer.Option("--exports", metavar="FOLDER")]
+"""Folder written by tbcad build; by default the one that the calibration names."""
+CalibrationFolder = Annotated[Place, typer.Option("--calibration", metavar="FOLDER")]
+"""Folder written by tbcad calibrate."""
+Azimuth = Annotated[float, typer.Option()]
+"""Azimuth of the camera about z, from x, degrees."""
+Elevation = Annotated[float, typer.Option()]
+"""Elevation of the camera, 0 to 90 degrees."""
+Distance = Annotated[float, typer.Option()]
+"""Distance of the camera from the centre of the object, mm."""
+Width = Annotated[int, typer.Option(min=16, max=8192)]
+"""Width of the picture, pixels."""
+Height = Annotated[int, typer.Option(min=16, max=8192)]
+"""Height of the picture, pixels."""
+Fov = Annotated[float | None, typer.Option()]
+"""Horizontal angle of view, degrees; by default the capture sphere fills the picture."""
+PaintOption = Annotated[Literal["own", "pattern", "plain"], typer.Option()]
+"""own: colours or texture of the file, or a pattern where it has none; pattern: always the pattern;
+plain: grey."""
+ObjectFile = Annotated[Place | None, typer.Option("--object", metavar="FILE")]
+"""Triangle mesh (PLY, STL, OBJ, OFF, GLB, glTF, 3MF) about the origin, with its colours or
+textures; by default a built-in knot."""
+UpOption = Annotated[Literal["y", "z"] | None, typer.Option("--up")]
+"""The axis of the object's file that points up; by default y for GLB and glTF, else z."""
+UnitOption = Annotated[Literal["mm", "cm", "m", "in"] | None, typer.Option("--unit")]
+"""Of the object's file; by default m for GLB and glTF, what a 3MF says, else mm."""
+PlotFormatOption = Annotated[Literal["png", "svg", "pdf"], typer.Option("--format")]
+"""Of plots: png, or svg and pdf for papers."""
 METHODS = (
     "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "
     "virtual cameras that see the same point"
@@ -131,38 +83,21 @@ MethodOfView = Annotated[
         "folder, else depth."
     ),
 ]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Dask scheduler, for example tcp://host:8786 (pip install 'tbcad\\[cluster]'); by "
-        "default all cores of this machine.",
-    ),
-]
+Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS")]
+"""Dask scheduler, for example tcp://host:8786 (pip install 'tbcad\\[cluster]'); by default all
+cores of this machine."""
 
 
 Time = TypeVar("Time")
 SHORTEST_S, LONGEST_S = 1e-6, 3600.0
 MOST_STOPS = 1_000_000  # as a run's record may have
 
-ExposureLeds = Annotated[
-    Time | None,
-    typer.Option(
-        "--exposure-leds",
-        metavar="S",
-        help="Exposure of the photographs by LEDs and in the dark, s, such as 1/60; --exposure-lit "
-        "alone is for all.",
-    ),
-]
-ExposureLit = Annotated[
-    Time | None,
-    typer.Option(
-        "--exposure-lit",
-        metavar="S",
-        help="Exposure of the photographs of the lit object, s, such as 0.5; --exposure-leds alone "
-        "is for all.",
-    ),
-]
+ExposureLeds = Annotated[Time | None, typer.Option("--exposure-leds", metavar="S")]
+"""Exposure of the photographs by LEDs and in the dark, s, such as 1/60; --exposure-lit alone is for
+all."""
+ExposureLit = Annotated[Time | None, typer.Option("--exposure-lit", metavar="S")]
+"""Exposure of the photographs of the lit object, s, such as 0.5; --exposure-leds alone is for
+all."""
 
 
 def exposures(
@@ -208,3 +143,6 @@ def numbers(text: str) -> tuple[int, ...]:
                 "for instance 1,5,20-30"
             ) from None
     return tuple(sorted(found))
+
+
+tell_options(__name__)

@@ -12,7 +12,7 @@ from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.options.builds import ToleranceOptions
-from tbcad.tolerancing.margin import NOT_SEARCHED, Margin, SolvedDesigns, margin, solved_designs
+from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
 from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,
     Case,
@@ -52,7 +52,7 @@ class ProcessOption:
 
     name: str
     estimate: YieldEstimate  # yield with the design as it is
-    margin: Margin = NOT_SEARCHED  # that it needs for the wanted yield
+    margin: Margin | None = None  # that it needs for the wanted yield; None: not searched for
     builds: int = SEARCH_BUILDS
 
 
@@ -68,7 +68,7 @@ class Analysis:
     result: ShellResult
     single_errors: tuple[SingleErrorEffect, ...]  # each kind by itself, the largest loss first
     process_options: tuple[ProcessOption, ...]  # every built-in process, or this one alone
-    margin: Margin  # that this process needs
+    margin: Margin | None  # that this process needs; None where it was not searched for
     sharpness: Sharpness
     prototype: PrototypeResult | None  # None where the export has none
 
@@ -109,7 +109,7 @@ def analyse(
     if options.process is None:
         options.progress("every process")
         compared = [*simulator.every_process(worst)]
-    own = NOT_SEARCHED
+    own = None
     if options.margins:
         options.progress("the margins needed")
         margin_of = cache(partial(simulator.margin, solved_designs()))

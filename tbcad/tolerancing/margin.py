@@ -47,9 +47,6 @@ class Margin:
     reason: str = ""  # why there is none, else ""
 
 
-NOT_SEARCHED = Margin(None, 0.0, "not searched for: add --margins")
-
-
 def solved_designs() -> SolvedDesigns:
     """Fast models of designs with several margins, for all processes."""
     return cache(lambda spec: edge_models(reflectors(design(spec))))

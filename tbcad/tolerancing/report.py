@@ -11,7 +11,7 @@ import numpy as np
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.tolerancing.analysis import Analysis
-from tbcad.tolerancing.margin import NOT_SEARCHED
+from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
     CoverageResult,
     estimate_yield,
@@ -26,6 +26,7 @@ from tbcad.tolerancing.process.kinds import MICROMETRE, ErrorSpec
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"
+NOT_SEARCHED = Margin(None, 0.0, "not searched for: add --margins")
 QUANTILES = (0.01, 0.05, 0.5)
 LOW_SHARE = 0.05  # share of the builds whose coverage lies below what table and map show
 NOTES = (
@@ -57,18 +58,18 @@ def _sentences(analysis: Analysis) -> Iterator[str]:
     for largest in analysis.single_errors[:1]:
         lost = f"{in_words(largest.kind)}: {largest.loss:.2f} mm by itself"
         yield f"Largest loss by {lost}; {_limit_text(analysis, largest)}."
-    searched, needed = analysis.margin != NOT_SEARCHED, analysis.margin
+    needed = analysis.margin or NOT_SEARCHED
     if needed.mm is not None:
         yield (
             f"A margin of {needed.mm:.2f} mm (tbcad build --radius-rule traced --set "
             f"mirrors.margin_mm={needed.mm:.2f}) makes {needed.share:.1%} good."
         )
-    elif searched:
+    elif analysis.margin:
         yield f"No margin was found that is enough: {needed.reason}."
     if len(options := analysis.process_options) > 1:
         yields = (f"{one.name} {one.estimate.share:.1%}" for one in options)
         yield f"Good builds, of {options[0].builds} each: {', '.join(yields)}."
-        if searched:
+        if analysis.margin:
             yield _margins_sentence(analysis)
     ssim = {name: values.mean() for name, values in vars(analysis.sharpness).items()}
     yield (
@@ -121,7 +122,8 @@ def _wanted(analysis: Analysis) -> str:
 
 
 def _margins_sentence(analysis: Analysis) -> str:
-    margins = {option.name: option.margin.mm for option in analysis.process_options}
+    options = analysis.process_options
+    margins = {one.name: (one.margin or NOT_SEARCHED).mm for one in options}
     enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
     none = [name for name, mm in margins.items() if mm is None]
     text = f"Margins needed for {_wanted(analysis)}: {', '.join(enough) or 'none found'}"
@@ -137,6 +139,7 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
     """tolerance.json."""
     prototype, options, target = analysis.prototype, analysis.options, analysis.target
     ssim = {name: float(values.mean()) for name, values in vars(analysis.sharpness).items()}
+    margin = analysis.margin or NOT_SEARCHED
     return {
         "schema": SCHEMA,
         "summary": summary_text(analysis),
@@ -147,8 +150,8 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
         "wanted_yield": options.wanted_yield,
         **_result_dict(analysis.result, target),
         "single_errors": _error_table(analysis).records(),
-        "margin_needed_mm": analysis.margin.mm,
-        "margin_reason": analysis.margin.reason,
+        "margin_needed_mm": margin.mm,
+        "margin_reason": margin.reason,
         "processes": _process_table(analysis).records(),
         "ssim": {**ssim, "calibration_residual_mrad": options.calibrated_mrad},
         "ray_spread_mm": spread_dict(analysis),
@@ -233,7 +236,7 @@ def _figures(analysis: Analysis) -> Iterator[Figure]:
     yield Figure("good builds", "%", 100 * analysis.estimate.share)
     yield Figure("worst camera, median", "mm", float(np.median(worst)))
     yield Figure("worst camera, 1 % cover less", "mm", float(np.quantile(worst, 0.01)))
-    if analysis.margin != NOT_SEARCHED:
+    if analysis.margin:
         yield Figure("margin needed", "mm", analysis.margin.mm)
     for effect in analysis.single_errors:
         yield Figure(f"loss by {in_words(effect.kind)} alone", "mm", effect.loss)
@@ -264,8 +267,8 @@ def _process_table(analysis: Analysis) -> Table:
             "yield": option.estimate.share,
             "yield_low": option.estimate.low,
             "yield_high": option.estimate.high,
-            "margin_needed_mm": option.margin.mm,
-            "reason": option.margin.reason,
+            "margin_needed_mm": (option.margin or NOT_SEARCHED).mm,
+            "reason": (option.margin or NOT_SEARCHED).reason,
         }
         for option in analysis.process_options
     ]
@@ -305,5 +308,6 @@ def _coverage_map(u: Floats, low: Floats) -> PlotPanel:
     horizontal = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
     x, y = from_zenith * u[:, 0] / horizontal, from_zenith * u[:, 1] / horizontal
     dots = Series("", x, y, ".", low, f"coverage that {LOW_SHARE:.0%} do not reach, mm")
-    labels = (f"angle from the zenith along {axis}, degrees" for axis in "xy")
-    return PlotPanel("Virtual cameras, the zenith in the middle", *labels, (dots,))
+    along_x, along_y = (f"angle from the zenith along {axis}, degrees" for axis in "xy")
+    title = "Virtual cameras, the zenith in the middle"
+    return PlotPanel(title, along_x, along_y, (dots,))

@@ -17,8 +17,7 @@ from tbcad.core.spec.load import load_spec
 from tbcad.drawings.order_sheet import order_sheet
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import read_export
-from tbcad.mirror_limits.held import chain_of, two_sigma
-from tbcad.mirror_limits.measuring import confidence, sampled
+from tbcad.mirror_limits.held import chain_of, confidence, sampled, two_sigma
 from tbcad.mirror_limits.sensitivity import MirrorLimits
 from tbcad.shell.files import design_mandrel, shell_envelope, write_mandrels, write_shell_solids
 from tbcad.tolerancing.process.chain import ChainStep

@@ -17,7 +17,7 @@ from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.analysis import Analysis, ProcessOption
-from tbcad.tolerancing.margin import NOT_SEARCHED, Margin
+from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
     MonteCarloCase,
     YieldEstimate,
@@ -126,8 +126,8 @@ class TestWords:
         assert "Margins needed for 99%: none found; none was found for fdm." in none
 
     def test_margins_that_were_not_searched_for(self, analysis: Analysis) -> None:
-        options = tuple(replace(option, margin=NOT_SEARCHED) for option in PROCESS_OPTIONS)
-        plain = replace(analysis, margin=NOT_SEARCHED, process_options=options)
+        options = tuple(replace(option, margin=None) for option in PROCESS_OPTIONS)
+        plain = replace(analysis, margin=None, process_options=options)
         said = summary_text(plain)
         assert "diamond 100.0%." in said
         assert "argin" not in said

@@ -161,7 +161,7 @@ def checked_frames(options: ReconstructOptions) -> list[FrameFiles]:
     from tbcad.light.simulate.image_files import check_image_path
     from tbcad.output.single_files import check_file
 
-    numbers = range(frame_count(folder)) if options.frame == EVERY else (options.frame,)
+    numbers = range(frame_count(folder)) if options.frame == "all" else (options.frame,)
     frames = [FrameFiles.of(options, number) for number in numbers]
     light_field = folder / LIGHT_FIELD_FILE if capture.is_dir() else capture
     taken: set[Path] = set()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from tbcad.errors import InputError
-from tbcad.options.call import parameters
+from tbcad.options.call import parameters, tell_options
 from tbcad.version import __version__
 
 if TYPE_CHECKING:
@@ -23,9 +23,12 @@ app = typer.Typer(
     "made, verified on the files written. Start with **tbcad build --out exports**.",
 )
 Told = TypeVar("Told", bound=Callable[..., int])
-Full = Annotated[bool, typer.Option("--full", help="Print every check before the summary.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON; see verify/README.")]
+Full = Annotated[bool, typer.Option("--full")]
+"""Print every check before the summary."""
+Quiet = Annotated[bool, typer.Option("--quiet", "-q")]
+"""Print the verdict only."""
+Json = Annotated[bool, typer.Option("--json")]
+"""Print the summary as JSON; see verify/README."""
 
 
 def command(name: str | None = None) -> Callable[[Told], Told]:
@@ -93,3 +96,6 @@ def print_json(record: object) -> None:
     import json
 
     typer.echo(json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+tell_options(__name__)

@@ -11,6 +11,7 @@ from tbcad.app.cli.app import Full, Json, Quiet, app, command, output_mode, prin
 from tbcad.common.screen import report_console, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import BuildOptions, ReportOptions, VerificationOptions
+from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_calibration
 from tbcad.options.shared import Exports, ForceFile, JsonResult
 
@@ -25,17 +26,15 @@ SHELL_STAGES, PROTOTYPE_STAGES, VERIFICATION_STAGES = (5, 14), (9, 27), 19
 FINDING_WIDTHS = (2, 22, 53)  # columns of a finding: whether it is good, its name, what was found
 
 
+DryRunOption = Annotated[bool, typer.Option("--dry-run")]
+"""Only show what would be built: mirrors, balls, masses, time and estimates of printing and cost;
+seconds, and nothing is written."""
+
+
 @command()
 def build(
     options: BuildOptions,
-    dry_run: Annotated[
-        bool,
-        typer.Option(
-            "--dry-run",
-            help="Only show what would be built: mirrors, balls, masses, time and estimates of "
-            "printing and cost; seconds, and nothing is written.",
-        ),
-    ] = False,
+    dry_run: DryRunOption = False,
     full: Full = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -73,18 +72,15 @@ def build(
     return 0 if built.passed else 1
 
 
+AsBuiltOption = Annotated[Path | None, typer.Option("--as-built", metavar="CALIBRATION")]
+"""Instead of the files, verify the prototype as tbcad calibrate found it: what it covers, and what
+to shim. Writes nothing."""
+
+
 @command("verify")
 def verify_command(
     options: VerificationOptions,
-    as_built: Annotated[
-        Path | None,
-        typer.Option(
-            "--as-built",
-            metavar="CALIBRATION",
-            help="Instead of the files, verify the prototype as tbcad calibrate found it: what it "
-            "covers, and what to shim. Writes nothing.",
-        ),
-    ] = None,
+    as_built: AsBuiltOption = None,
     full: Full = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -124,21 +120,18 @@ def _verify_as_built(folder: Path, calibration: Path, output: "Output") -> int:
     return 0 if report.passed else 1
 
 
+OutOption = Annotated[Path | None, typer.Option("--out", "-o")]
+"""PNG file to write; by default named after the subject."""
+OfOption = Annotated[str, typer.Option()]
+"""Subject: shell (both halves from outside, and the mirrors from a camera); edges or seam (of the
+mirrors, close up); rig, sides, base, seat or exploded (the prototype)."""
+
+
 @app.command()
 def picture(
     folder: Exports[Path],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="PNG file to write; by default named after the subject."),
-    ] = None,
-    of: Annotated[
-        str,
-        typer.Option(
-            help="Subject: shell (both halves from outside, and the mirrors from a camera); edges "
-            "or seam (of the mirrors, close up); rig, sides, base, seat or exploded (the "
-            "prototype)."
-        ),
-    ] = "shell",
+    out: OutOption = None,
+    of: OfOption = "shell",
     force: ForceFile = False,
 ) -> int:
     """Draw the shells or the prototype from the files of an export."""
@@ -190,3 +183,6 @@ def report(options: ReportOptions) -> int:
         file = report_page(options.on(screen))
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
     return 0
+
+
+tell_options(__name__)

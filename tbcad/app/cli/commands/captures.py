@@ -11,6 +11,7 @@ from tbcad.app.cli.app import command, print_json, print_result
 from tbcad.app.cli.endings import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
+from tbcad.options.call import tell_options
 from tbcad.options.captures import CaptureOptions, ExportOptions, Geometry, ReconstructOptions
 from tbcad.options.shared import JsonResult
 
@@ -19,21 +20,18 @@ if TYPE_CHECKING:
     from tbcad.app.api.reconstructions import Reconstructed
 
 
+MeshOption = Annotated[bool, typer.Option("--mesh")]
+"""Trace the exported meshes instead of the recorded spheres."""
+PrototypeOption = Annotated[bool, typer.Option("--prototype")]
+"""Trace the balls of the prototype, stop by stop, and merge the photographs into those of the
+shell."""
+
+
 @command()
 def capture(
     options: CaptureOptions,
-    mesh: Annotated[
-        bool,
-        typer.Option("--mesh", help="Trace the exported meshes instead of the recorded spheres."),
-    ] = False,
-    prototype: Annotated[
-        bool,
-        typer.Option(
-            "--prototype",
-            help="Trace the balls of the prototype, stop by stop, and merge the photographs into "
-            "those of the shell.",
-        ),
-    ] = False,
+    mesh: MeshOption = False,
+    prototype: PrototypeOption = False,
     json: JsonResult = False,
 ) -> int:
     """Simulate the photographs of an object by both cameras through the mirrors of an export.
@@ -126,17 +124,15 @@ def _lines(record: dict[str, Any]) -> Iterator[str]:
         )
 
 
+AllFramesOption = Annotated[bool, typer.Option("--all-frames")]
+"""All frames, one after the other, each started from the one before; the number of the frame is
+added to the names of files."""
+
+
 @command()
 def reconstruct(
     options: ReconstructOptions,
-    all_frames: Annotated[
-        bool,
-        typer.Option(
-            "--all-frames",
-            help="All frames, one after the other, each started from the one before; the number of "
-            "the frame is added to the names of files.",
-        ),
-    ] = False,
+    all_frames: AllFramesOption = False,
     json: JsonResult = False,
 ) -> int:
     """Reconstruct one object from all rays of a light field, as a field of density and colour.
@@ -191,3 +187,6 @@ def _reconstruction_lines(one: "Reconstructed") -> Iterator[str]:
                 f"{known['percentile_95_mm']:.3f} mm, at most {known['hausdorff_mm']:.2f} mm, "
                 "where rays see it"
             )
+
+
+tell_options(__name__)

@@ -12,6 +12,7 @@ from tbcad.app.cli.app import app, command, print_result
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import ToleranceOptions
+from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_calibration, check_is_export
 from tbcad.options.designs import OptimizeOptions
 from tbcad.options.shared import ForceFile, JsonResult, Out, PlotFormatOption
@@ -21,17 +22,16 @@ if TYPE_CHECKING:
 PAPER = "turtleback"
 
 
+DesignOption = Annotated[str, typer.Option("--from", metavar="NAME")]
+"""Design that comes with tbcad to begin from: see --list."""
+
+
 @app.command()
 def init(
     file: Annotated[
         Path | None, typer.Argument(metavar="FILE", help="Design file (TOML) to write.")
     ] = None,
-    design: Annotated[
-        str,
-        typer.Option(
-            "--from", metavar="NAME", help="Design that comes with tbcad to begin from: see --list."
-        ),
-    ] = PAPER,
+    design: DesignOption = PAPER,
     show: Annotated[
         bool, typer.Option("--list", help="Only list the designs that come with tbcad.")
     ] = False,
@@ -123,18 +123,15 @@ def _told(result: "SearchResult", out: Path, *others: Path) -> Iterator[str]:
     yield f"{out}: written, with {beside}; build and verify it by tbcad build {out}"
 
 
+AsBuiltOption = Annotated[Path | None, typer.Option("--as-built", metavar="CALIBRATION")]
+"""Instead of a process: this very prototype, with what its calibration (a folder that tbcad
+calibrate wrote) leaves unknown."""
+
+
 @command()
 def tolerance(
     options: ToleranceOptions,
-    as_built: Annotated[
-        Path | None,
-        typer.Option(
-            "--as-built",
-            metavar="CALIBRATION",
-            help="Instead of a process: this very prototype, with what its calibration (a folder "
-            "that tbcad calibrate wrote) leaves unknown.",
-        ),
-    ] = None,
+    as_built: AsBuiltOption = None,
     out: Out[Path] = Path("tolerance"),
     plot: PlotFormatOption = "png",
     json: JsonResult = False,
@@ -204,3 +201,6 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
     }
     files = replace_files(out, contents)
     return _show_files(record, summary(found), out, files, json)
+
+
+tell_options(__name__)

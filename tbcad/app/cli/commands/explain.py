@@ -8,6 +8,7 @@ import typer
 
 from tbcad.app.cli.app import app, print_result
 from tbcad.common.screen import WIDTH
+from tbcad.options.call import tell_options
 
 if TYPE_CHECKING:
     from tbcad.app.reference.entries import ReferenceEntry
@@ -17,17 +18,14 @@ KINDS = ("term", "section", "key", "check")
 INDENT = 13  # columns, of what stands behind a heading
 
 
+NameOption = Annotated[str | None, typer.Argument(metavar="NAME")]
+"""A term or symbol (theta1), a key of a design or its end (margin_mm), a column of a table
+(coverage_mm), or a check of the verification ("coverage, facets"); without it, all names."""
+
+
 @app.command()
 def explain(
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NAME",
-            help="A term or symbol (theta1), a key of a design or its end (margin_mm), a column of "
-            'a table (coverage_mm), or a check of the verification ("coverage, facets"); without '
-            "it, all names.",
-        ),
-    ] = None,
+    name: NameOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print the same as JSON.")] = False,
 ) -> int:
     """Explain a word of tbcad: what it is, its equation, unit and source, and where it is used.
@@ -102,3 +100,6 @@ def _wrapped(text: str, first: str, others: str) -> str:
         break_long_words=False,
         break_on_hyphens=False,
     )
+
+
+tell_options(__name__)

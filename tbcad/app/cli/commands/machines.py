@@ -13,6 +13,7 @@ import typer
 from tbcad.app.cli.app import command, print_result
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
+from tbcad.options.call import tell_options
 from tbcad.options.machines import (
     AsBuiltOptions,
     CalibrateOptions,
@@ -191,30 +192,23 @@ def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
     return 0
 
 
+NoPreflightOption = Annotated[bool, typer.Option("--no-preflight")]
+"""Begin at once, without a look at one stop under each light for saturated and dark photographs."""
+YesOption = Annotated[bool, typer.Option("--yes", "-y")]
+"""Ask nothing: pin out and object turned are taken for granted."""
+DryRunOption = Annotated[bool, typer.Option("--dry-run")]
+"""Print what would be done, without controller and camera."""
+
+
 @command()
 def run(
     options: RunOptions,
-    no_preflight: Annotated[
-        bool,
-        typer.Option(
-            "--no-preflight",
-            help="Begin at once, without a look at one stop under each light for saturated and "
-            "dark photographs.",
-        ),
-    ] = False,
+    no_preflight: NoPreflightOption = False,
     preflight_only: Annotated[
         bool, typer.Option("--preflight-only", help="That look alone; nothing is kept.")
     ] = False,
-    yes: Annotated[
-        bool,
-        typer.Option(
-            "--yes", "-y", help="Ask nothing: pin out and object turned are taken for granted."
-        ),
-    ] = False,
-    dry_run: Annotated[
-        bool,
-        typer.Option("--dry-run", help="Print what would be done, without controller and camera."),
-    ] = False,
+    yes: YesOption = False,
+    dry_run: DryRunOption = False,
     json: Annotated[
         bool, typer.Option("--json", help="With --dry-run: print it as JSON, all positions.")
     ] = False,
@@ -271,3 +265,6 @@ def _asked(yes: bool, question: str) -> bool:
 
 def _note(text: str) -> None:
     typer.echo(text, err=True)
+
+
+tell_options(__name__)

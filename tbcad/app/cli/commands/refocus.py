@@ -16,6 +16,7 @@ from tbcad.app.cli.commands.picture_files import (
 )
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
+from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_capture
 from tbcad.options.shared import (
     Azimuth,
@@ -36,6 +37,15 @@ if TYPE_CHECKING:
     from tbcad.types import Bytes, Progress
 
 
+FocusOption = Annotated[float, typer.Option()]
+"""Position of the focal plane: mm from the centre of the object toward the camera."""
+AllInFocusOption = Annotated[bool, typer.Option("--all-in-focus")]
+"""Make each pixel sharp at its own depth, which is found in the light field, instead of at
+--focus."""
+SweepOption = Annotated[Path | None, typer.Option()]
+"""Also write an animation of the focus through the object: GIF, WebP or PNG."""
+
+
 @app.command()
 def refocus(
     capture_folder: Capture[Path],
@@ -43,27 +53,10 @@ def refocus(
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     aperture: Annotated[float, typer.Option(help="Diameter of the lens, mm.")] = 300.0,
-    focus: Annotated[
-        float,
-        typer.Option(
-            help="Position of the focal plane: mm from the centre of the object toward the camera."
-        ),
-    ] = 0.0,
-    all_in_focus: Annotated[
-        bool,
-        typer.Option(
-            "--all-in-focus",
-            help="Make each pixel sharp at its own depth, which is found in the light field, "
-            "instead of at --focus.",
-        ),
-    ] = False,
+    focus: FocusOption = 0.0,
+    all_in_focus: AllInFocusOption = False,
     out: OutPicture[Path] = Path("refocus.png"),
-    sweep: Annotated[
-        Path | None,
-        typer.Option(
-            help="Also write an animation of the focus through the object: GIF, WebP or PNG."
-        ),
-    ] = None,
+    sweep: SweepOption = None,
     frames: Annotated[
         int, typer.Option(min=2, max=500, help="Number of pictures in the animation.")
     ] = 21,
@@ -131,3 +124,6 @@ def _truth(
     if samples == 0:
         return true_picture(scene, at)
     return to_bytes(lens_picture(scene, at, lens, samples, progress))
+
+
+tell_options(__name__)

@@ -9,6 +9,7 @@ import typer
 from tbcad.app.cli.app import app, print_result
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
+from tbcad.options.call import tell_options
 from tbcad.options.checks import DESIGN_FILE, FIELD_FILE, LIGHT_FIELD_FILE
 from tbcad.options.shared import (
     Azimuth,
@@ -33,51 +34,35 @@ REPORT_FILE = "report.html"
 MAX_PORT = 65535
 
 
+FolderOption = Annotated[Path, typer.Argument(metavar="FOLDER")]
+"""Folder written by tbcad build, or by tbcad capture or merge; or the file of tbcad reconstruct."""
+TurntableOption = Annotated[Path | None, typer.Option()]
+"""Write a page that turns the object, to send to somebody, instead of showing the light field or
+field: an HTML file of at most 6 MB, which opens from disk."""
+RowsOption = Annotated[int, typer.Option(min=1, max=13)]
+"""Rows of the turntable, between 15 and 75 degrees of elevation; a single one is at --elevation."""
+OpenPageOption = Annotated[bool, typer.Option("--open/--no-open")]
+"""Open the browser, or only print the address."""
+HttpPortOption = Annotated[int, typer.Option("--http-port", min=0, max=MAX_PORT)]
+"""Port of the address; 0: any that is free."""
+
+
 @app.command()
 def show(
-    folder: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FOLDER",
-            help="Folder written by tbcad build, or by tbcad capture or merge; or the file of "
-            "tbcad reconstruct.",
-        ),
-    ],
+    folder: FolderOption,
     azimuth: Azimuth = 0.0,
     elevation: Elevation = 30.0,
     distance: Distance = 640.0,
     width: Width = 640,
     height: Height = 480,
-    turntable: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write a page that turns the object, to send to somebody, instead of showing the "
-            "light field or field: an HTML file of at most 6 MB, which opens from disk.",
-        ),
-    ] = None,
+    turntable: TurntableOption = None,
     frames: Annotated[
         int, typer.Option(min=4, max=360, help="Views of the turntable once around.")
     ] = 60,
-    rows: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=13,
-            help="Rows of the turntable, between 15 and 75 degrees of elevation; a single one is "
-            "at --elevation.",
-        ),
-    ] = 3,
+    rows: RowsOption = 3,
     method: MethodOfView = None,
-    open_page: Annotated[
-        bool,
-        typer.Option("--open/--no-open", help="Open the browser, or only print the address."),
-    ] = True,
-    http_port: Annotated[
-        int,
-        typer.Option(
-            "--http-port", min=0, max=MAX_PORT, help="Port of the address; 0: any that is free."
-        ),
-    ] = 0,
+    open_page: OpenPageOption = True,
+    http_port: HttpPortOption = 0,
     force: ForceFile = False,
     json: JsonResult = False,
 ) -> int:
@@ -216,3 +201,6 @@ def _title(file: Path) -> str:
     """The name of the capture's folder, or of a light field or field that lies alone."""
     file = file.resolve()
     return file.parent.name if file.name in (LIGHT_FIELD_FILE, FIELD_FILE) else file.stem
+
+
+tell_options(__name__)

@@ -8,6 +8,7 @@ import typer
 
 from tbcad.app.cli.app import app
 from tbcad.app.cli.study_output import Work, of_design, of_export
+from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_object
 from tbcad.options.shared import (
     Distance,
@@ -32,18 +33,19 @@ study = typer.Typer(
 )
 app.add_typer(study, name="study")
 
-First = Annotated[int, typer.Option("--from", metavar="N", help="Smallest n, 1 or more.")]
-Last = Annotated[int, typer.Option("--to", metavar="N", help="Largest n, up to 60.")]
-Sensors = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--sensor",
-        metavar="WxH",
-        help="Width x height, pixels; repeatable. By default the sensor of the design, and half, "
-        "twice and four times its width and height (Table II).",
-    ),
-]
-Azimuths = Annotated[int, typer.Option(help="Number of azimuths at each elevation.")]
+First = Annotated[int, typer.Option("--from", metavar="N")]
+"""Smallest n, 1 or more."""
+Last = Annotated[int, typer.Option("--to", metavar="N")]
+"""Largest n, up to 60."""
+Sensors = Annotated[list[str] | None, typer.Option("--sensor", metavar="WxH")]
+"""Width x height, pixels; repeatable. By default the sensor of the design, and half, twice and four
+times its width and height (Table II)."""
+Azimuths = Annotated[int, typer.Option()]
+"""Number of azimuths at each elevation."""
+
+
+RatiosOption = Annotated[list[str] | None, typer.Option("--ratio", metavar="C:P")]
+"""Virtual cameras to pixels; repeatable. By default 1:1, 1:4 and 4:1."""
 
 
 @study.command("resolution")
@@ -53,14 +55,7 @@ def resolution_command(
     first: First = 2,
     last: Last = 40,
     sensors: Sensors = None,
-    ratios: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--ratio",
-            metavar="C:P",
-            help="Virtual cameras to pixels; repeatable. By default 1:1, 1:4 and 4:1.",
-        ),
-    ] = None,
+    ratios: RatiosOption = None,
     scheduler: Scheduler = None,
 ) -> Work:
     """Count virtual cameras and their pixels, and find where they balance (Fig. 5b, Table II)."""
@@ -136,14 +131,15 @@ def ssim_command(
     return partial(ssim, spec, subject, simulated, places, _by(method))
 
 
+NsOption = Annotated[list[int] | None, typer.Option("--n")]
+"""Subdivision; repeatable. By default eight from 6 to 33."""
+
+
 @study.command("balance")
 @of_design
 def balance_command(
     spec: "Spec",
-    ns: Annotated[
-        list[int] | None,
-        typer.Option("--n", help="Subdivision; repeatable. By default eight from 6 to 33."),
-    ] = None,
+    ns: NsOption = None,
     method: MethodOfStudy = "nearest",
     views: Annotated[
         int, typer.Option(help="Number of viewpoints, evenly over the hemisphere.")
@@ -184,6 +180,13 @@ def prototype_command(
     return partial(prototype_vs_shell, export, subject, places, _by(method), samples)
 
 
+FilterPxOption = Annotated[list[float] | None, typer.Option(metavar="PX")]
+"""Separation of the filter's four images, pixels; repeatable. By default 0.75, 1 and 2."""
+LensPxOption = Annotated[list[float] | None, typer.Option(metavar="PX")]
+"""Diameter of a lens's blur circle, pixels; repeatable. By default 2.4, the least that the depth of
+field allows."""
+
+
 @study.command("low-pass")
 @of_export
 def low_pass_command(
@@ -194,22 +197,8 @@ def low_pass_command(
     paint: PaintOption = "own",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
-    filter_px: Annotated[
-        list[float] | None,
-        typer.Option(
-            metavar="PX",
-            help="Separation of the filter's four images, pixels; repeatable. By default 0.75, 1 "
-            "and 2.",
-        ),
-    ] = None,
-    lens_px: Annotated[
-        list[float] | None,
-        typer.Option(
-            metavar="PX",
-            help="Diameter of a lens's blur circle, pixels; repeatable. By default 2.4, the least "
-            "that the depth of field allows.",
-        ),
-    ] = None,
+    filter_px: FilterPxOption = None,
+    lens_px: LensPxOption = None,
     samples: Annotated[
         int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
     ] = 2,
@@ -265,3 +254,6 @@ def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:
     from tbcad.studies.resolution import default_sensors
 
     return tuple(map(parse_sensor, dict.fromkeys(given or ()))) or default_sensors(spec)
+
+
+tell_options(__name__)

@@ -22,6 +22,7 @@ from tbcad.app.cli.commands.picture_files import (
 )
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
+from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_capture
 from tbcad.options.shared import (
     Azimuth,
@@ -64,6 +65,25 @@ class _Choice(NamedTuple):
 BY_DEFAULT = _Choice("field", None, "its file is in the capture's folder")
 
 
+SurfaceOption = Annotated[Surface | None, typer.Option()]
+"""Surface of the points that are compared by blend: the depth that the light field itself shows
+(the default), the plane through the centre of the object, or the object itself."""
+DepthFilesOption = Annotated[list[Path] | None, typer.Option("--depth", metavar="FILE")]
+"""Also write the depth that is found: as PNG of 16 bits, or as points (PLY); repeatable."""
+NormalsFileOption = Annotated[Path | None, typer.Option("--normals", metavar="FILE")]
+"""Of a field: also write the surface's normals (PNG)."""
+OpacityFileOption = Annotated[Path | None, typer.Option("--opacity", metavar="FILE")]
+"""Of a field: also write the opacity (PNG)."""
+LightOption = Annotated[Path | None, typer.Option(metavar="FILE")]
+"""Show the object in the light of its surroundings, a picture by direction (.hdr, .exr), by the
+reflectance field of tbcad capture --lights."""
+LightFormatOption = Annotated[LightFormat | None, typer.Option()]
+"""How that picture has its directions, +x in the middle and up at the top: latlong (the default
+where it is 2:1), a disc (angular, mirror-ball), or a cross of six faces."""
+FrameOption = Annotated[int | None, typer.Option(min=0, metavar="K")]
+"""Frame of tbcad capture --frames to show, from 0 on."""
+
+
 @app.command()
 def view(
     capture_folder: Capture[Path],
@@ -72,57 +92,16 @@ def view(
     distance: Distance = 640.0,
     out: OutPicture[Path] = Path("view.png"),
     method: MethodOfView = None,
-    surface: Annotated[
-        Surface | None,
-        typer.Option(
-            help="Surface of the points that are compared by blend: the depth that the light field "
-            "itself shows (the default), the plane through the centre of the object, or the object "
-            "itself."
-        ),
-    ] = None,
-    depth_files: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--depth",
-            metavar="FILE",
-            help="Also write the depth that is found: as PNG of 16 bits, or as points (PLY); "
-            "repeatable.",
-        ),
-    ] = None,
-    normals_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--normals", metavar="FILE", help="Of a field: also write the surface's normals (PNG)."
-        ),
-    ] = None,
-    opacity_file: Annotated[
-        Path | None,
-        typer.Option("--opacity", metavar="FILE", help="Of a field: also write the opacity (PNG)."),
-    ] = None,
-    light: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Show the object in the light of its surroundings, a picture by direction (.hdr, "
-            ".exr), by the reflectance field of tbcad capture --lights.",
-        ),
-    ] = None,
+    surface: SurfaceOption = None,
+    depth_files: DepthFilesOption = None,
+    normals_file: NormalsFileOption = None,
+    opacity_file: OpacityFileOption = None,
+    light: LightOption = None,
     light_turn: Annotated[
         float, typer.Option(help="Turns that light about z, degrees, counterclockwise from above.")
     ] = 0.0,
-    light_format: Annotated[
-        LightFormat | None,
-        typer.Option(
-            help="How that picture has its directions, +x in the middle and up at the top: latlong "
-            "(the default where it is 2:1), a disc (angular, mirror-ball), or a cross of six faces."
-        ),
-    ] = None,
-    frame: Annotated[
-        int | None,
-        typer.Option(
-            min=0, metavar="K", help="Frame of tbcad capture --frames to show, from 0 on."
-        ),
-    ] = None,
+    light_format: LightFormatOption = None,
+    frame: FrameOption = None,
     width: Width = 640,
     height: Height = 480,
     fov: Fov = None,
@@ -289,3 +268,6 @@ def _view(
     on_object = scene is not None and choice.surface == "object"
     depth = depth_along_rays(scene) if scene is not None and on_object else None
     return synthesise(shown, at, "blend", depth).image
+
+
+tell_options(__name__)

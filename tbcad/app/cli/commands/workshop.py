@@ -8,8 +8,14 @@ import typer
 from tbcad.app.cli.app import app, command, print_json, print_result
 from tbcad.common.screen import stages
 from tbcad.options.builds import OrderOptions
+from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_export, check_is_folder
 from tbcad.options.shared import Design, Exports, ForceFile, JsonResult, Out, Settings
+
+CamerasOption = Annotated[Path | None, typer.Option("--cameras", metavar="FILE")]
+"""CSV list of further cameras, with the columns of docs/camera.md."""
+LensesOption = Annotated[Path | None, typer.Option("--lenses", metavar="FILE")]
+"""CSV list of further lenses, with the columns of docs/camera.md."""
 
 
 @app.command()
@@ -19,22 +25,8 @@ def camera(
         int | None, typer.Option(help="Subdivision of the icosahedron, 2 to 60; the paper has 18.")
     ] = None,
     settings: Settings = None,
-    cameras: Annotated[
-        Path | None,
-        typer.Option(
-            "--cameras",
-            metavar="FILE",
-            help="CSV list of further cameras, with the columns of docs/camera.md.",
-        ),
-    ] = None,
-    lenses: Annotated[
-        Path | None,
-        typer.Option(
-            "--lenses",
-            metavar="FILE",
-            help="CSV list of further lenses, with the columns of docs/camera.md.",
-        ),
-    ] = None,
+    cameras: CamerasOption = None,
+    lenses: LensesOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print the sheet as JSON.")] = False,
 ) -> int:
     """Say which sensor, lens, stop and focus a design needs, and which cameras on sale have them.
@@ -86,18 +78,15 @@ def order(options: OrderOptions, json: JsonResult = False) -> int:
     return 0 if chain["holds"] else 1
 
 
+PricesOption = Annotated[Path | None, typer.Option("--prices", metavar="FILE")]
+"""CSV list of prices to use in place of the build's, with the columns of docs/prototype.md; bom.csv
+stays as it is."""
+
+
 @app.command()
 def parts(
     folder: Exports[Path],
-    prices: Annotated[
-        Path | None,
-        typer.Option(
-            "--prices",
-            metavar="FILE",
-            help="CSV list of prices to use in place of the build's, with the columns of "
-            "docs/prototype.md; bom.csv stays as it is.",
-        ),
-    ] = None,
+    prices: PricesOption = None,
     full: Annotated[bool, typer.Option("--full", help="Show every row.")] = False,
     json: Annotated[
         bool, typer.Option("--json", help="Print totals and all rows as JSON.")
@@ -116,19 +105,15 @@ def parts(
     return 0
 
 
+OnlyOption = Annotated[list[str] | None, typer.Option("--only", metavar="PART")]
+"""Draw this only, such as bearing_head or optical_layout; repeatable. By default everything."""
+
+
 @app.command()
 def drawings(
     folder: Exports[Path],
     out: Out[Path] = Path("drawings"),
-    only: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--only",
-            metavar="PART",
-            help="Draw this only, such as bearing_head or optical_layout; repeatable. By default "
-            "everything.",
-        ),
-    ] = None,
+    only: OnlyOption = None,
     json: Annotated[
         bool, typer.Option("--json", help="Print what was written as JSON, without progress.")
     ] = False,
@@ -188,3 +173,6 @@ def assembly(
     file = write_page(folder, out, machine, steps, pictures=pictures, force=force)
     typer.echo(f"{file}: {len(steps)} steps, {sum(machine.quantities.values())} parts")
     return 0
+
+
+tell_options(__name__)
