@@ -41,18 +41,13 @@ def test_the_papers_design_sets_what_the_paper_says() -> None:
 
 
 @pytest.mark.parametrize("path", sorted(DESIGNS.glob("*.toml")), ids=lambda path: path.stem)
-class TestEveryDesign:
-    def test_is_named_like_its_file(self, path: Path) -> None:
-        assert load_spec(path).name == path.stem
-
-    def test_mirrors_see_the_capture_sphere(self, path: Path) -> None:
-        spec = load_spec(path)
-        assert designed(spec).arrays[0].coverage.min() >= spec.optics.capture_diameter_mm
-
-
-def test_the_flat_baseline_sees_what_its_comment_says() -> None:
-    array = designed(load_spec(DESIGNS / "mukaigawa-flat.toml")).arrays[0]
-    assert array.coverage.min() == pytest.approx(21.1, abs=0.05)
+def test_mirrors_of_every_design_see_the_capture_sphere(path: Path) -> None:
+    spec = load_spec(path)
+    least = designed(spec).arrays[0].coverage.min()
+    assert spec.name == path.stem
+    assert least >= spec.optics.capture_diameter_mm
+    if path.stem == "mukaigawa-flat":  # as its comment says
+        assert least == pytest.approx(21.1, abs=0.05)
 
 
 def test_the_sensor_design_keeps_the_papers_balance() -> None:

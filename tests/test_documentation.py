@@ -87,15 +87,8 @@ def test_tables_are_made_from_the_results() -> None:
     code = "import sys; from table import filled; sys.stdout.write(filled(sys.stdin.read()))"
     page = (BENCHMARKS / "README.md").read_text(encoding="utf-8")
     assert {"<!-- table: all -->", "<!-- table: commands -->"} <= set(page.splitlines())
-    run = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=BENCHMARKS,
-        input=page,
-        capture_output=True,
-        encoding="utf-8",
-        check=True,
-    )
-    assert run.stdout == page
+    words = [sys.executable, "-c", code]
+    assert subprocess.check_output(words, cwd=BENCHMARKS, input=page, encoding="utf-8") == page
 
 
 def test_readme_stays_short() -> None:
@@ -103,35 +96,22 @@ def test_readme_stays_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 100
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])
-def test_packages_of_debian_are_those_of_the_ci(document: str) -> None:
-    text = (ROOT / document).read_text(encoding="utf-8")
-    named = re.findall(r"`apt-get install ([^`]*)`", text)
-    libraries, pictures = packages_of_the_ci()
-    assert [sorted(one.split()) for one in named] == [sorted(libraries), sorted(pictures)]
-
-
-def packages_of_the_ci() -> list[list[str]]:
-    """Packages of Debian that the kernel needs, and those for pictures."""
+def test_packages_of_debian_are_those_of_the_ci() -> None:
+    """Those that the kernel needs, and those for pictures; the container has both."""
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     patterns = (r"libraries=\((.*)\)", r"\n *(.*)\) +# for pictures")
-    return [re.findall(pattern, ci)[0].split() for pattern in patterns]
-
-
-def test_packages_of_the_container_are_those_of_the_ci() -> None:
-    text = (ROOT / "Dockerfile").read_text(encoding="utf-8").replace("\\\n", " ")
-    (named,) = re.findall(r"apt-get install -y --no-install-recommends (.*?) &&", text)
-    assert sorted(named.split()) == sorted([one for group in packages_of_the_ci() for one in group])
-
-
-def test_the_container_copies_what_is_built() -> None:
+    needed = [sorted(re.findall(pattern, ci)[0].split()) for pattern in patterns]
+    for document in ("README.md", "CONTRIBUTING.md"):
+        text = (ROOT / document).read_text(encoding="utf-8")
+        named = re.findall(r"`apt-get install ([^`]*)`", text)
+        assert [sorted(one.split()) for one in named] == needed
     text = (ROOT / "Dockerfile").read_text(encoding="utf-8")
-    sources = [
-        name for line in re.findall(r"^COPY (.*)$", text, re.M) for name in line.split()[:-1]
-    ]
+    (named,) = re.findall(r"--no-install-recommends (.*?) &&", text.replace("\\\n", " "))
+    assert sorted(named.split()) == sorted(needed[0] + needed[1])
+    copied = [name for line in re.findall(r"^COPY (.*)$", text, re.M) for name in line.split()[:-1]]
     allowed = re.findall(r"^!(.*)$", (ROOT / ".dockerignore").read_text(), re.M)
-    assert sorted(sources) == sorted(allowed)
-    assert all((ROOT / name).exists() for name in sources)
+    assert sorted(copied) == sorted(allowed)
+    assert all((ROOT / name).exists() for name in copied)
 
 
 class Command(NamedTuple):
@@ -168,16 +148,11 @@ EVERY = list(shown_commands())
 OF_TBCAD = ("--version", "--install-completion")  # options without a command
 
 
-def test_commands_are_found() -> None:
-    assert sum(one.whole for one in EVERY) > 20
-    assert {"README.md", "docs/tolerance.md", "docs/light-field.md"} <= {
-        one.document for one in EVERY if one.whole
-    }
-
-
 def test_commands_are_understood() -> None:
     """By the real command with its real options; a sentence may leave its arguments out."""
-    known = commands()
+    known, whole = commands(), [one.document for one in EVERY if one.whole]
+    assert len(whole) > 20
+    assert {"README.md", "docs/tolerance.md", "docs/light-field.md"} <= {*whole}
     for shown in EVERY:
         words = shown.words
         name = next(words[:k] for k in range(len(words), -1, -1) if words[:k] in known)
@@ -208,10 +183,11 @@ SMALLER = {
 PICTURES = ["--width", "96", "--height", "72"]
 # Needs other computers; programs that tests/clients start; a prototype and its photographs, or
 # simulated ones, which take minutes: these commands have tests of their own.
-NOT_RUN = ("--scheduler", "--clients", "--port", "boards/", "captures/real", "simulate-run")
-NOT_RUN += ("runs/first", "calibration/", "calibration", "captures/first")
-NOT_RUN += ("calibration-shell/",)
-NOT_RUN += ("show",)  # goes on until it is stopped: tests/light/viewer
+# And show goes on until it is stopped: tests/light/viewer.
+NOT_RUN = {
+    *("--scheduler", "--clients", "--port", "boards/", "captures/real", "simulate-run", "show"),
+    *("runs/first", "calibration/", "calibration", "captures/first", "calibration-shell/"),
+}
 OF_THEIR_OWN = ("docs/tour.md",)  # documents whose commands have a test of their own
 SAMPLE = ROOT / "docs" / "sample"
 
@@ -229,11 +205,8 @@ def whole_export(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer simulated builds, pictures, viewpoints and processes."""
-    for name, value in {
-        "SEARCH_BUILDS": 10,
-        "PHOTOGRAPHED_BUILDS": 1,
-        "BUILT_IN": ("diamond",),
-    }.items():
+    few = {"SEARCH_BUILDS": 10, "PHOTOGRAPHED_BUILDS": 1, "BUILT_IN": ("diamond",)}
+    for name, value in few.items():
         monkeypatch.setattr(f"tbcad.tolerancing.analysis.{name}", value)
     monkeypatch.setattr("tbcad.tolerancing.montecarlo.sharpness.VIEWPOINTS", ((60.0,), 1, 640.0))
 
@@ -272,7 +245,7 @@ def test_commands_work_one_after_the_other(
     assert cv2.imwrite(str(tmp_path / "sky.hdr"), sky)
     (tmp_path / "captures").mkdir()
     for shown in EVERY:
-        if shown.document != document or not shown.whole or {*NOT_RUN} & {*shown.words}:
+        if shown.document != document or not shown.whole or NOT_RUN & {*shown.words}:
             continue
         # A build before this one has left shells alone; the sample is quickly verified.
         shutil.rmtree(tmp_path / "exports", ignore_errors=True)

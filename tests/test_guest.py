@@ -71,17 +71,15 @@ asyncio.run(cell())
 """
 
 
-def run_script(place: Path, parts: str, builds: int, hidden: bool = False) -> None:
-    script = place / "script.py"
+def run_python(
+    place: Path, parts: str, builds: int, code: tuple[str, ...] = (), hidden: bool = False
+) -> None:
+    """Run some code, or the script as a file."""
+    folder, script = place / "path", place / "script.py"
     script.write_text(SCRIPT, encoding="utf-8")
-    run_python([str(script)], place, parts, builds, hidden)
-
-
-def run_python(code: list[str], place: Path, parts: str, builds: int, hidden: bool = False) -> None:
-    folder = place / "path"
     folder.mkdir()
     (folder / "sitecustomize.py").write_text(HIDDEN if hidden else "", encoding="utf-8")
-    command = [sys.executable, *code, str(place), parts, str(builds)]
+    command = [sys.executable, *(code or [script]), str(place), parts, str(builds)]
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "")
@@ -99,19 +97,19 @@ def digests(folder: Path) -> dict[str, str]:
 @pytest.mark.slow
 def test_a_build_in_a_script_with_threads_changes_nothing_else(tmp_path: Path) -> None:
     """Without what only a POSIX system has; the next test has it."""
-    run_script(tmp_path, "shell", 1, hidden=True)
+    run_python(tmp_path, "shell", 1, hidden=True)
 
 
 @pytest.mark.slow
 def test_a_build_in_a_notebook(tmp_path: Path) -> None:
     """Its workers have no file to run again, and a loop of events is not theirs."""
-    run_python(["-c", f"SCRIPT = {SCRIPT!r}\n{CELL}"], tmp_path, "shell", 1)
+    run_python(tmp_path, "shell", 1, ("-c", f"SCRIPT = {SCRIPT!r}\n{CELL}"))
 
 
 @pytest.mark.slow
 def test_two_builds_at_once_write_what_a_command_writes(tmp_path: Path) -> None:
     """Each has processes of its own, which never run the script."""
-    run_script(tmp_path, "shell,prototype", 2)
+    run_python(tmp_path, "shell,prototype", 2)
     written = digests(tmp_path / "0")
     assert digests(tmp_path / "1") == written
     main = "import sys; from tbcad.app.cli import main; sys.exit(main())"

@@ -49,7 +49,6 @@ WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um", "wall_chain_um")  # of mirrors
 Key = TypeVar("Key", str, int, frozenset[str])
 SAME = 1e-9  # mm: numbers in a file have 15 digits
 SAME_PLANE = 1e-6  # of normal and distance (mm): at n = 18 no two walls are closer than 2e-4
-NO_WALLS: Mapping[str, Floats] = {}
 EITHER_WAY = np.array([1.0, -1.0])
 
 
@@ -167,9 +166,7 @@ def write_solid(folder: Path, export: Path, half: Half, chain: Mapping[str, str]
         raise InputError(f"{export / half.name}.step has no face {missing[0]}: run tbcad build")
     given = tolerances(half, dowel_face(solid, half.dowel_mm))
     write_tolerances(folder / step, solid, replace(given, notes={**given.notes, **chain}))
-    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
-    walls = {name: plane for of_mirror in half.walls for name, plane in of_mirror.items()}
-    check_read_back(folder / step, given, centres, walls)
+    check_read_back(folder / step, given, half)
     return step
 
 
@@ -211,18 +208,13 @@ def notes(wall_um: Floats | None = None) -> dict[str, str]:
     }
 
 
-def check_read_back(
-    path: Path,
-    given: FaceTolerances,
-    centres: Mapping[str, Floats],
-    walls: Mapping[str, Floats] = NO_WALLS,
-) -> None:
-    """Compare all zones and radii in a file with what they should be.
+def check_read_back(path: Path, given: FaceTolerances, half: Half) -> None:
+    """Compare all zones and radii in a file with what they should be, by the faces of a half.
 
-    Centres of the mirrors' spheres are by id, mm; walls of pedestals by their faces' names, point
-    (mm) and normal, (6,). StepError if one is missing, doubled, or not as given: a fault of tbcad.
+    StepError if one is missing, doubled, or not as given: a fault of tbcad.
     """
-    read = read_tolerances(path)
+    read, centres = read_tolerances(path), dict(zip(half.ids, half.surfaces.centre, strict=True))
+    walls = {name: plane for of_mirror in half.walls for name, plane in of_mirror.items()}
     flat = sorted(one.value for one in read if one.kind == "flatness")
     written = sorted(given.flatness.values())
     _same(path, "flatness", dict(enumerate(flat)), dict(enumerate(written)))

@@ -85,24 +85,23 @@ def test_an_attempt_tells_its_last_line_or_why_it_failed(
     assert "no answer" in attempt("x", "import signal; signal.pause()", "y").detail
 
 
-@pytest.mark.parametrize(
-    ("alone", "xvfb", "detail"),
-    [(True, None, "drawn"), (False, True, "drawn, under xvfb-run"), (False, None, "crashed")],
-)
-def test_pictures(
-    monkeypatch: pytest.MonkeyPatch, alone: bool, xvfb: bool | None, detail: str
-) -> None:
+def pictured(remedy: str, ok: bool) -> Finding:
+    return Finding("pictures", ok, "drawn" if ok else "crashed", "" if ok else remedy)
+
+
+def test_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """With fakes: a real display is not to be had everywhere."""
-
-    def fake(name: str, _: str, remedy: str, before: list[str] | None = None) -> Finding:
-        ok = bool(xvfb) if before else alone
-        return Finding(name, ok, "drawn" if ok else "crashed", "" if ok else remedy)
-
-    monkeypatch.setattr(doctor, "attempt", fake)
-    monkeypatch.setattr(doctor.shutil, "which", lambda _: None if xvfb is None else "/x")
-    finding = doctor.pictures()
-    assert finding.detail == detail
-    assert finding.ok != ("apt-get install xvfb" in finding.remedy)
+    for alone, xvfb, detail in (
+        (True, False, "drawn"),
+        (False, True, "drawn, under xvfb-run"),
+        (False, False, "crashed"),
+    ):
+        drawn = [alone, xvfb]  # in the order in which it is tried
+        monkeypatch.setattr(doctor, "attempt", lambda *a, ok=drawn: pictured(a[2], ok.pop(0)))
+        monkeypatch.setattr(doctor.shutil, "which", lambda _, there=xvfb: "/x" if there else None)
+        finding = doctor.pictures()
+        assert finding.detail == detail
+        assert finding.ok != ("apt-get install xvfb" in finding.remedy)
 
 
 def test_memory_and_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

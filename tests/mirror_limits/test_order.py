@@ -1,17 +1,18 @@
-"""What a chain holds of limits, what is measured, and the page that a workshop reads."""
+"""Files of an order as other readers get them, what a chain holds, and the page of a workshop."""
 
-import csv
 import json
 from math import hypot, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 
+from tbcad.app.api import order
 from tbcad.app.cli import run
+from tbcad.cad.formats.step import read_named_solid
 from tbcad.cad.formats.step_tolerances import read_tolerances
-from tbcad.core.mirrors.array import design
-from tbcad.core.mirrors.record import write_record
+from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.optics.reflection import roughness_nm, scattered_share
 from tbcad.core.spec.load import load_spec
 from tbcad.drawings.order_sheet import order_sheet
@@ -19,11 +20,14 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.mirror_limits.held import chain_of, confidence, sampled, two_sigma
 from tbcad.mirror_limits.sensitivity import MirrorLimits
-from tbcad.shell.files import design_mandrel, shell_envelope, write_mandrels, write_shell_solids
+from tbcad.shell.files import design_mandrel, write_mandrels
 from tbcad.tolerancing.process.chain import ChainStep
 from tbcad.tolerancing.process.process import BUILT_IN, load_process
+from tests.exported_files import contents, read_csv
 from tests.sheet_texts import check_texts, texts
+from tests.shell_meshes import export_with_solids
 
+SMALL = ["n=4", "mirrors.coating_um=20"]
 OWN = """based_on = "nickel-diamond"
 steps = ["diamond-mandrel", "bath", "coat"]
 [step.bath]
@@ -32,13 +36,14 @@ title = "electroformed in K\u00f6ln"
 
 
 @pytest.fixture(scope="module")
-def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("mandrels")
-    made = design(load_spec(None, ["n=4", "shell.negative=true", "mirrors.margin_mm=0.8"]))
-    mandrel = design_mandrel(made)
-    write_record(folder, made, shells=True)
-    write_shell_solids(made, shell_envelope(made), folder)
-    write_mandrels(made, mandrel, folder)
+def coated() -> MirrorDesign:
+    return design(load_spec(None, [*SMALL, "shell.negative=true", "mirrors.margin_mm=0.8"]))
+
+
+@pytest.fixture(scope="module")
+def exports(coated: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = export_with_solids(tmp_path_factory.mktemp("mandrels"), coated)
+    write_mandrels(coated, design_mandrel(coated), folder)
     return folder
 
 
@@ -50,8 +55,76 @@ def written(exports: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def table(folder: Path, column: str) -> np.ndarray:
-    with (folder / "inspection_a.csv").open(encoding="utf-8") as file:
-        return np.array([float(row[column]) for row in csv.DictReader(file)])
+    return np.array([float(row[column]) for row in read_csv(folder / "inspection_a.csv")])
+
+
+def test_spheres_are_those_below_the_coat(written: Path, coated: MirrorDesign) -> None:
+    array = coated.arrays[0]
+    assert [row["id"] for row in read_csv(written / "inspection_a.csv")] == array.ids
+    assert table(written, "radius_mm") == pytest.approx(array.mirrors.radius - 0.020, abs=1e-12)
+    centre = np.stack([table(written, f"centre_{axis}_mm") for axis in "xyz"], axis=1)
+    assert centre == pytest.approx(array.mirrors.centre, abs=1e-9)
+
+
+@pytest.mark.parametrize("half", ["a", "b"])
+def test_the_datums_are_the_planes_of_seam_and_foot(
+    exports: Path, coated: MirrorDesign, half: str
+) -> None:
+    """By their names in the STEP file, whose faces the kernel reads in another order."""
+    faces = dict(read_named_solid(exports / f"shell_{half}.step").faces)
+    for name, axis in (("seam", 0), ("foot", 2)):
+        plane = BRepAdaptor_Surface(faces[name]).Plane()
+        normal = np.array(plane.Axis().Direction().Coord())
+        assert np.abs(normal) == pytest.approx(np.eye(3)[axis], abs=1e-12)
+        level = coated.arrays[0].cells.surfaces.apex[-1, 2] if name == "foot" else 0.0
+        assert plane.Location().Coord()[axis] == pytest.approx(level, abs=1e-9)
+
+
+def test_tolerances_as_a_parser_of_the_grammar_reads_them(written: Path) -> None:
+    """No CAD kernel: the schema, one zone a mirror in the frame A, B, C, and notes."""
+    from steputils import p21
+
+    file = p21.readfile(str(written / "shell_a_tolerances.step"))
+    assert "AP242" in str(file.header.entities["FILE_SCHEMA"].params)
+    zones, frames, names, notes = [], set(), {}, {}
+    for instance in file.data[0].instances.values():
+        entities = [instance.entity] if hasattr(instance, "entity") else instance.entities
+        kinds = {entity.name: entity.params for entity in entities}
+        if "SURFACE_PROFILE_TOLERANCE" in kinds:
+            width = file[kinds["GEOMETRIC_TOLERANCE"][2]].entity.params[0]
+            zones.append(float(width.param))
+            frames.add(kinds["GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE"][0][0])
+        if "DATUM" in kinds:
+            names[instance.ref] = kinds["DATUM"][4]
+        if "DESCRIPTIVE_REPRESENTATION_ITEM" in kinds:
+            name, note = kinds["DESCRIPTIVE_REPRESENTATION_ITEM"]
+            notes[name] = note
+    assert sorted(zones) == pytest.approx(np.sort(table(written, "profile_mm")), abs=1e-12)
+    for frame in frames:
+        compartments = file[frame].entity.params[4]
+        assert [names[file[one].entity.params[4]] for one in compartments] == ["A", "B", "C"]
+    assert "Rq 4.4 nm" in notes["surface finish"]
+
+
+def test_what_is_refused(
+    record: Path, exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sample, out = Path(__file__).parents[2] / "docs" / "sample", str(tmp_path / "out")
+    for words, wrong in (
+        ([str(record)], "shell_a.step is not there: build the shell too"),
+        ([str(sample), "--out", out], "its mirrors are planar"),
+        ([str(exports), "--yield", "1.5"], "--yield 1.5: allowed is"),
+    ):
+        assert run(["order", "--chain", "cnc", *words]) == 2
+        assert wrong in capsys.readouterr().err
+    assert run(["inspection", str(exports)]) == 2
+    assert "tbcad inspection is called order: write tbcad order" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:
+    order(exports, out=tmp_path / "again")
+    assert contents(tmp_path / "again") == contents(written)
 
 
 def test_mandrel_and_nickel_share_the_limit(written: Path) -> None:

@@ -1,6 +1,5 @@
 """Limits of mirrors on pedestals: each depends on its own mirror alone, and its walls have one."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -14,14 +13,15 @@ from tbcad.app.api import order
 from tbcad.cad.formats.step import StepError, read_named_solid
 from tbcad.cad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.pedestals.cells import groove_walls
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.mirror_limits.files import Half, check_read_back, dowel_face, halves, tolerances
 from tbcad.mirror_limits.order import found_limits, minimum_at_limits
 from tbcad.mirror_limits.sensitivity import MirrorLimits, Sensitivities, sensitivities
-from tbcad.shell.files import shell_envelope, wall_names, write_shell_solids
+from tbcad.shell.files import wall_names
+from tests.exported_files import read_csv
 from tests.pedestal_designs import pedestal_design
+from tests.shell_meshes import export_with_solids
 
 TARGET = 60.0
 
@@ -44,10 +44,7 @@ def made() -> MirrorDesign:
 
 @pytest.fixture(scope="module")
 def folder(made: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("shells")
-    write_record(folder, made, shells=True)
-    write_shell_solids(made, shell_envelope(made), folder)
-    return folder
+    return export_with_solids(tmp_path_factory.mktemp("shells"), made)
 
 
 @pytest.fixture(scope="module")
@@ -73,19 +70,13 @@ def test_each_virtual_camera_depends_on_its_own_mirrors_alone(export: ExportedDe
 def test_all_mirrors_at_their_limits_are_good(
     export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]
 ) -> None:
+    """So is one kind alone at five times its limit, a part of five; they are not far too small."""
+    each = found[1].each
     assert minimum_at_limits(export, found[1], builds=200) >= TARGET
-    assert minimum_at_limits(export, replace(found[1], each=4 * found[1].each)) < TARGET
-
-
-@pytest.mark.parametrize("kind", [0, 3])
-def test_one_kind_alone_may_take_the_whole_margin(
-    export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits], kind: int
-) -> None:
-    """Five times its limit, a part of five each; no more than that: it is not far too small."""
-    alone = np.zeros_like(found[1].each)
-    alone[:, kind] = found[1].each[:, kind]
-    assert minimum_at_limits(export, replace(found[1], each=5 * alone)) >= TARGET - 1e-3
-    assert minimum_at_limits(export, replace(found[1], each=8 * alone)) < TARGET
+    assert minimum_at_limits(export, replace(found[1], each=4 * each)) < TARGET
+    for kind in np.eye(4)[[0, 3]]:
+        assert minimum_at_limits(export, replace(found[1], each=5 * each * kind)) >= TARGET - 1e-3
+        assert minimum_at_limits(export, replace(found[1], each=8 * each * kind)) < TARGET
 
 
 @pytest.mark.slow
@@ -93,8 +84,7 @@ def test_files_name_walls_and_their_limits(
     folder: Path, made: MirrorDesign, tmp_path: Path
 ) -> None:
     order(folder, chain="diamond", out=tmp_path / "out")
-    with (tmp_path / "out" / "inspection_b.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(tmp_path / "out" / "inspection_b.csv")
     record = json.loads((tmp_path / "out" / "order.json").read_text(encoding="utf-8"))
     smallest = record["limits"]["smallest"]
     assert min(float(row["wall_limit_um"]) for row in rows) >= smallest["wall_um"] > 0
@@ -139,23 +129,15 @@ def given(folder: Path, half: Half) -> FaceTolerances:
     return result
 
 
-def read_back(folder: Path, half: Half, given: FaceTolerances) -> None:
-    centres = dict(zip(half.ids, half.surfaces.centre, strict=True))
-    walls = {name: plane for one in half.walls for name, plane in one.items()}
-    check_read_back(folder / "toleranced.step", given, centres, walls)
-
-
-@pytest.mark.parametrize(
-    ("fault", "message"),
-    [("narrower", "read otherwise"), ("swapped", "zones of walls")],
-)
 def test_zones_of_walls_that_are_not_as_given_are_refused(
-    folder: Path, half: Half, given: FaceTolerances, fault: str, message: str
+    folder: Path, half: Half, given: FaceTolerances
 ) -> None:
     (first, width), (second, other), *rest = given.common_profile.items()
-    changed = {
-        "narrower": {first: width / 2, second: other, **dict(rest)},
-        "swapped": {(*first[1:], second[0]): width, (first[0], *second[1:]): other, **dict(rest)},
-    }[fault]
-    with pytest.raises(StepError, match=message):
-        read_back(folder, half, replace(given, common_profile=changed))
+    check_read_back(folder / "toleranced.step", given, half)
+    for changed, message in (
+        ({first: width / 2, second: other}, "read otherwise"),
+        ({(*first[1:], second[0]): width, (first[0], *second[1:]): other}, "zones of walls"),
+    ):
+        wrong = replace(given, common_profile={**changed, **dict(rest)})
+        with pytest.raises(StepError, match=message):
+            check_read_back(folder / "toleranced.step", wrong, half)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.core.spec.load import load_spec
+from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.light.reconstruction import picture
 from tbcad.light.reconstruction.picture import BY_FIELD
 from tbcad.light.reconstruction.start import Level, Settings
@@ -61,12 +61,14 @@ def test_size_is_the_longest_side_of_a_box(pinhole: tuple[float, ...], size: flo
 
 
 def test_a_candidate_is_the_design_of_its_place() -> None:
-    spec = load_spec(None, FEW_PIXELS)
-    one = evaluate(spec, None, (110.0, -120.0, 105.0, 1.2, 1.1))
-    moved = ["camera_mm=[110, 0, -120]", "semi_minor_mm=105", "stretch=[1.2, 1.1]"]
-    options = [*moved, *FEW_PIXELS]
-    assert one.figures == figures_of(design(load_spec(None, options)))
-    assert one.reason == ""
+    """Other keys stay."""
+    kept = (*FEW_PIXELS, "shell.wall_mm=4", "prototype.frame.floor_mm=-250")
+    spec = load_spec(None, [*kept, "camera_mm=[100, 7, -100]"])
+    keys = ("camera_mm=[110, 7, -120]", "semi_minor_mm=105", "stretch=[1.2, 1.1]")
+    moved, place = load_spec(None, [*kept, *keys]), (110.0, -120.0, 105.0, 1.2, 1.1)
+    assert spec_dict(placed(spec, place)) == spec_dict(moved)
+    one = evaluate(spec, None, place)
+    assert (one.figures, one.reason) == (figures_of(design(moved)), "")
 
 
 def test_the_first_place_is_within_the_bounds() -> None:
@@ -75,14 +77,6 @@ def test_the_first_place_is_within_the_bounds() -> None:
         limits = np.array(bounds(spec, size))
         assert (limits[:, 0] <= place_of(spec)).all()
         assert (place_of(spec) <= limits[:, 1]).all()
-
-
-def test_other_keys_stay() -> None:
-    spec = load_spec(None, ["n=4", "shell.wall_mm=4", "camera_mm=[100, 7, -100]"])
-    moved = placed(spec, (120.0, -90.0, 101.0, 1.0, 1.0))
-    assert moved.optics.camera_mm == (120.0, 7.0, -90.0)
-    assert moved.shell.wall_mm == 4
-    assert moved.optics.n == 4
 
 
 @pytest.fixture(autouse=True)

@@ -89,15 +89,12 @@ def test_a_store_of_another_design_is_refused(tmp_path: Path) -> None:
     assert store.read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["", "{", "[]\n", '{"design": 1}\n{"place": 1}\n', '{"design": 1}\n{"place": [1, 2]}\n'],
-)
-def test_a_broken_store_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_broken_store_is_refused(tmp_path: Path) -> None:
     store = tmp_path / "store.jsonl"
-    store.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=r"store.jsonl: (no list of candidates|of another)"):
-        search(SPEC, asked(80), store)
+    for text in ("", "{", "[]\n", '{"design": 1}\n{"place": 1}\n', '{"design": 1}\n'):
+        store.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"store.jsonl: (no list of candidates|of another)"):
+            search(SPEC, asked(80), store)
 
 
 def test_a_first_design_that_cannot_be_made() -> None:

@@ -30,10 +30,6 @@ SMALL = ["n=6", "camera.width_px=208", "camera.height_px=155"]
 SENSORS = (Sensor(208, 155), Sensor(312, 232), Sensor(416, 310))
 
 
-def quiet(_: str) -> None:
-    pass
-
-
 def test_sensors_of_table_ii_have_its_n() -> None:
     """Table II: 12, 18, 26 and 36; in proportion 1040 x 776 would have 13 and 4160 x 3104 25."""
     paper, other = load_spec(None), load_spec(None, ["n=17"])
@@ -54,9 +50,7 @@ class SmallViews(Viewpoints):
 @pytest.fixture(scope="module")
 def study() -> Study:
     viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 1, 640.0)))
-    return ssim(
-        load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest", quiet
-    )
+    return ssim(load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest")
 
 
 def test_more_pixels_make_better_and_sharper_views(study: Study) -> None:
@@ -132,13 +126,6 @@ def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
     assert len(study_files(found)) == 5
 
 
-def test_blurs_refused() -> None:
-    with pytest.raises(InputError, match="--filter-px 0"):
-        BlurOptions((0.0,)).checked()
-    with pytest.raises(InputError, match="--lens-px nan"):
-        BlurOptions(lens_px=(np.nan,)).checked()
-
-
 def test_viewpoints_around_the_object() -> None:
     viewpoints = viewpoints_around((0.0, 45.0), 4, 500.0)
     assert viewpoints.azimuth_deg.tolist() == [0, 90, 180, 270] * 2
@@ -189,12 +176,15 @@ def test_a_highlight_moves_with_the_viewpoint_and_is_where_light_is_mirrored() -
     assert brighter[hit & (angle < np.radians(3)) & (plain.colour.min(axis=1) < 150)].all()
 
 
-def test_subdivisions() -> None:
+def test_what_is_refused() -> None:
+    for wrong in (BlurOptions((0.0,)), BlurOptions(lens_px=(np.nan,))):
+        with pytest.raises(InputError, match=r"--(filter-px 0|lens-px nan)"):
+            wrong.checked()
     assert parse_subdivisions(None) == SUBDIVISIONS
     assert parse_subdivisions([9, 4, 9]) == (4, 9)
-    for wrong in (1, 61):
-        with pytest.raises(InputError, match=f"--n is {wrong}, allowed is 2 to 60"):
-            parse_subdivisions([4, wrong])
+    for number in (1, 61):
+        with pytest.raises(InputError, match=f"--n is {number}, allowed is 2 to 60"):
+            parse_subdivisions([4, number])
 
 
 def test_viewpoints_are_even_over_the_hemisphere() -> None:

@@ -59,17 +59,13 @@ def test_own_margins_where_they_are_smaller() -> None:
     assert best > even
 
 
-def test_one_margin_where_own_ones_gain_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_margins_stay_where_others_gain_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One for all, or those that there are; margins of single mirrors are computed anew."""
     found = OwnMargins(np.full(49, 5.0), 5.0, 1.0)
     monkeypatch.setattr(process_module, "own_margins", lambda *_: found)
     made = design_for_process(load_spec(None, SMALL), load_process("cnc"), 0.9)
     assert made.is_even
     assert made.spec.mirrors.margin_mm == made.even_mm < 5
-
-
-def test_a_margin_that_is_enough_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Facets need some, too: nothing is taken away. Margins of single mirrors are computed anew."""
-    monkeypatch.setattr(process_module, "own_margins", lambda *_: None)
     spec = load_spec(None, ["n=4", "margin_mm=1.5", f"own_margins_mm={[1.6] * 49}"])
     made = design_for_process(spec, load_process("diamond"), 0.9)
     assert (made.spec.mirrors.margin_mm, made.spec.mirrors.own_margins_mm) == (1.5, ())
@@ -110,8 +106,9 @@ def test_what_margins_cost_in_views() -> None:
 )
 def test_what_cannot_be_asked(settings: list[str], wanted: float, wrong: str) -> None:
     rough = load_process("fdm", ["sphere_centre_um=2000"])
-    with pytest.raises(InputError, match=wrong):
-        design_for_process(load_spec(None, [*SMALL, *settings]), rough, wanted)
+    for search in (design_for_process, edges_for_process):
+        with pytest.raises(InputError, match=wrong):
+            search(load_spec(None, [*SMALL, "shell.edges=valley", *settings]), rough, wanted)
 
 
 @pytest.mark.slow
@@ -196,23 +193,20 @@ def made_up(monkeypatch: pytest.MonkeyPatch, gain: float, impossible: Sequence[s
     monkeypatch.setattr(process_module, "seeing_pixels", pixels)
 
 
-@pytest.mark.parametrize(("edges", "gain"), [("valley", 2.0), ("pedestal", 0.5)])
-def test_edges_that_the_design_names_stay(
-    edges: str, gain: float, monkeypatch: pytest.MonkeyPatch
+def test_edges_of_the_design_stay_and_pedestals_must_leave_a_per_cent_more(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    made_up(monkeypatch, gain)
-    choice = edges_for_process(load_spec(None, named(edges)), inserts(), WANTED)
-    assert (choice.made.spec.shell.edges, choice.other) == (edges, None)
-    assert edges_text(choice) == f"edges: {edges}, as the design says"
-
-
-@pytest.mark.parametrize(("gain", "taken"), [(1.009, "valley"), (1.01, "pedestal")])
-def test_pedestals_must_leave_a_per_cent_more(
-    monkeypatch: pytest.MonkeyPatch, gain: float, taken: str
-) -> None:
-    made_up(monkeypatch, gain)
-    choice = edges_for_process(load_spec(None, SMALL), inserts(), WANTED)
-    assert choice.made.spec.shell.edges == taken
+    for options, gain, edges, other in (
+        (named("valley"), 2.0, "valley", None),
+        (named("pedestal"), 0.5, "pedestal", None),
+        (SMALL, 1.009, "valley", "pedestal"),
+        (SMALL, 1.01, "pedestal", "valley"),
+    ):
+        made_up(monkeypatch, gain)
+        choice = edges_for_process(load_spec(None, options), inserts(), WANTED)
+        assert choice.made.spec.shell.edges == edges
+        assert (choice.other and choice.other.edges) == other
+        assert edges_text(choice).startswith(f"edges: {edges}, ")
 
 
 def test_one_kind_without_margins_leaves_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,11 +228,3 @@ def test_pedestals_that_cannot_be_made_are_not_taken() -> None:
     assert choice.other is not None
     assert "coat thinner or shell.groove_mm larger" in str(choice.other.error)
     assert edges_text(choice).endswith("; pedestal: cannot be made")
-
-
-def test_what_cannot_be_asked_is_refused_before_anything_is_tried(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(process_module, "seeing_pixels", lambda _: pytest.fail("tried"))
-    with pytest.raises(InputError, match="rule paper"):
-        edges_for_process(load_spec(None, [*SMALL, "radius_rule=paper"]), inserts(), WANTED)

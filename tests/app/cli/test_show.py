@@ -58,14 +58,11 @@ def refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
     assert error.count("\n") == 1
 
 
-def test_a_report_of_somebody_else(export: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_not_by_tbcad(export: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (export / "report.html").write_text("<!doctype html>mine", encoding="utf-8")
     refused([str(export)], "report.html is not by tbcad: move it", capsys)
-
-
-def test_a_light_field_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "lightfield.h5").write_bytes(b"no")
-    refused([str(tmp_path), "--no-open"], "is no light field", capsys)
+    (export / "lightfield.h5").write_bytes(b"no")
+    refused([str(export), "--no-open"], "is no light field", capsys)
 
 
 def test_a_turntable_is_written_and_not_replaced(

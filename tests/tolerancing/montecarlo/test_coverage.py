@@ -45,17 +45,13 @@ def test_pixels_are_the_area_of_the_outline(small_design: MirrorDesign) -> None:
             assert area[k] == pytest.approx(polygon, rel=1e-6)
 
 
-def test_longer_focal_length_makes_larger_pictures(halves: EdgeModels) -> None:
-    draws = none(halves)[0]
-    longer = replace(draws, focal=np.array([1.01]))
-    ratio = mirror_coverage(halves[0], longer).pixels / mirror_coverage(halves[0], draws).pixels
-    assert ratio == pytest.approx(1.01**2, rel=1e-12)
-
-
-def test_facets_cost_what_they_cost(halves: EdgeModels) -> None:
-    whole, _ = coverage(halves, none(halves))
-    less, _ = coverage(halves, draw(Errors(facets=Error(0, 0.4)), 1, range(1), len(halves[0])))
+def test_facets_and_focal_length_cost_what_they_cost(halves: EdgeModels) -> None:
+    """Facets take as much of the coverage, and pictures grow with the square of the length."""
+    whole, pixels = coverage(halves, none(halves))
+    errors = Errors(facets=Error(0, 0.4), camera_focal=Error(0, 0.01))
+    less, larger = coverage(halves, draw(errors, 1, range(1), len(halves[0])))
     assert whole - less == pytest.approx(0.4, abs=1e-12)
+    assert larger / pixels == pytest.approx(1.01**2, rel=1e-12)
 
 
 def test_lesser_half_of_a_mirror_on_the_seam_counts(halves: EdgeModels) -> None:

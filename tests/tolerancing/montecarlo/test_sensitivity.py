@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import fields
+from itertools import product
 
 import numpy as np
 import pytest
@@ -51,22 +52,23 @@ def test_scaled_multiplies_spread_and_mean_and_nothing_else() -> None:
     assert scaled(MIXED, 1.0) == MIXED
 
 
-@pytest.mark.parametrize("power", [0.5, 1.0, 3.0])
-@pytest.mark.parametrize("mean", [0.02, 0.4, 5.0])
-def test_bent_loss(power: float, mean: float) -> None:
-    """The loss is the mean's power: the factor is the root of the room over the mean."""
-    found = tolerable_factor(
-        Errors(facets=Error(0, mean)), 0.9, TARGET, synthetic(lambda x: x**power)
-    )
-    assert found == pytest.approx(ROOM ** (1 / power) / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
+def factor_of(mean: float, loss: Callable[[float], float]) -> float:
+    return tolerable_factor(Errors(facets=Error(0, mean)), 0.9, TARGET, synthetic(loss))
 
 
-def test_loss_with_a_cliff_is_bracketed() -> None:
-    """Nothing is lost up to three times, all beyond: no straight line leads there."""
-    found = tolerable_factor(
-        Errors(facets=Error(0, 1.0)), 0.9, TARGET, synthetic(lambda x: 50.0 if x > 3 else 0.0)
-    )
-    assert found == pytest.approx(3.0, rel=FACTOR_TOLERANCE)
+def test_factors_of_losses_in_closed_form() -> None:
+    """The loss is the mean's power: the factor is the root of the room over the mean.
+
+    Where nothing is lost up to three times, and all beyond, no straight line leads to it. What
+    costs nothing may be anything, and what would be reached at a million times.
+    """
+    for power, mean in product((0.5, 1.0, 3.0), (0.02, 0.4, 5.0)):
+        wanted = pytest.approx(ROOM ** (1 / power) / mean, rel=FACTOR_TOLERANCE, abs=1e-4)
+        assert factor_of(mean, lambda x, power=power: x**power) == wanted  # type: ignore[misc]
+    cliff = factor_of(1.0, lambda x: 50.0 if x > 3 else 0.0)
+    assert cliff == pytest.approx(3.0, rel=FACTOR_TOLERANCE)
+    for loss in (lambda _: 0.0, lambda x: x):
+        assert factor_of(ROOM / 1e6, loss) == np.inf
 
 
 @pytest.mark.parametrize("count", [1, 10, 101])
@@ -77,13 +79,6 @@ def test_share_is_good_exactly_where_it_is_reached(count: int) -> None:
         for target in worst:
             good = estimate_yield(worst, target).share >= wanted
             assert (coverage_at_yield(worst, wanted) >= target) == good
-
-
-def test_what_costs_nothing_may_be_anything() -> None:
-    """Nor does what would be reached at a million times."""
-    slight = Errors(facets=Error(0, ROOM / 1e6))
-    for loss in (lambda _: 0.0, lambda x: x):
-        assert tolerable_factor(slight, 0.99, TARGET, synthetic(loss)) == np.inf
 
 
 def test_design_that_falls_short_allows_nothing() -> None:

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import (
     MISSING_VARIANCE,
@@ -101,15 +100,6 @@ def test_without_length_it_is_each_mirrors_own_error(halves: EdgeModels) -> None
     assert not warped.radius.any()
     assert not warped.foot.any()
     assert not warped.form.any()
-
-
-def test_a_build_is_the_same_alone_or_among_others(halves: EdgeModels) -> None:
-    case = MonteCarloCase(halves, replace(CNC, waviness=Error(5e-4)), 5)
-    together, alone = case(range(4)), case(range(2, 3))
-    for name in ("coverage", "pixels", "angle"):
-        assert np.array_equal(getattr(together, name)[2:3], getattr(alone, name)), name
-    fewer = CoverageCase(halves, case.errors, 5, worst_only=True)(range(4)).worst
-    assert np.array_equal(fewer, together.worst)
 
 
 def fields_of(

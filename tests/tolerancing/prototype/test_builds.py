@@ -211,15 +211,11 @@ class TestMotions:
         assert known < 0.1
 
 
-def test_caps_are_off_as_made_and_balls_as_bought() -> None:
-    cap = np.array([True, False])
-    errors = Errors(sphere_radius=Error(mean=0.3), ball_radius=Error(mean=0.002))
-    drawn = draw_prototypes(errors, 1, range(2), cap, np.zeros(3))
-    assert drawn.radius.tolist() == [[0.3, 0.002]] * 2
-
-
 def test_later_builds_continue_earlier_ones(model: PrototypeWindows) -> None:
     case = PrototypeCase(model, Errors(**SPREAD), 5)
+    # Caps are off as made, balls as bought.
+    made = draws_of(model, 2, sphere_radius=Error(mean=0.3), ball_radius=Error(mean=0.002))
+    assert (made.radius == np.where(model.is_cap, 0.3, 0.002)).all()
     whole, later = simulate(case, 23), simulate(case, 6, first=17)
     for field in fields(PrototypeResult):
         assert (getattr(later, field.name) == getattr(whole, field.name)[17:]).all()
