@@ -12,7 +12,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 import tbcad
-from tbcad.app.cli.commands.picture_files import scene_of, true_picture
+from tbcad.app.cli.commands.refocus import scene_of, true_picture
 from tbcad.light.reconstruction.field import NAME, read_field
 from tbcad.light.simulate.scene.rays import camera_around_object
 

@@ -9,8 +9,7 @@ from tbcad.cad.drafting.sheet import TitleBlock
 from tbcad.cad.formats.pdf import drawable
 from tbcad.core.spec.csv_rows import read_toml
 from tbcad.core.spec.design import Spec
-from tbcad.mirror_limits.held import IN_STATISTICS
-from tbcad.mirror_limits.held import UNCERTAINTY_SHARE
+from tbcad.mirror_limits.held import IN_STATISTICS, UNCERTAINTY_SHARE
 
 FIGURE_HEAD = ("figure", "limit", "limit of 2 sigma", "chain, 2 sigma", "verdict")
 ANY, WORDS = "any", "order_page.toml"

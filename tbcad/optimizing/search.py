@@ -34,7 +34,7 @@ from tbcad.optimizing.candidate import (
     rounded,
     store_bytes,
 )
-from tbcad.options.designs import Objective, OptimizeOptions
+from tbcad.options.builds import Objective, OptimizeOptions
 from tbcad.types import Floats
 
 POPULATION = 40  # places of a generation: eight for each variable

@@ -1,4 +1,4 @@
-"""How like the truth views are, sensor by sensor, each with its own n (Fig. 9)."""
+"""How like the truth views are: by sensor, each with its own n (Fig. 9), and of the prototype."""
 
 import tempfile
 from collections.abc import Iterator
@@ -8,18 +8,19 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import linregress
+from scipy.stats import linregress, ttest_rel
 
 from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.files import create_light_field, write_camera
 from tbcad.light.simulate.capture.light_field import NAME, LightField
 from tbcad.light.simulate.capture.photograph import Sensor, photograph
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import reflectors
+from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
     QUALITY,
@@ -28,6 +29,7 @@ from tbcad.light.simulate.views.viewpoints import (
     ground_truths,
     view_quality,
 )
+from tbcad.options.captures import Geometry
 from tbcad.studies.paper import (
     balanced_sensors,
     claims,
@@ -36,7 +38,7 @@ from tbcad.studies.paper import (
     try_design,
     with_lens_of_table_i,
 )
-from tbcad.types import Bytes, Progress
+from tbcad.types import Bytes, Floats, Progress
 
 MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim_sd")
 FITS = ("elevation_deg", "sensors", "slope", "intercept", "r2")
@@ -217,3 +219,88 @@ def _elevation_panels(means: Table) -> list[PlotPanel]:
         )
         panels.append(PlotPanel(title, "elevation, degrees", unit, tuple(curves)))
     return panels
+
+
+LEVEL = 0.95
+PROTOTYPE_WHERE = "section 5.1"
+
+
+def mean_difference_interval(one: Floats, other: Floats) -> tuple[float, float]:
+    """Interval of the mean of the other's values (v,) less the one's (Student's t, paired)."""
+    if len(one) < 2:
+        return -np.inf, np.inf
+    interval = ttest_rel(other, one).confidence_interval(LEVEL)
+    return float(interval.low), float(interval.high)
+
+
+def prototype_vs_shell(
+    export: ExportedDesign,
+    subject: SceneObject,
+    viewpoints: Viewpoints,
+    method: StudyMethod,
+    samples: int = 3,
+    progress: Progress = lambda _: None,
+) -> Study:
+    """The study: both light fields of one object, and the same views of both.
+
+    A pixel of a photograph is the mean of samples x samples rays. InputError: there is no prototype
+    in the export.
+    """
+    scene, views = prepared_scene(subject), viewpoints.cameras(export.capture_mm)
+    truths = ground_truths(scene, views, progress)
+    kinds: tuple[Geometry, ...] = ("spheres", "prototype")
+    light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
+    shell, prototype = (
+        view_quality(MirrorTiles(one), scene, views, truths, method, progress)
+        for one in light_fields
+    )
+    facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
+    columns = {
+        **viewpoints.angles(),
+        **{
+            f"{name}_{key}": quality[key]
+            for key in ("psnr_db", "ssim", "blur_mm")
+            for name, quality in (("shell", shell), ("prototype", prototype))
+        },
+        "ssim_difference": prototype["ssim"] - shell["ssim"],
+    }
+    table = Table.of_columns("prototype", columns, (facts, *notes("prototype")))
+    return Study("prototype", _prototype_figures(table), (table,), _prototype_panels(table))
+
+
+def _prototype_figures(table: Table) -> tuple[Figure, ...]:
+    mean = {name: float(table.numbers(name).mean()) for name in table.columns}
+    low, high = mean_difference_interval(
+        table.numbers("shell_ssim"), table.numbers("prototype_ssim")
+    )
+    verdict = "not significant" if low <= 0 <= high else "significant"
+    spread = float(np.std(table.numbers("shell_ssim"), ddof=1)) if len(table.rows) > 1 else None
+    figures = (
+        Figure("mean SSIM of the shell's views", "", mean["shell_ssim"]),
+        Figure("mean SSIM of the prototype's views", "", mean["prototype_ssim"]),
+        Figure("difference", "", mean["ssim_difference"]),
+        Figure("its interval at 95 %, low", "", low),
+        Figure("its interval at 95 %, high", "", high),
+        Figure("at 95 % the difference is", "", verdict, "no significant difference"),
+        Figure("standard deviation of SSIM over the shell's views", "", spread),
+        Figure("mean blur of the shell's views", "mm", mean["shell_blur_mm"]),
+        Figure("mean blur of the prototype's views", "mm", mean["prototype_blur_mm"]),
+        Figure("mean PSNR of the shell's views", "dB", mean["shell_psnr_db"]),
+        Figure("mean PSNR of the prototype's views", "dB", mean["prototype_psnr_db"]),
+    )
+    return tuple(replace(figure, where=PROTOTYPE_WHERE) for figure in figures)
+
+
+def _prototype_panels(table: Table) -> tuple[PlotPanel, ...]:
+    elevation = table.numbers("elevation_deg")
+    pairs = (
+        Series("shell", elevation - 0.7, table.numbers("shell_ssim"), "C0."),
+        Series("prototype", elevation + 0.7, table.numbers("prototype_ssim"), "C1."),
+    )
+    difference = Series("", elevation, table.numbers("ssim_difference"), "k.")
+    return (
+        PlotPanel("Views against the truth", "elevation, degrees", "SSIM", pairs),
+        PlotPanel(
+            "Prototype less shell", "elevation, degrees", "difference of SSIM", (difference,)
+        ),
+    )

@@ -19,19 +19,17 @@ from tbcad.tolerancing.montecarlo.builds import (
     CoverageCase,
     MonteCarloCase,
     ShellResult,
+    SingleErrorEffect,
+    WorstCoverage,
     YieldEstimate,
     estimate_yield,
+    one_at_a_time,
+    shell_kinds,
     simulate,
     yield_sentence,
 )
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.montecarlo.sensitivity import (
-    SingleErrorEffect,
-    WorstCoverage,
-    one_at_a_time,
-    shell_kinds,
-)
 from tbcad.tolerancing.montecarlo.sharpness import Sharpness, reference_views, sharpness
 from tbcad.tolerancing.process.process import BUILT_IN, Process, load_process, process_errors
 from tbcad.tolerancing.prototype.windows import (

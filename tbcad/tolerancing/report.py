@@ -13,7 +13,9 @@ from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
+    FACTOR_TOLERANCE,
     CoverageResult,
+    SingleErrorEffect,
     estimate_yield,
     percent,
     yield_sentence,
@@ -21,8 +23,7 @@ from tbcad.tolerancing.montecarlo.builds import (
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel
 from tbcad.tolerancing.montecarlo.form import ray_spread
-from tbcad.tolerancing.montecarlo.sensitivity import FACTOR_TOLERANCE, SingleErrorEffect
-from tbcad.tolerancing.process.kinds import MICROMETRE, ErrorSpec
+from tbcad.tolerancing.process.chain import MICROMETRE, ErrorSpec
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"

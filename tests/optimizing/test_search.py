@@ -23,7 +23,7 @@ from tbcad.optimizing.search import (
     search_files,
     weightings,
 )
-from tbcad.options.designs import OptimizeOptions
+from tbcad.options.builds import OptimizeOptions
 
 SPEC = load_spec(None, ["n=4", "shell.wall_mm=4"])
 BEST = (123.0, -140.0, 111.5, 1.3, 1.15)

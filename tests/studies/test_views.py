@@ -23,8 +23,13 @@ from tbcad.light.simulate.views.viewpoints import (
 from tbcad.studies.balance import SUBDIVISIONS, balance, parse_subdivisions
 from tbcad.studies.low_pass import BlurOptions, low_pass
 from tbcad.studies.paper import balanced_sensors
-from tbcad.studies.prototype_vs_shell import mean_difference_interval, prototype_vs_shell
-from tbcad.studies.ssim import proportionate_n, sensor_n, ssim
+from tbcad.studies.ssim import (
+    mean_difference_interval,
+    proportionate_n,
+    prototype_vs_shell,
+    sensor_n,
+    ssim,
+)
 
 SMALL = ["n=6", "camera.width_px=208", "camera.height_px=155"]
 SENSORS = (Sensor(208, 155), Sensor(312, 232), Sensor(416, 310))

@@ -20,13 +20,13 @@ from tbcad.tolerancing.analysis import Analysis, ProcessOption
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
     MonteCarloCase,
+    SingleErrorEffect,
     YieldEstimate,
     estimate_yield,
     simulate,
 )
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.sensitivity import SingleErrorEffect
 from tbcad.tolerancing.montecarlo.sharpness import Sharpness
 from tbcad.tolerancing.process.process import load_process
 from tbcad.tolerancing.prototype.windows import PrototypeResult

@@ -11,7 +11,7 @@ from tbcad_verify.record.export import Export
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, simulate
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, scaled, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import (
     ShellDraws,
@@ -23,7 +23,6 @@ from tbcad.tolerancing.montecarlo.draws import (
 )
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.sensitivity import scaled
 from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 from tests.pedestal_designs import pedestal_design
 from tests.tolerancing.exact_builds import (

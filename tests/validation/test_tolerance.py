@@ -13,11 +13,11 @@ from tbcad_verify.record.export import Export
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
+from tbcad.tolerancing.montecarlo.builds import scaled
 from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.sensitivity import scaled
 from tests.tolerancing.exact_builds import (
     bisected_coverage,
     read_record_of,

@@ -10,8 +10,8 @@ from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import short_text
 from tbcad.core.spec.load import load_spec, option_texts
 from tbcad.errors import InputError
+from tbcad.options.builds import AnyDesign, OptimizeOptions
 from tbcad.options.call import keywords, silent
-from tbcad.options.designs import AnyDesign, OptimizeOptions
 
 if TYPE_CHECKING:
     from build123d import Part

@@ -19,9 +19,9 @@ from tbcad.options.machines import (
     CalibrateOptions,
     IntrinsicsOptions,
     MergeOptions,
+    RunOptions,
     SimulateRunOptions,
 )
-from tbcad.options.runs import RunOptions
 from tbcad.options.shared import exposures
 
 if TYPE_CHECKING:

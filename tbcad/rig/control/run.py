@@ -8,7 +8,7 @@ from time import monotonic
 
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
-from tbcad.options.runs import Ask, RunOptions, Show
+from tbcad.options.machines import Ask, RunOptions, Show
 from tbcad.options.shared import exposures
 from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs

@@ -6,7 +6,7 @@ from itertools import groupby
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.options.runs import Ask, Preflight, Show
+from tbcad.options.machines import Ask, Preflight, Show
 from tbcad.records.run import Frame, exposure_name
 from tbcad.rig.control.camera import RunCamera, Shot
 from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault

@@ -25,9 +25,9 @@ from tbcad.core.spec.prototype import GradeName
 from tbcad.core.spec.section import Section, as_tuple
 from tbcad.prototype.balls.catalogue import load_grades
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.process.chain import ChainStep, chained
-from tbcad.tolerancing.process.kinds import (
+from tbcad.tolerancing.process.chain import (
     MICROMETRE,
+    ChainStep,
     Degrees,
     ErrorSpec,
     FilletMicrometres,
@@ -39,6 +39,7 @@ from tbcad.tolerancing.process.kinds import (
     Permille,
     RootMeanSquare,
     SmoothMicrometres,
+    chained,
 )
 
 BUILT_IN = (

@@ -8,20 +8,18 @@ import numpy as np
 import pytest
 
 from tbcad.tolerancing.montecarlo.builds import (
+    FACTOR_TOLERANCE,
+    LARGEST_FACTOR,
     MonteCarloCase,
     coverage_at_yield,
     estimate_yield,
+    one_at_a_time,
+    scaled,
     simulate,
+    tolerable_factor,
 )
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.sensitivity import (
-    FACTOR_TOLERANCE,
-    LARGEST_FACTOR,
-    one_at_a_time,
-    scaled,
-    tolerable_factor,
-)
 
 MIXED = Errors(
     sphere_centre=Error(0.02),

@@ -11,10 +11,9 @@ import typer
 from tbcad.app.cli.app import app, command, print_result
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
-from tbcad.options.builds import ToleranceOptions
+from tbcad.options.builds import OptimizeOptions, ToleranceOptions
 from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_calibration, check_is_export
-from tbcad.options.designs import OptimizeOptions
 from tbcad.options.shared import ForceFile, JsonResult, Out, PlotFormatOption
 
 if TYPE_CHECKING:

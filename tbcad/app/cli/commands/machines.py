@@ -19,9 +19,10 @@ from tbcad.options.machines import (
     CalibrateOptions,
     IntrinsicsOptions,
     MergeOptions,
+    Preflight,
+    RunOptions,
     SimulateRunOptions,
 )
-from tbcad.options.runs import Preflight, RunOptions
 from tbcad.options.shared import JsonResult, exposures
 
 if TYPE_CHECKING:

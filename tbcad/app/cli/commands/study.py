@@ -172,7 +172,7 @@ def prototype_command(
     check_is_object(object_file, up, unit)
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
-    from tbcad.studies.prototype_vs_shell import prototype_vs_shell
+    from tbcad.studies.ssim import prototype_vs_shell
 
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from tbcad.app.cli.app import app
-from tbcad.app.cli.commands.picture_files import (
+from tbcad.app.cli.commands.refocus import (
     Beside,
     check_beside,
     check_pictures,
