@@ -215,10 +215,7 @@ def _reader(kind: Any) -> Any:
 
 
 def _check(name: str, value: object, kind: Any, option: ParameterInfo | str) -> None:
-    from annotated_types import Ge, Le
     from pydantic import ValidationError
-
-    from tbcad.core.spec.errors import short_text
 
     low, high = getattr(option, "min", None), getattr(option, "max", None)
     try:
@@ -228,23 +225,35 @@ def _check(name: str, value: object, kind: Any, option: ParameterInfo | str) -> 
     except ValidationError:
         inside = False
     if not inside:
-        limits = [of(bound) for of, bound in ((Ge, low), (Le, high)) if bound is not None]
-        raise InputError(
-            f"{name} is {short_text(value)}, allowed is {_allowed(kind, limits)}: change it"
-        )
+        raise InputError(refusal(name, value, _allowed(kind, low, high)))
 
 
-def _allowed(kind: Any, limits: Sequence[object]) -> str:
+def refusal(name: str, value: object, allowed: str) -> str:
+    """The line about a wrong value of an option."""
+    from tbcad.core.spec.errors import short_text
+
+    return f"{name} is {short_text(value)}, allowed is {allowed}: change it"
+
+
+def allowed_between(kind: Any, low: float | None, high: float | None) -> str:
+    """What values of a simple type are allowed, in words."""
+    from annotated_types import Ge, Le
+
     from tbcad.core.spec.errors import allowed_text
 
+    limits = [of(bound) for of, bound in ((Ge, low), (Le, high)) if bound is not None]
+    return allowed_text(kind, limits)
+
+
+def _allowed(kind: Any, low: float | None, high: float | None) -> str:
     kinds = [one for one in get_args(kind) if one is not NoneType]
     if get_origin(kind) is Sequence:
-        return f"a list, each of them {_allowed(kinds[0], limits)}"
+        return f"a list, each of them {_allowed(kinds[0], low, high)}"
     if get_origin(kind) not in (Union, UnionType):
-        return allowed_text(kind, limits)
+        return allowed_between(kind, low, high)
     if Path in kinds:
         return "a path"
-    return " or ".join(_allowed(one, limits) for one in kinds)
+    return " or ".join(_allowed(one, low, high) for one in kinds)
 
 
 def _with_arguments(text: str, record: type[Call]) -> str:

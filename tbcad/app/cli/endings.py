@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tbcad.errors import InputError, ProcessLost, one_line
+from tbcad.options.call import allowed_between, refusal
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -130,22 +131,10 @@ def usage_error_text(error: typer.TyperException) -> str:
 
 
 def _wrong_value(parameter: Any, error: "ValidationError") -> str:
-    from tbcad.core.spec.errors import short_text
-
-    given = error.errors(include_url=False)[0]["input"]
-    return f"{_name(parameter)} is {short_text(given)}, allowed is {_allowed(parameter)}: change it"
-
-
-def _allowed(parameter: Any) -> str:
-    from annotated_types import Ge, Le
-
-    from tbcad.core.spec.errors import allowed_text
-
-    kind, limits = parameter.type_descriptor, parameter.type_descriptor.parameter_info
-    between = [
-        limit(bound) for limit, bound in ((Ge, limits.min), (Le, limits.max)) if bound is not None
-    ]
-    return " or ".join(kind.choices) if kind.is_choice else allowed_text(kind.annotation, between)
+    kind, given = parameter.type_descriptor, error.errors(include_url=False)[0]["input"]
+    limits = kind.parameter_info.min, kind.parameter_info.max
+    choices = kind.choices if kind.is_choice else [allowed_between(kind.annotation, *limits)]
+    return refusal(_name(parameter), given, " or ".join(choices))
 
 
 def _name(parameter: Any) -> str:

@@ -14,7 +14,7 @@ import pytest
 from tbcad_verify.report.summary import MAX_LINES
 
 from tbcad.app.cli import run
-from tbcad.app.cli.study_output import _show
+from tbcad.app.cli.app import _show
 from tbcad.app.doctor import Finding
 from tbcad.common.results import Figure, Study
 from tbcad.common.screen import WIDTH, TimeLeft, paragraph, stages

@@ -1,6 +1,7 @@
 """Wrong values of every option of every command: one line in tbcad's own words."""
 
 import re
+import sys
 from typing import Any
 
 import pytest
@@ -41,7 +42,7 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     for name in ("build", "photograph", "analyse", "verify", "simulate_run"):
         monkeypatch.setattr(f"tbcad.app.api.{name}", begun)
     monkeypatch.setattr("tbcad.tolerancing.process_design.edges_for_process", begun)
-    monkeypatch.setattr("tbcad.app.cli.study_output.stages", begun)
+    monkeypatch.setattr(sys.modules["tbcad.app.cli.app"], "stages", begun)
     monkeypatch.setattr("tbcad.app.api.designs._checked_store", begun)
     monkeypatch.setattr("tbcad.app.doctor.diagnose", begun)
     monkeypatch.chdir(tmp_path)

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import app
-from tbcad.app.cli.study_output import Work, of_design, of_export
+from tbcad.app.cli.app import Work, app, of_design, of_export
 from tbcad.options.call import tell_options
 from tbcad.options.checks import check_is_object
 from tbcad.options.shared import (
