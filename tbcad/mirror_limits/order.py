@@ -96,7 +96,7 @@ def _record(
     export: ExportedDesign, found: Sensitivities, limits: MirrorLimits, chain: Chain
 ) -> dict[str, Any]:
     """The record of an order."""
-    smallest, median = limits.each.min(axis=0), np.median(limits.each, axis=0)
+    each = {"smallest": limits.each.min(axis=0), "median": np.median(limits.each, axis=0)}
     process, numbers = chain.process, sampled(export.reflectors[0].mirrors.apex, limits)
     ids = [mirror_ids(one.camera_id, len(one)) for one in export.reflectors]
     return {
@@ -108,8 +108,7 @@ def _record(
         "simulated_minimum_mm": minimum_at_limits(export, limits),
         "designed_minimum_mm": float(found.coverage.min()),
         "limits": {
-            "smallest": dict(zip(UNITS, smallest.tolist(), strict=False)),
-            "median": dict(zip(UNITS, median.tolist(), strict=False)),
+            **{name: dict(zip(UNITS, row.tolist(), strict=False)) for name, row in each.items()},
             "seat_um": limits.seat_um,
         },
         "chain": {
@@ -167,8 +166,7 @@ def minimum_at_limits(export: ExportedDesign, limits: MirrorLimits, builds: int 
     for model, each in zip(models, np.split(limits.each, 2), strict=True):
         shape = (builds, len(model))
         sign = generator.choice([-1.0, 1.0], (2, *shape))
-        wall = np.zeros(shape)
-        angle = generator.uniform(0, 2 * np.pi, shape)
+        angle, wall = generator.uniform(0, 2 * np.pi, shape), np.zeros(shape)
         tilt = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * each[:, 1, None]
         if len(model.walls):
             wall = generator.choice([-1.0, 1.0], shape) * each[:, 3]

@@ -1,6 +1,7 @@
 """Views with the prototype, blurred by an optical low-pass filter (section 5.3, Fig. 11)."""
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -197,22 +198,21 @@ def _figures(means: Table) -> tuple[Figure, ...]:
 def _panels(means: Table) -> tuple[PlotPanel, ...]:
     names = tuple(_name(record) for record in means.where(view="pinhole").records())
     place = np.arange(len(names), dtype=np.float64)
-    labels = {
-        "ssim": ("Similarity of views to the truth", "mean SSIM"),
-        "blur_mm": ("Blur of views", "mean standard deviation at the object, mm"),
-    }
-    kinds = (
-        ("pinhole", "pinhole at --distance", "C0o"),
-        ("aperture", "aperture of 80 mm at 160 mm", "C1s"),
-    )
-    panels = []
-    for column, (title, unit) in labels.items():
-        bars = (
-            Series(label, means.where(view=view).numbers(column), place, style)
-            for view, label, style in kinds
+
+    def panel(column: str, title: str, unit: str) -> PlotPanel:
+        pinhole, aperture = (
+            means.where(view=view).numbers(column) for view in ("pinhole", "aperture")
         )
-        panels.append(PlotPanel(title, unit, "", tuple(bars), names=names))
-    return tuple(panels)
+        bars = (
+            Series("pinhole at --distance", pinhole, place, "C0o"),
+            Series("aperture of 80 mm at 160 mm", aperture, place, "C1s"),
+        )
+        return PlotPanel(title, unit, "", bars, names=names)
+
+    return (
+        panel("ssim", "Similarity of views to the truth", "mean SSIM"),
+        panel("blur_mm", "Blur of views", "mean standard deviation at the object, mm"),
+    )
 
 
 def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
@@ -223,12 +223,8 @@ def low_pass_shifts(separation_px: float, samples: int) -> tuple[Shift, ...]:
     all (J. E. Greivenkamp, Applied Optics 29, 676, 1990).
     """
     ends = (-separation_px / 2, separation_px / 2)
-    return tuple(
-        (x + column, y + row)
-        for x, y in subpixel_shifts(samples)
-        for row in ends
-        for column in ends
-    )
+    images = product(subpixel_shifts(samples), ends, ends)
+    return tuple((x + column, y + row) for (x, y), row, column in images)
 
 
 def defocus_shifts(diameter_px: float, count: int) -> tuple[Shift, ...]:

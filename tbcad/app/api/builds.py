@@ -197,9 +197,7 @@ def _as_made(mirrors: MirrorDesign) -> AsMade:
     from tbcad.light.simulate.scene.reflector import reflectors
     from tbcad.tolerancing.montecarlo.builds import as_made
 
-    spec = mirrors.spec
-    target, coat = spec.optics.capture_diameter_mm, spec.mirrors.coating_um
-    return as_made(reflectors(mirrors), target, coat)
+    return as_made(reflectors(mirrors), mirrors.spec)
 
 
 def as_made(
@@ -221,8 +219,7 @@ def as_made(
         export = read_export(folder)
     except InputError:  # the verification says what is wrong with it
         return None
-    coat = export.spec.mirrors.coating_um
-    return simulated(export.reflectors, export.capture_mm, coat, detail)
+    return simulated(export.reflectors, export.spec, detail)
 
 
 @keywords(ReportOptions)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 from tbcad_verify.report.as_made import AsMade, ProcessYield, enough_bad
 
+from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import chunks, in_threads
 from tbcad.light.simulate.scene.reflector import Reflector
@@ -191,10 +192,7 @@ def percent(estimate: YieldEstimate) -> str:
 
 
 def as_made(
-    cameras: tuple[Reflector, Reflector],
-    capture_mm: float,
-    coating_um: float,
-    detail: Progress = lambda _: None,
+    cameras: tuple[Reflector, Reflector], spec: Spec, detail: Progress = lambda _: None
 ) -> AsMade:
     """Simulate builds of both shells by every built-in process; the same answer every time."""
     if not all((one.mirrors.curvature > 0).all() for one in cameras):
@@ -202,14 +200,13 @@ def as_made(
     models, yields = edge_models(cameras), []
     for name in BUILT_IN:
         detail(name)
-        yields.append(_process_yield(models, name, capture_mm, coating_um))
+        yields.append(_process_yield(models, name, spec))
     return AsMade(BUILDS, tuple(sorted(yields, key=lambda one: -one.coverage_mm)))
 
 
-def _process_yield(
-    models: EdgeModels, name: str, capture_mm: float, coating_um: float
-) -> ProcessYield:
-    errors = process_errors(load_process(name), coating_um)
+def _process_yield(models: EdgeModels, name: str, spec: Spec) -> ProcessYield:
+    capture_mm = spec.optics.capture_diameter_mm
+    errors = process_errors(load_process(name), spec.mirrors.coating_um)
     case, worst = CoverageCase(models, errors, SEED, worst_only=True), np.empty(0)
     try:
         while len(worst) < BUILDS and (worst < capture_mm).sum() < enough_bad(BUILDS):

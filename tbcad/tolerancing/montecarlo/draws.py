@@ -221,26 +221,19 @@ def shell_error_shapes(m: int, modes: int = 0, walls: int = 0) -> dict[str, Shap
     """Shape of each kind of error of a shell, in the order of the streams; only append to it.
 
     A half has m mirrors, w walls of pedestals, and a warp that follows from so many vectors.
-    Mirrors on pedestals have no valleys.
     """
-    valleys = (2, int(walls == 0))
     return {
         "sphere_centre": (2, m, 3),
         "sphere_radius": (2, m),
         "scale_isotropic": (2,),
         "scale_axis": (3,),
-        "shell_shift": (2, 3),
-        "shell_tilt": (2, 3),
-        "camera_shift": (2, 3),
-        "camera_tilt": (2, 3),
-        "camera_focal": (2,),
-        "coating": (2,),
-        "facets": (2,),
+        **dict.fromkeys(("shell_shift", "shell_tilt", "camera_shift", "camera_tilt"), (2, 3)),
+        **dict.fromkeys(("camera_focal", "coating", "facets"), (2,)),
         "warp": (2, modes, 3),
         "waviness": (2, m, len(TERMS)),
         "groove_wall": (2, walls),
-        "cutter_radius": valleys,
-        "ridge_rounding": valleys,
+        # Mirrors on pedestals have no valleys.
+        **dict.fromkeys(("cutter_radius", "ridge_rounding"), (2, int(walls == 0))),
     }
 
 

@@ -1,6 +1,6 @@
 """One half of the shell as designed, as the fast model needs it, and its simulated builds."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -68,7 +68,7 @@ def neighbour_pairs(cells: Cells) -> NeighbourPairs:
     pair = np.column_stack([first, second])[(first < second) & (first < m)].astype(np.int64)
     offset, face = _cutting_faces(nearby, cells.surfaces, m, pair)
     reach_mm = REACH * np.append(cell_radii(cells), [0, 0])[pair].max(axis=1)
-    return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
+    return _with_own_feet(pair, offset, face, reach_mm, m)
 
 
 def _pairs_with_walls(cells: PedestalCells) -> NeighbourPairs:
@@ -82,20 +82,20 @@ def _pairs_with_walls(cells: PedestalCells) -> NeighbourPairs:
     others = side != of_pair
     offset = np.concatenate([[0], np.cumsum(count - 1)])
     reach_mm = REACH * cell_radii(cells)[mirror]
-    pair, face = np.column_stack([mirror, plane]), plane[side[others]]
-    return _with_own_feet(NeighbourPairs(pair, offset, face, reach_mm, np.arange(0)), m)
+    pair = np.column_stack([mirror, plane])
+    return _with_own_feet(pair, offset, plane[side[others]], reach_mm, m)
 
 
-def _with_own_feet(pairs: NeighbourPairs, m: int) -> NeighbourPairs:
-    """The same with a foot plane for each mirror: a shell that warps takes its foot with it."""
-    first, second = pairs.pair.T
+def _with_own_feet(pair: Ints, offset: Ints, face: Ints, reach: Floats, m: int) -> NeighbourPairs:
+    """Pairs with a foot plane for each mirror: a shell that warps takes its foot with it."""
+    first, second = pair.T
     footed = np.unique(first[second == m + 1])
     number = np.full(m, m + 1)
     number[footed] = m + 2 + np.arange(len(footed))
-    of_face = np.repeat(first, np.diff(pairs.offset))
+    of_face = np.repeat(first, np.diff(offset))
     pair = np.column_stack([first, np.where(second == m + 1, number[first], second)])
-    face = np.where(pairs.face == m + 1, number[of_face], pairs.face)
-    return replace(pairs, pair=pair, face=face, footed=footed)
+    face = np.where(face == m + 1, number[of_face], face)
+    return NeighbourPairs(pair, offset, face, reach, footed)
 
 
 def cell_radii(cells: Cells) -> Floats:
@@ -164,8 +164,7 @@ EdgeModels: TypeAlias = tuple[EdgeModel, EdgeModel]
 
 def edge_models(cameras: tuple[Reflector, Reflector]) -> EdgeModels:
     """The fast models of both cameras with their mirrors."""
-    a, b = cameras
-    return edge_model(a), edge_model(b)
+    return edge_model(cameras[0]), edge_model(cameras[1])
 
 
 def edge_model(at: Reflector) -> EdgeModel:
@@ -190,10 +189,9 @@ def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
 @lru_cache(maxsize=1)  # processes of one material share the length
 def _warp_maps(a: EdgeModel, b: EdgeModel, length: float) -> WarpMaps:
     chosen = pivots(a.apex, length)  # of both halves the same mirrors
-    fields = (smooth_field(one.apex, length, chosen) for one in (a, b))
     first, second = (
-        warp_map(one.table, one.cell_radius, one.walls, field)
-        for one, field in zip((a, b), fields, strict=True)
+        warp_map(one.table, one.cell_radius, one.walls, smooth_field(one.apex, length, chosen))
+        for one in (a, b)
     )
     return first, second
 

@@ -5,6 +5,8 @@ rays, but for the residual of the calibration.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,29 +141,24 @@ def _light_field(
 
 def _with_rays_of(rays: LightField, pictures: LightField) -> LightField:
     """The pictures of one light field with the rays of another."""
-    frames = {
-        name: replace(
-            frame, planes={**frame.planes, "colour": pictures.frames[name].planes["colour"]}
-        )
-        for name, frame in rays.frames.items()
-    }
-    return replace(pictures, frames=frames)
+    colour = {name: frame.planes["colour"] for name, frame in pictures.frames.items()}
+    planes = {name: {**one.planes, "colour": colour[name]} for name, one in rays.frames.items()}
+    return _with_planes(rays, planes)
+
+
+def _with_planes(source: LightField, planes: dict[str, dict[str, Any]]) -> LightField:
+    frames = {name: replace(one, planes=planes[name]) for name, one in source.frames.items()}
+    return replace(source, frames=frames)
 
 
 def _with_residual(built: LightField, residual: float, seed: tuple[int, int]) -> LightField:
     """A light field with every mirror's rays turned by a random residual of the calibration."""
     sequence = np.random.SeedSequence(seed[0], spawn_key=(seed[1], CALIBRATION_STREAM))
-    generator = np.random.default_rng(sequence)
-    frames = {
-        name: replace(frame, planes=_rotated(frame, residual, generator))
-        for name, frame in built.frames.items()
-    }
-    return replace(built, frames=frames)
+    turned = partial(_rotated, residual=residual, generator=np.random.default_rng(sequence))
+    return _with_planes(built, {name: turned(frame) for name, frame in built.frames.items()})
 
 
-def _rotated(
-    frame: CameraFrame, residual: float, generator: np.random.Generator
-) -> dict[str, object]:
+def _rotated(frame: CameraFrame, residual: float, generator: np.random.Generator) -> dict[str, Any]:
     """Planes of a frame whose mirrors' rays are turned by small random angles."""
     rotation = np.vstack([np.zeros(3), residual * generator.standard_normal((len(frame.u), 3))])
     mirror, direction = frame.planes["mirror"], frame.planes["direction"]
@@ -197,9 +194,6 @@ def view_ssims(specs: dict[str, Spec]) -> dict[str, float]:
     capture_mm = next(iter(specs.values())).optics.capture_diameter_mm
     scene = prepared_scene(built_in_object(capture_mm))
     reference = reference_views(scene, capture_mm)
-    return {
-        words: float(
-            _ssim(_light_field(reflectors(design(one)), scene, capture_mm), reference).mean()
-        )
-        for words, one in specs.items()
-    }
+    made = {words: reflectors(design(spec)) for words, spec in specs.items()}
+    sources = {words: _light_field(one, scene, capture_mm) for words, one in made.items()}
+    return {words: float(_ssim(one, reference).mean()) for words, one in sources.items()}

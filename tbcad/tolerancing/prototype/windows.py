@@ -276,14 +276,12 @@ def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> Prototyp
     of a mirror's halves at the seam. Offsets are the distance at the object between the ray in the
     middle of each window and the designed ray, square to that; infinite without a ball.
     """
-    v, m = int(model.virtual.max()) + 1, len(model.virtual)
-    result = PrototypeResult(*(np.empty((len(draws), size)) for size in (v, m, v, m)))
+    rows = []
     for build in range(len(draws)):
         poses = [run_pose(model, draws, build, half) for half in (0, 1)]
         known = [calibrated_pose(model, half, pose) for half, pose in enumerate(poses)]
-        result.coverage[build], result.offset[build] = _seen(model, poses)
-        result.calibrated_coverage[build], result.calibrated_offset[build] = _seen(model, known)
-    return result
+        rows.append((*_seen(model, poses), *_seen(model, known)))
+    return PrototypeResult(*map(np.array, zip(*rows, strict=True)))
 
 
 def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:

@@ -172,8 +172,8 @@ def test_refocus_and_sweep(
 
 
 def test_all_in_focus(captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["refocus", str(captured), "--all-in-focus", "--aperture", "80"]
-    words += ["--width", "96", "--height", "72", "--out", str(tmp_path / "f.png")]
+    words = ["refocus", str(captured), "--all-in-focus", "--aperture", "80", "--width", "96"]
+    words += ["--height", "72", "--out", str(tmp_path / "f.png")]
     assert run(words) == 0
     assert "against the pinhole picture" in capsys.readouterr().out
     assert run([*words, "--sweep", str(tmp_path / "f.gif")]) == 2

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command, print_json, print_result
+from tbcad.app.cli.app import command, print_result
 from tbcad.app.cli.endings import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
@@ -50,21 +50,21 @@ def capture(
         asked = replace(options, out=out, geometry=geometry).on(screen)
         photographs = photograph(asked)
         record = write_photographs(photographs, asked)
-    if json:
-        print_json(record)
-        return 0
+    written = f"{photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5"
+    print_result(record, [*_capture_lines(record, out, frames), f"{out}: {written}"], json)
+    return 0
+
+
+def _capture_lines(record: dict[str, Any], out: Path, frames: int | None) -> Iterator[str]:
     for camera, counts in record["cameras"].items():
         seen, on = counts["pixels_that_see_the_capture_sphere"], counts["pixels_on_mirrors"]
-        typer.echo(f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere")
+        yield f"camera {camera}: {on} pixels on mirrors, {seen} see the capture sphere"
+    told = {"sequence.h5": f"{frames} frames"} if frames is not None else {}
     if reflectance := record.get("reflectance"):
-        size = (out / "reflectance.h5").stat().st_size / 1e6
-        lamps_and_rays = f"{reflectance['lamps']} lamps, {reflectance['rays']} rays"
-        typer.echo(f"{out / 'reflectance.h5'}: {lamps_and_rays}, {size:.0f} MB")
-    if frames is not None:
-        size = (out / "sequence.h5").stat().st_size / 1e6
-        typer.echo(f"{out / 'sequence.h5'}: {frames} frames, {size:.0f} MB")
-    typer.echo(f"{out}: {photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5")
-    return 0
+        lamps = f"{reflectance['lamps']} lamps, {reflectance['rays']} rays"
+        told = {"reflectance.h5": lamps, **told}
+    for name, text in told.items():
+        yield f"{out / name}: {text}, {(out / name).stat().st_size / 1e6:.0f} MB"
 
 
 STAGES = 4
