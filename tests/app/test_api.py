@@ -84,26 +84,21 @@ def test_printed_parts_are_valid_and_assembled() -> None:
 def test_bad_input_is_one_line() -> None:
     with pytest.raises(InputError, match=r"n and settings go with a design file"):
         tbcad.design(tbcad.load_spec(None), n=4)
-    with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
-        tbcad.design(n=3).shell("c")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
-        tbcad.design(n=3).mandrel("c")  # type: ignore[arg-type]
+    for part in (tbcad.design(n=3).shell, tbcad.design(n=3).mandrel):
+        with pytest.raises(InputError, match=r"there is no camera 'c': allowed are 'a' and 'b'"):
+            part("c")  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"optics\.n is 99"):
         tbcad.design(n=99)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("calibrate", "dataset", "intrinsics", "merge", "optimize", "refocus"),
-        *("simulate_run", "tolerance", "view"),
-    ],
-)
-def test_a_function_says_in_one_line_what_it_wants(name: str) -> None:
-    with pytest.raises(InputError, match=r"\w+ is 3, allowed is [^\n]+: change it$"):
-        getattr(tbcad, name)(3)
-    with pytest.raises(InputError, match=r"(?i)^[^\n]+(no such f|is not there|is missing)[^\n]+$"):
-        getattr(tbcad, name)("absent")
+def test_a_function_says_in_one_line_what_it_wants() -> None:
+    missing = r"(?i)^[^\n]+(no such f|is not there|is missing)[^\n]+$"
+    names = "calibrate dataset intrinsics merge optimize refocus simulate_run tolerance view"
+    for name in names.split():
+        with pytest.raises(InputError, match=r"\w+ is 3, allowed is [^\n]+: change it$"):
+            getattr(tbcad, name)(3)
+        with pytest.raises(InputError, match=missing):
+            getattr(tbcad, name)("absent")
 
 
 def test_from_a_design_to_a_view(tmp_path: Path) -> None:

@@ -81,6 +81,7 @@ def test_an_option_is_called_and_takes_the_same_everywhere() -> None:
             kind = str(one.type_descriptor.annotation).replace(" | None", "")
             kinds[long_name(one)].add((kind, one.is_flag))
             assert long_name(one) != "--out" or "-o" in one.opts
+            assert bool(one.secondary_opts) == bool(one.is_flag and one.default)  # --no- ...
         names = {long_name(one) for one in options(command)}
         assert ("--json" in names) != (words[0] in WITHOUT_FIGURES), words
     assert {name for name, found in kinds.items() if len(found) > 1} == SEVERAL_KINDS
