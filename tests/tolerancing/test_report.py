@@ -104,6 +104,8 @@ class TestWords:
     def test_spread_of_rays_by_waviness(self, analysis: Analysis) -> None:
         spread = report_dict(analysis)["ray_spread_mm"]
         assert 0 < spread["median"] <= spread["largest"]
+        area = np.median(analysis.result.pixels) * spread["pixel_width_median"] ** 2
+        assert area == pytest.approx(np.pi * TARGET**2 / 4)
         said = f"displaces a mirror's rays by {spread['median']:.2g} mm at the object"
         assert said in summary_text(analysis)
         smooth = replace(analysis, process=load_process("sla", ["waviness_um=0"]))
