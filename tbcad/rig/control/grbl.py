@@ -22,8 +22,8 @@ from tbcad.rig.control.messages import (
     Port,
     Status,
     firmware_of,
-    meaning,
     parse,
+    told,
 )
 from tbcad.rig.control.plan import ControllerReset, MachineFault
 from tbcad.types import Progress
@@ -210,13 +210,12 @@ class Grbl:
 
     def _refuse(self, message: Message, line: str) -> None:
         """Raise what ends a run."""
-        told = f"{line!r}: {message.text}: {meaning(message)}"
         if message.kind == "error":
             self.pending = ""
-            raise MachineFault(f"the controller refuses {told}")
+            raise MachineFault(f"the controller refuses {told(line, message)}")
         if message.kind == "alarm":
             self._stopped = True
-            raise MachineFault(f"the controller stopped at {told}")
+            raise MachineFault(f"the controller stopped at {told(line, message)}")
         if message.kind == "banner":
             raise ControllerReset(
                 f"the controller began anew at {line!r} ({message.text}): it has forgotten its "

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array, diags_array
 from scipy.stats import chi2
 
 import tbcad.rig.calibration.run
@@ -16,9 +15,9 @@ from tbcad.common.screen import WIDTH
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import MIN_SEEN
+from tbcad.records.calibration import HalvesRecord
 from tbcad.records.run import DARK, exposure_name
 from tbcad.rig.calibration.calibrate import (
-    Halves,
     MachineCalibration,
     Setup,
     calibrate,
@@ -26,28 +25,23 @@ from tbcad.rig.calibration.calibrate import (
     prepared_setup,
 )
 from tbcad.rig.calibration.detection.detection import Detection
-from tbcad.rig.calibration.estimate.jacobian import base_slopes, highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Prior, covariance
+from tbcad.rig.calibration.estimate.jacobian import base_slopes
+from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.led_layout import (
     best_layout,
     layout_cost,
     led_room,
-    ray_errors,
     shell_information,
-    sphere_information,
     with_partners,
 )
-from tbcad.rig.calibration.priors import shell_prior
 from tbcad.rig.calibration.report.record import rays_table, residuals_table
 from tbcad.rig.calibration.report.recovered import at_plane, centre_pixels, traced
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
 from tbcad.rig.calibration.run import write_calibration
 from tbcad.rig.calibration.study import whole_errors
-from tbcad.rig.calibration.uncertainty import known_rays
-from tbcad.rig.machine.designed import BuiltPrototype, designed_shell, read_leds
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import TRUTH, Highlights, Machine, read_machine, write_machine
-from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
 from tests.rig.calibration.machines import drawn, every_highlight, small_machine, small_prior
@@ -137,7 +131,7 @@ def test_frames_that_are_not_photographed_are_missing_mirrors(setup: Setup) -> N
     half = tuple(frame for frame in setup.frames if frame.object_turn_deg == 0)
     size = setup.designed.camera.width_px, setup.designed.camera.height_px
     again = prepared_setup(setup.export, half, size, None)
-    seen = Detection(every_highlight(again.designed, 1), (), ())
+    seen = Detection(every_highlight(again.designed, 1), {}, ())
     result = calibrate(again, seen, again.prior(ERRORS))
     assert {name[0] for name in result.rays.ids} == {"a"}
     assert {name[0] for name in result.rays.absent} == {"b"}
@@ -234,26 +228,6 @@ def test_refused(
     assert not out.exists()
 
 
-def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: ExportedDesign) -> None:
-    leds = read_leds(export.folder)
-    machine = designed_shell(export.reflectors[0], leds)
-    count = len(machine.radius)
-    every = np.ones((count, len(leds)), dtype=bool)
-    information = sphere_information(machine.camera, machine.centre, machine.radius, leds, every)
-    mm, mrad = ray_errors(information, [*range(len(leds))], NOISE_PX, (SIGMA_MM, SIGMA_MM))
-    prior = shell_prior(machine, process_errors(load_process("sla")))
-    for block, sigma in prior.sigma.items():
-        sigma[:] = SIGMA_MM if block in (Block.CENTRES, Block.RADII) else 0
-    seen = [one.ravel() for one in np.indices((1, count, len(leds)))]
-    values = np.zeros(len(prior.free))
-    _, slopes = highlights_with_slopes(prior, values, *seen)
-    identity = diags_array(np.ones(len(values)))
-    known = covariance(prior, csc_array(slopes.T @ slopes / NOISE_PX**2 + identity))
-    rays = known_rays(prior, values, known, np.zeros(count, dtype=np.int64), np.arange(count))
-    assert mm == pytest.approx(rays.whole.place_mm, rel=1e-6)
-    assert mrad == pytest.approx(rays.whole.turn_mrad, rel=1e-6)
-
-
 def test_best_layout_beats_others_and_keeps_to_the_room(export: ExportedDesign) -> None:
     room = led_room(export)
     places = room.places()
@@ -285,7 +259,7 @@ def prior() -> Prior:
     return small_prior(small_machine(stops=6))
 
 
-def _halves(prior: Prior, highlights: Highlights) -> tuple[Halves, ...]:
+def _halves(prior: Prior, highlights: Highlights) -> tuple[HalvesRecord, ...]:
     frame, sphere = np.zeros(len(prior.mean.radius), dtype=np.int64), np.arange(5)
     return cross_validation(estimate(prior, highlights), frame, sphere, lambda _: None)
 
@@ -295,7 +269,7 @@ def test_halves_differ_by_what_their_covariances_say(prior: Prior) -> None:
     ratios: dict[str, list[float]] = {}
     for seed in range(BUILDS):
         for half in _halves(prior, every_highlight(drawn(prior, seed)[1], 50 + seed)):
-            ratios.setdefault(half.by, []).append(half.ratio**2)
+            ratios.setdefault(half.apart, []).append(half.ratio**2)
     assert set(ratios) == {"angles", "LEDs"}
     assert all(0.2 < np.mean(squares) < 3 for squares in ratios.values())
 
@@ -305,7 +279,7 @@ def test_halves_that_contradict_each_other_are_seen(prior: Prior) -> None:
     aside = np.where((highlights.frame % 2 == 0)[:, None], [0.0, 0.5], 0.0)
     wrong = replace(highlights, pixel=highlights.pixel + aside * (highlights.sphere[:, None] % 3))
     right, found = (_halves(prior, one)[0] for one in (highlights, wrong))
-    assert found.by == "angles"
+    assert found.apart == "angles"
     assert found.found_mm > 2 * right.found_mm
 
 
@@ -313,4 +287,4 @@ def test_halves_of_too_few_highlights_are_left_out(prior: Prior) -> None:
     highlights = every_highlight(drawn(prior, 1)[1], 2)
     kept = np.flatnonzero(highlights.led == 0)
     few = Highlights(*(getattr(highlights, one.name)[kept] for one in fields(highlights)))
-    assert [half.by for half in _halves(prior, few)] == ["angles"]
+    assert [half.apart for half in _halves(prior, few)] == ["angles"]

@@ -14,7 +14,7 @@ from tbcad.app.cli import run as tbcad
 from tbcad.errors import InputError
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.camera import EXIF, EXPOSURE, ImageFacts, Shot
-from tbcad.rig.control.chosen_camera import CommandCamera
+from tbcad.rig.control.cameras import CommandCamera
 from tbcad.rig.control.plan import CameraFault
 from tbcad.rig.control.preflight import look, preflight
 from tbcad.rig.control.shooting import Photograph, common_settings, take

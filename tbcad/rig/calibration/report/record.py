@@ -1,21 +1,14 @@
 """calibration.json, covariance.npz and the tables: all that a calibration is based on and knows."""
 
 from io import BytesIO
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tbcad.common.results import Table
-from tbcad.records.calibration import (
-    CalibrationRecord,
-    HalvesRecord,
-    HighlightFigures,
-    OutlierRecord,
-    ParameterBlock,
-    PulledParameter,
-    RayFigures,
-)
+from tbcad.records.calibration import CalibrationRecord, ParameterBlock
+from tbcad.records.document import RecordSection
 from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
@@ -27,6 +20,7 @@ from tbcad.types import Floats, Ints
 AXES = ("x", "y", "z")
 SPHERE = ("x_mm", "y_mm", "z_mm", "radius_mm")
 DIGITS = 6
+Section = TypeVar("Section", bound=RecordSection)
 
 
 def spheres_table(result: MachineCalibration, known: Covariance) -> Table:
@@ -146,50 +140,16 @@ def calibration_record(
     result: MachineCalibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
 ) -> CalibrationRecord:
     """What calibration.json says; the basis names run, export, process and lens."""
-    found = result.found
     return CalibrationRecord(
         **basis,
         verdict=judged.answer.value,
-        rays=RayFigures(
-            mirrors=len(result.rays.ids),
-            mirrors_without_frame=result.rays.absent,
-            place_mm_median=_short(judged.place_mm[0]),
-            place_mm_95=_short(judged.place_mm[1]),
-            turn_mrad_median=_short(judged.turn_mrad[0]),
-            turn_mrad_95=_short(judged.turn_mrad[1]),
-            in_run_mm_median=_short(judged.in_run[0]),
-            in_run_mrad_median=_short(judged.in_run[1]),
-            in_design_mm_median=_short(judged.whole_mm[0]),
-            in_design_mrad_median=_short(judged.whole_mrad[0]),
-            needed_mm_median=_short(judged.needed_mm),
-            share_short_of_need=_short(judged.short),
-        ),
-        highlights=HighlightFigures(
-            given=len(found.highlights),
-            used=int(found.used.sum()),
-            rejected_by_detection=_counts(result),
-            noise_factor=_short(found.noise_factor),
-            residual_px=_short(float(np.sqrt((found.residual[found.used] ** 2).mean()))),
-            degrees_of_freedom=round(found.freedom),
-        ),
-        outliers=tuple(
-            OutlierRecord(photograph=name, ball=ball, led=led, sigmas=_short(sigma))
-            for name, ball, led, sigma in outliers(result)
-        ),
-        halves=tuple(
-            HalvesRecord(
-                apart=half.by,
-                highlights=half.counts,
-                found_mm=_short(half.found_mm),
-                expected_mm=_short(half.expected_mm),
-            )
-            for half in result.halves
-        ),
+        rays=_short(judged.rays),
+        highlights=_short(judged.highlights),
+        outliers=tuple(map(_short, outliers(result))),
+        halves=tuple(map(_short, result.halves)),
         faults=result.detection.faults,
         doubts=judged.doubts,
-        unlike_the_process=tuple(
-            PulledParameter(parameter=name, sigmas=_short(sigma)) for name, sigma in judged.pulled
-        ),
+        unlike_the_process=tuple(map(_short, judged.pulled)),
         parameters=_parameters(result, known),
     )
 
@@ -228,11 +188,13 @@ def _parameters(result: MachineCalibration, known: Covariance) -> dict[str, Para
     after = np.zeros(len(prior.flat_sigma))
     after[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
     return {
-        block: ParameterBlock(
-            number=prior.sigma[block].size,
-            free=int((prior.sigma[block] > 0).sum()),
-            prior_sigma=_median(prior.sigma[block].ravel()),
-            sigma=_median(after[start : start + prior.sigma[block].size]),
+        block: _short(
+            ParameterBlock(
+                number=prior.sigma[block].size,
+                free=int((prior.sigma[block] > 0).sum()),
+                prior_sigma=_median(prior.sigma[block].ravel()),
+                sigma=_median(after[start : start + prior.sigma[block].size]),
+            )
         )
         for block, start in prior.first.items()
     }
@@ -240,13 +202,12 @@ def _parameters(result: MachineCalibration, known: Covariance) -> dict[str, Para
 
 def _median(values: Floats) -> float | None:
     free = values[values > 0]
-    return _short(float(np.median(free))) if len(free) else None
+    return float(np.median(free)) if len(free) else None
 
 
-def _counts(result: MachineCalibration) -> dict[str, int]:
-    reasons = [rejected.reason.value for rejected in result.detection.rejected]
-    return {reason: reasons.count(reason) for reason in sorted(set(reasons))}
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def _short(figures: Section) -> Section:
+    """The same with numbers of so many digits."""
+    numbers = {name: value for name, value in figures if isinstance(value, float)}
+    return figures.model_copy(
+        update={name: float(f"{value:.{DIGITS}g}") for name, value in numbers.items()}
+    )
