@@ -1,7 +1,7 @@
 """A controller on a pseudo-terminal that follows GRBL's protocol, with a base and lights.
 
-It knows states, `ok`, `error:n` and `ALARM:n`, realtime characters, 128 bytes of receive buffer, a
-planner of 15 motions, soft reset, homing, soft limits, G92, and the outputs of M64, M65, M8 and M9.
+It knows states, `ok`, `error:n` and `ALARM:n`, realtime characters, a planner of one motion, soft
+reset, homing, G92, and the outputs of M64, M65, M8 and M9.
 While it homes it is silent, grblHAL unless bit 12 of $10 is set; a hold comes after it, a reset
 ends it by ALARM:6. A reset in mid-motion and an alarm let the motor go, unless $37 of grblHAL keeps
 it on; sleep does always. After ALARM:1 and 2 it takes a reset only, and GRBL answers nothing else.
@@ -11,19 +11,17 @@ limits.c, protocol.c and stepper.c there; report.c, gcode.c, machine_limits.c, m
 stepper.c of grblHAL core.
 """
 
-import math
 import os
 import pty
 import re
 import select
 import threading
 import tty
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import monotonic
 
-RX_BYTES, PLANNER, LINE = 128, 15, 79
+LINE = 79
 BANNERS = {
     "grblhal": "GrblHAL 1.1f ['$' or '$HELP' for help]",
     "grbl": "Grbl 1.1h ['$' for help]",
@@ -129,7 +127,7 @@ class GrblDouble(threading.Thread, Double):
         self.firmware, self.greeting = firmware, BANNERS[firmware]
         self.settings = dict(settings)
         self.asked: list[float] = []
-        self.overflows, self.held, self.homed = 0, 0, False
+        self.held, self.homed = 0, False
         self.deaf = False  # to a feed hold
         self.boots = False  # whether opening its port lets it begin anew, as many boards do
         self._closing, self._silent = False, False
@@ -139,7 +137,7 @@ class GrblDouble(threading.Thread, Double):
         self.state = "Alarm" if self.settings.get(22) else "Idle"
 
     def _clear(self) -> None:
-        self._rx, self._planner = bytearray(), deque[_Motion]()
+        self._rx = bytearray()
         self._motion: _Motion | None = None
         self._wait: Callable[[], bool] | None = None
         self._done: Callable[[], None] = lambda: None
@@ -167,7 +165,8 @@ class GrblDouble(threading.Thread, Double):
     def put_into(self, state: str) -> None:
         """Sleep, check mode or an open door, by a person at the machine."""
         self.state = state
-        {"Sleep": self._sleep, "Check": self._check}.get(state, lambda: None)()
+        self._checking = state == "Check"
+        self.machine.let_go += state == "Sleep"  # whatever the settings are
 
     def stop_by_limit(self) -> None:
         """A switch is pressed."""
@@ -191,13 +190,6 @@ class GrblDouble(threading.Thread, Double):
                     self._report()
                 case 0x21:
                     self._hold()
-                case 0x7E:
-                    if self.state == "Hold:0":
-                        self.state = "Idle"
-                case 0x0D:
-                    pass
-                case _ if len(self._rx) >= RX_BYTES:
-                    self.overflows += 1
                 case _:
                     self._rx.append(byte)
 
@@ -208,8 +200,7 @@ class GrblDouble(threading.Thread, Double):
         self.held += 1
         self._mpos = self._motion.at(self.now)
         self._follow()
-        self._motion = None
-        self._planner.clear()  # a resume is not needed here
+        self._motion = None  # a resume is not needed here
         self.state = "Hold:0"
 
     def reset(self) -> None:
@@ -282,9 +273,6 @@ class GrblDouble(threading.Thread, Double):
         if self._motion and self.now >= self._motion.start_s + self._motion.seconds:
             self._mpos, self._motion = self._motion.end, None
             self._follow()
-        if self._motion is None and self._planner:
-            self._motion = self._planner.popleft()
-            self._motion.start_s = self.now
         if self._wait is not None:
             if not self._wait():
                 return
@@ -323,13 +311,10 @@ class GrblDouble(threading.Thread, Double):
             self._ok()
 
     def _ok(self) -> None:
-        if self._motion is None and not self._planner:
+        if not self.moving:
             self.see(self.machine)
         if self._reply:
             self._say("ok")
-
-    def _at_rest(self) -> bool:
-        return self._motion is None and not self._planner
 
     def _when(self, ready: Callable[[], bool], done: Callable[[], None] = lambda: None) -> None:
         self._wait, self._done = ready, done
@@ -352,9 +337,7 @@ class GrblDouble(threading.Thread, Double):
             "$H": self._home,
             "$$": self._list,
             "$X": self._unlock,
-            "$C": self._check,
             "$I": self._tell,
-            "$SLP": self._sleep,
         }
         if line in commands:
             return commands[line]()
@@ -373,22 +356,11 @@ class GrblDouble(threading.Thread, Double):
         for text in BUILD_INFO[self.firmware]:
             self._say(text)
 
-    def _sleep(self) -> None:
-        """Sleep lets the motor go, whatever the settings are."""
-        self.state = "Sleep"
-        self.machine.let_go += 1
-
     def _unlock(self) -> int | None:
         if self.state.startswith("Door"):
             return 13
         self.state = "Idle"
         return None
-
-    def _check(self) -> None:
-        if self._checking:
-            self.reset()
-        else:
-            self._checking, self.state = True, "Check"
 
     def _home(self) -> int | None:
         if not self.settings.get(22):
@@ -424,7 +396,7 @@ class GrblDouble(threading.Thread, Double):
         elif codes & {"M64", "M65"}:
             return self._output(int(values["P"]), on="M64" in codes)
         elif codes & {"M8", "M9"}:
-            self._when(self._at_rest, lambda: self.switch_relay(on="M8" in codes))
+            self._when(lambda: not self.moving, lambda: self.switch_relay(on="M8" in codes))
         elif "X" in values:
             return self._move(values["X"] + self._offset)
         return None
@@ -433,7 +405,7 @@ class GrblDouble(threading.Thread, Double):
         ends: list[float] = []
 
         def ready() -> bool:
-            if self._at_rest() and not ends:
+            if not self.moving and not ends:
                 ends.append(self.now + seconds)
             return bool(ends) and self.now >= ends[0]
 
@@ -451,15 +423,13 @@ class GrblDouble(threading.Thread, Double):
         if not self._feed:
             return 22
         if self.settings.get(20) and not -self.settings[130] <= target <= 0:
-            self._planner.clear()
             self._halt(2)
             return None
-        begin = self._planner[-1].end if self._planner else self._mpos
-        begin = self._motion.end if self._motion and not self._planner else begin
         speed = min(self._feed, self.settings[110]) / 60
-        seconds = abs(target - begin) / speed + speed / self.settings[120]
-        self._when(
-            lambda: len(self._planner) < PLANNER,
-            lambda: self._planner.append(_Motion(begin, target, math.inf, seconds)),
-        )
+
+        def begin() -> None:
+            seconds = abs(target - self._mpos) / speed + speed / self.settings[120]
+            self._motion = _Motion(self._mpos, target, self.now, seconds)
+
+        self._when(lambda: not self.moving, begin)
         return None

@@ -189,11 +189,6 @@ def test_other_configuration(
     assert "[output_pin led_4] is missing" in refused(klipper_rig.words())
 
 
-def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig) -> None:
-    klipper_rig.controller.settings[MOTOR] |= {"enable_pin": "!PB3", "dir_pin": "! PB4"}
-    assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
-
-
 IDLE = {"timeout": 1e7, "gcode": "\nM84\n"}
 
 
