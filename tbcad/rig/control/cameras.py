@@ -9,7 +9,6 @@ import shlex
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
 from types import ModuleType
@@ -18,7 +17,8 @@ from typing import Any
 from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
 from tbcad.records.run import PhaseTimes, Setting
-from tbcad.rig.control.camera import (
+from tbcad.rig.control.messages import INSTALL
+from tbcad.rig.control.photographs import (
     RunCamera,
     Shot,
     are_near,
@@ -26,7 +26,6 @@ from tbcad.rig.control.camera import (
     shutter_seconds,
     suffix_of,
 )
-from tbcad.rig.control.messages import INSTALL
 from tbcad.rig.control.plan import CameraFault
 
 PLACE = "{output}"
@@ -103,13 +102,11 @@ def _filled(word: str, fields: dict[str, str]) -> str:
 class WatchedFolder(RunCamera):
     """The new file that appears after a release is the photograph."""
 
-    def __init__(
-        self, folder: Path, timeout_s: float, clock: Callable[[], float] = monotonic
-    ) -> None:
+    def __init__(self, folder: Path, timeout_s: float) -> None:
         """Watch a folder."""
         if not folder.is_dir():
             raise InputError(f"--camera folder:{folder}: there is no such folder: make it first")
-        self._folder, self._timeout_s, self._clock = folder, timeout_s, clock
+        self._folder, self._timeout_s = folder, timeout_s
         self._known: set[str] = set()
         self.released = True
 
@@ -123,9 +120,9 @@ class WatchedFolder(RunCamera):
 
     def photograph(self) -> Shot:
         """Wait until a new file is there and complete."""
-        end, sizes = self._clock() + self._timeout_s, dict[str, tuple[int, float]]()
+        end, sizes = monotonic() + self._timeout_s, dict[str, tuple[int, float]]()
         fault = f"no photograph came into {self._folder} within {self._timeout_s:g} s"
-        while self._clock() < end:
+        while monotonic() < end:
             new = sorted(self._names() - self._known)
             if len(new) > 1:
                 raise CameraFault(f"{len(new)} photographs came into {self._folder}, not one")
@@ -143,7 +140,7 @@ class WatchedFolder(RunCamera):
     def _rests(self, path: Path, sizes: dict[str, tuple[int, float]]) -> bool:
         """Whether a file has had its size for a while."""
         try:
-            size, now = path.stat().st_size, self._clock()
+            size, now = path.stat().st_size, monotonic()
         except FileNotFoundError:
             return False
         before, since = sizes.setdefault(path.name, (size, now))

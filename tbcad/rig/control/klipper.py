@@ -220,19 +220,17 @@ class KlipperState:
 class Klipper:
     """A Klipper host."""
 
-    def __init__(
-        self, server: Moonraker, note: Progress, clock: Callable[[], float] = monotonic
-    ) -> None:
+    def __init__(self, server: Moonraker, note: Progress) -> None:
         """Speak to Klipper through Moonraker; notes are what the operator should know."""
-        self._server, self._note, self._clock = server, note, clock
+        self._server, self._note = server, note
 
     def connect(self) -> None:
         """Wait until Klipper is ready; MachineFault: it is not, or the server is not Moonraker."""
         info = self._server.get("/server/info")
         if not isinstance(info, dict) or "klippy_state" not in info:
             raise MachineFault(f"the server is not Moonraker: {ELSEWHERE}")
-        begun = self._clock()
-        while self._clock() - begun < STARTING_S.get((state := self.state()).name, 0.0):
+        begun = monotonic()
+        while monotonic() - begun < STARTING_S.get((state := self.state()).name, 0.0):
             sleep(AGAIN_S)
         if state.name != READY:
             raise MachineFault(f"{state.what}: {state.safe}")
@@ -301,12 +299,12 @@ class Klipper:
     def _until_done(
         self, answer: "Future[Any]", expected_s: float, held: bool, limit_s: float
     ) -> None:
-        begun = self._clock()
+        begun = monotonic()
         late = begun + expected_s + LATE_S
         self._look(answer, self.check_held if held else self.check_ready)
         while not wait([answer], LOOK_S).done:
             self._look(answer, self.check_ready)
-            if (now := self._clock()) - begun > limit_s:
+            if (now := monotonic()) - begun > limit_s:
                 raise MachineFault("Klipper is busy with another program's G-code")
             if now > late:
                 late = float("inf")
@@ -338,8 +336,8 @@ class Klipper:
 
     def _until_back(self, fault: Unreachable, held: bool) -> None:
         """Wait until Moonraker is there again, which finds Klipper some seconds later."""
-        begun = self._clock()
-        while self._clock() - begun < BACK_S:
+        begun = monotonic()
+        while monotonic() - begun < BACK_S:
             with suppress(Unreachable):
                 if self.state().name not in STARTING_S:
                     return self.check_held() if held else self.check_ready()

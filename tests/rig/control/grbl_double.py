@@ -17,7 +17,7 @@ import re
 import select
 import threading
 import tty
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from time import monotonic
 
@@ -41,6 +41,8 @@ OUTPUTS = 8
 TICK_S, SPEED = 0.0005, 2000.0
 Fault = Callable[[int, str], str | None]
 """By a line's number and text: drop_ok, drop_line, reset, power, error, alarm, silence."""
+Answer = int | Iterator[None] | None
+"""To a line: the number of an error, or what is to be waited for before its `ok`."""
 
 
 @dataclass
@@ -139,9 +141,8 @@ class GrblDouble(threading.Thread, Double):
     def _clear(self) -> None:
         self._rx = bytearray()
         self._motion: _Motion | None = None
-        self._wait: Callable[[], bool] | None = None
-        self._done: Callable[[], None] = lambda: None
-        self._reply = True
+        self._steps: Iterator[None] = iter(())  # of the line that is done now
+        self._reply, self._dropped = False, False
         self._homing: _Motion | None = None
         self._hold_later, self._blocked = False, False
         self._offset, self._feed, self._checking = 0.0, 0.0, False
@@ -273,12 +274,9 @@ class GrblDouble(threading.Thread, Double):
         if self._motion and self.now >= self._motion.start_s + self._motion.seconds:
             self._mpos, self._motion = self._motion.end, None
             self._follow()
-        if self._wait is not None:
-            if not self._wait():
-                return
-            self._wait = None
-            self._done()
-            self._ok()
+        for _ in self._steps:
+            return
+        self._ok()
         if self._blocked or self.state.startswith(("Hold", "Sleep")):
             return
         if b"\n" not in self._rx:
@@ -293,10 +291,8 @@ class GrblDouble(threading.Thread, Double):
         number = len(self.lines)
         self.on_line(number)
         fault = self.fault(number, line)
-        self._reply = fault != "drop_ok"
-        if fault == "drop_line":
-            return
         faults: dict[str | None, Callable[[], None]] = {
+            "drop_line": lambda: None,
             "reset": self.reset,
             "power": self.power_cycle,
             "silence": self.unplug,
@@ -304,22 +300,23 @@ class GrblDouble(threading.Thread, Double):
             "alarm": self.stop_by_limit,
         }
         if fault in faults:
-            faults[fault]()
-        elif (error := self._run_line(line)) is not None:
-            self._say(f"error:{error}")
-        elif self._wait is None:
-            self._ok()
+            return faults[fault]()
+        answer = self._run_line(line)
+        if isinstance(answer, int):
+            return self._say(f"error:{answer}")
+        self._steps, self._dropped, self._reply = answer or iter(()), fault == "drop_ok", True
 
     def _ok(self) -> None:
+        """End the line that was done, if there was one."""
+        if not self._reply:
+            return
+        self._reply = False
         if not self.moving:
             self.see(self.machine)
-        if self._reply:
+        if not self._dropped:
             self._say("ok")
 
-    def _when(self, ready: Callable[[], bool], done: Callable[[], None] = lambda: None) -> None:
-        self._wait, self._done = ready, done
-
-    def _run_line(self, line: str) -> int | None:
+    def _run_line(self, line: str) -> Answer:
         if len(line) > LINE:
             return 11
         if line.startswith("$"):
@@ -332,8 +329,8 @@ class GrblDouble(threading.Thread, Double):
         codes = {f"{letter}{float(number):g}" for letter, number in words if letter in "GM"}
         return self._gcode(codes, words)
 
-    def _system(self, line: str) -> int | None:
-        commands: dict[str, Callable[[], int | None]] = {
+    def _system(self, line: str) -> Answer:
+        commands: dict[str, Callable[[], Answer]] = {
             "$H": self._home,
             "$$": self._list,
             "$X": self._unlock,
@@ -362,29 +359,32 @@ class GrblDouble(threading.Thread, Double):
         self.state = "Idle"
         return None
 
-    def _home(self) -> int | None:
-        if not self.settings.get(22):
-            return 5
+    def _home(self) -> Answer:
+        return self._homed() if self.settings.get(22) else 5
+
+    def _homed(self) -> Iterator[None]:
         self.state = "Home"
         seconds = abs(self.machine.angle - self.switch_deg) / self.settings[25] * 60
         self._homing = _Motion(self.machine.angle, self.switch_deg, self.now, seconds)
-        end = self.now + seconds
+        yield from self._until(self.now + seconds)
+        pull_off = self.settings[27]
+        self._mpos = -self.settings[130] + pull_off
+        self._zero = self.switch_deg + pull_off - self._mpos
+        self._follow()
+        self._homing = None
+        self.state, self.homed = "Hold:0" if self._hold_later else "Idle", True
 
-        def found() -> None:
-            pull_off = self.settings[27]
-            self._mpos = -self.settings[130] + pull_off
-            self._zero = self.switch_deg + pull_off - self._mpos
-            self._follow()
-            self._homing = None
-            self.state, self.homed = "Hold:0" if self._hold_later else "Idle", True
+    def _until(self, time: float) -> Iterator[None]:
+        while self.now < time:
+            yield
 
-        self._when(lambda: self.now >= end, found)
-        return None
+    def _at_rest(self) -> Iterator[None]:
+        while self.moving:
+            yield
 
-    def _gcode(self, codes: set[str], words: list[tuple[str, str]]) -> int | None:
+    def _gcode(self, codes: set[str], words: list[tuple[str, str]]) -> Answer:
         values = {letter: float(number) for letter, number in words if letter in "XAFP"}
-        if "F" in values:
-            self._feed = values["F"]
+        self._feed = values.get("F", self._feed)
         if not codes <= KNOWN:
             return 20
         if "G92.1" in codes:
@@ -392,26 +392,20 @@ class GrblDouble(threading.Thread, Double):
         elif "G92" in codes:
             self._offset = self._mpos - values["X"]
         elif "G4" in codes:
-            self._dwell(values.get("P", 0.0))
+            return self._dwell(values.get("P", 0.0))
         elif codes & {"M64", "M65"}:
             return self._output(int(values["P"]), on="M64" in codes)
         elif codes & {"M8", "M9"}:
-            self._when(lambda: not self.moving, lambda: self.switch_relay(on="M8" in codes))
+            return self._release(on="M8" in codes)
         elif "X" in values:
-            return self._move(values["X"] + self._offset)
+            return self._move(values["X"] + self._offset) if self._feed else 22
         return None
 
-    def _dwell(self, seconds: float) -> None:
-        ends: list[float] = []
+    def _dwell(self, seconds: float) -> Iterator[None]:
+        yield from self._at_rest()
+        yield from self._until(self.now + seconds)
 
-        def ready() -> bool:
-            if not self.moving and not ends:
-                ends.append(self.now + seconds)
-            return bool(ends) and self.now >= ends[0]
-
-        self._when(ready)
-
-    def _output(self, output: int, *, on: bool) -> int | None:
+    def _output(self, output: int, *, on: bool) -> Answer:
         if self.firmware == "grbl":
             return 20
         if output >= OUTPUTS:
@@ -419,17 +413,14 @@ class GrblDouble(threading.Thread, Double):
         self.switch_light(output, on=on)
         return None
 
-    def _move(self, target: float) -> int | None:
-        if not self._feed:
-            return 22
+    def _release(self, *, on: bool) -> Iterator[None]:
+        yield from self._at_rest()
+        self.switch_relay(on=on)
+
+    def _move(self, target: float) -> Iterator[None]:
+        yield from self._at_rest()
         if self.settings.get(20) and not -self.settings[130] <= target <= 0:
-            self._halt(2)
-            return None
+            return self._halt(2)
         speed = min(self._feed, self.settings[110]) / 60
-
-        def begin() -> None:
-            seconds = abs(target - self._mpos) / speed + speed / self.settings[120]
-            self._motion = _Motion(self._mpos, target, self.now, seconds)
-
-        self._when(lambda: not self.moving, begin)
-        return None
+        seconds = abs(target - self._mpos) / speed + speed / self.settings[120]
+        self._motion = _Motion(self._mpos, target, self.now, seconds)

@@ -16,8 +16,16 @@ from tbcad.rig.control.base import Base
 from tbcad.rig.control.plan import read_settings
 from tests.rig.control.conftest import Told
 from tests.rig.control.grbl_double import GrblDouble
-from tests.rig.control.rig import Rig, at, until
-from tests.rig.control.run_checks import ALL, FAST, check_every_photograph, check_goes_on, events
+from tests.rig.control.rig import (
+    ALL,
+    FAST,
+    Rig,
+    at,
+    check_every_photograph,
+    check_goes_on,
+    events,
+    until,
+)
 
 
 @pytest.mark.parametrize("what", ["drop_ok", "drop_line"])

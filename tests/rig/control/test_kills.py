@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tests.rig.control.rig import Rig, until
-from tests.rig.control.run_checks import check_every_photograph, content, journal
+from tests.rig.control.rig import Rig, check_every_photograph, content, journal, until
 
 PER_STOP = 12
 PHOTOGRAPH = 4  # lines

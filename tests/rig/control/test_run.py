@@ -16,8 +16,7 @@ from tbcad.rig.control.selection import chosen_frames, chosen_phases
 from tbcad.rig.runs import read_run
 from tests.exported_files import Rows, edit_csv
 from tests.rig.control.conftest import Told
-from tests.rig.control.rig import Rig
-from tests.rig.control.run_checks import ALL, check_every_photograph, events
+from tests.rig.control.rig import ALL, Rig, check_every_photograph, events
 
 
 def test_every_photograph_of_a_run(either_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
