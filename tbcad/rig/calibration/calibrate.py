@@ -200,11 +200,7 @@ def _compared(
 
 def _static(found: Estimate) -> Ints:
     """Free parameters that are not of single frames, of which a half sees every other one."""
-    prior = found.prior
-    single = np.zeros(len(prior.flat_sigma), dtype=bool)
-    for block in (Block.ANGLES, Block.RUNOUT):
-        single[prior.first[block] : prior.first[block] + prior.sigma[block].size] = True
-    return np.flatnonzero(~single[prior.free])
+    return np.flatnonzero(~found.prior.is_of(Block.ANGLES, Block.RUNOUT))
 
 
 def _subset(found: Estimate, part: Bools) -> Highlights:

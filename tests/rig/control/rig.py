@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Event
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,9 @@ TIMES = {"taken", "seconds"}
 NEIGHBOURS = (-1, 0, 1)  # tenths of a degree: the program's angles are truncated
 
 
+PER_STOP = 12
+PHOTOGRAPH = 4  # lines
+DELAY_S = 0.008  # in which a photograph comes from the camera to the disk
 ROOT = Path(__file__).parents[3]
 PICTURE = "scene.jpg"
 PICTURE_BYTES = 16_384  # the virtual camera asks for a file's size once
@@ -199,8 +204,6 @@ def at(
 
 def until(condition: Callable[[], bool], seconds: float = 600.0) -> None:
     """Wait for something that a thread does."""
-    from time import monotonic, sleep
-
     end = monotonic() + seconds
     while not condition():
         assert monotonic() < end
@@ -254,3 +257,41 @@ def content(folder: Path) -> dict[str, Any]:
         else:
             found[path.name] = path.read_bytes()
     return found
+
+
+def killed_run(rig: Rig, camera: str, stops: int, kills: int, seed: int) -> None:
+    """Start, kill at random moments, and go on until the end."""
+    random = np.random.default_rng(seed)
+    each = PER_STOP * stops // kills * PHOTOGRAPH  # lines, so that all kills come in time
+    words = rig.words(camera=camera, stops=f"1-{stops}")
+    for lines in random.integers(1, rig.controller.lines_before + each, kills).tolist():
+        kill_after(rig, words, lines, random.uniform(0, DELAY_S))
+        if (rig.out / "run.json").is_file():
+            words = rig.words("--resume", camera=camera, stops=None)
+    process = rig.start(words)
+    _, err = process.communicate(timeout=600)
+    assert process.returncode == 0, err
+
+
+def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
+    """Kill a command a moment after its controller has some lines; the next line is not answered.
+
+    So a command that is faster than the process that kills it gets no farther.
+    """
+    end = len(rig.controller.lines) + lines
+    killed = Event()
+
+    def hold(number: int) -> None:
+        if number > end:
+            killed.wait()
+
+    rig.controller.on_line = hold
+    process = rig.start(words)
+    until(lambda: len(rig.controller.lines) >= end or process.poll() is not None)
+    sleep(delay_s)
+    code = process.poll()
+    process.kill()
+    output = process.communicate()
+    rig.controller.on_line = lambda number: None
+    killed.set()
+    assert code is None, output

@@ -38,8 +38,16 @@ from tbcad.rig.machine.machine import Machine, read_machine
 from tbcad.rig.runs import read_photograph, read_run
 from tests.rig.control import grbl_double
 from tests.rig.control.conftest import export
-from tests.rig.control.rig import OUTPUTS, PICTURE_BYTES, SIZE, Rig, connected_rig, content, journal
-from tests.rig.control.test_kills import killed_run
+from tests.rig.control.rig import (
+    OUTPUTS,
+    PICTURE_BYTES,
+    SIZE,
+    Rig,
+    connected_rig,
+    content,
+    journal,
+    killed_run,
+)
 
 NEAR_DEG = 0.05  # of a stop: nearer than any two stops are
 PROMPT = b"done? [Y/n]:"

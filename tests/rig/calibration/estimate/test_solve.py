@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csc_array, diags_array
 from scipy.stats import chi2
 
 from tbcad.common.results import study_files
@@ -19,7 +20,7 @@ from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.rig.calibration.estimate.jacobian import base_slopes, highlights_with_slopes, reflections
 from tbcad.rig.calibration.estimate.parameters import Block, Prior, covariance
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate, outlier_limit
-from tbcad.rig.calibration.led_layout import NUMBERS
+from tbcad.rig.calibration.led_layout import NUMBERS, only_spheres, ray_errors, shell_information
 from tbcad.rig.calibration.priors import (
     MEASURED_MM,
     parse_measured,
@@ -36,11 +37,12 @@ from tbcad.rig.calibration.study import (
 )
 from tbcad.rig.calibration.uncertainty import (
     SPHERE_MM,
+    known_rays,
     ray_slopes,
     ray_uncertainty,
     rigid_motions,
 )
-from tbcad.rig.machine.designed import designed_shell
+from tbcad.rig.machine.designed import designed_shell, read_leds
 from tbcad.rig.machine.machine import Highlights
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import (
@@ -52,6 +54,7 @@ from tests.rig.calibration.machines import (
     small_prior,
 )
 
+SIGMA_MM = 0.025
 STEP = 1e-3  # of the prior standard deviations
 FEW, MANY = 10, 100
 MARGIN_PX = 100
@@ -85,7 +88,7 @@ def _all_rays(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_blocks_are_those_of_the_dense_inverse(found: Estimate) -> None:
-    known = covariance(found.prior, found.information)
+    known = found.covariance
     dense = np.linalg.inv(found.information.toarray())
     slopes, _ = ray_slopes(found.prior, found.values, *_all_rays(found.prior))
     full = slopes @ dense @ slopes.T
@@ -172,6 +175,22 @@ def test_rays_are_off_by_what_the_covariance_says(prior: Prior) -> None:
     mean = _errors_over_sigmas(prior, FEW).mean()
     low, high = chi2.ppf([0.001, 0.999], 2 * FEW) / (2 * FEW)
     assert low < mean < high
+
+
+def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: ExportedDesign) -> None:
+    leds = read_leds(export.folder)
+    information = shell_information(export, leds)
+    mm, mrad = ray_errors(information, [*range(len(leds))], NOISE_PX, (SIGMA_MM, SIGMA_MM))
+    led, sphere = np.nonzero(information.by_led.any(axis=(2, 3)))
+    free = only_spheres(designed_shell(export.reflectors[0], leds))
+    prior = replace(free, sigma={block: SIGMA_MM * one for block, one in free.sigma.items()})
+    values, every = np.zeros(len(prior.free)), np.arange(len(mm))
+    _, slopes = highlights_with_slopes(prior, values, 0 * led, sphere, led)
+    identity = diags_array(np.ones(len(values)))
+    known = covariance(prior, csc_array(slopes.T @ slopes / NOISE_PX**2 + identity))
+    rays = known_rays(prior, values, known, 0 * every, every).whole
+    assert mm == pytest.approx(rays.place_mm, rel=1e-6)
+    assert mrad == pytest.approx(rays.turn_mrad, rel=1e-6)
 
 
 @pytest.mark.slow
