@@ -54,7 +54,7 @@ from tests.rig.calibration.machines import (
     small_prior,
 )
 
-SIGMA_MM = 0.025
+SIGMA_MM, RADIUS_MM = 0.025, 0.002  # of centres and radii
 STEP = 1e-3  # of the prior standard deviations
 FEW, MANY = 10, 100
 MARGIN_PX = 100
@@ -180,10 +180,12 @@ def test_rays_are_off_by_what_the_covariance_says(prior: Prior) -> None:
 def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: ExportedDesign) -> None:
     leds = read_leds(export.folder)
     information = shell_information(export, leds)
-    mm, mrad = ray_errors(information, [*range(len(leds))], NOISE_PX, (SIGMA_MM, SIGMA_MM))
+    mm, mrad = ray_errors(information, [*range(len(leds))], NOISE_PX, (SIGMA_MM, RADIUS_MM))
     led, sphere = np.nonzero(information.by_led.any(axis=(2, 3)))
     free = only_spheres(designed_shell(export.reflectors[0], leds))
-    prior = replace(free, sigma={block: SIGMA_MM * one for block, one in free.sigma.items()})
+    known_to = {Block.CENTRES: SIGMA_MM, Block.RADII: RADIUS_MM}
+    sigma = {block: known_to.get(block, 0.0) * one for block, one in free.sigma.items()}
+    prior = replace(free, sigma=sigma)
     values, every = np.zeros(len(prior.free)), np.arange(len(mm))
     _, slopes = highlights_with_slopes(prior, values, 0 * led, sphere, led)
     identity = diags_array(np.ones(len(values)))
