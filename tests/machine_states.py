@@ -9,6 +9,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.run import Frame
+from tbcad.rig import runs
 from tbcad.rig.machine.designed import designed_prototype
 from tbcad.rig.machine.machine import Machine
 
@@ -24,12 +25,7 @@ def machine_of(export: ExportedDesign, plan: Plan) -> Machine:
 
 def frames_of(plan: Plan) -> tuple[Frame, ...]:
     """All stops of the first run, then of the second."""
-    degrees = np.degrees(plan.angle).tolist()
-    return tuple(
-        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
-        for turn in (0, 180)
-        for stop, angle in enumerate(degrees, 1)
-    )
+    return runs.frames_of(plan.angle)
 
 
 def perturbed(machine: Machine, seed: int) -> Machine:

@@ -14,8 +14,9 @@ from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.priors import prototype_prior
 from tbcad.rig.machine.designed import designed_prototype, is_cap, random_build
 from tbcad.rig.machine.machine import Machine
+from tbcad.rig.runs import frames_of
 from tbcad.rig.simulated_run.led_light import Occluders
-from tbcad.rig.simulated_run.photographs import ImagingChain, SimulatedRun, frames_of
+from tbcad.rig.simulated_run.photographs import ImagingChain, SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.types import Floats
@@ -65,7 +66,7 @@ def small_run(
     designed = finer(designed_prototype(export, plan))
     kinds = fdm_errors()
     built = random_build(designed, plan, kinds, SEED, wind_up=np.zeros(len(plan.angle)))
-    every = frames_of(np.degrees(plan.angle))
+    every = frames_of(plan.angle)
     kept = np.array([k for k, frame in enumerate(every) if frame.stop in stops])
     frames = tuple(every[k] for k in kept)
     scene = prepared_scene(built_in_object(subject_mm or 30.0))

@@ -134,12 +134,24 @@ class OutlierRecord(RecordSection):
 
 
 class HalvesRecord(RecordSection):
-    """Calibrations of both halves of the data: how far apart they are, and should be."""
+    """Calibrations of both halves of the data, by the rays of mirrors at the object's centre.
+
+    Attributes:
+        apart: what distinguishes the halves, "angles" or "LEDs".
+        highlights: of each half.
+        found_mm: root mean square distance of both halves' rays.
+        expected_mm: likewise, as their covariances say.
+    """
 
     apart: str
     highlights: tuple[int, ...]
     found_mm: float
     expected_mm: float
+
+    @property
+    def ratio(self) -> float:
+        """Of what is found to what is expected."""
+        return self.found_mm / self.expected_mm
 
 
 class PulledParameter(RecordSection):

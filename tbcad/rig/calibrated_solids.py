@@ -44,6 +44,8 @@ TICKS = 5
 CALIBRATE = "calibrate again with tbcad calibrate"
 AXES = 2  # of the plane at the object in which a ray may be off
 PERCENT = 95.0
+RAY_FIGURES = ("sigma_mm", "sigma_mrad", "pixel_mm")
+"""Standard deviations of place at the object and of direction; width of a pixel there."""
 
 
 @dataclass(frozen=True)
@@ -165,15 +167,13 @@ def _rows(machine: Machine, found: Deviations) -> list[Row]:
 
 @dataclass(frozen=True)
 class AsBuiltTolerance:
-    """Coverage and pointing of a calibrated machine, over m mirrors of both cameras."""
+    """Coverage and pointing of a calibrated machine, by the mirrors of both cameras."""
 
     target: float  # coverage that is wanted, mm
-    ids: tuple[str, ...]  # of the mirrors whose stops are calibrated, (m,)
-    absent: tuple[str, ...]  # of the others
-    coverage: Floats  # with windows where the balls are, mm, (m,)
-    place: Floats  # root mean square distance at the object of a ray from the true one, mm, (m,)
-    turn: Floats  # likewise its direction, mrad, (m,)
-    pixel: Floats  # width of a pixel at the object, mm, (m,)
+    # of the mirrors whose stops are calibrated: coverage with windows where the balls are, and
+    # figures of rays.csv
+    mirrors: Table
+    absent: tuple[str, ...]  # ids of the others
     worst: Floats  # minimum coverage of each simulated truth, mm, (s,)
 
     @property
@@ -205,68 +205,52 @@ def as_built_tolerance(
     ids = [name for name, calibrated in every if calibrated and name in rays]
     if not ids:
         raise InputError(f"{calibration / RayRow.FILE} names no mirror of {exports}: {CALIBRATE}")
-    shown = np.array([coverage[name] for name in ids])
-    place = np.array([rays[name].sigma_mm for name in ids])
+    records = [
+        {"mirror": name, "coverage_mm": coverage[name]}
+        | {figure: getattr(rays[name], figure) for figure in RAY_FIGURES}
+        for name in ids
+    ]
+    mirrors = Table.of_records("as-built", records)
+    shown, place = mirrors.numbers("coverage_mm"), mirrors.numbers("sigma_mm")
     random, size = np.random.default_rng(seed), (len(place), AXES)
     lost = (2 * norm(random.standard_normal(size)) * place / np.sqrt(AXES) for _ in range(builds))
     worst = np.array([(shown - one).min() for one in lost])
-    return AsBuiltTolerance(
-        target=export.capture_mm,
-        ids=tuple(ids),
-        absent=tuple(sorted({*coverage} - {*ids})),
-        coverage=shown,
-        place=place,
-        turn=np.array([rays[name].sigma_mrad for name in ids]),
-        pixel=np.array([rays[name].pixel_mm for name in ids]),
-        worst=worst,
-    )
-
-
-def tolerance_table(found: AsBuiltTolerance) -> Table:
-    """Every mirror."""
-    return Table.of_columns(
-        "as-built",
-        {
-            "mirror": found.ids,
-            "coverage_mm": found.coverage,
-            "sigma_mm": found.place,
-            "sigma_mrad": found.turn,
-            "pixel_mm": found.pixel,
-        },
-    )
+    absent = tuple(sorted({*coverage} - {*ids}))
+    return AsBuiltTolerance(export.capture_mm, mirrors, absent, worst)
 
 
 def tolerance_record(found: AsBuiltTolerance, builds: int, seed: int) -> dict[str, Any]:
     """The object of as-built.json."""
+    coverage, place, turn, pixel = map(found.mirrors.numbers, ("coverage_mm", *RAY_FIGURES))
     return {
         "schema": "tbcad-as-built-tolerance/1",
         "target_mm": found.target,
         "builds": builds,
         "seed": seed,
         "share_good": found.share,
-        "coverage_mm_minimum": float(found.coverage.min()),
+        "coverage_mm_minimum": float(coverage.min()),
         "coverage_mm_worst_median": float(np.median(found.worst)),
-        "place_mm_median": float(np.median(found.place)),
-        "place_mm_95": float(np.percentile(found.place, PERCENT)),
-        "turn_mrad_median": float(np.median(found.turn)),
-        "turn_mrad_95": float(np.percentile(found.turn, PERCENT)),
-        "pixel_mm_median": float(np.median(found.pixel)),
-        "mirrors": len(found.ids),
+        "place_mm_median": float(np.median(place)),
+        "place_mm_95": float(np.percentile(place, PERCENT)),
+        "turn_mrad_median": float(np.median(turn)),
+        "turn_mrad_95": float(np.percentile(turn, PERCENT)),
+        "pixel_mm_median": float(np.median(pixel)),
+        "mirrors": len(place),
         "mirrors_not_calibrated": list(found.absent),
     }
 
 
 def summary(found: AsBuiltTolerance) -> str:
     """The result in words."""
-    least, truth = float(found.coverage.min()), float(np.median(found.worst))
+    coverage, place, turn, pixel = map(found.mirrors.numbers, ("coverage_mm", *RAY_FIGURES))
     lost = f" {len(found.absent)} mirrors are not calibrated." if found.absent else ""
     return (
         f"As calibrated, {found.share:.0%} of {len(found.worst)} simulated truths show "
-        f"{found.target:g} mm by all {len(found.ids)} mirrors: minimum coverage {least:.2f} mm as "
-        f"calibrated, {truth:.2f} mm in the median truth. Rays are known to "
-        f"{np.median(found.place):.3f} mm at the object ({np.percentile(found.place, PERCENT):.3f} "
-        f"at {PERCENT:.0f} %) and {np.median(found.turn):.2f} mrad; a pixel is "
-        f"{np.median(found.pixel):.3f} mm wide there.{lost}"
+        f"{found.target:g} mm by all {len(place)} mirrors: minimum coverage {coverage.min():.2f} "
+        f"mm as calibrated, {np.median(found.worst):.2f} mm in the median truth. Rays are known to "
+        f"{np.median(place):.3f} mm at the object ({np.percentile(place, PERCENT):.3f} at "
+        f"{PERCENT:.0f} %) and {np.median(turn):.2f} mrad; a pixel is {np.median(pixel):.3f} mm "
+        f"wide there.{lost}"
     )
 
 

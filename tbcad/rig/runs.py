@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from tbcad.records.run import (
     exposure_name,
     read_record,
 )
+from tbcad.types import Floats
 
 Image16: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]
 AGAIN = Exposure.MISSING
@@ -88,6 +89,16 @@ class Run(InFolder):
             {name: one for name, one in self.exposures.items() if name in names},
             {name: fault for name, fault in self.faults.items() if name in names},
         )
+
+
+def frames_of(angle: Floats) -> tuple[Frame, ...]:
+    """The frames of both runs through stops at base angles (s,), radians."""
+    turns: tuple[Literal[0, 180], ...] = (0, 180)
+    return tuple(
+        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=degrees)
+        for turn in turns
+        for stop, degrees in enumerate(np.degrees(angle).tolist(), 1)
+    )
 
 
 def read_run(folder: Path) -> Run:

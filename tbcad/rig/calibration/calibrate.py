@@ -8,6 +8,7 @@ import numpy as np
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.records.calibration import HalvesRecord
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Frame, Geometry
 from tbcad.records.tables import StopRow
@@ -115,21 +116,6 @@ class MirrorRays:
 
 
 @dataclass(frozen=True)
-class Halves:
-    """How two halves of the highlights agree, by rays at angles that are known."""
-
-    by: str  # what is apart: "angles" or "LEDs"
-    counts: tuple[int, int]  # highlights of each half
-    found_mm: float  # root mean square distance of both halves' rays at the object's centre
-    expected_mm: float  # as their covariances say
-
-    @property
-    def ratio(self) -> float:
-        """Of what is found to what is expected."""
-        return self.found_mm / self.expected_mm
-
-
-@dataclass(frozen=True)
 class MachineCalibration:
     """A calibrated machine."""
 
@@ -137,7 +123,7 @@ class MachineCalibration:
     detection: Detection
     found: Estimate
     rays: MirrorRays
-    halves: tuple[Halves, ...]
+    halves: tuple[HalvesRecord, ...]
 
 
 def calibrate(
@@ -178,7 +164,7 @@ def ray_places(setup: Setup) -> tuple[tuple[str, ...], tuple[str, ...], Ints, In
 
 def cross_validation(
     found: Estimate, frame: Ints, sphere: Ints, progress: Progress
-) -> tuple[Halves, ...]:
+) -> tuple[HalvesRecord, ...]:
     """Calibrate from every other frame and from the rest, likewise LEDs; compare rays (m,)."""
     results = []
     for by, field in HALVES.items():
@@ -191,7 +177,7 @@ def cross_validation(
 
 def _compared(
     found: Estimate, by: str, parts: list[Bools], rays: tuple[Ints, Ints], progress: Progress
-) -> Halves:
+) -> HalvesRecord:
     progress(f"halves with {by} apart")
     one, other = (estimate(found.prior, _subset(found, part), start=found.values) for part in parts)
     slopes, _ = ray_slopes(found.prior, found.values, *rays)
@@ -204,9 +190,9 @@ def _compared(
     expected = np.einsum("mdq,qr,mdr->", places, spread, places, optimize=True)
     squares = difference.reshape(-1, 4)[:, :2] ** 2
     count = len(squares)
-    return Halves(
-        by=by,
-        counts=(len(one.highlights), len(other.highlights)),
+    return HalvesRecord(
+        apart=by,
+        highlights=(len(one.highlights), len(other.highlights)),
         found_mm=math.sqrt(float(squares.sum()) / count),
         expected_mm=math.sqrt(float(expected) / count),
     )
@@ -214,11 +200,7 @@ def _compared(
 
 def _static(found: Estimate) -> Ints:
     """Free parameters that are not of single frames, of which a half sees every other one."""
-    prior = found.prior
-    single = np.zeros(len(prior.flat_sigma), dtype=bool)
-    for block in (Block.ANGLES, Block.RUNOUT):
-        single[prior.first[block] : prior.first[block] + prior.sigma[block].size] = True
-    return np.flatnonzero(~single[prior.free])
+    return np.flatnonzero(~found.prior.is_of(Block.ANGLES, Block.RUNOUT))
 
 
 def _subset(found: Estimate, part: Bools) -> Highlights:

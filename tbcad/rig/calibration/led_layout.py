@@ -6,22 +6,24 @@ is moved once more, until none gets better.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
-from tbcad.core.optics.camera import LensCamera
-from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.geometry.vectors import norm
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
-from tbcad.rig.calibration.estimate.jacobian import projection, reflections
-from tbcad.rig.calibration.uncertainty import SPHERE_MM
+from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
+from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.priors import shell_prior
+from tbcad.rig.calibration.uncertainty import SPHERE_MM, ray_slopes
 from tbcad.rig.machine.designed import designed_shell, read_leds
-from tbcad.types import Bools, Floats, Progress
+from tbcad.rig.machine.machine import Machine
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.types import Floats, Progress
 
-APART_MM = 10.0  # of the planes in which a ray is followed; lines are straight
 RINGS, AZIMUTHS, HEIGHTS = 2, 18, 5  # of the places that are tried; azimuths over half a turn
 NUMBERS = (4, 6, 8, 16)
 USUAL_PX, USUAL_PROCESS = 0.05, "fdm"
@@ -43,18 +45,6 @@ class SphereInformation:
     rays: Floats
 
 
-def sphere_information(
-    camera: LensCamera, centre: Floats, radius: Floats, leds: Floats, seen: Bools
-) -> SphereInformation:
-    """What highlights of LEDs (l, 3) tell of spheres (m,), where seen, (m, l); in mm."""
-    slopes = [
-        _slopes(camera, centre, radius, np.broadcast_to(led, centre.shape))[0] for led in leds
-    ]
-    weight = seen.T[:, :, None, None]
-    by_led = np.stack([one.swapaxes(1, 2) @ one for one in slopes]) * weight
-    return SphereInformation(by_led, _ray_slopes(camera, centre, radius))
-
-
 def ray_errors(
     information: SphereInformation,
     chosen: list[int],
@@ -74,31 +64,6 @@ def ray_errors(
     slopes = information.rays[:, :, free]
     spread = np.diagonal(slopes @ inverse @ slopes.swapaxes(1, 2), axis1=1, axis2=2)
     return np.sqrt(spread[:, :2].sum(axis=1)), 1000 * np.sqrt(spread[:, 2:].sum(axis=1))
-
-
-def _slopes(
-    camera: LensCamera, centre: Floats, radius: Floats, light: Floats
-) -> tuple[Floats, Floats]:
-    """Of columns and rows by centre and radius (m, 2, 4), and by the light's place (m, 2, 3)."""
-    image = reflections(centre, radius, light, camera.pinhole)
-    _, by_image, _ = projection(camera, (image.point - camera.pinhole) @ camera.axes.T)
-    by_point = by_image @ camera.axes
-    of_sphere = np.concatenate([image.by_centre, image.by_radius[..., None]], axis=2)
-    return by_point @ of_sphere, by_point @ image.by_light
-
-
-def _ray_slopes(camera: LensCamera, centre: Floats, radius: Floats) -> Floats:
-    """See tbcad.rig.calibration.uncertainty: the ray is where lights appear at the same pixel."""
-    origin = np.zeros_like(centre)
-    point = reflections(centre, radius, origin, camera.pinhole).point
-    direction = reflected_rays(camera.pinhole, point, unit(point - centre))
-    across = perpendicular_axes(direction).swapaxes(1, 2)
-    places = []
-    for distance in (0.0, APART_MM):
-        by_sphere, by_light = _slopes(camera, centre, radius, distance * direction)
-        places.append(-np.linalg.solve(by_light @ across, by_sphere))
-    near, far = places
-    return np.concatenate([near, (far - near) / APART_MM], axis=1)
 
 
 @dataclass(frozen=True)
@@ -203,10 +168,30 @@ def led_room(export: ExportedDesign) -> LedRoom:
 
 def shell_information(export: ExportedDesign, leds: Floats) -> SphereInformation:
     """What LEDs tell of each mirror of camera a, by one photograph."""
-    machine = designed_shell(export.reflectors[0], leds)
+    prior = only_spheres(designed_shell(export.reflectors[0], leds))
     virtual = export.reflectors[0].u * mirror_distance(export)
-    seen = ~hidden_by_object(export.spec.prototype.stage, leds, virtual, export.capture_mm / 2)
-    return sphere_information(machine.camera, machine.centre, machine.radius, leds, seen)
+    hidden = hidden_by_object(export.spec.prototype.stage, leds, virtual, export.capture_mm / 2)
+    values, sphere = np.zeros(len(prior.free)), np.arange(len(virtual))
+    frame = 0 * sphere
+
+    def own(slopes: csr_array) -> Floats:
+        """Of each sphere by itself: a row has entries of no other."""
+        return slopes.sorted_indices().data.reshape(len(sphere), -1, 4)
+
+    slopes = [
+        own(highlights_with_slopes(prior, values, frame, sphere, frame + led)[1])
+        for led in range(len(leds))
+    ]
+    by_led = np.stack([one.swapaxes(1, 2) @ one for one in slopes])
+    rays, _ = ray_slopes(prior, values, frame, sphere)
+    return SphereInformation(by_led * ~hidden.T[:, :, None, None], own(rays))
+
+
+def only_spheres(machine: Machine) -> Prior:
+    """A prior of deviations of 1 mm of centres and radii, all else known."""
+    prior, free = shell_prior(machine, Errors()), (Block.CENTRES, Block.RADII)
+    sigma = {block: np.full(one.shape, float(block in free)) for block, one in prior.sigma.items()}
+    return replace(prior, sigma=sigma)
 
 
 def layout_cost(information: SphereInformation, leds: list[int]) -> float:

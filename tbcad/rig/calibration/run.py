@@ -22,7 +22,6 @@ from tbcad.records.calibration import NAME as RECORD
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate, prepared_setup
 from tbcad.rig.calibration.detection.detect import detect
 from tbcad.rig.calibration.detection.matching import object_room
-from tbcad.rig.calibration.estimate.parameters import covariance
 from tbcad.rig.calibration.intrinsics.files import read_lens
 from tbcad.rig.calibration.priors import parse_measured
 from tbcad.rig.calibration.report.plots import INCHES, draw_recovered, plots
@@ -177,20 +176,19 @@ def write_calibration(
     plot: PlotFormat = "png",
 ) -> dict[str, Any]:
     """Write all files of a calibration into the caller's folder, and return its record."""
-    known = covariance(result.found.prior, result.found.information)
-    record = calibration_record(result, judged, known, basis)
+    record = calibration_record(result, judged, basis)
     write_machine(folder / MACHINE, result.found.machine, result.setup.frames)
     record.write(folder / RECORD)
     tables = (
-        spheres_table(result, known),
-        angles_table(result, known),
+        spheres_table(result),
+        angles_table(result),
         rays_table(result),
         residuals_table(result),
     )
     for table in tables:
         (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
-    (folder / COVARIANCE).write_bytes(covariance_bytes(result, known))
-    for name, data in plots(result, sphere_covariances(result, known), plot).items():
+    (folder / COVARIANCE).write_bytes(covariance_bytes(result))
+    for name, data in plots(result, sphere_covariances(result), plot).items():
         (folder / name).write_bytes(data)
     write_manifest(folder, "calibration")
     return record.document()
@@ -200,9 +198,7 @@ def write_recovered(
     folder: Path, result: MachineCalibration, truth: Machine, plot: PlotFormat = "png"
 ) -> str:
     """Write recovered.csv and its plot of a simulated run, and return what they say."""
-    kinds = recovered_errors(
-        result, covariance(result.found.prior, result.found.information), truth
-    )
+    kinds = recovered_errors(result, truth)
     table = recovered_table(kinds)
     (folder / f"{table.name}.csv").write_text(csv_text(table), encoding="utf-8")
     drawn = figure_file(lambda figure: draw_recovered(figure, kinds), INCHES, plot)

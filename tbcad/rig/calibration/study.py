@@ -5,7 +5,6 @@ of the whole machine, nothing known but by the process.
 """
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
@@ -15,7 +14,6 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
-from tbcad.records.run import Frame
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
 from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior, covariance
@@ -32,6 +30,7 @@ from tbcad.rig.calibration.led_layout import (
 )
 from tbcad.rig.calibration.uncertainty import RayUncertainty, known_rays
 from tbcad.rig.machine.machine import Machine
+from tbcad.rig.runs import frames_of
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.types import Floats, Ints, Progress
 
@@ -39,7 +38,6 @@ NOISES_PX = (0.02, 0.05, 0.1, 0.2)
 PROCESSES = ("fdm", "sls", "sla", "cnc")
 LARGE_MM = 10.0  # prior standard deviation that tells nothing
 ONE_BALL = "free, 50 stops"
-TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 STOPS_OF_ONE = 50  # photographs of one ball on its base
 SHARES = (50, 95)  # percent of the mirrors
 WHERE = "an earlier estimate, other LEDs"
@@ -182,12 +180,7 @@ def _seen(setup: Setup, machine: Machine, frames: Ints) -> tuple[Ints, Ints, Int
 
 def designed_setup(export: ExportedDesign) -> Setup:
     """The prototype of an export with all frames of both runs, before it is photographed."""
-    camera, degrees = export.reflectors[0].camera, np.degrees(read_plan(export).angle).tolist()
-    frames = tuple(
-        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
-        for turn in TURNS
-        for stop, angle in enumerate(degrees, 1)
-    )
+    camera, frames = export.reflectors[0].camera, frames_of(read_plan(export).angle)
     return prepared_setup(export, frames, (camera.width_px, camera.height_px), None)
 
 

@@ -19,7 +19,7 @@ from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images, reflections
-from tbcad.rig.calibration.estimate.parameters import Covariance, Prior, covariance
+from tbcad.rig.calibration.estimate.parameters import Covariance, Prior
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
@@ -66,8 +66,7 @@ class RayUncertainty:
 
 def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:
     """Covariance of an estimate's rays by spheres (m,) in frames (m,)."""
-    known = covariance(found.prior, found.information)
-    return known_rays(found.prior, found.values, known, frame, sphere)
+    return known_rays(found.prior, found.values, found.covariance, frame, sphere)
 
 
 def known_rays(

@@ -12,7 +12,6 @@ stepper.c of GRBL 1.1h; machine_limits.c, motion_control.c, stepper.c and report
 """
 
 from collections import deque
-from collections.abc import Callable
 from time import monotonic
 
 from tbcad.rig.control.messages import (
@@ -22,8 +21,8 @@ from tbcad.rig.control.messages import (
     Port,
     Status,
     firmware_of,
-    meaning,
     parse,
+    told,
 )
 from tbcad.rig.control.plan import ControllerReset, MachineFault
 from tbcad.types import Progress
@@ -44,11 +43,11 @@ GONE = "the controller does not answer: is it plugged in and switched on?"
 class Grbl:
     """A controller on a port."""
 
-    def __init__(self, port: Port, note: Progress, clock: Callable[[], float] = monotonic) -> None:
+    def __init__(self, port: Port, note: Progress) -> None:
         """Speak to a controller; notes are what the operator should know."""
-        self._port, self._note, self._clock = port, note, clock
+        self._port, self._note = port, note
         self._unread, self._messages = b"", deque[Message]()
-        self._asked = self._heard = clock()
+        self._asked = self._heard = monotonic()
         self._held = False
         self._stopped = False  # by an alarm, since when GRBL may answer a reset only
         self.pending = ""
@@ -62,8 +61,8 @@ class Grbl:
         a program that was killed: a soft reset at rest clears it and keeps the motor on. One that
         is silent homes, or was stopped by an alarm, which a soft reset ends as well.
         """
-        begun = self._clock()
-        while self._clock() - begun < BANNER_S and not self.greeting:
+        begun = monotonic()
+        while monotonic() - begun < BANNER_S and not self.greeting:
             message = self._next()
             if message and message.kind == "banner":
                 self.greeting = message.text
@@ -89,9 +88,9 @@ class Grbl:
     def status(self) -> Status:
         """A fresh status report; MachineFault: there is none, an alarm, or a new beginning."""
         self._drain("?")
-        begun = self._clock()
+        begun = monotonic()
         asked = False
-        while self._clock() - begun < SILENCE_S:
+        while monotonic() - begun < SILENCE_S:
             asked = self._ask() or asked
             if (message := self._next()) is None:
                 continue
@@ -130,11 +129,11 @@ class Grbl:
 
     def _answer(self, line: str, expected_s: float, silent_s: float) -> list[Message] | None:
         """What came before the `ok`; None if it is lost."""
-        began, idle, others = self._clock(), None, list[Message]()
+        began, idle, others = monotonic(), None, list[Message]()
         self._heard = began
         while True:
             message = self._next()
-            now = self._clock()
+            now = monotonic()
             if message is not None:
                 self._heard = now
                 if message.kind == "ok":
@@ -175,8 +174,8 @@ class Grbl:
     def reset(self) -> None:
         """Reset the controller, which must rest or home, and wait for its greeting."""
         self._port.write(RESET)
-        begun = self._clock()
-        while self._clock() - begun < BANNER_S:
+        begun = monotonic()
+        while monotonic() - begun < BANNER_S:
             message = self._next()
             if message and message.kind == "banner":
                 self.greeting = message.text
@@ -187,14 +186,14 @@ class Grbl:
 
     def forget(self) -> None:
         """Ignore whatever was sent until now, or is about to come."""
-        begun = self._clock()
-        while self._clock() - begun < LATE_S:
+        begun = monotonic()
+        while monotonic() - begun < LATE_S:
             self._next()
 
     def status_in_alarm(self) -> Status | None:
         """A status report, in alarm too; None: no answer."""
-        begun = self._clock()
-        while self._clock() - begun < SILENCE_S:
+        begun = monotonic()
+        while monotonic() - begun < SILENCE_S:
             self._ask()
             message = self._next()
             if message and message.status:
@@ -202,21 +201,20 @@ class Grbl:
         return None
 
     def _until_rest(self) -> None:
-        begun = self._clock()
-        while self._clock() - begun < SILENCE_S:
+        begun = monotonic()
+        while monotonic() - begun < SILENCE_S:
             status = self.status_in_alarm()
             if status is None or status.resting:
                 return
 
     def _refuse(self, message: Message, line: str) -> None:
         """Raise what ends a run."""
-        told = f"{line!r}: {message.text}: {meaning(message)}"
         if message.kind == "error":
             self.pending = ""
-            raise MachineFault(f"the controller refuses {told}")
+            raise MachineFault(f"the controller refuses {told(line, message)}")
         if message.kind == "alarm":
             self._stopped = True
-            raise MachineFault(f"the controller stopped at {told}")
+            raise MachineFault(f"the controller stopped at {told(line, message)}")
         if message.kind == "banner":
             raise ControllerReset(
                 f"the controller began anew at {line!r} ({message.text}): it has forgotten its "
@@ -225,14 +223,14 @@ class Grbl:
 
     def _drain(self, line: str, seconds: float = 0.0) -> None:
         """Take answers that came late, so that none is taken for the next line's."""
-        begun = self._clock()
-        while (message := self._next(wait=seconds > 0)) or self._clock() - begun < seconds:
+        begun = monotonic()
+        while (message := self._next(wait=seconds > 0)) or monotonic() - begun < seconds:
             if message:
                 self._refuse(message, line)
 
     def _ask(self, not_before: float = float("-inf")) -> bool:
         """Ask for the status, if it was not asked within STATUS_S; tell whether it was."""
-        now = self._clock()
+        now = monotonic()
         if now - max(self._asked, not_before) < STATUS_S:
             return False
         self._asked = now

@@ -4,21 +4,164 @@ Klipper has no feed hold: a motion that was queued comes to its end, and what en
 emergency stop, switches the motor off. It tells nothing of a manual stepper's angle either, so
 that angle holds for as long as the motor was never let go; in a shutdown its report of that is
 not true, and the state counts. All scripts of a run may be sent twice: places are absolute.
-Source: docs/external_api/printer.md of Moonraker; docs/Status_Reference.md, klippy/gcode.py,
-extras/stepper_enable.py and toolhead.py of Klipper; tried with both.
+Source: docs/external_api/ of Moonraker: introduction.md, authorization.md, printer.md;
+docs/Status_Reference.md, klippy/gcode.py, extras/stepper_enable.py and toolhead.py of Klipper;
+tried with both.
 """
 
+import json
+import os
+import re
+import socket
+import ssl
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
+from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection
 from threading import Thread
 from time import monotonic, sleep
 from typing import Any
+from urllib.parse import urlsplit
 
-from tbcad.rig.control.moonraker import ELSEWHERE, Moonraker, Refused, Unreachable
+from tbcad.errors import InputError
 from tbcad.rig.control.plan import ControllerReset, MachineFault
 from tbcad.types import Progress
+
+PREFIX = "moonraker:"
+KEY = "MOONRAKER_API_KEY"
+ANSWER_S = 5.0  # that a request may take which does not wait for the machine
+MOST_BYTES = 16_000_000  # of an answer; a large configuration has 200 kB
+UNAUTHORIZED = 401
+PORTS = {"http": 80, "https": 443}
+_URL = re.compile(r"https?://[\w.:\[\]-]+(?:/[\w./~-]*)?", re.ASCII | re.IGNORECASE)
+ELSEWHERE = "is this Moonraker? It listens at port 7125, as in moonraker:http://HOST:7125"
+FORM = "allowed is moonraker:http://HOST or moonraker:http://HOST:7125, with https too"
+
+AWAY = "is the printer's computer switched on and in this network?"
+REASONS: tuple[tuple[type[Exception], str], ...] = (
+    (socket.gaierror, "there is no such host: look at its name, or use its number"),
+    (UnicodeError, "there is no such host: look at its name, or use its number"),
+    (
+        ssl.SSLCertVerificationError,
+        "its certificate is not trusted: name that of its authority in SSL_CERT_FILE",
+    ),
+    (ssl.SSLError, "it does not speak https: say http://"),
+    (ConnectionRefusedError, f"nothing listens there: {ELSEWHERE}"),
+    (TimeoutError, f"no answer: {AWAY}"),
+    (ConnectionResetError, f"the connection was cut: {AWAY}"),
+    (HTTPException, f"the answer is not HTTP: {ELSEWHERE}, or at https://"),
+)
+"""Why there is no answer, and what to do; the first that fits."""
+
+
+class Unreachable(MachineFault):
+    """Moonraker gives no answer: it may have got the request."""
+
+
+class Refused(MachineFault):
+    """Moonraker answers with an error."""
+
+    def __init__(self, text: str, code: int) -> None:
+        """Keep the HTTP status beside the text."""
+        super().__init__(text)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where Moonraker listens."""
+
+    host: str
+    port: int
+    path: str  # before those of the API, without a slash at its end
+    secure: bool  # whether by https
+
+
+def read_address(text: str) -> Address:
+    """Read the URL of a server."""
+    if any(sign in text for sign in "@?#"):
+        raise InputError(f"--port has more than a host: {FORM}; an API key goes into {KEY}")
+    try:
+        parts = urlsplit(text)
+        port = parts.port or (PORTS[parts.scheme] if parts.port is None else 0)
+    except (ValueError, KeyError):
+        port = 0
+    if not port or not parts.hostname or _URL.fullmatch(text) is None:
+        raise InputError(f"--port names {text!r:.60}: {FORM}")
+    return Address(parts.hostname, port, parts.path.rstrip("/"), parts.scheme == "https")
+
+
+class Moonraker:
+    """A server; each request has a connection of its own, from any thread."""
+
+    def __init__(self, address: Address) -> None:
+        """Ask a server, with the API key of the environment if there is one."""
+        self._address = address
+        key = os.environ.get(KEY, "").strip()
+        if not (key.isascii() and key.isprintable()):
+            raise InputError(f"{KEY} is no API key: copy it from Moonraker's settings")
+        self._headers = {"Content-Type": "application/json"} | ({"X-Api-Key": key} if key else {})
+
+    def get(self, path: str, limit_s: float = ANSWER_S) -> Any:
+        """Result of a GET request; Unreachable: no answer, Refused: the answer is an error."""
+        return self._result("GET", path, None, limit_s)
+
+    def post(self, path: str, body: dict[str, Any], limit_s: float | None = ANSWER_S) -> Any:
+        """Result of a POST request, waited for without end if there is no limit; else as `get`."""
+        return self._result("POST", path, json.dumps(body), limit_s)
+
+    def _result(self, method: str, path: str, body: str | None, limit_s: float | None) -> Any:
+        try:
+            response, data = self._answer(method, path, body, limit_s)
+        except (OSError, HTTPException, ValueError) as error:
+            raise Unreachable(f"Moonraker: {_reason(error)}") from None
+        try:
+            answer = json.loads(data)
+        except (ValueError, RecursionError):
+            answer = None
+        if response.status == UNAUTHORIZED:
+            raise Refused(
+                f"Moonraker does not let this computer in: set {KEY} to its API key, or name the "
+                "computer under trusted_clients in moonraker.conf",
+                response.status,
+            )
+        if isinstance(answer, dict) and "result" in answer:
+            return answer["result"]
+        raise Refused(_error_text(response, answer), response.status)
+
+    def _answer(
+        self, method: str, path: str, body: str | None, limit_s: float | None
+    ) -> tuple[HTTPResponse, bytes]:
+        to = self._address
+        connection = (HTTPSConnection if to.secure else HTTPConnection)(
+            to.host, to.port, timeout=ANSWER_S
+        )
+        try:
+            connection.connect()
+            connection.sock.settimeout(limit_s)
+            connection.request(method, to.path + path, body, self._headers)
+            response = connection.getresponse()
+            return response, response.read(MOST_BYTES)
+        finally:
+            connection.close()
+
+
+def _error_text(response: HTTPResponse, answer: Any) -> str:
+    error = answer.get("error") if isinstance(answer, dict) else None
+    if isinstance(error, dict):
+        return " ".join(str(error.get("message")).split())
+    if (where := response.getheader("Location")) is not None:
+        return f"the server sends us to {where}: name that address"
+    return f"the server answers {response.status} {response.reason}: {ELSEWHERE}"
+
+
+def _reason(error: Exception) -> str:
+    for kind, text in REASONS:
+        if isinstance(error, kind):
+            return text
+    return f"{error}: {AWAY}"
+
 
 MOTOR = "manual_stepper base"
 INFO, SCRIPT = "/printer/info", "/printer/gcode/script"
@@ -77,19 +220,17 @@ class KlipperState:
 class Klipper:
     """A Klipper host."""
 
-    def __init__(
-        self, server: Moonraker, note: Progress, clock: Callable[[], float] = monotonic
-    ) -> None:
+    def __init__(self, server: Moonraker, note: Progress) -> None:
         """Speak to Klipper through Moonraker; notes are what the operator should know."""
-        self._server, self._note, self._clock = server, note, clock
+        self._server, self._note = server, note
 
     def connect(self) -> None:
         """Wait until Klipper is ready; MachineFault: it is not, or the server is not Moonraker."""
         info = self._server.get("/server/info")
         if not isinstance(info, dict) or "klippy_state" not in info:
             raise MachineFault(f"the server is not Moonraker: {ELSEWHERE}")
-        begun = self._clock()
-        while self._clock() - begun < STARTING_S.get((state := self.state()).name, 0.0):
+        begun = monotonic()
+        while monotonic() - begun < STARTING_S.get((state := self.state()).name, 0.0):
             sleep(AGAIN_S)
         if state.name != READY:
             raise MachineFault(f"{state.what}: {state.safe}")
@@ -158,12 +299,12 @@ class Klipper:
     def _until_done(
         self, answer: "Future[Any]", expected_s: float, held: bool, limit_s: float
     ) -> None:
-        begun = self._clock()
+        begun = monotonic()
         late = begun + expected_s + LATE_S
         self._look(answer, self.check_held if held else self.check_ready)
         while not wait([answer], LOOK_S).done:
             self._look(answer, self.check_ready)
-            if (now := self._clock()) - begun > limit_s:
+            if (now := monotonic()) - begun > limit_s:
                 raise MachineFault("Klipper is busy with another program's G-code")
             if now > late:
                 late = float("inf")
@@ -195,8 +336,8 @@ class Klipper:
 
     def _until_back(self, fault: Unreachable, held: bool) -> None:
         """Wait until Moonraker is there again, which finds Klipper some seconds later."""
-        begun = self._clock()
-        while self._clock() - begun < BACK_S:
+        begun = monotonic()
+        while monotonic() - begun < BACK_S:
             with suppress(Unreachable):
                 if self.state().name not in STARTING_S:
                     return self.check_held() if held else self.check_ready()

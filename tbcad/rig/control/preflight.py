@@ -14,7 +14,7 @@ from scipy.ndimage import label, maximum
 
 from tbcad.errors import InputError
 from tbcad.records.run import DARK, DARK_LIT, LIT
-from tbcad.rig.control.camera import Shot
+from tbcad.rig.control.photographs import Shot
 from tbcad.rig.runs import Image16, decoded_image
 from tbcad.types import Floats, Progress
 

@@ -14,16 +14,15 @@ from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs
 from tbcad.records.run import DARK_LIT, PhaseTimes, RunRecord, read_record
 from tbcad.rig.control.base import Base
-from tbcad.rig.control.chosen_camera import (
+from tbcad.rig.control.cameras import (
     check_camera_name,
     check_can_expose,
     connected_camera,
 )
 from tbcad.rig.control.grbl import Grbl
-from tbcad.rig.control.klipper import Klipper
+from tbcad.rig.control.klipper import PREFIX, Klipper, Moonraker, read_address
 from tbcad.rig.control.klipper_base import KlipperBase, read_klipper_files
 from tbcad.rig.control.messages import SerialPort
-from tbcad.rig.control.moonraker import PREFIX, Moonraker, read_address
 from tbcad.rig.control.plan import ControlPlan, DrivenMachine, MachineFault, read_control_plan
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,

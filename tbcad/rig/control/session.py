@@ -8,7 +8,17 @@ from pathlib import Path
 from tbcad.errors import InputError
 from tbcad.options.machines import Ask, Preflight, Show
 from tbcad.records.run import Frame, exposure_name
-from tbcad.rig.control.camera import RunCamera, Shot
+from tbcad.rig.control.photographs import (
+    Photograph,
+    RunCamera,
+    Shot,
+    check_like_record,
+    exposure_of,
+    faults_refused,
+    light_on,
+    run_record,
+    taken_twice,
+)
 from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault
 from tbcad.rig.control.selection import (
     Outcome,
@@ -21,15 +31,6 @@ from tbcad.rig.control.selection import (
     duration_text,
     expected_seconds,
     size_text,
-)
-from tbcad.rig.control.shooting import (
-    Photograph,
-    check_like_record,
-    exposure_of,
-    faults_refused,
-    light_on,
-    run_record,
-    taken_twice,
 )
 from tbcad.rig.runs import DiskFault, RunWriter, new_run, resumed_run
 from tbcad.types import Progress
@@ -93,8 +94,7 @@ class Session:
         each_s = sum(one.seconds for one in trials.values()) / len(trials)
         self._expected = expected_seconds(self._plan, remaining, each_s + self._base.switch_s)
         seconds = sum(self._expected.values())
-        facts = trial.facts
-        each = bytes_each(len(trial.shot.data), facts.width_px, facts.height_px)
+        each = bytes_each(len(trial.shot.data), *trial.size_px)
         needed = disk_bytes(count(remaining), each)
         check_disk(folder, needed)
         if not resume:
@@ -114,12 +114,11 @@ class Session:
     def _trial(self, seconds: float | None) -> Photograph:
         with faults_refused():
             trial = taken_twice(self._camera, self._base, seconds, lambda _: None)
-        size = trial.facts.width_px, trial.facts.height_px
-        if size != self._options.size_px:
-            want = self._options.size_px
+        (width, height), want = trial.size_px, self._options.size_px
+        if trial.size_px != want:
             raise InputError(
-                f"the camera gives {size[0]} x {size[1]} pixels, {want[0]} x {want[1]} are wanted: "
-                f"set its image size, or say --size {size[0]}x{size[1]}"
+                f"the camera gives {width} x {height} pixels, {want[0]} x {want[1]} are wanted: "
+                f"set its image size, or say --size {width}x{height}"
             )
         return trial
 

@@ -159,35 +159,14 @@ def designed_build(designed: Machine, plan: Plan) -> BuiltPrototype:
 
 
 def random_build(
-    designed: Machine,
-    plan: Plan,
-    errors: Errors,
-    seed: int,
-    *,
-    wind_up: Floats,
+    designed: Machine, plan: Plan, errors: Errors, seed: int, *, wind_up: Floats
 ) -> BuiltPrototype:
     """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs.
 
     The wind-up is the turn of the base under gravity at the plan's stops, radians, (t,).
     """
     draws = draw_prototypes(errors, seed, [0], is_cap(plan), wind_up)
-    return _built(designed, plan, draws, draw_other_errors(len(designed.leds), seed))
-
-
-def draw_other_errors(leds: int, seed: int, camera: int = 0) -> OtherErrors:
-    """Errors of the lens, the sensor and so many LEDs, for a camera by its number from 0."""
-    key = np.random.SeedSequence(seed, spawn_key=(0, OTHER_STREAM + camera))
-    random = np.random.Generator(np.random.Philox(key))
-    return OtherErrors(
-        leds=LED_MM * random.standard_normal((leds, 3)),
-        distortion=np.array(DISTORTION) * random.standard_normal(len(DISTORTION)),
-        principal=PRINCIPAL_PX * random.standard_normal(2),
-    )
-
-
-def _built(
-    designed: Machine, plan: Plan, draws: PrototypeDraws, other: OtherErrors
-) -> BuiltPrototype:
+    other = draw_other_errors(len(designed.leds), seed)
     tilt = Rotation.from_rotvec(draws.tilt[0] @ plan.frame[1:])
     seats = draws.seat[0]
     machine = Machine(
@@ -203,6 +182,17 @@ def _built(
     # A ball is its own body, too large or too small as it is.
     body_radius = np.where(is_cap(plan), plan.body_radius, machine.radius)
     return BuiltPrototype(machine, tilt.apply(plan.body_centre + seats), body_radius)
+
+
+def draw_other_errors(leds: int, seed: int, camera: int = 0) -> OtherErrors:
+    """Errors of the lens, the sensor and so many LEDs, for a camera by its number from 0."""
+    key = np.random.SeedSequence(seed, spawn_key=(0, OTHER_STREAM + camera))
+    random = np.random.Generator(np.random.Philox(key))
+    return OtherErrors(
+        leds=LED_MM * random.standard_normal((leds, 3)),
+        distortion=np.array(DISTORTION) * random.standard_normal(len(DISTORTION)),
+        principal=PRINCIPAL_PX * random.standard_normal(2),
+    )
 
 
 def is_cap(plan: Plan) -> Bools:

@@ -153,15 +153,6 @@ def phases_of(leds: int) -> tuple[str, ...]:
     return (DARK, *(f"led_{led}" for led in range(1, leds + 1)), LIT)
 
 
-def frames_of(angles: Floats) -> tuple[Frame, ...]:
-    """The frames of both runs through stops at base angles (s,), degrees."""
-    return tuple(
-        Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
-        for turn in (0, 180)
-        for stop, angle in enumerate(angles.tolist(), 1)
-    )
-
-
 def object_light(
     pinhole: Floats,
     directions: Floats,

@@ -46,13 +46,13 @@ from tbcad.rig.machine.designed import (
 )
 from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
+from tbcad.rig.runs import frames_of
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
 from tbcad.rig.simulated_run.photographs import (
     EXPOSURE_S,
     LED_LIGHT,
     ImagingChain,
     SimulatedRun,
-    frames_of,
     phases_of,
 )
 from tbcad.rig.simulated_run.sensor import Image16, SimulatedSensor
@@ -122,7 +122,7 @@ def _prototype(
     )
     lamps = read_lamps(export.folder)
     lit = lit_by(lamps, subject) if lamps else subject
-    return _Subject(((built, frames_of(np.degrees(plan.angle))),), lit, stage_scene(export.folder))
+    return _Subject(((built, frames_of(plan.angle)),), lit, stage_scene(export.folder))
 
 
 def _shell(

@@ -15,7 +15,7 @@ from PIL import Image
 
 from tbcad.cad.formats.pictures import decoded, picture_of, read_picture, visible_files
 from tbcad.errors import InputError
-from tbcad.rig.control.camera import image_facts
+from tbcad.rig.control.photographs import image_facts
 from tests.raw_photographs import dng
 
 RANDOM = np.random.default_rng(5)

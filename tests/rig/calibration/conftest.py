@@ -28,7 +28,7 @@ def built(setup: Setup) -> BuiltPrototype:
 
 @pytest.fixture(scope="session")
 def detection(built: BuiltPrototype) -> Detection:
-    return Detection(every_highlight(built.machine, 5), (), (FAULT,))
+    return Detection(every_highlight(built.machine, 5), {}, (FAULT,))
 
 
 @pytest.fixture(scope="session")

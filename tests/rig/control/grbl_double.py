@@ -1,7 +1,7 @@
 """A controller on a pseudo-terminal that follows GRBL's protocol, with a base and lights.
 
-It knows states, `ok`, `error:n` and `ALARM:n`, realtime characters, 128 bytes of receive buffer, a
-planner of 15 motions, soft reset, homing, soft limits, G92, and the outputs of M64, M65, M8 and M9.
+It knows states, `ok`, `error:n` and `ALARM:n`, realtime characters, a planner of one motion, soft
+reset, homing, G92, and the outputs of M64, M65, M8 and M9.
 While it homes it is silent, grblHAL unless bit 12 of $10 is set; a hold comes after it, a reset
 ends it by ALARM:6. A reset in mid-motion and an alarm let the motor go, unless $37 of grblHAL keeps
 it on; sleep does always. After ALARM:1 and 2 it takes a reset only, and GRBL answers nothing else.
@@ -11,19 +11,17 @@ limits.c, protocol.c and stepper.c there; report.c, gcode.c, machine_limits.c, m
 stepper.c of grblHAL core.
 """
 
-import math
 import os
 import pty
 import re
 import select
 import threading
 import tty
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from time import monotonic
 
-RX_BYTES, PLANNER, LINE = 128, 15, 79
+LINE = 79
 BANNERS = {
     "grblhal": "GrblHAL 1.1f ['$' or '$HELP' for help]",
     "grbl": "Grbl 1.1h ['$' for help]",
@@ -43,6 +41,8 @@ OUTPUTS = 8
 TICK_S, SPEED = 0.0005, 2000.0
 Fault = Callable[[int, str], str | None]
 """By a line's number and text: drop_ok, drop_line, reset, power, error, alarm, silence."""
+Answer = int | Iterator[None] | None
+"""To a line: the number of an error, or what is to be waited for before its `ok`."""
 
 
 @dataclass
@@ -129,7 +129,7 @@ class GrblDouble(threading.Thread, Double):
         self.firmware, self.greeting = firmware, BANNERS[firmware]
         self.settings = dict(settings)
         self.asked: list[float] = []
-        self.overflows, self.held, self.homed = 0, 0, False
+        self.held, self.homed = 0, False
         self.deaf = False  # to a feed hold
         self.boots = False  # whether opening its port lets it begin anew, as many boards do
         self._closing, self._silent = False, False
@@ -139,11 +139,10 @@ class GrblDouble(threading.Thread, Double):
         self.state = "Alarm" if self.settings.get(22) else "Idle"
 
     def _clear(self) -> None:
-        self._rx, self._planner = bytearray(), deque[_Motion]()
+        self._rx = bytearray()
         self._motion: _Motion | None = None
-        self._wait: Callable[[], bool] | None = None
-        self._done: Callable[[], None] = lambda: None
-        self._reply = True
+        self._steps: Iterator[None] = iter(())  # of the line that is done now
+        self._reply, self._dropped = False, False
         self._homing: _Motion | None = None
         self._hold_later, self._blocked = False, False
         self._offset, self._feed, self._checking = 0.0, 0.0, False
@@ -167,7 +166,8 @@ class GrblDouble(threading.Thread, Double):
     def put_into(self, state: str) -> None:
         """Sleep, check mode or an open door, by a person at the machine."""
         self.state = state
-        {"Sleep": self._sleep, "Check": self._check}.get(state, lambda: None)()
+        self._checking = state == "Check"
+        self.machine.let_go += state == "Sleep"  # whatever the settings are
 
     def stop_by_limit(self) -> None:
         """A switch is pressed."""
@@ -191,13 +191,6 @@ class GrblDouble(threading.Thread, Double):
                     self._report()
                 case 0x21:
                     self._hold()
-                case 0x7E:
-                    if self.state == "Hold:0":
-                        self.state = "Idle"
-                case 0x0D:
-                    pass
-                case _ if len(self._rx) >= RX_BYTES:
-                    self.overflows += 1
                 case _:
                     self._rx.append(byte)
 
@@ -208,8 +201,7 @@ class GrblDouble(threading.Thread, Double):
         self.held += 1
         self._mpos = self._motion.at(self.now)
         self._follow()
-        self._motion = None
-        self._planner.clear()  # a resume is not needed here
+        self._motion = None  # a resume is not needed here
         self.state = "Hold:0"
 
     def reset(self) -> None:
@@ -282,15 +274,9 @@ class GrblDouble(threading.Thread, Double):
         if self._motion and self.now >= self._motion.start_s + self._motion.seconds:
             self._mpos, self._motion = self._motion.end, None
             self._follow()
-        if self._motion is None and self._planner:
-            self._motion = self._planner.popleft()
-            self._motion.start_s = self.now
-        if self._wait is not None:
-            if not self._wait():
-                return
-            self._wait = None
-            self._done()
-            self._ok()
+        for _ in self._steps:
+            return
+        self._ok()
         if self._blocked or self.state.startswith(("Hold", "Sleep")):
             return
         if b"\n" not in self._rx:
@@ -305,10 +291,8 @@ class GrblDouble(threading.Thread, Double):
         number = len(self.lines)
         self.on_line(number)
         fault = self.fault(number, line)
-        self._reply = fault != "drop_ok"
-        if fault == "drop_line":
-            return
         faults: dict[str | None, Callable[[], None]] = {
+            "drop_line": lambda: None,
             "reset": self.reset,
             "power": self.power_cycle,
             "silence": self.unplug,
@@ -316,25 +300,23 @@ class GrblDouble(threading.Thread, Double):
             "alarm": self.stop_by_limit,
         }
         if fault in faults:
-            faults[fault]()
-        elif (error := self._run_line(line)) is not None:
-            self._say(f"error:{error}")
-        elif self._wait is None:
-            self._ok()
+            return faults[fault]()
+        answer = self._run_line(line)
+        if isinstance(answer, int):
+            return self._say(f"error:{answer}")
+        self._steps, self._dropped, self._reply = answer or iter(()), fault == "drop_ok", True
 
     def _ok(self) -> None:
-        if self._motion is None and not self._planner:
+        """End the line that was done, if there was one."""
+        if not self._reply:
+            return
+        self._reply = False
+        if not self.moving:
             self.see(self.machine)
-        if self._reply:
+        if not self._dropped:
             self._say("ok")
 
-    def _at_rest(self) -> bool:
-        return self._motion is None and not self._planner
-
-    def _when(self, ready: Callable[[], bool], done: Callable[[], None] = lambda: None) -> None:
-        self._wait, self._done = ready, done
-
-    def _run_line(self, line: str) -> int | None:
+    def _run_line(self, line: str) -> Answer:
         if len(line) > LINE:
             return 11
         if line.startswith("$"):
@@ -347,14 +329,12 @@ class GrblDouble(threading.Thread, Double):
         codes = {f"{letter}{float(number):g}" for letter, number in words if letter in "GM"}
         return self._gcode(codes, words)
 
-    def _system(self, line: str) -> int | None:
-        commands: dict[str, Callable[[], int | None]] = {
+    def _system(self, line: str) -> Answer:
+        commands: dict[str, Callable[[], Answer]] = {
             "$H": self._home,
             "$$": self._list,
             "$X": self._unlock,
-            "$C": self._check,
             "$I": self._tell,
-            "$SLP": self._sleep,
         }
         if line in commands:
             return commands[line]()
@@ -373,46 +353,38 @@ class GrblDouble(threading.Thread, Double):
         for text in BUILD_INFO[self.firmware]:
             self._say(text)
 
-    def _sleep(self) -> None:
-        """Sleep lets the motor go, whatever the settings are."""
-        self.state = "Sleep"
-        self.machine.let_go += 1
-
     def _unlock(self) -> int | None:
         if self.state.startswith("Door"):
             return 13
         self.state = "Idle"
         return None
 
-    def _check(self) -> None:
-        if self._checking:
-            self.reset()
-        else:
-            self._checking, self.state = True, "Check"
+    def _home(self) -> Answer:
+        return self._homed() if self.settings.get(22) else 5
 
-    def _home(self) -> int | None:
-        if not self.settings.get(22):
-            return 5
+    def _homed(self) -> Iterator[None]:
         self.state = "Home"
         seconds = abs(self.machine.angle - self.switch_deg) / self.settings[25] * 60
         self._homing = _Motion(self.machine.angle, self.switch_deg, self.now, seconds)
-        end = self.now + seconds
+        yield from self._until(self.now + seconds)
+        pull_off = self.settings[27]
+        self._mpos = -self.settings[130] + pull_off
+        self._zero = self.switch_deg + pull_off - self._mpos
+        self._follow()
+        self._homing = None
+        self.state, self.homed = "Hold:0" if self._hold_later else "Idle", True
 
-        def found() -> None:
-            pull_off = self.settings[27]
-            self._mpos = -self.settings[130] + pull_off
-            self._zero = self.switch_deg + pull_off - self._mpos
-            self._follow()
-            self._homing = None
-            self.state, self.homed = "Hold:0" if self._hold_later else "Idle", True
+    def _until(self, time: float) -> Iterator[None]:
+        while self.now < time:
+            yield
 
-        self._when(lambda: self.now >= end, found)
-        return None
+    def _at_rest(self) -> Iterator[None]:
+        while self.moving:
+            yield
 
-    def _gcode(self, codes: set[str], words: list[tuple[str, str]]) -> int | None:
+    def _gcode(self, codes: set[str], words: list[tuple[str, str]]) -> Answer:
         values = {letter: float(number) for letter, number in words if letter in "XAFP"}
-        if "F" in values:
-            self._feed = values["F"]
+        self._feed = values.get("F", self._feed)
         if not codes <= KNOWN:
             return 20
         if "G92.1" in codes:
@@ -420,26 +392,20 @@ class GrblDouble(threading.Thread, Double):
         elif "G92" in codes:
             self._offset = self._mpos - values["X"]
         elif "G4" in codes:
-            self._dwell(values.get("P", 0.0))
+            return self._dwell(values.get("P", 0.0))
         elif codes & {"M64", "M65"}:
             return self._output(int(values["P"]), on="M64" in codes)
         elif codes & {"M8", "M9"}:
-            self._when(self._at_rest, lambda: self.switch_relay(on="M8" in codes))
+            return self._release(on="M8" in codes)
         elif "X" in values:
-            return self._move(values["X"] + self._offset)
+            return self._move(values["X"] + self._offset) if self._feed else 22
         return None
 
-    def _dwell(self, seconds: float) -> None:
-        ends: list[float] = []
+    def _dwell(self, seconds: float) -> Iterator[None]:
+        yield from self._at_rest()
+        yield from self._until(self.now + seconds)
 
-        def ready() -> bool:
-            if self._at_rest() and not ends:
-                ends.append(self.now + seconds)
-            return bool(ends) and self.now >= ends[0]
-
-        self._when(ready)
-
-    def _output(self, output: int, *, on: bool) -> int | None:
+    def _output(self, output: int, *, on: bool) -> Answer:
         if self.firmware == "grbl":
             return 20
         if output >= OUTPUTS:
@@ -447,19 +413,14 @@ class GrblDouble(threading.Thread, Double):
         self.switch_light(output, on=on)
         return None
 
-    def _move(self, target: float) -> int | None:
-        if not self._feed:
-            return 22
+    def _release(self, *, on: bool) -> Iterator[None]:
+        yield from self._at_rest()
+        self.switch_relay(on=on)
+
+    def _move(self, target: float) -> Iterator[None]:
+        yield from self._at_rest()
         if self.settings.get(20) and not -self.settings[130] <= target <= 0:
-            self._planner.clear()
-            self._halt(2)
-            return None
-        begin = self._planner[-1].end if self._planner else self._mpos
-        begin = self._motion.end if self._motion and not self._planner else begin
+            return self._halt(2)
         speed = min(self._feed, self.settings[110]) / 60
-        seconds = abs(target - begin) / speed + speed / self.settings[120]
-        self._when(
-            lambda: len(self._planner) < PLANNER,
-            lambda: self._planner.append(_Motion(begin, target, math.inf, seconds)),
-        )
-        return None
+        seconds = abs(target - self._mpos) / speed + speed / self.settings[120]
+        self._motion = _Motion(self._mpos, target, self.now, seconds)

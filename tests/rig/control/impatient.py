@@ -16,8 +16,8 @@ WAITS_S = {
     "klipper.AGAIN_S": 0.01,
     "klipper.STARTING_S": {"startup": 1.0, "disconnected": 0.1},
     "klipper.BACK_S": 1.0,
-    "chosen_camera.POLL_S": 0.01,
-    "chosen_camera.QUIET_S": 0.05,
+    "cameras.POLL_S": 0.01,
+    "cameras.QUIET_S": 0.05,
 }
 """By name below `tbcad.rig.control`."""
 

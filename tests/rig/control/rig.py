@@ -1,6 +1,7 @@
-"""A machine without hardware: a controller's double, and what stands before the camera."""
+"""A machine without hardware: a double, what stands before the camera, and checks of its run."""
 
 import io
+import json
 import os
 import subprocess
 import sys
@@ -9,16 +10,30 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Event
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
 from PIL import Image
 
+from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.plan import read_settings
+from tbcad.rig.runs import read_photograph, read_run
 from tests.rig.control.exposing_camera import SIZE
 from tests.rig.control.grbl_double import Fault, GrblDouble, Machine
 from tests.rig.control.klipper_double import KlipperDouble, printer_settings
 
+OUTPUTS = {"dark": (), "led_1": (1,), "led_2": (2,), "led_3": (3,), "led_4": (4,), "lit": (0,)}
+ALL = 2 * 2 * len(OUTPUTS)  # photographs at two stops
+FAST = 2000.0  # of the controller's time
+TIMES = {"taken", "seconds"}
+NEIGHBOURS = (-1, 0, 1)  # tenths of a degree: the program's angles are truncated
+
+
+PER_STOP = 12
+PHOTOGRAPH = 4  # lines
+DELAY_S = 0.008  # in which a photograph comes from the camera to the disk
 ROOT = Path(__file__).parents[3]
 PICTURE = "scene.jpg"
 PICTURE_BYTES = 16_384  # the virtual camera asks for a file's size once
@@ -189,9 +204,94 @@ def at(
 
 def until(condition: Callable[[], bool], seconds: float = 600.0) -> None:
     """Wait for something that a thread does."""
-    from time import monotonic, sleep
-
     end = monotonic() + seconds
     while not condition():
         assert monotonic() < end
         sleep(0.002)
+
+
+def check_every_photograph(folder: Path, count: int) -> None:
+    """Each is of its place under its light, byte for byte as the camera gave it."""
+    run = read_run(folder)
+    assert not run.faults
+    assert len(run.exposures) == count
+    for exposure in run.exposures.values():
+        image = (folder / "photographs" / exposure.file).read_bytes()
+        angle, lights = exposure.frame.base_angle_deg, frozenset(OUTPUTS[exposure.phase])
+        assert image in {scene(round(angle + tenth / 10, 1), lights) for tenth in NEIGHBOURS}
+        assert read_photograph(run, exposure).shape == (*SIZE[::-1], 3)
+    names = {path.name for path in (folder / "photographs").iterdir()}
+    assert names == {one.file for one in run.exposures.values()} | {
+        f"{name}.json" for name in run.exposures
+    }
+    taken = [line["name"] for line in journal(folder) if line["event"] == "taken"]
+    assert set(taken) == set(run.exposures)
+    assert len(taken) == len(run.exposures)
+
+
+def check_goes_on(rig: Rig, count: int) -> None:
+    """Without faults the run that was stopped becomes complete."""
+    rig.controller.fault = lambda number, line: None
+    rig.controller.on_line = lambda number: None
+    rig.controller.run_at(FAST)
+    assert tbcad(rig.resume()) == 0
+    check_every_photograph(rig.out, count)
+
+
+def journal(folder: Path) -> list[dict[str, Any]]:
+    lines = (folder / "journal.jsonl").read_text().splitlines()
+    return [json.loads(line) for line in lines]
+
+
+def events(folder: Path) -> list[str]:
+    return [line["event"] for line in journal(folder)]
+
+
+def content(folder: Path) -> dict[str, Any]:
+    """A run's folder but for times and journal."""
+    found: dict[str, Any] = {}
+    for path in (folder / "run.json", *(folder / "photographs").iterdir()):
+        if path.suffix == ".json":
+            value = json.loads(path.read_text())
+            found[path.name] = {key: value[key] for key in value if key not in TIMES}
+        else:
+            found[path.name] = path.read_bytes()
+    return found
+
+
+def killed_run(rig: Rig, camera: str, stops: int, kills: int, seed: int) -> None:
+    """Start, kill at random moments, and go on until the end."""
+    random = np.random.default_rng(seed)
+    each = PER_STOP * stops // kills * PHOTOGRAPH  # lines, so that all kills come in time
+    words = rig.words(camera=camera, stops=f"1-{stops}")
+    for lines in random.integers(1, rig.controller.lines_before + each, kills).tolist():
+        kill_after(rig, words, lines, random.uniform(0, DELAY_S))
+        if (rig.out / "run.json").is_file():
+            words = rig.words("--resume", camera=camera, stops=None)
+    process = rig.start(words)
+    _, err = process.communicate(timeout=600)
+    assert process.returncode == 0, err
+
+
+def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
+    """Kill a command a moment after its controller has some lines; the next line is not answered.
+
+    So a command that is faster than the process that kills it gets no farther.
+    """
+    end = len(rig.controller.lines) + lines
+    killed = Event()
+
+    def hold(number: int) -> None:
+        if number > end:
+            killed.wait()
+
+    rig.controller.on_line = hold
+    process = rig.start(words)
+    until(lambda: len(rig.controller.lines) >= end or process.poll() is not None)
+    sleep(delay_s)
+    code = process.poll()
+    process.kill()
+    output = process.communicate()
+    rig.controller.on_line = lambda number: None
+    killed.set()
+    assert code is None, output

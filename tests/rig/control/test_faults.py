@@ -16,8 +16,20 @@ from tbcad.rig.control.base import Base
 from tbcad.rig.control.plan import read_settings
 from tests.rig.control.conftest import Told
 from tests.rig.control.grbl_double import GrblDouble
-from tests.rig.control.rig import Rig, at, until
-from tests.rig.control.run_checks import ALL, FAST, check_every_photograph, check_goes_on, events
+from tests.rig.control.rig import (
+    ALL,
+    FAST,
+    PER_STOP,
+    Rig,
+    at,
+    check_every_photograph,
+    check_goes_on,
+    content,
+    events,
+    journal,
+    killed_run,
+    until,
+)
 
 
 @pytest.mark.parametrize("what", ["drop_ok", "drop_line"])
@@ -275,3 +287,17 @@ def test_full_disk(rig: Rig, monkeypatch: pytest.MonkeyPatch, stopped: Told) -> 
     assert not rig.controller.machine.lights
     monkeypatch.setattr(runs, "write_safely", whole)
     check_goes_on(rig, ALL)
+
+
+@pytest.mark.slow
+def test_three_kills(either_rig: Rig) -> None:
+    """Forty of them, with the virtual camera, are in test_whole_loop."""
+    rig, kills = either_rig, 3
+    killed_run(rig, rig.copying, stops=1, kills=kills, seed=1)
+    check_every_photograph(rig.out, PER_STOP)
+    begun = [one["event"] for one in journal(rig.out) if one["event"] in ("started", "resumed")]
+    assert len(begun) > kills // 2
+    killed = content(rig.out)
+    rig.out.rename(rig.folder / "killed")
+    assert tbcad(rig.words(stops="1")) == 0
+    assert content(rig.out) == killed

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.rig.control.grbl import SYNC, Grbl
+from tbcad.rig.control.grbl import Grbl
 from tbcad.rig.control.messages import SerialPort, Status, parse
 from tbcad.rig.control.plan import MachineFault
-from tests.rig.control.grbl_double import PLANNER, GrblDouble
+from tests.rig.control.grbl_double import GrblDouble
 from tests.rig.control.rig import until
 
 SETTINGS = {1: 255.0, 20: 0.0, 22: 1.0, 25: 360.0, 27: 2.0, 110: 900.0, 120: 50.0, 130: 200.0}
@@ -39,17 +39,6 @@ def homed(grbl: Grbl) -> Grbl:
     return grbl
 
 
-def test_motions_wait_for_each_other(homed: Grbl, double: GrblDouble) -> None:
-    """More of them than the planner holds; the dwell is over when the last is."""
-    double.run_at(200.0)
-    for number in range(2 * PLANNER):
-        homed.command(f"G1 X{-90 + number} F900")
-    homed.command(SYNC, expected_s=2.0)
-    assert double.machine.angle == pytest.approx(-90 + 2 * PLANNER - 1)
-    assert double.overflows == 0
-    assert homed.status().state == "Idle"
-
-
 def test_lines_that_are_refused_or_not_sent(homed: Grbl, double: GrblDouble) -> None:
     for line, says in (
         ("G1 X1", "error:22: no feed is set"),
@@ -61,16 +50,6 @@ def test_lines_that_are_refused_or_not_sent(homed: Grbl, double: GrblDouble) -> 
         with pytest.raises(MachineFault, match=says):
             homed.command(line)
     assert double.lines[-1] == "$Q"
-
-
-def test_soft_limit(homed: Grbl, double: GrblDouble) -> None:
-    homed.command("$20=1")
-    with pytest.raises(MachineFault, match="ALARM:2: the target is beyond the soft limits"):
-        homed.command("G1 X101 F900")
-    homed.forget()
-    status = homed.status_in_alarm()
-    assert status is not None
-    assert status.state == "Alarm"
 
 
 def test_hold_keeps_the_place(homed: Grbl, double: GrblDouble) -> None:

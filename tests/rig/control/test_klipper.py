@@ -9,8 +9,7 @@ import pytest
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control.klipper_base import PIECE_S
 from tests.rig.control.conftest import Told
-from tests.rig.control.rig import Rig, at, until
-from tests.rig.control.run_checks import ALL, check_every_photograph, check_goes_on, events
+from tests.rig.control.rig import ALL, Rig, at, check_every_photograph, check_goes_on, events, until
 
 
 @pytest.fixture(autouse=True)

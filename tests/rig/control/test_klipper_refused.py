@@ -11,7 +11,7 @@ from threading import Thread
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control import klipper_base, moonraker
+from tbcad.rig.control import klipper, klipper_base
 from tests.rig.control.conftest import Told
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
@@ -189,11 +189,6 @@ def test_other_configuration(
     assert "[output_pin led_4] is missing" in refused(klipper_rig.words())
 
 
-def test_signs_of_pins_that_are_the_boards(klipper_rig: Rig) -> None:
-    klipper_rig.controller.settings[MOTOR] |= {"enable_pin": "!PB3", "dir_pin": "! PB4"}
-    assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
-
-
 IDLE = {"timeout": 1e7, "gcode": "\nM84\n"}
 
 
@@ -244,7 +239,7 @@ def test_same_values(wanted: str, found: object, same: bool) -> None:
     ],
 )
 def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None:
-    assert astuple(moonraker.read_address(text)) == address
+    assert astuple(klipper.read_address(text)) == address
 
 
 def test_exports_that_are_not_for_klipper(

@@ -13,17 +13,15 @@ from PIL import Image
 from tbcad.app.cli import run as tbcad
 from tbcad.errors import InputError
 from tbcad.rig.control.base import Base
-from tbcad.rig.control.camera import EXIF, EXPOSURE, ImageFacts, Shot
-from tbcad.rig.control.chosen_camera import CommandCamera
+from tbcad.rig.control.cameras import CommandCamera
+from tbcad.rig.control.photographs import EXIF, EXPOSURE, Photograph, Shot, common_settings, take
 from tbcad.rig.control.plan import CameraFault
 from tbcad.rig.control.preflight import look, preflight
-from tbcad.rig.control.shooting import Photograph, common_settings, take
 from tbcad.rig.runs import read_run
 from tests.rig.control import exposing_camera
 from tests.rig.control.conftest import Told
 from tests.rig.control.exposing_camera import SIZE, radiance
-from tests.rig.control.rig import Rig, connected_rig
-from tests.rig.control.run_checks import events
+from tests.rig.control.rig import Rig, connected_rig, events
 
 GOOD = ("--exposure-leds", "1/100", "--exposure-lit", "2")
 
@@ -190,7 +188,7 @@ def test_leds_that_will_not_do(levels: tuple[float, ...], says: str) -> None:
 
 
 def photograph(**settings: str) -> Photograph:
-    return Photograph(Shot(b"", ".jpg", dict(settings)), ImageFacts(64, 48, "", None, {}), 1.0)
+    return Photograph(Shot(b"", ".jpg", {}), (64, 48), "", dict(settings), 1.0)
 
 
 def test_exposure_alone_may_differ_between_phases() -> None:
@@ -211,7 +209,6 @@ def test_photograph_that_was_exposed_otherwise_is_none(rig: Rig) -> None:
     Image.new("RGB", SIZE).save(file, exif=exif)
     camera = CommandCamera(f"cp {file} {{output}}.jpg", 10.0)
     base = cast("Base", None)  # releases nothing
-    assert take(camera, base).exposure_s == 0.5
-    assert take(camera, base, 0.45).exposure_s == 0.5
+    assert take(camera, base).told_s == take(camera, base, 0.45).told_s == 0.5
     with pytest.raises(CameraFault, match=r"0.1 s of exposure were asked for.*has 0.5 s"):
         take(camera, base, 0.1)

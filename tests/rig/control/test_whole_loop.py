@@ -1,9 +1,19 @@
 """From a simulated machine by way of controller, camera and operator to a view of the object.
 
-The camera sees what `tbcad simulate-run` photographs; every step after that is a command.
+The camera sees what `tbcad simulate-run` photographs; every step after that is a command. The
+operator sits at a terminal, turns the object when the command asks for it, and says so. The virtual
+camera gives JPEG files only, and asks for a file's size once: photographs are JPEG files of the
+best quality, all filled up to one size.
 """
 
-from collections.abc import Iterator
+import io
+import os
+import pty
+import subprocess
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from shutil import move
@@ -26,10 +36,103 @@ from tbcad.prototype.drive.drive import Drive
 from tbcad.rig.machine.designed import designed_prototype
 from tbcad.rig.machine.machine import Machine, read_machine
 from tbcad.rig.runs import read_photograph, read_run
+from tests.rig.control import grbl_double
 from tests.rig.control.conftest import export
-from tests.rig.control.run_checks import content, journal
-from tests.rig.control.simulated_scene import OperatedRig, operated_rig
-from tests.rig.control.test_kills import killed_run
+from tests.rig.control.rig import (
+    OUTPUTS,
+    PICTURE_BYTES,
+    SIZE,
+    Rig,
+    connected_rig,
+    content,
+    journal,
+    killed_run,
+)
+
+NEAR_DEG = 0.05  # of a stop: nearer than any two stops are
+PROMPT = b"done? [Y/n]:"
+STRAIGHT = b"object straight"
+
+
+def jpeg(pixels: np.ndarray) -> bytes:
+    """A JPEG file that keeps each pixel's colour but for rounding, as long as all of them."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "JPEG", quality=100, subsampling=0, keep_rgb=True)
+    data = file.getvalue()
+    assert len(data) <= PICTURE_BYTES
+    return data.ljust(PICTURE_BYTES, b"\0")
+
+
+@dataclass
+class SimulatedScene:
+    """What is to be seen of a simulated run: nothing at angles that it was not photographed at."""
+
+    folder: Path  # of the run
+    turned: bool = False  # whether the object is turned by 180 degrees
+    _angle: np.ndarray = field(init=False)
+    _pictures: dict[tuple[bool, int, frozenset[int]], bytes] = field(init=False)
+
+    def __post_init__(self) -> None:
+        run = read_run(self.folder)
+        every = run.exposures.values()
+        stops = {one.frame.stop: one.frame.base_angle_deg for one in every}
+        self._angle = np.array([stops[stop] for stop in sorted(stops)])
+        self._pictures = {
+            (one.frame.object_turn_deg > 0, one.frame.stop, frozenset(OUTPUTS[one.phase])): jpeg(
+                read_photograph(run, one)
+            )
+            for one in every
+        }
+        self._nothing = jpeg(np.zeros((*SIZE[::-1], 3), np.uint8))
+
+    def __call__(self, machine: grbl_double.Machine) -> bytes:
+        """The photograph of a machine."""
+        away = np.abs(self._angle - machine.angle)
+        stop = int(away.argmin()) + 1
+        at = self.turned, stop, frozenset(machine.lights)
+        return self._pictures.get(at, self._nothing) if away.min() < NEAR_DEG else self._nothing
+
+
+@dataclass
+class OperatedRig(Rig):
+    """A rig with an operator, who is asked."""
+
+    scene: SimulatedScene  # before the camera
+
+    def words(self, *more: str, camera: str | None = None, stops: str | None = None) -> list[str]:
+        """A command line of tbcad that asks."""
+        return [
+            word for word in super().words(*more, camera=camera, stops=stops) if word != "--yes"
+        ]
+
+    def start(
+        self,
+        words: list[str],
+        before: Sequence[str] = (),
+        module: str = "tests.rig.control.impatient",
+        terminal: int | None = None,
+    ) -> "subprocess.Popen[str]":
+        """A command in a process of its own, at the operator's terminal."""
+        assert terminal is None
+        screen, terminal = pty.openpty()
+        process = super().start(words, before, module, terminal)
+        os.close(terminal)
+        threading.Thread(target=self._operate, args=(screen,), daemon=True).start()
+        return process
+
+    def _operate(self, screen: int) -> None:
+        """Turn the object as the screen says, and answer that it is done."""
+        shown = b""
+        with suppress(OSError):  # the command has ended
+            while data := os.read(screen, 4096):
+                shown += data
+                if shown.endswith(PROMPT):
+                    question = shown.removesuffix(PROMPT).rpartition(b"\n")[2]
+                    self.scene.turned = STRAIGHT not in question
+                    os.write(screen, b"\n")
+                    shown = b""
+        os.close(screen)
+
 
 pytestmark = [
     pytest.mark.slow,
@@ -43,13 +146,7 @@ LIKE = 0.99  # SSIM of views that differ by rounding
 
 
 class Loop:
-    """One machine, photographed at once and with kills.
-
-    Attributes:
-        rig: that photographs.
-        simulated: the run that is seen.
-        stops: of its plan.
-    """
+    """One machine, photographed at once and with kills."""
 
     def __init__(self, rig: OperatedRig, stops: int) -> None:
         self.rig, self.stops = rig, stops
@@ -95,7 +192,9 @@ def loop(drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loo
     simulated = folder / "simulated"
     assert tbcad(["simulate-run", str(exports), "--seed", "3", "--out", str(simulated)]) == 0
     switch = home_angles(layout, MotionSpec()).switch
-    rig = operated_rig(exports, simulated, folder, switch)
+    scene = SimulatedScene(simulated)
+    controller = connected_rig(exports, folder, switch, view=scene).controller
+    rig = OperatedRig(controller, exports, folder, scene)
     yield Loop(rig, len(layout.stops.angle))
     rig.controller.close()
 

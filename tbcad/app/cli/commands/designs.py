@@ -185,7 +185,6 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
         as_built_tolerance,
         summary,
         tolerance_record,
-        tolerance_table,
     )
 
     check_study_folder(out)
@@ -196,7 +195,7 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
     record = dumps(tolerance_record(found, builds, seed), indent=1) + "\n"
     contents = {
         "as-built.json": record.encode(),
-        "as-built.csv": csv_text(tolerance_table(found)).encode(),
+        "as-built.csv": csv_text(found.mirrors).encode(),
     }
     files = replace_files(out, contents)
     return _show_files(record, summary(found), out, files, json)

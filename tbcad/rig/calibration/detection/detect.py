@@ -11,7 +11,7 @@ from tbcad.light.simulate.parallel import THREADS
 from tbcad.records.run import DARK, Frame, dark_factor, exposure_name
 from tbcad.rig.calibration.detection.detection import (
     Detection,
-    Rejected,
+    Reasons,
     Rejection,
     no_highlights,
     relative_light,
@@ -124,23 +124,20 @@ def detect(
     hidden = maybe_hidden(found.machine, expected, room)
     share = relative_light(expected, partner, spots, exposure)
     reasons = verdicts(expected, partner, spots, share, hidden)
-    overruled = [(~photographed[expected.frame, expected.led], Rejection.NO_PHOTOGRAPH)]
+    inside = expected.inside
+    reasons[inside & ~photographed[expected.frame, expected.led]] = Rejection.NO_PHOTOGRAPH
     if move is not None:
-        overruled.append((~move.kept[expected.frame], Rejection.MOVED))
-    for which, reason in overruled:
-        for number in np.flatnonzero(which & expected.inside).tolist():
-            reasons[number] = reason
+        reasons[inside & ~move.kept[expected.frame]] = Rejection.MOVED
     faults += _dead_leds(len(machine.leds), expected, reasons)
-    used = np.array([reason is None for reason in reasons])
+    used = reasons == ""
     if not used.any():
         raise nothing(spots, reasons=reasons)
     paired = np.where(used, partner, -1)
     sigma = _sigmas(spots.only(np.unique(paired[used])), spots, read)
     highlights = highlights_of(expected, paired, spots, sigma[np.maximum(partner, 0)])
-    keys = (one.tolist() for one in (expected.frame, expected.sphere, expected.led))
-    every = zip(*keys, reasons, strict=True)
-    rejected = (Rejected(f, s, led, why) for f, s, led, why in every if why is not None)
-    return Detection(highlights, tuple(rejected), tuple(faults))
+    places = np.column_stack([expected.frame, expected.sphere, expected.led])[~used].tolist()
+    rejected = dict(zip(map(tuple, places), reasons[~used].tolist(), strict=True))
+    return Detection(highlights, rejected, tuple(faults))
 
 
 def _read_frames(run: Run, leds: int, progress: Progress) -> list[_Read]:
@@ -236,11 +233,10 @@ def _move_line(frames: tuple[Frame, ...], move: CameraMove, shift: Floats) -> st
     )
 
 
-def _dead_leds(leds: int, expected: Expected, reasons: list[Rejection | None]) -> list[str]:
+def _dead_leds(leds: int, expected: Expected, reasons: Reasons) -> list[str]:
     """Lines on LEDs that do not shine, of those that are photographed."""
-    passed_over = (Rejection.OUTSIDE, Rejection.NO_PHOTOGRAPH, Rejection.MOVED)
-    counted = np.array([reason not in passed_over for reason in reasons])
-    absent = np.array([reason in (Rejection.MISSING, Rejection.HIDDEN) for reason in reasons])
+    counted = ~np.isin(reasons, [Rejection.OUTSIDE, Rejection.NO_PHOTOGRAPH, Rejection.MOVED])
+    absent = np.isin(reasons, [Rejection.MISSING, Rejection.HIDDEN])
     of = partial(np.bincount, minlength=leds)
     every, dark = of(expected.led[counted]), of(expected.led[counted & absent])
     return [

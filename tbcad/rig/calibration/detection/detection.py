@@ -6,11 +6,13 @@ run's record in the same order.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
@@ -19,6 +21,8 @@ from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, Unmeasured,
 from tbcad.rig.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints
 
+Reasons: TypeAlias = NDArray[np.str_]
+LONGEST = "U64"  # of a reason
 HALF = 0.5
 SHORTER = (
     "photograph the LEDs again with a shorter exposure (tbcad run --exposure-leds; tbcad run "
@@ -51,23 +55,14 @@ class Rejection(StrEnum):
 
 
 @dataclass(frozen=True)
-class Rejected:
-    """A highlight that is not used."""
-
-    frame: int  # from 0
-    sphere: int  # from 0
-    led: int  # from 0
-    reason: Rejection
-
-
-@dataclass(frozen=True)
 class Detection:
     """The result of a detection."""
 
     # that can be used; their pixels are where the LEDs' own positions appear, the centroids'
     # offsets from that taken off
     highlights: Highlights
-    rejected: tuple[Rejected, ...]  # highlights that were expected and are not used, each once
+    # why others that were expected are not used, by frame, sphere and LED, from 0
+    rejected: Mapping[tuple[int, int, int], str]
     # of photographs, LEDs and frames, each in one line that names what, and what is done
     faults: tuple[str, ...]
 
@@ -76,7 +71,7 @@ def no_highlights(
     spots: BrightSpots,
     unmeasured: Unmeasured,
     photographs: int,
-    reasons: Sequence[Rejection | None] = (),
+    reasons: Reasons | None = None,
 ) -> InputError:
     """The error of a run without highlights, by its spots and what is bright besides.
 
@@ -84,9 +79,8 @@ def no_highlights(
     fit no machine.
     """
     saturated = int(np.count_nonzero(spots.full >= FULL))
-    if reasons:
-        numbers = Counter(str(reason) for reason in reasons if reason is not None)
-        del numbers[Rejection.OUTSIDE]
+    if reasons is not None:
+        numbers = Counter(reasons[reasons != Rejection.OUTSIDE].tolist())
     else:
         elsewhere = len(spots) - saturated
         numbers = Counter({"saturated": saturated, "where no highlight is expected": elsewhere})
@@ -138,9 +132,9 @@ def relative_light(
 
 def verdicts(
     expected: Expected, partner: Ints, spots: BrightSpots, share: Floats, hidden: Bools
-) -> list[Rejection | None]:
-    """Why each highlight is not used, or None; of n highlights, the spot of each or -1."""
-    found: list[Rejection | None] = [None] * len(partner)
+) -> Reasons:
+    """Why each of n highlights, the spot of each or -1, is not used; empty if it is, (n,)."""
+    found = np.full(len(partner), "", dtype=LONGEST)
     on = partner >= 0
     spot = np.where(on, partner, 0)
     tests: tuple[tuple[Bools, Rejection], ...] = (
@@ -155,8 +149,7 @@ def verdicts(
         (~expected.inside, Rejection.OUTSIDE),
     )
     for wrong, reason in tests:
-        for number in np.flatnonzero(wrong).tolist():
-            found[number] = reason
+        found[wrong] = reason
     return found
 
 

@@ -101,18 +101,9 @@ def find_spots(
     clipped = sum(int(image[place].max() >= FULL * largest) for place in large)
     sums = [_measured(image, dark, *one) for one in places if _radius(one[0]) <= MAX_RADIUS_PX]
     table = np.array([one for one in sums if one is not None]).reshape(-1, COLUMNS)
-    light, radius, shot, spread, colours, full = table[:, 2:].T
-    found = BrightSpots(
-        frame=np.full(len(table), frame),
-        led=np.full(len(table), led),
-        pixel=table[:, :2],
-        light=light,
-        radius=radius,
-        shot=shot,
-        spread=spread,
-        colours=colours,
-        full=full / largest,
-    )
+    table[:, -1] /= largest
+    frames, leds = np.full(len(table), frame), np.full(len(table), led)
+    found = BrightSpots(frames, leds, table[:, :2], *table[:, 2:].T)
     return found, Unmeasured(len(large), clipped)
 
 

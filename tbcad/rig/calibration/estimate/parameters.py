@@ -28,7 +28,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.rig.machine.machine import Machine
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Floats, Ints
 
 
 class Block(StrEnum):
@@ -90,6 +90,11 @@ class Prior:
     def across(self) -> Floats:
         """Two directions across the axis, (2, 3)."""
         return perpendicular_axes(self.mean.axis)
+
+    def is_of(self, *blocks: Block) -> Bools:
+        """Whether free parameters are of some blocks, (q,)."""
+        every = [np.full(self.sigma[block].size, block in blocks) for block in Block]
+        return np.concatenate(every)[self.free]
 
     def blocks(self, values: Floats) -> dict[str, Floats]:
         """All parameters' values in their own units, of free ones in prior standard deviations."""
@@ -186,15 +191,11 @@ def covariance(prior: Prior, information: csc_array) -> Covariance:
     return Covariance(inner, outer, inverse, follows, (of_outer + of_outer.T) / 2)
 
 
-def _is_inner(prior: Prior) -> np.ndarray:
+def _is_inner(prior: Prior) -> Bools:
     """Whether free parameters are of one frame, or of one sphere where these are more."""
     of_frames, of_spheres = (Block.ANGLES, Block.RUNOUT), (Block.CENTRES, Block.RADII)
     free = [sum(int((prior.sigma[b] > 0).sum()) for b in two) for two in (of_frames, of_spheres)]
-    blocks = of_frames if free[0] > free[1] else of_spheres
-    result = np.zeros(len(prior.flat_sigma), dtype=bool)
-    for block in blocks:
-        result[prior.first[block] : prior.first[block] + prior.sigma[block].size] = True
-    return result[prior.free]
+    return prior.is_of(*(of_frames if free[0] > free[1] else of_spheres))
 
 
 def _block_inverse(matrix: csr_array) -> csr_array:

@@ -10,6 +10,7 @@ the prior too, and whose exact sparse steps it does not offer.
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
@@ -17,7 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.calibration.estimate.parameters import Covariance, Prior, covariance
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.types import Bools, Floats, Progress
 
@@ -59,9 +60,10 @@ class Estimate:
         length = np.linalg.norm(self.residual, axis=1)
         return np.asarray(length / (self.highlights.sigma * self.noise_factor))
 
-    def factor(self) -> SuperLU:
-        """The information, factorised."""
-        return _factor(self.information)
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of the free parameters."""
+        return covariance(self.prior, self.information)
 
 
 def estimate(

@@ -1,25 +1,19 @@
 """calibration.json, covariance.npz and the tables: all that a calibration is based on and knows."""
 
 from io import BytesIO
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tbcad.common.results import Table
-from tbcad.records.calibration import (
-    CalibrationRecord,
-    HalvesRecord,
-    HighlightFigures,
-    OutlierRecord,
-    ParameterBlock,
-    PulledParameter,
-    RayFigures,
-)
+from tbcad.records.calibration import CalibrationRecord, ParameterBlock
+from tbcad.records.document import RecordSection
 from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior
+from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
 from tbcad.rig.machine.designed import is_cap
 from tbcad.types import Floats, Ints
@@ -27,14 +21,15 @@ from tbcad.types import Floats, Ints
 AXES = ("x", "y", "z")
 SPHERE = ("x_mm", "y_mm", "z_mm", "radius_mm")
 DIGITS = 6
+Section = TypeVar("Section", bound=RecordSection)
 
 
-def spheres_table(result: MachineCalibration, known: Covariance) -> Table:
+def spheres_table(result: MachineCalibration) -> Table:
     """Centres at base angle zero and radii: designed, estimated, difference, deviation."""
     designed, found = result.setup.designed, result.found.machine
     before = np.column_stack([designed.centre, designed.radius])
     after = np.column_stack([found.centre, found.radius])
-    sigma = np.sqrt(np.diagonal(sphere_covariances(result, known), axis1=1, axis2=2))
+    sigma = np.sqrt(np.diagonal(sphere_covariances(result), axis1=1, axis2=2))
     h, used = result.found.highlights, result.found.used
     count = np.bincount(h.sphere[used], minlength=len(before))
     caps = is_cap(result.setup.plan)
@@ -53,13 +48,13 @@ def spheres_table(result: MachineCalibration, known: Covariance) -> Table:
     return Table.of_columns("spheres", columns)
 
 
-def sphere_covariances(result: MachineCalibration, known: Covariance) -> Floats:
+def sphere_covariances(result: MachineCalibration) -> Floats:
     """Of each sphere's centre at base angle zero and radius, mm^2, (k, 4, 4)."""
-    prior = result.found.prior
-    return known.of(base_slopes(prior, result.found.values).matrix(prior), 4)
+    found = result.found
+    return found.covariance.of(base_slopes(found.prior, found.values).matrix(found.prior), 4)
 
 
-def angles_table(result: MachineCalibration, known: Covariance) -> Table:
+def angles_table(result: MachineCalibration) -> Table:
     """Of each frame: planned and estimated angle, deviation, and where the base is shifted to."""
     found, planned = result.found, np.degrees(result.setup.designed.angle)
     machine, frames = found.machine, result.setup.frames
@@ -73,9 +68,9 @@ def angles_table(result: MachineCalibration, known: Covariance) -> Table:
         "planned_deg": planned,
         "estimated_deg": angle,
         "difference_deg": angle - planned,
-        "sigma_deg": np.degrees(angle_sigmas(found.prior, known)),
+        "sigma_deg": np.degrees(angle_sigmas(found)),
         **{f"shift_{axis}_mm": shift[:, i] for i, axis in enumerate(AXES)},
-        "sigma_shift_mm": _runout_sigmas(found.prior, known),
+        "sigma_shift_mm": _runout_sigmas(found),
     }
     return Table.of_columns("angles", columns)
 
@@ -120,81 +115,44 @@ def residuals_table(result: MachineCalibration) -> Table:
     return Table.of_columns("residuals", columns)
 
 
-def angle_sigmas(prior: Prior, known: Covariance) -> Floats:
+def angle_sigmas(found: Estimate) -> Floats:
     """Of each frame's angle, with the offset of its series, radians, (f,)."""
-    frames = np.arange(len(prior.mean.angle))
-    columns = np.stack(
-        [prior.first[Block.OFFSET] + prior.series, prior.first[Block.ANGLES] + frames], axis=1
-    )
-    return _sigmas(prior, known, columns)
+    prior = found.prior
+    frames = prior.first[Block.ANGLES] + np.arange(len(prior.mean.angle))
+    return _sigmas(found, np.stack([prior.first[Block.OFFSET] + prior.series, frames], axis=1))
 
 
-def _runout_sigmas(prior: Prior, known: Covariance) -> Floats:
+def _runout_sigmas(found: Estimate) -> Floats:
     """Root mean square of each frame's shift, mm, (f,)."""
-    frames = np.arange(len(prior.mean.angle))
-    ways = [(prior.first[Block.RUNOUT] + 2 * frames + way)[:, None] for way in (0, 1)]
-    return np.asarray(np.hypot(*(_sigmas(prior, known, columns) for columns in ways)))
+    both = found.prior.first[Block.RUNOUT] + np.arange(2 * len(found.prior.mean.angle))
+    return np.asarray(np.hypot(*(_sigmas(found, both[way::2, None]) for way in (0, 1))))
 
 
-def _sigmas(prior: Prior, known: Covariance, columns: Ints) -> Floats:
-    ones = np.ones((len(columns), 1, columns.shape[1]))
-    slopes = Slopes((columns,), (ones,)).matrix(prior)
-    return np.asarray(np.sqrt(known.of(slopes, 1)[:, 0, 0]))
+def _sigmas(found: Estimate, columns: Ints) -> Floats:
+    """Of sums of parameters (n, c), (n,)."""
+    slopes = Slopes((columns,), (np.ones((len(columns), 1, columns.shape[1])),))
+    return np.asarray(np.sqrt(found.covariance.of(slopes.matrix(found.prior), 1)[:, 0, 0]))
 
 
 def calibration_record(
-    result: MachineCalibration, judged: CalibrationVerdict, known: Covariance, basis: dict[str, Any]
+    result: MachineCalibration, judged: CalibrationVerdict, basis: dict[str, Any]
 ) -> CalibrationRecord:
     """What calibration.json says; the basis names run, export, process and lens."""
-    found = result.found
     return CalibrationRecord(
         **basis,
         verdict=judged.answer.value,
-        rays=RayFigures(
-            mirrors=len(result.rays.ids),
-            mirrors_without_frame=result.rays.absent,
-            place_mm_median=_short(judged.place_mm[0]),
-            place_mm_95=_short(judged.place_mm[1]),
-            turn_mrad_median=_short(judged.turn_mrad[0]),
-            turn_mrad_95=_short(judged.turn_mrad[1]),
-            in_run_mm_median=_short(judged.in_run[0]),
-            in_run_mrad_median=_short(judged.in_run[1]),
-            in_design_mm_median=_short(judged.whole_mm[0]),
-            in_design_mrad_median=_short(judged.whole_mrad[0]),
-            needed_mm_median=_short(judged.needed_mm),
-            share_short_of_need=_short(judged.short),
-        ),
-        highlights=HighlightFigures(
-            given=len(found.highlights),
-            used=int(found.used.sum()),
-            rejected_by_detection=_counts(result),
-            noise_factor=_short(found.noise_factor),
-            residual_px=_short(float(np.sqrt((found.residual[found.used] ** 2).mean()))),
-            degrees_of_freedom=round(found.freedom),
-        ),
-        outliers=tuple(
-            OutlierRecord(photograph=name, ball=ball, led=led, sigmas=_short(sigma))
-            for name, ball, led, sigma in outliers(result)
-        ),
-        halves=tuple(
-            HalvesRecord(
-                apart=half.by,
-                highlights=half.counts,
-                found_mm=_short(half.found_mm),
-                expected_mm=_short(half.expected_mm),
-            )
-            for half in result.halves
-        ),
+        rays=_short(judged.rays),
+        highlights=_short(judged.highlights),
+        outliers=tuple(map(_short, outliers(result))),
+        halves=tuple(map(_short, result.halves)),
         faults=result.detection.faults,
         doubts=judged.doubts,
-        unlike_the_process=tuple(
-            PulledParameter(parameter=name, sigmas=_short(sigma)) for name, sigma in judged.pulled
-        ),
-        parameters=_parameters(result, known),
+        unlike_the_process=tuple(map(_short, judged.pulled)),
+        parameters=_parameters(result),
     )
 
 
-def covariance_bytes(result: MachineCalibration, known: Covariance) -> bytes:
+def covariance_bytes(result: MachineCalibration) -> bytes:
     """covariance.npz: the same calibration gives the same bytes.
 
     Arrays: parameter (q,) names of the free ones; value and prior_sigma (q,), in prior standard
@@ -216,37 +174,37 @@ def covariance_bytes(result: MachineCalibration, known: Covariance) -> bytes:
         information_row=upper.row[kept].astype(np.int32),
         information_column=upper.col[kept].astype(np.int32),
         information=upper.data[kept],
-        sphere=sphere_covariances(result, known),
+        sphere=sphere_covariances(result),
         ray=result.rays.known.whole.covariance,
     )
     return file.getvalue()
 
 
-def _parameters(result: MachineCalibration, known: Covariance) -> dict[str, ParameterBlock]:
+def _parameters(result: MachineCalibration) -> dict[str, ParameterBlock]:
     """Each block's priors and results: deviations before and after, median of its parameters."""
-    prior = result.found.prior
-    after = np.zeros(len(prior.flat_sigma))
-    after[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
+    found = result.found
+    before, after = found.prior.sigma, found.prior.blocks(found.covariance.sigma())
     return {
-        block: ParameterBlock(
-            number=prior.sigma[block].size,
-            free=int((prior.sigma[block] > 0).sum()),
-            prior_sigma=_median(prior.sigma[block].ravel()),
-            sigma=_median(after[start : start + prior.sigma[block].size]),
+        block: _short(
+            ParameterBlock(
+                number=before[block].size,
+                free=int((before[block] > 0).sum()),
+                prior_sigma=_median(before[block]),
+                sigma=_median(after[block]),
+            )
         )
-        for block, start in prior.first.items()
+        for block in Block
     }
 
 
 def _median(values: Floats) -> float | None:
     free = values[values > 0]
-    return _short(float(np.median(free))) if len(free) else None
+    return float(np.median(free)) if len(free) else None
 
 
-def _counts(result: MachineCalibration) -> dict[str, int]:
-    reasons = [rejected.reason.value for rejected in result.detection.rejected]
-    return {reason: reasons.count(reason) for reason in sorted(set(reasons))}
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def _short(figures: Section) -> Section:
+    """The same with numbers of so many digits."""
+    numbers = {name: value for name, value in figures if isinstance(value, float)}
+    return figures.model_copy(
+        update={name: float(f"{value:.{DIGITS}g}") for name, value in numbers.items()}
+    )

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +13,7 @@ from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Covariance
+from tbcad.rig.calibration.estimate.parameters import Block
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
@@ -49,16 +48,15 @@ class Kind:
         return float((np.abs(self.sigmas_off) <= SIGMAS).mean())
 
 
-def recovered_errors(
-    result: MachineCalibration, known: Covariance, truth: Machine
-) -> tuple[Kind, ...]:
+def recovered_errors(result: MachineCalibration, truth: Machine) -> tuple[Kind, ...]:
     """Errors by kind, against the true machine with the same frames; none that are fixed."""
     designed, prior = result.setup.designed, result.found.prior
     caps, rest = is_cap(result.setup.plan), _besides_motion(designed.centre)
-    spheres, besides = _sphere_sigmas(result, known, rest)
+    spheres, besides = _sphere_sigmas(result, rest)
     width = np.concatenate([prior.sigma[block] for block in LENS])
     width = np.where(width > 0, width, 1.0)
-    of, axes = partial(_sigma, result, known), designed.camera.axes
+    of, axes = prior.blocks(result.found.covariance.sigma()), designed.camera.axes
+    lens = np.concatenate([of[block] for block in LENS])
     rows: tuple[tuple[str, str, float, Callable[[Machine], Floats], Floats], ...] = (
         ("centres", "um", MICROMETRES, lambda one: one.centre, spheres[:, :3]),
         (BESIDES, "um", MICROMETRES, lambda one: rest @ one.centre.ravel(), besides),
@@ -67,22 +65,22 @@ def recovered_errors(
         (
             *("base angles", "deg", 1.0),
             lambda one: np.degrees(one.angle),
-            np.degrees(angle_sigmas(prior, known)),
+            np.degrees(angle_sigmas(result.found)),
         ),
-        ("axis", "mrad", MILLI, lambda one: one.axis @ prior.across.T, of(Block.TILT)),
+        ("axis", "mrad", MILLI, lambda one: one.axis @ prior.across.T, of[Block.TILT]),
         (
             *("base in each frame", "um", MICROMETRES),
             lambda one: _base_places(one, prior.across),
-            _place_sigmas(result, known),
+            _place_sigmas(result),
         ),
-        ("camera's place", "um", MICROMETRES, lambda one: one.camera.pinhole, of(Block.PINHOLE)),
+        ("camera's place", "um", MICROMETRES, lambda one: one.camera.pinhole, of[Block.PINHOLE]),
         (
             *("camera's direction", "mrad", MILLI),
             lambda one: Rotation.from_matrix(one.camera.axes @ axes.T).as_rotvec(),
-            of(Block.CAMERA_TURN),
+            of[Block.CAMERA_TURN],
         ),
-        ("lens", "deviations of the prior", 1.0, lambda one: _lens(one) / width, of(*LENS) / width),
-        ("LEDs", "um", MICROMETRES, lambda one: one.leds, of(Block.LEDS)),
+        ("lens", "deviations of the prior", 1.0, lambda one: _lens(one) / width, lens / width),
+        ("LEDs", "um", MICROMETRES, lambda one: one.leds, of[Block.LEDS]),
     )
     machines = designed, truth, result.found.machine
     kinds = []
@@ -105,12 +103,10 @@ def recovered_table(kinds: tuple[Kind, ...]) -> Table:
     return Table.of_columns("recovered", columns)
 
 
-def _sphere_sigmas(
-    result: MachineCalibration, known: Covariance, rest: Floats
-) -> tuple[Floats, Floats]:
+def _sphere_sigmas(result: MachineCalibration, rest: Floats) -> tuple[Floats, Floats]:
     """Of centres and radii, mm, (k, 4), and of centres besides a motion and growth of all."""
     slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
-    covariance = np.asarray(slopes @ known.times(slopes.T.toarray()))
+    covariance = np.asarray(slopes @ result.found.covariance.times(slopes.T.toarray()))
     sigma = np.sqrt(np.diag(covariance)).reshape(-1, 4)
     of_centres = np.arange(sigma.size).reshape(-1, 4)[:, :3].ravel()
     besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
@@ -134,7 +130,7 @@ def _base_places(machine: Machine, across: Floats) -> Floats:
     return np.asarray((point - turned + shift) @ across.T)
 
 
-def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
+def _place_sigmas(result: MachineCalibration) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
     frames = np.arange(len(angle))
@@ -146,7 +142,7 @@ def _place_sigmas(result: MachineCalibration, known: Covariance) -> Floats:
         prior.first[Block.RUNOUT] + 2 * frames[:, None] + np.arange(2),
     )
     values = (by_point, np.broadcast_to(np.eye(2), by_point.shape))
-    covariance = known.of(Slopes(columns, values).matrix(prior), 2)
+    covariance = result.found.covariance.of(Slopes(columns, values).matrix(prior), 2)
     return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
 
 
@@ -156,14 +152,6 @@ def _lens(machine: Machine) -> Floats:
     logarithm = np.log(camera.focal)
     focal = [logarithm.mean(), logarithm[0] - logarithm[1]]
     return np.concatenate([focal, camera.principal, camera.distortion])
-
-
-def _sigma(result: MachineCalibration, known: Covariance, *blocks: Block) -> Floats:
-    prior = result.found.prior
-    every = np.zeros(len(prior.flat_sigma))
-    every[prior.free] = known.sigma() * prior.flat_sigma[prior.free]
-    ends = [(prior.first[block], prior.sigma[block].size) for block in blocks]
-    return np.concatenate([every[first : first + size] for first, size in ends])
 
 
 @dataclass(frozen=True)

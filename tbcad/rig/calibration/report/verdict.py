@@ -8,11 +8,16 @@ from enum import StrEnum
 import numpy as np
 
 from tbcad.common.screen import WIDTH
+from tbcad.records.calibration import (
+    HighlightFigures,
+    OutlierRecord,
+    PulledParameter,
+    RayFigures,
+)
 from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.detection.detection import Detection, Rejection
 from tbcad.rig.calibration.estimate.parameters import Block, Prior
-from tbcad.types import Floats
 
 NEEDED_PIXELS = 0.5
 """Of a photograph's pixel at the object: beyond, calibration blurs more than the pixels do."""
@@ -38,70 +43,86 @@ class CalibrationVerdict:
     """What to think of a calibration."""
 
     answer: Answer
-    # root mean square error of the rays at the object's centre, median and 95 %, mm, besides a
-    # motion of all of them
-    place_mm: tuple[float, float]
-    turn_mrad: tuple[float, float]  # of their directions, mrad
-    in_run: tuple[float, float]  # the same of both among the rays of one run, medians, mm and mrad
-    whole_mm: tuple[float, float]  # the same in the frame of the design, mm
-    whole_mrad: tuple[float, float]  # likewise, mrad
-    needed_mm: float  # half a pixel at the object, median of the mirrors, mm
-    short: float  # share of the rays that are less well known than half of their pixel
+    rays: RayFigures
+    highlights: HighlightFigures
     doubts: tuple[str, ...]  # why it may not be trusted, one line each
-    # parameters that the process does not explain, by name and prior deviations
-    pulled: tuple[tuple[str, float], ...]
+    pulled: tuple[PulledParameter, ...]  # that the process does not explain
     steps: tuple[str, ...]
 
 
 def verdict(result: MachineCalibration) -> CalibrationVerdict:
     """Judge a calibration."""
-    known = result.rays.known
-    short = float((known.relative.place_mm > NEEDED_PIXELS * known.pixel_mm).mean())
-    doubts = _doubts(result)
-    pulled = _pulled(result)
-    enough = short <= 1 - SHARE / 100
+    rays, doubts, pulled = _rays(result), _doubts(result), _pulled(result)
+    enough = rays.share_short_of_need <= 1 - SHARE / 100
     trusted = Answer.DOUBTFUL if doubts else Answer.GOOD
     return CalibrationVerdict(
         answer=trusted if enough else Answer.NOT_GOOD,
-        place_mm=_median_and_most(known.relative.place_mm),
-        turn_mrad=_median_and_most(known.relative.turn_mrad),
-        in_run=(float(np.median(known.in_run.place_mm)), float(np.median(known.in_run.turn_mrad))),
-        whole_mm=_median_and_most(known.whole.place_mm),
-        whole_mrad=_median_and_most(known.whole.turn_mrad),
-        needed_mm=NEEDED_PIXELS * float(np.median(known.pixel_mm)),
-        short=short,
+        rays=rays,
+        highlights=_highlights(result),
         doubts=doubts,
         pulled=pulled,
         steps=_steps(result, enough, bool(doubts), bool(pulled)),
     )
 
 
+def _rays(result: MachineCalibration) -> RayFigures:
+    """How well rays are known besides a motion of all, of those of one run, and as they are."""
+    known = result.rays.known
+    place, turn = known.relative.place_mm, known.relative.turn_mrad
+    needed = NEEDED_PIXELS * known.pixel_mm
+    return RayFigures(
+        mirrors=len(result.rays.ids),
+        mirrors_without_frame=result.rays.absent,
+        place_mm_median=np.median(place),
+        place_mm_95=np.percentile(place, SHARE),
+        turn_mrad_median=np.median(turn),
+        turn_mrad_95=np.percentile(turn, SHARE),
+        in_run_mm_median=np.median(known.in_run.place_mm),
+        in_run_mrad_median=np.median(known.in_run.turn_mrad),
+        in_design_mm_median=np.median(known.whole.place_mm),
+        in_design_mrad_median=np.median(known.whole.turn_mrad),
+        needed_mm_median=np.median(needed),
+        share_short_of_need=(place > needed).mean(),
+    )
+
+
+def _highlights(result: MachineCalibration) -> HighlightFigures:
+    found = result.found
+    return HighlightFigures(
+        given=len(found.highlights),
+        used=int(found.used.sum()),
+        rejected_by_detection=dict(sorted(Counter(result.detection.rejected.values()).items())),
+        noise_factor=found.noise_factor,
+        residual_px=np.sqrt((found.residual[found.used] ** 2).mean()),
+        degrees_of_freedom=round(found.freedom),
+    )
+
+
 def verdict_text(result: MachineCalibration, judged: CalibrationVerdict) -> str:
     """The verdict as it is printed: first the answer, at most 80 columns."""
-    found = result.found
-    place, turn = judged.place_mm, judged.turn_mrad
-    residual = float(np.sqrt((found.residual[found.used] ** 2).mean()))
+    rays, seen = judged.rays, judged.highlights
     counts = _not_used(result.detection)
     told = "; ".join(f"{number} {reason}" for reason, number in counts.most_common())
     left_out = [
-        f"{name} ball {ball} {sigma:.0f} sigma" for name, ball, _, sigma in outliers(result)
+        f"{one.photograph} ball {one.ball} {one.sigmas:.0f} sigma" for one in outliers(result)
     ]
     lines = [
-        f"{judged.answer}: rays at the object are known to {place[0]:.3f} mm (median; "
-        f"{place[1]:.3f} mm for {SHARE} %), {judged.needed_mm:.2f} mm is needed (half a pixel)",
-        f"their directions to {turn[0]:.2f} mrad (median; {turn[1]:.2f} mrad for {SHARE} %); tbcad "
-        f"tolerance assumes {ASSUMED_MRAD} mrad",
-        f"among the rays of one run {judged.in_run[0]:.3f} mm, {judged.in_run[1]:.2f} mrad "
-        "(median); the rest is the axis of the object's half turn, which no highlight shows",
-        f"where the whole machine is in its design's frame: {judged.whole_mm[0]:.3f} mm, "
-        f"{judged.whole_mrad[0]:.2f} mrad (median of the rays); what all rays share only moves the "
-        "picture",
-        f"from {int(found.used.sum())} highlights of {len(result.setup.frames)} frames, "
+        f"{judged.answer}: rays at the object are known to {rays.place_mm_median:.3f} mm (median; "
+        f"{rays.place_mm_95:.3f} mm for {SHARE} %), {rays.needed_mm_median:.2f} mm is needed (half "
+        "a pixel)",
+        f"their directions to {rays.turn_mrad_median:.2f} mrad (median; {rays.turn_mrad_95:.2f} "
+        f"mrad for {SHARE} %); tbcad tolerance assumes {ASSUMED_MRAD} mrad",
+        f"among the rays of one run {rays.in_run_mm_median:.3f} mm, {rays.in_run_mrad_median:.2f} "
+        "mrad (median); the rest is the axis of the object's half turn, which no highlight shows",
+        f"where the whole machine is in its design's frame: {rays.in_design_mm_median:.3f} mm, "
+        f"{rays.in_design_mrad_median:.2f} mrad (median of the rays); what all rays share only "
+        "moves the picture",
+        f"from {seen.used} highlights of {len(result.setup.frames)} frames, "
         f"{len(result.setup.designed.radius)} spheres and {len(result.setup.designed.leds)} LEDs",
-        f"residuals {residual:.3f} px (root mean square each way), "
-        f"{found.noise_factor:.2f} times what detection expects",
+        f"residuals {seen.residual_px:.3f} px (root mean square each way), "
+        f"{seen.noise_factor:.2f} times what detection expects",
         *(
-            f"halves with {half.by} apart differ by {half.found_mm:.3f} mm, expected "
+            f"halves with {half.apart} apart differ by {half.found_mm:.3f} mm, expected "
             f"{half.expected_mm:.3f} mm"
             for half in result.halves
         ),
@@ -109,41 +130,37 @@ def verdict_text(result: MachineCalibration, judged: CalibrationVerdict) -> str:
         *_listed("left out", left_out),
         *(f"doubt: {one}" for one in judged.doubts),
         *_listed("fault", result.detection.faults),
-        *_listed("unlike the process", [f"{n} {s:+.1f} sigma" for n, s in judged.pulled]),
+        *_listed(
+            "unlike the process",
+            [f"{one.parameter} {one.sigmas:+.1f} sigma" for one in judged.pulled],
+        ),
         *(f"next: {step}" for step in judged.steps),
     ]
     return "\n".join(textwrap.fill(line, WIDTH, subsequent_indent="  ") for line in lines)
 
 
-def outliers(result: MachineCalibration) -> list[tuple[str, int, int, float]]:
-    """Photograph, ball and LED from 1, and deviations, of highlights left out, the worst first."""
+def outliers(result: MachineCalibration) -> list[OutlierRecord]:
+    """Highlights left out, the worst first."""
     found, h = result.found, result.found.highlights
-    wrong = np.flatnonzero(~found.used)
-    names = [
-        (
-            exposure_name(result.setup.frames[h.frame[i]], f"led_{h.led[i] + 1}"),
-            int(h.sphere[i]) + 1,
-            int(h.led[i]) + 1,
-            float(found.sigmas_off[i]),
+    every = (
+        OutlierRecord(
+            photograph=exposure_name(result.setup.frames[h.frame[i]], f"led_{h.led[i] + 1}"),
+            ball=h.sphere[i] + 1,
+            led=h.led[i] + 1,
+            sigmas=found.sigmas_off[i],
         )
-        for i in wrong
-    ]
-    return sorted(names, key=lambda one: -one[3])
+        for i in np.flatnonzero(~found.used)
+    )
+    return sorted(every, key=lambda one: -one.sigmas)
 
 
 def parameter_names(prior: Prior) -> list[str]:
     """Names of all parameters, fixed ones too, numbers from 1."""
-    names = []
-    for block in Block:
-        shape = prior.sigma[block].shape
-        for index in np.ndindex(shape):
-            names.append(" ".join([block, *(str(i + 1) for i in index)]))
-    return names
-
-
-def _median_and_most(values: Floats) -> tuple[float, float]:
-    median, most = np.percentile(values, [50, SHARE])
-    return float(median), float(most)
+    return [
+        " ".join([block, *(str(i + 1) for i in index)])
+        for block in Block
+        for index in np.ndindex(prior.sigma[block].shape)
+    ]
 
 
 def _doubts(result: MachineCalibration) -> tuple[str, ...]:
@@ -158,22 +175,21 @@ def _doubts(result: MachineCalibration) -> tuple[str, ...]:
     if share > MAX_OUTLIERS:
         doubts.append(f"{share:.0%} of the highlights are outliers")
     doubts.extend(
-        f"halves with {half.by} apart differ {half.ratio:.1f} times as much as they should"
+        f"halves with {half.apart} apart differ {half.ratio:.1f} times as much as they should"
         for half in result.halves
         if half.ratio > MAX_RATIO
     )
     return tuple(doubts)
 
 
-def _pulled(result: MachineCalibration) -> tuple[tuple[str, float], ...]:
+def _pulled(result: MachineCalibration) -> tuple[PulledParameter, ...]:
     """Parameters that are farther from their prior means than the process explains."""
-    found = result.found
-    names = parameter_names(found.prior)
-    worst = np.argsort(-np.abs(found.values))
+    values, free = result.found.values, result.found.prior.free
+    names = parameter_names(result.found.prior)
     return tuple(
-        (names[found.prior.free[i]], float(found.values[i]))
-        for i in worst
-        if abs(found.values[i]) > PULLED
+        PulledParameter(parameter=names[free[i]], sigmas=values[i])
+        for i in np.argsort(-np.abs(values))
+        if abs(values[i]) > PULLED
     )
 
 
@@ -205,10 +221,9 @@ def _steps(
     return tuple(steps or ["tbcad merge"])
 
 
-def _not_used(detection: Detection) -> Counter[Rejection]:
+def _not_used(detection: Detection) -> Counter[str]:
     """Numbers of highlights that detection does not use, but those outside of the picture."""
-    reasons = (rejected.reason for rejected in detection.rejected)
-    return Counter(reason for reason in reasons if reason is not Rejection.OUTSIDE)
+    return Counter(why for why in detection.rejected.values() if why != Rejection.OUTSIDE)
 
 
 def _listed(heading: str, texts: "list[str] | tuple[str, ...]") -> list[str]:
