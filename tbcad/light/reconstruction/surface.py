@@ -27,7 +27,7 @@ from tbcad.light.reconstruction.fit import medium_of
 from tbcad.light.reconstruction.marching import MATT, SOFTNESS, Singles, composited
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import NUMBERS
-from tbcad.light.simulate.parallel import chunks, first_then_threads, in_threads
+from tbcad.light.simulate.parallel import first_then_threads, in_threads, over_chunks
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Bytes, Floats, Ints
 
@@ -194,8 +194,7 @@ def _hidden(embree: Any, points: Singles) -> Bools:
             seen[left] += _free(embree, place[left], toward)
         return np.asarray(seen < SEEN_FROM)
 
-    parts = in_threads(part, chunks(len(points), POINTS_PER_CHUNK))
-    return np.concatenate([np.zeros(0, dtype=bool), *parts])
+    return over_chunks(part, len(points), POINTS_PER_CHUNK)
 
 
 def _hemisphere(n: int) -> Singles:
