@@ -15,8 +15,6 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tbcad.core.geometry.vectors import norm
@@ -214,10 +212,9 @@ def _free(embree: Any, points: Singles, toward: Singles) -> Bools:
 
 def _bodies(points: Singles, faces: Ints, least: float) -> tuple[Singles, Ints]:
     """The surfaces of all bodies of at least that size, mm."""
-    v = len(points)
-    ends = np.concatenate([faces[:, :2], faces[:, 1:]]).T
-    graph = coo_array((np.ones(ends.shape[1], dtype=np.int8), ends), shape=(v, v))
-    count, label = connected_components(graph, directed=False)
+    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
+    label = trimesh.graph.connected_component_labels(edges, node_count=len(points))
+    count = label.max() + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)
