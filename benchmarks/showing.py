@@ -23,8 +23,9 @@ from timing import Figure, Row, at_least, measured
 from tbcad import Views
 from tbcad.light.reconstruction.field import NAME, read_field
 from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.viewer.page import Query
-from tbcad.light.viewer.render import FieldRenderer, Renderer, ViewRenderer
+from tbcad.light.viewer.render import Renderer, field_renderer, light_field_renderer
 from tbcad.light.viewer.server import HOST, ViewServer
 
 Method = Literal["nearest", "blend", "depth"]
@@ -73,7 +74,7 @@ def few(views: Views, method: Method) -> int:
 def showing(capture: Path, rounds: int) -> list[Row]:
     """Views while the viewpoint moves: made alone, over HTTP, and on a page in Chromium."""
     with LightField.open(capture) as source:
-        renderer = Renderer(source)
+        renderer = light_field_renderer(MirrorTiles(source))
         around(renderer.picture)  # compiles
         alone = [rates(lambda: around(renderer.picture)) for _ in range(rounds)]
         packed = [rates(lambda: around(renderer.jpeg)) for _ in range(rounds)]
@@ -90,7 +91,7 @@ def showing(capture: Path, rounds: int) -> list[Row]:
 
 def field_shown(field: Path, rounds: int) -> list[Row]:
     """Views by a field: at rest, and while the viewpoint moves, also half as large."""
-    renderer = FieldRenderer(read_field(field))
+    renderer = field_renderer(read_field(field))
     around(renderer.picture)  # compiles
     still = [rates(lambda: around(renderer.picture, still=True)) for _ in range(rounds)]
     moving = [rates(lambda: around(renderer.picture)) for _ in range(rounds)]
@@ -129,7 +130,7 @@ def rates(work: Callable[[], int]) -> tuple[float, float]:
 
 
 @contextmanager
-def running(renderer: ViewRenderer) -> Iterator[ViewServer]:
+def running(renderer: Renderer) -> Iterator[ViewServer]:
     with ViewServer(renderer, "knot", Query()) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()

@@ -7,8 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.viewer.page import Query
-from tbcad.light.viewer.render import Renderer
+from tbcad.light.viewer.render import light_field_renderer
 from tbcad.light.viewer.server import ViewServer
 from tests.clients.browser import Browser
 
@@ -39,7 +40,10 @@ PICTURE_APERTURE_MM = 120.0
 @contextmanager
 def served(captured: Path, start: Query) -> Iterator[ViewServer]:
     """The viewer's server of a capture, in this process."""
-    with LightField.open(captured) as source, ViewServer(Renderer(source), "knot", start) as server:
+    with (
+        LightField.open(captured) as source,
+        ViewServer(light_field_renderer(MirrorTiles(source)), "knot", start) as server,
+    ):
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         try:

@@ -13,7 +13,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export, reflectors
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-from tbcad.light.viewer.render import Renderer
+from tbcad.light.viewer.render import Renderer, light_field_renderer
 from tests.ball_captures import ball, four  # noqa: F401 - fixtures
 
 CAPTURE_MM = 60.0
@@ -46,8 +46,8 @@ def tiles(light_field: LightField) -> MirrorTiles:
 
 
 @pytest.fixture(scope="session")
-def renderer(light_field: LightField) -> Renderer:
-    return Renderer(light_field)
+def renderer(tiles: MirrorTiles) -> Renderer:
+    return light_field_renderer(tiles)
 
 
 @pytest.fixture(scope="session")

@@ -15,10 +15,9 @@ from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.colmap import SparseModel
 from tbcad.errors import InputError
 from tbcad.light.datasets.machine_scene import write_machine_scene
-from tbcad.light.datasets.pictures import Pictures, crop_of, default_size, taken_pictures
+from tbcad.light.datasets.pictures import PinholePictures, crop_of, default_size, taken_pictures
 from tbcad.light.datasets.pinholes import (
     SeedPoints,
-    pinhole_of,
     seed_points,
     write_nerfstudio,
     write_ngp_rays,
@@ -144,23 +143,19 @@ def _written(
         return {"rays": write_ray_table(folder, source, virtual, detail)}
     progress("pictures")
     size = options.size or default_size(virtual, source.capture_mm)
-    pictures = taken_pictures(source, virtual, size, scene, detail)
+    pictures, errors = taken_pictures(source, virtual, size, scene, detail)
     progress("seed points")
-    seeds = seed_points(pictures.cameras, pictures.picture, pictures.mask, source.capture_mm)
+    cameras = virtual.pinhole_cameras(source.capture_mm, size)
+    seeds = seed_points(cameras, pictures.picture, pictures.mask, source.capture_mm)
     progress("files")
     write = write_nerfstudio if options.to == "nerfstudio" else write_colmap
     write(folder, [one.name for one in virtual.mirrors], pictures, seeds)
-    return _of_pictures(size, pictures, seeds)
-
-
-def _of_pictures(size: int, pictures: Pictures, seeds: SeedPoints) -> dict[str, Any]:
-    errors = pictures.reprojection_px
     found = {
         "size_px": size,
         "seed_points": len(seeds.points),
         "known_pixels": round(float(pictures.mask.mean()), DIGITS),
     }
-    if errors is None or not len(errors):
+    if not len(errors):
         return found
     figures = {"rays": len(errors), "median": _rounded(np.median(errors))}
     figures["percentile_95"] = _rounded(np.percentile(errors, 95))
@@ -196,27 +191,25 @@ def _rows(virtual: FittedCameras) -> Iterator[Row]:
         yield dict(zip(COLUMNS, cells, strict=True))
 
 
-def write_colmap(folder: Path, names: list[str], pictures: Pictures, seeds: SeedPoints) -> None:
+def write_colmap(
+    folder: Path, names: list[str], pictures: PinholePictures, seeds: SeedPoints
+) -> None:
     """Write images, masks and the sparse model into a folder that exists."""
     write_pictures(folder, names, pictures, MASK_SUFFIX)
     (folder / MODEL).mkdir(parents=True)
-    for name, data in sparse_model(names, pictures, seeds).files().items():
-        (folder / MODEL / name).write_bytes(data)
-
-
-def sparse_model(names: list[str], pictures: Pictures, seeds: SeedPoints) -> SparseModel:
-    """The cameras and points as COLMAP has them."""
-    pinholes = [pinhole_of(camera) for camera in pictures.cameras]
-    intrinsics = [np.concatenate([one.focal_px, one.principal_px]) for one in pinholes]
-    return SparseModel(
+    count, size = pictures.mask.shape[:2]
+    lens = [pictures.focal_px, pictures.focal_px, *np.full((2, count), size / 2)]
+    model = SparseModel(
         tuple(f"{name}.png" for name in names),
-        pinholes[0].size_px,
-        np.array(intrinsics),
-        np.array([one.axes for one in pinholes]),
-        np.array([one.centre for one in pinholes]),
+        (size, size),
+        np.column_stack(lens),
+        pictures.axes,
+        pictures.centre,
         seeds.points,
         seeds.colours,
     )
+    for name, data in model.files().items():
+        (folder / MODEL / name).write_bytes(data)
 
 
 def write_ray_table(

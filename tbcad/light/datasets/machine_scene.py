@@ -19,6 +19,7 @@ from tbcad.cad.formats.mesh_files import mesh_ply
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.geodesic import triangle_grid
+from tbcad.light.datasets.pinholes import camera_to_world
 from tbcad.light.simulate.object_files.normals import is_closed
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, SurfaceHits
@@ -124,11 +125,8 @@ def blender_script(cameras: dict[str, Camera], parts: list[str]) -> str:
 
 def _blender_camera(camera: Camera) -> dict[str, Any]:
     """Matrix of a camera that looks along -z with +y up, angle of view, and size."""
-    right, down, forward = camera.axes
-    matrix = np.eye(4)
-    matrix[:3] = np.column_stack([right, -down, -forward, camera.pinhole])
     return {
-        "matrix": matrix.tolist(),
+        "matrix": camera_to_world(camera.pinhole, camera.axes),
         "angle": float(camera.hfov),
         "size": [camera.width_px, camera.height_px],
     }

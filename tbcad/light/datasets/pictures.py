@@ -15,6 +15,7 @@ from tbcad.light.datasets.virtual_cameras import (
     MirrorId,
     at_middle,
     chosen_mirrors,
+    neighbour_steps,
     read_crop,
     reading_order,
     virtual_cameras,
@@ -66,11 +67,9 @@ def _sees_sphere(camera: Camera, radius: float) -> Bools:
 
 def _samples(place: Floats, known: Bools) -> int:
     """Samples across a pixel, one at least for each ray."""
-    inside = known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1]
-    if not inside.any():
+    across, down = neighbour_steps(place, known)
+    if not len(across):
         return 1
-    across = (place[:-1, 1:] - place[:-1, :-1])[inside]
-    down = (place[1:, :-1] - place[:-1, :-1])[inside]
     area = np.abs(across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0])
     return int(np.clip(np.ceil(1 / np.sqrt(np.median(area))), 1, MOST_SAMPLES))
 
@@ -126,15 +125,15 @@ def _fill_triangle(place: Floats, colour: Bytes, corners: Ints, total: Colours, 
 
 
 @dataclass(frozen=True)
-class Pictures:
-    """Pictures of m pinhole cameras, of one size."""
+class PinholePictures:
+    """Pictures of m virtual cameras that look at the origin, of one size."""
 
-    cameras: list[Camera]  # (m,)
-    picture: Bytes  # (m, h, w, 3)
-    mask: Bools  # where it is known, (m, h, w)
-    # distance of each ray's place from where its point of the object appears through the pinhole,
-    # of all rays that hit the object; None without the object
-    reprojection_px: Floats | None
+    centre: Floats  # of the pinholes, mm, (m, 3)
+    axes: Floats  # rows: along the rows, down the columns, forward, (m, 3, 3)
+    focal_px: Floats  # (m,)
+    picture: Bytes  # (m, s, s, 3)
+    mask: Bools  # where it is known, (m, s, s)
+    capture_mm: float  # diameter of the capture sphere
 
 
 def default_size(virtual: FittedCameras, capture_mm: float) -> int:
@@ -148,10 +147,12 @@ def taken_pictures(
     size_px: int,
     scene: Scene | None,
     progress: Progress = lambda _: None,
-) -> Pictures:
+) -> tuple[PinholePictures, Floats]:
     """Resample the crops of all virtual cameras, to pictures of `size_px` x `size_px` pixels.
 
-    InputError: so many pictures of this size do not fit into memory.
+    Also distances of each ray's place from where its point of the object appears through the
+    pinhole, pixels, of all rays that hit the object, (n,); none without it. InputError: so many
+    pictures of this size do not fit into memory.
     """
     cameras, radius = virtual.pinhole_cameras(source.capture_mm, size_px), source.capture_mm / 2
     if len(cameras) * size_px**2 * 4 > MOST_BYTES:
@@ -168,8 +169,11 @@ def taken_pictures(
         return np.zeros(0) if scene is None else reprojection_errors(crop, cameras[k], scene)
 
     order = reading_order(source, virtual.mirrors).tolist()
-    errors = list(in_batches(take, order, lambda k: progress(virtual.mirrors[k].name)))
-    return Pictures(cameras, picture, mask, None if scene is None else np.concatenate(errors))
+    errors = in_batches(take, order, lambda k: progress(virtual.mirrors[k].name))
+    off = np.concatenate([np.zeros(0), *errors])
+    axes = np.array([one.axes for one in cameras]).reshape(-1, 3, 3)
+    focal = np.array([1 / one.pixel_pitch for one in cameras])
+    return PinholePictures(virtual.centre, axes, focal, picture, mask, source.capture_mm), off
 
 
 def crop_of(source: LightField, mirror: MirrorId) -> Crop:
@@ -189,27 +193,10 @@ def reprojection_errors(crop: Crop, camera: Camera, scene: Scene) -> Floats:
     return norm(camera.project(points) - places(crop, camera)[crop.meets][hit])
 
 
-@dataclass(frozen=True)
-class PinholePictures:
-    """Pictures of m virtual cameras that look at the origin."""
-
-    centre: Floats  # of the pinholes, mm, (m, 3)
-    axes: Floats  # rows: along the rows, down the columns, forward, (m, 3, 3)
-    focal_px: Floats  # (m,)
-    picture: Bytes  # (m, s, s, 3)
-    mask: Bools  # where it is known, (m, s, s)
-    capture_mm: float  # diameter of the capture sphere
-
-
 def pinhole_pictures(source: LightField, progress: Progress = lambda _: None) -> PinholePictures:
     """The pictures of all virtual cameras of a light field."""
     virtual = virtual_cameras(source, chosen_mirrors(source, None, 1), progress)
-    taken = taken_pictures(source, virtual, _size(virtual, source.capture_mm), None, progress)
-    axes = np.array([one.axes for one in taken.cameras]).reshape(-1, 3, 3)
-    focal = np.array([1 / one.pixel_pitch for one in taken.cameras])
-    return PinholePictures(
-        virtual.centre, axes, focal, taken.picture, taken.mask, source.capture_mm
-    )
+    return taken_pictures(source, virtual, _size(virtual, source.capture_mm), None, progress)[0]
 
 
 def _size(virtual: FittedCameras, capture_mm: float) -> int:

@@ -25,7 +25,7 @@ from scipy.stats import qmc
 from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.pictures import Pictures, crop_of
+from tbcad.light.datasets.pictures import PinholePictures, crop_of
 from tbcad.light.datasets.virtual_cameras import Crop, FittedCameras, at_middle
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import png_bytes
@@ -66,11 +66,8 @@ class Pinhole:
 
     @property
     def camera_to_world(self) -> list[list[float]]:
-        """Matrix of a camera that looks along -z with +y up and +x to the right, 4 x 4."""
-        right, down, forward = self.axes
-        matrix = np.eye(4)
-        matrix[:3] = np.column_stack([right, -down, -forward, self.centre])
-        return [[float(value) for value in row] for row in matrix]
+        """Matrix, 4 x 4."""
+        return camera_to_world(self.centre, self.axes)
 
     def intrinsics(self) -> dict[str, Any]:
         """Focal lengths, principal point and size by their names in transforms.json."""
@@ -78,13 +75,16 @@ class Pinhole:
         return dict(zip(("fl_x", "fl_y", "cx", "cy", "w", "h"), numbers, strict=True))
 
 
-def pinhole_of(camera: Camera) -> Pinhole:
-    """A camera with square pixels whose axis meets the middle of the picture."""
-    size = np.array([camera.width_px, camera.height_px])
-    focal = np.full(2, 1 / camera.pixel_pitch)
-    return Pinhole(
-        camera.pinhole, camera.axes, focal, size / 2, (camera.width_px, camera.height_px)
-    )
+def camera_to_world(centre: Floats, axes: Floats) -> list[list[float]]:
+    """Matrix of a camera that looks along -z with +y up and +x to the right, 4 x 4.
+
+    Axes are unit vectors along the rows, down the columns, and forward, (3, 3).
+    """
+    right, down, forward = axes
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([right, -down, -forward, centre])
+    rows: list[list[float]] = matrix.tolist()
+    return rows
 
 
 def fitted_pinhole(crop: Crop, centre: Floats) -> Pinhole:
@@ -138,7 +138,9 @@ def _linear_fit(points: Floats, pixels: Floats, centre: Floats, size: tuple[int,
     )
 
 
-def write_nerfstudio(folder: Path, names: list[str], pictures: Pictures, seeds: SeedPoints) -> None:
+def write_nerfstudio(
+    folder: Path, names: list[str], pictures: PinholePictures, seeds: SeedPoints
+) -> None:
     """Write all files into a folder that exists."""
     write_pictures(folder, names, pictures, ".png")
     (folder / POINTS).write_bytes(points_ply(seeds.points, seeds.colours))
@@ -146,21 +148,24 @@ def write_nerfstudio(folder: Path, names: list[str], pictures: Pictures, seeds: 
     (folder / TRANSFORMS).write_text(text, encoding="utf-8")
 
 
-def transforms(names: list[str], pictures: Pictures) -> dict[str, object]:
+def transforms(names: list[str], pictures: PinholePictures) -> dict[str, object]:
     """The document of all cameras.
 
     Focal lengths differ and are given by frame; what all share is given once.
     """
-    pinholes = [pinhole_of(camera) for camera in pictures.cameras]
-    shared = {name: pinholes[0].intrinsics()[name] for name in ("cx", "cy", "w", "h")}
+    size = pictures.mask.shape[1]
+    shared = {"cx": size / 2, "cy": size / 2, "w": size, "h": size}
+    focal = pictures.focal_px.tolist()
     frames = [
         {
             "file_path": f"{IMAGES}/{name}.png",
             "mask_path": f"{MASKS}/{name}.png",
-            **{key: one.intrinsics()[key] for key in ("fl_x", "fl_y")},
-            "transform_matrix": one.camera_to_world,
+            **{"fl_x": one, "fl_y": one},
+            "transform_matrix": camera_to_world(centre, axes),
         }
-        for name, one in zip(names, pinholes, strict=True)
+        for name, one, centre, axes in zip(
+            names, focal, pictures.centre, pictures.axes, strict=True
+        )
     ]
     return {
         "camera_model": "OPENCV",
@@ -172,7 +177,9 @@ def transforms(names: list[str], pictures: Pictures) -> dict[str, object]:
     }
 
 
-def write_pictures(folder: Path, names: list[str], pictures: Pictures, mask_suffix: str) -> None:
+def write_pictures(
+    folder: Path, names: list[str], pictures: PinholePictures, mask_suffix: str
+) -> None:
     """Write images/NAME.png and masks/NAME with a suffix: white where the picture is known."""
     (folder / IMAGES).mkdir()
     (folder / MASKS).mkdir()

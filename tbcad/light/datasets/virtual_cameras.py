@@ -189,15 +189,11 @@ def _measured(crop: Crop, radius: float) -> Floats | str:
     pitch = _pitch(crop, centre)
     if pitch is None:
         return "no four rays side by side meet the capture sphere"
-    off = norm(foot_points(origin, direction, centre) - centre)
+    offset = origin - centre
+    off = norm(offset - dot(offset, direction)[:, None] * direction)
     rms = np.sqrt(np.mean(off**2))
     error = _central_errors(origin, direction, centre, radius).max()
     return np.array([*centre, len(origin), pitch, rms, worst, error])
-
-
-def foot_points(origin: Floats, direction: Floats, point: Floats) -> Floats:
-    """Points (n, 3) of rays nearest to a point (3,)."""
-    return np.asarray(origin + dot(point - origin, direction)[:, None] * direction)
 
 
 def at_middle(origin: Floats, direction: Floats, forward: Floats, depth: float = 0.0) -> Floats:
@@ -226,12 +222,15 @@ def _pitch(crop: Crop, centre: Floats) -> float | None:
     """Side of the square that is as large as four neighbouring rays span, in the middle, mm."""
     forward = -unit(centre)
     points = at_middle(crop.origin, crop.direction, forward)
-    inside = crop.meets[:-1, :-1] & crop.meets[:-1, 1:] & crop.meets[1:, :-1]
-    if not inside.any():
-        return None
-    across = (points[:-1, 1:] - points[:-1, :-1])[inside]
-    down = (points[1:, :-1] - points[:-1, :-1])[inside]
-    return float(np.sqrt(np.median(norm(np.cross(across, down)))))
+    across, down = neighbour_steps(points, crop.meets)
+    return float(np.sqrt(np.median(norm(np.cross(across, down))))) if len(across) else None
+
+
+def neighbour_steps(places: Floats, known: Bools) -> tuple[Floats, Floats]:
+    """Steps to the next column and row, (n, k), where places (h, w, k) of all three are known."""
+    inside = known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1]
+    corner = places[:-1, :-1]
+    return (places[:-1, 1:] - corner)[inside], (places[1:, :-1] - corner)[inside]
 
 
 def camera_at(centre: Floats, capture_mm: float, size_px: int) -> Camera:

@@ -14,12 +14,12 @@ from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.light.reconstruction.field import Field
 from tbcad.light.reconstruction.fit import fit, medium_of
-from tbcad.light.reconstruction.marching import Medium, Singles, composited
+from tbcad.light.reconstruction.marching import Singles, composited
 from tbcad.light.reconstruction.rays import LEAST_CHORD_MM, captured_rays, entries
 from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import write_images
-from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.viewpoints import OwnMethod
 from tbcad.types import Bytes, Floats
@@ -64,9 +64,13 @@ def field_picture(made: Field, view: Camera, stride: float = STRIDE) -> FieldPic
     seen = np.flatnonzero(length > LEAST_CHORD_MM)
     found = np.zeros((len(direction), 5), dtype=np.float32)
     found[:, 4] = np.nan
-    found[seen] = _in_threads(
-        entry[seen], direction[seen].astype(np.float32), length[seen], medium_of(made, stride)
-    )
+    entry_seen, way, length = entry[seen], direction[seen].astype(np.float32), length[seen]
+    medium = medium_of(made, stride)
+
+    def part(at: slice) -> Singles:
+        return composited(entry_seen[at], way[at], length[at], medium)
+
+    found[seen] = over_chunks(part, len(seen), RAYS_PER_CHUNK)
     shape = (view.height_px, view.width_px)
     before = np.linalg.norm(entry - view.pinhole, axis=1)
     image = np.rint(255 * np.clip(found[:, :3], 0, 1)).astype(np.uint8)
@@ -75,13 +79,6 @@ def field_picture(made: Field, view: Camera, stride: float = STRIDE) -> FieldPic
         found[:, 3].reshape(shape),
         (before + found[:, 4]).reshape(shape),
     )
-
-
-def _in_threads(entry: Singles, direction: Singles, length: Singles, medium: Medium) -> Singles:
-    parts = chunks(len(length), RAYS_PER_CHUNK)
-    composited(entry[:0], direction[:0], length[:0], medium)  # compiled before any thread
-    found = in_threads(lambda at: composited(entry[at], direction[at], length[at], medium), parts)
-    return np.concatenate([np.zeros((0, 5), dtype=np.float32), *found])
 
 
 def field_normals(made: Field, view: Camera, picture: FieldPicture) -> Floats:

@@ -15,8 +15,6 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tbcad.core.geometry.vectors import norm
@@ -27,7 +25,7 @@ from tbcad.light.reconstruction.fit import medium_of
 from tbcad.light.reconstruction.marching import MATT, SOFTNESS, Singles, composited
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import NUMBERS
-from tbcad.light.simulate.parallel import chunks, first_then_threads, in_threads
+from tbcad.light.simulate.parallel import first_then_threads, in_threads, over_chunks
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Bytes, Floats, Ints
 
@@ -194,8 +192,7 @@ def _hidden(embree: Any, points: Singles) -> Bools:
             seen[left] += _free(embree, place[left], toward)
         return np.asarray(seen < SEEN_FROM)
 
-    parts = in_threads(part, chunks(len(points), POINTS_PER_CHUNK))
-    return np.concatenate([np.zeros(0, dtype=bool), *parts])
+    return over_chunks(part, len(points), POINTS_PER_CHUNK)
 
 
 def _hemisphere(n: int) -> Singles:
@@ -215,10 +212,9 @@ def _free(embree: Any, points: Singles, toward: Singles) -> Bools:
 
 def _bodies(points: Singles, faces: Ints, least: float) -> tuple[Singles, Ints]:
     """The surfaces of all bodies of at least that size, mm."""
-    v = len(points)
-    ends = np.concatenate([faces[:, :2], faces[:, 1:]]).T
-    graph = coo_array((np.ones(ends.shape[1], dtype=np.int8), ends), shape=(v, v))
-    count, label = connected_components(graph, directed=False)
+    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
+    label = trimesh.graph.connected_component_labels(edges, node_count=len(points))
+    count = label.max() + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)

@@ -28,10 +28,10 @@ from tbcad.errors import InputError
 from tbcad.light.datasets.virtual_cameras import MirrorId
 from tbcad.light.reflectance.environment import Environment
 from tbcad.light.reflectance.lamp_places import LampPlaces, projectors
-from tbcad.light.simulate.capture.files import COMPRESSION_LEVEL, chunked, filtered_chunk
+from tbcad.light.simulate.capture.files import create_rays, filtered_chunk
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.light.simulate.capture.photograph import row_bands, to_bytes
-from tbcad.light.simulate.parallel import chunks, in_batches, in_threads
+from tbcad.light.simulate.parallel import chunks, in_batches, in_threads, over_chunks
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, received_light
 from tbcad.light.simulate.scene.ray_casting import Scene, surface_hits
 from tbcad.types import Colours, Floats, Ints, Progress
@@ -70,8 +70,7 @@ class ReflectanceField:
                 total += np.einsum("lrc,lc->rc", values, weight[some])
             return total
 
-        parts = in_threads(part, chunks(stored.shape[1], RAYS_PER_CHUNK))
-        return np.concatenate([np.zeros((0, 3), dtype=np.float32), *parts])
+        return over_chunks(part, stored.shape[1], RAYS_PER_CHUNK)
 
 
 @contextmanager
@@ -128,13 +127,11 @@ def relit(source: LightField, reflectance: ReflectanceField, light: Environment)
     exposure = 1 / white if white > 0 else 1.0
     frames = {}
     for name, frame in source.frames.items():
-        shape = (frame.camera.height_px, frame.camera.width_px)
-        if name not in lit or reflectance.pixel[name].max(initial=0) >= shape[0] * shape[1]:
+        pixels = frame.camera.height_px * frame.camera.width_px
+        if name not in lit or reflectance.pixel[name].max(initial=0) >= pixels:
             raise InputError(f"the reflectance field is not of this light field: {AGAIN}")
-        picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
-        picture[reflectance.pixel[name]] = to_bytes(255 * exposure * lit[name])
-        planes = {**frame.planes, "colour": picture.reshape(*shape, 3)}
-        frames[name] = replace(frame, planes=planes)
+        shown = to_bytes(255 * exposure * lit[name])
+        frames[name] = frame.coloured(reflectance.pixel[name], shown)
     points = reflectance.facts.get("light", "points") == "points"
     return Relit(replace(source, frames=frames), lamps, points, exposure)
 
@@ -222,15 +219,13 @@ def _write_camera(
     group: h5py.Group, seen: SeenSpots, light: Light, lamps: LampPlaces, progress: Progress
 ) -> None:
     """Write a picture for each lamp, as HDF5 would, but compress in several threads."""
-    group.create_dataset("pixel", data=seen.pixel.astype(np.uint32), compression=COMPRESSION_LEVEL)
     count, rays = len(lamps.name), len(seen.pixel)
-    chunk = (1, min(RAYS_PER_CHUNK, max(rays, 1)), 3)
-    stored = chunked(group, "transport", "f2", (count, rays, 3), chunk)
-    items = [(k, part) for k in range(count) for part in chunks(rays, chunk[1])]
+    stored = create_rays(group, "transport", "f2", seen.pixel, count)
+    items = [(k, part) for k in range(count) for part in chunks(rays, stored.chunks[1])]
 
     def packed(item: tuple[int, slice]) -> bytes:
         k, part = item
-        return filtered_chunk(transport(seen, light, k, part).astype("<f2")[None], chunk)
+        return filtered_chunk(transport(seen, light, k, part).astype("<f2")[None], stored.chunks)
 
     def begin(item: tuple[int, slice]) -> None:
         progress(f"camera {group.name[1:]}, lamp {lamps.name[item[0]]}")

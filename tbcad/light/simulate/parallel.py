@@ -3,7 +3,10 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from os import cpu_count
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -24,6 +27,15 @@ def first_then_threads(work: Callable[[Item], Result], items: Sequence[Item]) ->
     compiled yet have ended the process.
     """
     return [work(item) for item in items[:1]] + in_threads(work, items[1:])
+
+
+def over_chunks(work: Callable[[slice], NDArray[Any]], count: int, size: int) -> NDArray[Any]:
+    """Arrays of what is in slices of at most `size` of `count` items, one after the other.
+
+    First that of no item, whose shape and kind all others have: loops are compiled before threads.
+    """
+    parts = first_then_threads(work, [slice(0, 0), *chunks(count, size)])
+    return np.concatenate(parts)
 
 
 def in_batches(

@@ -1,9 +1,9 @@
 """Views of a light field or a field: one after the other as asked for, and a turntable of many."""
 
-from abc import ABC, abstractmethod
 from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from io import BytesIO
 from itertools import count
 from pathlib import Path
@@ -20,8 +20,7 @@ from tbcad.light.datasets.pictures import pinhole_pictures
 from tbcad.light.depth.depth_map import DepthViews, depth_views
 from tbcad.light.depth.plane_sweep import QUICK
 from tbcad.light.reconstruction.field import Field
-from tbcad.light.reconstruction.picture import field_picture
-from tbcad.light.simulate.capture.light_field import LightField
+from tbcad.light.reconstruction.picture import STRIDE, field_picture
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus
@@ -37,6 +36,7 @@ from tbcad.output.single_files import check_file
 from tbcad.types import Bytes, Progress
 
 MethodAtRest = Method | Literal["depth"]
+View = Callable[[Camera], Bytes]  # what makes the picture (h, w, 3) of a camera
 JPEG_QUALITY = 88
 # While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
 MOVING_RADIUS2 = 2
@@ -54,15 +54,18 @@ class Superseded(Exception):
     """Another view has been asked for meanwhile."""
 
 
-class ViewRenderer(ABC):
+class Renderer:
     """Pictures of a light field or a field; one is made at a time, by all cores."""
 
-    def __init__(self, method: str, lens: MirrorTiles | None, capture_mm: float) -> None:
-        """Prepare for requests; the method is that of views that do not move.
+    def __init__(
+        self, method: str, lens: MirrorTiles | None, capture_mm: float, rest: View, moving: View
+    ) -> None:
+        """Prepare for requests; the method is that of `rest`, of views that do not move.
 
         A lens's pictures are added up from a light field; None: there are none.
         """
         self.method, self.lens, self.capture_mm = method, lens, capture_mm
+        self._rest, self._moving = rest, moving
         self._lock = Lock()
         self._numbers = count(1)
         self._latest = 0
@@ -90,7 +93,7 @@ class ViewRenderer(ABC):
         """
         view = query.camera(self.capture_mm)
         if query.aperture == 0:
-            return self._at_rest(view) if query.still else self._moving(view)
+            return self._rest(view) if query.still else self._moving(view)
         if self.lens is None:
             raise InputError(f"aperture {query.aperture:g}: a field alone has none, give 0")
         lens = ThinLens(query.aperture, query.focus)
@@ -100,54 +103,34 @@ class ViewRenderer(ABC):
         smaller = replace(query, width=width, height=height).camera(self.capture_mm)
         return refocus(self.lens, smaller, lens, lens_pinholes(MOVING_RADIUS2)).image
 
-    @abstractmethod
-    def _at_rest(self, view: Camera) -> Bytes:
-        """The best picture that a pinhole would see, (h, w, 3)."""
 
-    @abstractmethod
-    def _moving(self, view: Camera) -> Bytes:
-        """The quickest, (h, w, 3)."""
-
-
-class Renderer(ViewRenderer):
-    """Pictures of a light field: its tiles, and pictures of its virtual cameras to move fast."""
-
-    method: MethodAtRest
-
-    def __init__(
-        self,
-        source: LightField,
-        method: MethodAtRest = "depth",
-        progress: Progress = lambda _: None,
-    ) -> None:
-        """Make the pictures of all virtual cameras of a light field, whose file stays open."""
-        self.tiles = MirrorTiles(source)
-        self.pictures = pinhole_pictures(source, progress)
-        self._limits = search_radius(self.tiles), horizon_search_radius(self.tiles)
-        super().__init__(method, self.tiles, source.capture_mm)
-
-    def _at_rest(self, view: Camera) -> Bytes:
-        if self.method == "depth":
-            return DepthViews(self.tiles, self.pictures).of(view)[0].image
-        return synthesise(self.tiles, view, self.method).image
-
-    def _moving(self, view: Camera) -> Bytes:
-        return moving_view(self.pictures, view, self._limits)
+def light_field_renderer(
+    tiles: MirrorTiles, method: MethodAtRest = "depth", progress: Progress = lambda _: None
+) -> Renderer:
+    """Of a light field, whose file stays open: makes the pictures of all its virtual cameras."""
+    pictures, reach = pinhole_pictures(tiles.source, progress), tiles.source.capture_mm
+    limits = search_radius(tiles), horizon_search_radius(tiles)
+    rest = _synthesised(tiles, method, lambda: DepthViews(tiles, pictures))
+    return Renderer(method, tiles, reach, rest, lambda at: moving_view(pictures, at, limits))
 
 
-class FieldRenderer(ViewRenderer):
-    """Pictures of a field; those of a lens from the light field that it was fitted to."""
+def field_renderer(made: Field, lens: MirrorTiles | None = None) -> Renderer:
+    """Of a field, and of its light field, whose file stays open, where it is at hand."""
+    fast = partial(_of_field, made, stride=MOVING_STRIDE)
+    return Renderer("field", lens, capture_mm(made), partial(_of_field, made), fast)
 
-    def __init__(self, made: Field, lens: MirrorTiles | None = None) -> None:
-        """Take a field, and its light field, whose file stays open, where it is at hand."""
-        super().__init__("field", lens, capture_mm(made))
-        self._made = made
 
-    def _at_rest(self, view: Camera) -> Bytes:
-        return field_picture(self._made, view).image
+def _of_field(made: Field, view: Camera, stride: float = STRIDE) -> Bytes:
+    return field_picture(made, view, stride).image
 
-    def _moving(self, view: Camera) -> Bytes:
-        return field_picture(self._made, view, MOVING_STRIDE).image
+
+def _synthesised(
+    tiles: MirrorTiles, method: MethodAtRest, by_depth: Callable[[], DepthViews]
+) -> View:
+    if method == "depth":
+        views = by_depth()
+        return lambda view: views.of(view)[0].image
+    return lambda view: synthesise(tiles, view, method).image
 
 
 def capture_mm(pictured: MirrorTiles | Field) -> float:
@@ -196,7 +179,12 @@ def write_turntable(
 
     InputError: it cannot be written, or so many views do not fit into MAX_BYTES.
     """
-    picture, pictures = _pictures(shown, table.method, progress), []
+    picture = (
+        partial(_of_field, shown)
+        if isinstance(shown, Field)
+        else _synthesised(shown, table.method, lambda: depth_views(shown, QUICK, progress))
+    )
+    pictures = []
     azimuths = (2 * np.pi * np.arange(table.columns) / table.columns).tolist()
     for k, elevation in enumerate(table.elevations_deg):
         progress(f"row {k + 1} of {len(table.elevations_deg)}, elevation {elevation:.0f} degrees")
@@ -240,15 +228,3 @@ def turntable_page(
     views = sum(map(len, frames))
     about = f"{views} views of {table.size[0]} x {table.size[1]} pixels."
     return filled("turntable", title, data, begin=BEGIN, images="data: blob:", about=about)
-
-
-def _pictures(
-    shown: MirrorTiles | Field, method: MethodAtRest, progress: Progress
-) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera."""
-    if isinstance(shown, Field):
-        return lambda camera: field_picture(shown, camera).image
-    if method == "depth":
-        views = depth_views(shown, QUICK, progress)
-        return lambda camera: views.of(camera)[0].image
-    return lambda camera: synthesise(shown, camera, method).image

@@ -16,7 +16,7 @@ from typing import Any
 
 from tbcad.errors import InputError
 from tbcad.light.viewer.page import Query, parse_query, viewer_page
-from tbcad.light.viewer.render import Superseded, ViewRenderer
+from tbcad.light.viewer.render import Renderer, Superseded
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
@@ -44,7 +44,7 @@ class ViewServer(ThreadingHTTPServer):
     allow_reuse_address = False
     request_queue_size = MAX_CONNECTIONS
 
-    def __init__(self, renderer: ViewRenderer, title: str, start: Query, port: int = 0) -> None:
+    def __init__(self, renderer: Renderer, title: str, start: Query, port: int = 0) -> None:
         """Listen on this computer alone, at a port, 0 for any; InputError if it is taken."""
         self.renderer = renderer
         page = viewer_page(

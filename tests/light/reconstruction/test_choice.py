@@ -68,14 +68,6 @@ def test_a_ball_is_in_its_hull_and_little_else(radius: float) -> None:
     assert (away[inside] < most).mean() > 0.998
 
 
-def test_two_balls_are_two_hulls() -> None:
-    balls = [Ball((-5, 0, 0), 2, RED), Ball((5, 0, 0), 2, RED)]
-    inside, places, _ = hull_of(rays_of(balls, 200_000))
-    assert not inside[np.abs(places[..., 0]) < 1].any()
-    for side in (-1, 1):
-        assert inside[np.linalg.norm(places - [5 * side, 0, 0], axis=-1) < 2].all()
-
-
 def test_photographs_without_background_are_refused() -> None:
     everywhere = np.random.default_rng(0).uniform(0.3, 1, (5_000, 3)).astype(np.float32)
     level = noise_level(everywhere.max(axis=1))
@@ -88,11 +80,6 @@ def test_a_ball_that_almost_fills_the_capture_sphere_is_not_background() -> None
     shades = np.random.default_rng(0).uniform(0.3, 1, (50_000, 1)).astype(np.float32)
     inside, places, _ = hull_of(replace(rays, colour=rays.colour * shades))
     assert inside[np.linalg.norm(places, axis=-1) < 0.9 * RADIUS].all()
-
-
-def test_few_rays_lose_nothing() -> None:
-    inside, places, _ = hull_of(rays_of([Ball((0, 0, 0), 6, RED)], 2_000))
-    assert inside[np.linalg.norm(places, axis=-1) < 6].mean() > 0.99
 
 
 def choose(
@@ -242,16 +229,6 @@ def test_a_ball_is_found_with_its_radius_and_colour(order: int) -> None:
     assert found[:, 3].min() > 0.9
     assert np.abs(found[:, 4] - BALL.radius).mean() < 0.7 * made.grid.pitch_mm
     assert np.abs(found[:, :3] - BALL.colour).mean() < 0.02
-
-
-def test_two_balls_are_found_with_nothing_between() -> None:
-    made = fitted(rays_of(TWO, 40_000))
-    for ball in TWO:
-        found = toward(ball.centre, made)
-        assert np.abs(found[:, 4] - ball.radius).mean() < 0.7 * made.grid.pitch_mm
-        assert np.abs(found[:, :3] - ball.colour).mean() < 0.03
-    between = [np.float32([a]) for a in ([0.3, -9, 0], [0, 1, 0], 18)]
-    assert composited(*between, medium_of(made, 0.2))[0, 3] < 0.02
 
 
 def backward(work: Callable[..., object], items: Iterable[object]) -> list[object]:

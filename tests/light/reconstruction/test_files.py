@@ -178,14 +178,6 @@ def test_a_ball_is_where_it_is(made: Path) -> None:
     assert facts["unexplained_light"] < 0.01
 
 
-def test_same_bytes_on_another_number_of_threads(
-    ball: Path, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tbcad.light.simulate.parallel.THREADS", 3)
-    reconstruct(ball, out=tmp_path / "again.npz", **SMALL)
-    assert (tmp_path / "again.npz").read_bytes() == made.read_bytes()
-
-
 @pytest.mark.parametrize("epochs", [1, 6])
 def test_same_bytes_after_a_stop(epochs: int, ball: Path, made: Path, tmp_path: Path) -> None:
     out = tmp_path / "field.npz"

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tbcad.light.reconstruction.field import Field, Grid
-from tbcad.light.reconstruction.fit import medium_of
 from tbcad.light.reconstruction.gradient import (
     CORNER,
     MEMORY,
@@ -86,25 +85,6 @@ def test_a_uniform_slab_lets_through_the_exponential_of_its_thickness(number: fl
         assert found[:, 4] == pytest.approx(half, abs=2 * step)
     else:
         assert np.isnan(found[:, 4]).all()
-
-
-def test_a_ball_becomes_half_opaque_at_its_surface() -> None:
-    # A number a u at the depth u has the opacity 1 - exp(-a u^2 / 2): half at sqrt(2 log 2 / a).
-    steep, radius = 20.0, 6.0
-    grid = cube(61)
-    values = filled(grid, lambda at: np.clip(steep * (radius - np.linalg.norm(at, axis=1)), -3, 60))
-    entry = single(lines(300)[0])[0]
-    direction, length = single(-entry / RADIUS, np.full(300, WIDTH))
-    found = composited(entry, direction, length, medium_of(Field(grid, values), 0.1))
-    expected = RADIUS - radius + np.sqrt(2 * np.log(2) / steep)
-    assert found[:, 4] == pytest.approx(expected, abs=0.05)
-    miss = np.cross(direction, [0.3, 0.5, 0.8])
-    miss *= 6.4 / np.linalg.norm(miss, axis=1, keepdims=True)
-    beside = composited(
-        *single(miss - 7 * direction, direction, np.full(300, 14)),
-        medium_of(Field(grid, values), 0.1),
-    )
-    assert beside[:, 3].max() < 0.02
 
 
 def sparse(n: int, seed: int, columns: int, share: float = 0.4) -> Field:

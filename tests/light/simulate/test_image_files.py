@@ -17,7 +17,7 @@ from tbcad.light.simulate.image_files import (
     write_animation,
     write_images,
 )
-from tbcad.light.simulate.parallel import first_then_threads
+from tbcad.light.simulate.parallel import first_then_threads, over_chunks
 from tbcad.light.simulate.views.viewpoints import (
     equivalent_blur_px,
     image_quality,
@@ -128,5 +128,8 @@ def test_the_first_item_is_done_alone_and_results_are_in_order() -> None:
 
     assert first_then_threads(work, range(20)) == [item**2 for item in range(20)]
     assert first_then_threads(work, []) == []
+    numbers = np.arange(20)
+    assert over_chunks(lambda part: numbers[part], 20, 3).tolist() == list(range(20))
+    assert over_chunks(lambda part: numbers[part], 0, 3).shape == (0,)
     assert done[0] == (0, True)
     assert not any(on_main for _, on_main in done[1:])

@@ -16,6 +16,7 @@ from PIL import Image
 
 from tbcad.errors import InputError
 from tbcad.light.depth.depth_map import depth_views
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, refocus
 from tbcad.light.viewer.page import Query, limits, parse_query
 from tbcad.light.viewer.render import Renderer
@@ -91,14 +92,16 @@ def test_the_page_asks_nobody_else(server: ViewServer) -> None:
     assert "default-src 'none'" in str(answer.headers["Content-Security-Policy"])
 
 
-def test_a_view_is_that_of_the_library(server: ViewServer, renderer: Renderer) -> None:
+def test_a_view_is_that_of_the_library(
+    server: ViewServer, renderer: Renderer, tiles: MirrorTiles
+) -> None:
     answer, body = get(server, f"/{server.token}/view?azimuth=40&elevation=20&still=1&{SMALL}")
     assert answer.status == 200
     assert answer.headers["Content-Type"] == "image/jpeg"
     query = Query(azimuth=40, elevation=20, width=160, height=120)
     view = query.camera(renderer.capture_mm)
     assert renderer.method == "depth"
-    image = depth_views(renderer.tiles).of(view)[0].image
+    image = depth_views(tiles).of(view)[0].image
     shown = np.asarray(Image.open(BytesIO(body)))
     assert shown.shape == image.shape
     assert np.abs(shown.astype(float) - image).mean() < 3
@@ -153,10 +156,12 @@ def test_addresses_and_ports_are_a_servers_own(server: ViewServer, renderer: Ren
         ViewServer(renderer, "knot", Query(), server.server_port)
 
 
-def test_a_lens_at_rest_is_that_of_refocus_and_moving_it_is_smaller(renderer: Renderer) -> None:
+def test_a_lens_at_rest_is_that_of_refocus_and_moving_it_is_smaller(
+    renderer: Renderer, tiles: MirrorTiles
+) -> None:
     query = Query(aperture=200, focus=10, width=160, height=120, still=1)
     lens, view = ThinLens(200, 10), query.camera(renderer.capture_mm)
-    assert np.array_equal(renderer.picture(query), refocus(renderer.tiles, view, lens).image)
+    assert np.array_equal(renderer.picture(query), refocus(tiles, view, lens).image)
     moving = Query(aperture=200, focus=10, width=160, height=120)
     assert renderer.picture(moving).shape == (60, 80, 3)
 

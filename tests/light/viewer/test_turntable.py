@@ -18,6 +18,7 @@ from tbcad.light.depth.plane_sweep import QUICK
 from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
+from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
 from tbcad.light.simulate.views.refocus import ThinLens, refocus
 from tbcad.light.simulate.views.synthesis import synthesise
@@ -27,21 +28,19 @@ from tbcad.light.viewer.render import (
     BEGIN,
     KIND,
     WEBP_QUALITIES,
-    FieldRenderer,
     MethodAtRest,
-    Renderer,
     Turntable,
+    field_renderer,
     smallest_loss,
     turntable_page,
     write_turntable,
 )
 from tbcad.light.viewer.server import ViewServer
 from tbcad.types import Floats
-from tests.light.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, ball, data_of
+from tests.light.viewer.fields import CAPTURE_MM, ball, data_of
 
 TABLE = Turntable(4, (20.0, 60.0), 640.0, (160, 120), "nearest")
 SMALL = Query(azimuth=40, elevation=20, width=160, height=120, still=1)
-COLOUR_8 = np.rint(255 * np.array(COLOUR))
 FAR = (1e3,)
 
 
@@ -56,30 +55,30 @@ def error(file: Path, row: int, column: int, image: np.ndarray) -> float:
 
 @pytest.mark.parametrize("method", ["nearest", "depth"])
 def test_views_are_those_of_the_library(
-    renderer: Renderer, tmp_path: Path, method: MethodAtRest
+    tiles: MirrorTiles, tmp_path: Path, method: MethodAtRest
 ) -> None:
     file, told = tmp_path / "knot.html", list[str]()
     table = replace(TABLE, method=method)
-    size = write_turntable(file, renderer.tiles, table, "knot", told.append)
+    size = write_turntable(file, tiles, table, "knot", told.append)
     page = file.read_text(encoding="utf-8")
     assert size == file.stat().st_size
     assert page.startswith(BEGIN)
     assert len(told) >= len(TABLE.elevations_deg)
     assert data_of(page)["kind"] == KIND
-    view = Query(azimuth=180, elevation=60, width=160, height=120).camera(renderer.capture_mm)
+    view = Query(azimuth=180, elevation=60, width=160, height=120).camera(CAPTURE_MM)
     images = {
-        "nearest": synthesise(renderer.tiles, view, "nearest").image,
-        "depth": depth_views(renderer.tiles, QUICK).of(view)[0].image,
+        "nearest": synthesise(tiles, view, "nearest").image,
+        "depth": depth_views(tiles, QUICK).of(view)[0].image,
     }
     errors = {name: error(file, 1, 2, image) for name, image in images.items()}
     assert errors[method] < 4
     assert min(errors, key=lambda name: errors[name]) == method
 
 
-def test_the_same_views_give_the_same_file(renderer: Renderer, tmp_path: Path) -> None:
+def test_the_same_views_give_the_same_file(tiles: MirrorTiles, tmp_path: Path) -> None:
     files = [tmp_path / name for name in ("a.html", "b.html")]
     for file in files:
-        write_turntable(file, renderer.tiles, TABLE, "knot", lambda _: None)
+        write_turntable(file, tiles, TABLE, "knot", lambda _: None)
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
@@ -98,36 +97,27 @@ def shown(picture: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
     return picture.max(axis=2) > 100
 
 
-def test_a_ball_is_seen_as_large_as_it_is() -> None:
-    picture = FieldRenderer(ball()).picture(SMALL)
-    assert np.array_equal(picture[60, 80], COLOUR_8)
-    view = SMALL.camera(CAPTURE_MM)
-    radius_px = RADIUS_MM / np.sqrt(640**2 - RADIUS_MM**2) / view.pixel_pitch
-    assert np.sqrt(shown(picture).sum() / np.pi) == pytest.approx(radius_px, rel=0.03)
-    assert picture[:5].max() == 0
-
-
 def test_a_view_that_moves_is_nearly_that_at_rest() -> None:
-    renderer = FieldRenderer(ball())
+    renderer = field_renderer(ball())
     still, moving = (renderer.picture(Query(**{**vars(SMALL), "still": k})) for k in (1, 0))
     assert moving.shape == still.shape
     assert not np.array_equal(moving, still)
     assert (shown(moving) == shown(still)).mean() > 0.99
 
 
-def test_a_lens_is_of_the_light_field(renderer: Renderer) -> None:
+def test_a_lens_is_of_the_light_field(tiles: MirrorTiles) -> None:
     query = Query(aperture=200, focus=10, width=64, height=48, still=1)
     view = query.camera(CAPTURE_MM)
-    with_lens = FieldRenderer(ball(), renderer.tiles)
-    expected = refocus(renderer.tiles, view, ThinLens(200, 10)).image
+    with_lens = field_renderer(ball(), tiles)
+    expected = refocus(tiles, view, ThinLens(200, 10)).image
     assert np.array_equal(with_lens.picture(query), expected)
     with pytest.raises(InputError, match="aperture 200: a field alone has none"):
-        FieldRenderer(ball()).picture(query)
+        field_renderer(ball()).picture(query)
 
 
 @pytest.mark.parametrize("lens", [True, False])
-def test_a_page_has_sliders_of_a_lens_where_there_is_one(renderer: Renderer, lens: bool) -> None:
-    made = FieldRenderer(ball(), renderer.tiles if lens else None)
+def test_a_page_has_sliders_of_a_lens_where_there_is_one(tiles: MirrorTiles, lens: bool) -> None:
+    made = field_renderer(ball(), tiles if lens else None)
     with ViewServer(made, "ball", SMALL) as server:
         page = server.page.decode()
     assert (data_of(page)["method"], data_of(page)["lens"]) == ("field", lens)
@@ -143,7 +133,8 @@ def test_a_turntable_of_a_field(tmp_path: Path) -> None:
 
 def test_views_in_python() -> None:
     view = tbcad.view(ball(), 40, 20, size=(160, 120))
-    assert np.array_equal(view.image, FieldRenderer(ball()).picture(SMALL))
+    assert np.array_equal(view.image, field_picture(ball(), SMALL.camera(CAPTURE_MM)).image)
+    assert np.array_equal(view.image, field_renderer(ball()).picture(SMALL))
     assert view.seen.all()
     assert tbcad.Views(ball()).view(40, 20, size=(160, 120))._repr_png_() == view._repr_png_()
     with pytest.raises(InputError, match="'depth' is for a light field"):

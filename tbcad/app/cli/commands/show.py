@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tbcad.light.reconstruction.field import Field
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.viewer.page import Query
-    from tbcad.light.viewer.render import MethodAtRest, ViewRenderer
+    from tbcad.light.viewer.render import MethodAtRest, Renderer
 
 REPORT_FILE = "report.html"
 MAX_PORT = 65535
@@ -162,15 +162,15 @@ def _show_views(shown: _Shown, start: "Query", port: int, open_page: bool, json:
     return 0
 
 
-def _renderer(shown: _Shown) -> "ViewRenderer":
+def _renderer(shown: _Shown) -> "Renderer":
     from tbcad.light.reconstruction.field import Field
-    from tbcad.light.viewer.render import FieldRenderer, Renderer
+    from tbcad.light.viewer.render import field_renderer, light_field_renderer
 
     if isinstance(shown.pictured, Field):
-        return FieldRenderer(shown.pictured, shown.tiles)
+        return field_renderer(shown.pictured, shown.tiles)
     with stages(1) as screen:
         screen.stage("pictures of the virtual cameras")
-        return Renderer(shown.pictured.source, shown.method, screen.detail)
+        return light_field_renderer(shown.pictured, shown.method, screen.detail)
 
 
 def _write_turntable(

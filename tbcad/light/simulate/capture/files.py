@@ -24,6 +24,7 @@ from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.types import Bytes, Ints
 
 CHUNK = (BAND_ROWS, 256)
+RAYS_PER_CHUNK = {"u1": 1 << 16, "f2": 1 << 15}  # 192 kB
 COMPRESSION_LEVEL = 1  # higher ones save 2 % at most
 OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
@@ -88,6 +89,17 @@ def chunked(
     """An array in compressed chunks, which `filtered_chunk` makes too; it may grow to `most`."""
     filters = {"shuffle": True, "compression": COMPRESSION_LEVEL}
     return group.create_dataset(name, shape, kind, chunks=chunks, maxshape=most, **filters)
+
+
+def create_rays(
+    group: h5py.Group, name: str, kind: str, pixel: Ints, pictures: int | None
+) -> h5py.Dataset:
+    """Numbers of pixels (r,), and a table (pictures, r, 3) of them; None: it grows from nothing."""
+    group.create_dataset("pixel", data=pixel.astype(np.uint32), compression=COMPRESSION_LEVEL)
+    rays = len(pixel)
+    chunk = (1, min(RAYS_PER_CHUNK[kind], max(rays, 1)), 3)
+    most = (None, rays, 3) if pictures is None else None
+    return chunked(group, name, kind, (pictures or 0, rays, 3), chunk, most)
 
 
 def _write_chunks(planes: Mapping[str, h5py.Dataset], band: RowBand) -> None:

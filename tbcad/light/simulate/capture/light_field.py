@@ -33,7 +33,7 @@ from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, seen_by, to
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import Shift, TracedRays, part_tracer, unit_directions
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
-from tbcad.types import Floats
+from tbcad.types import Bytes, Floats, Ints
 
 NAME = "lightfield.h5"
 SCHEMA = "tbcad-lightfield/1"
@@ -64,6 +64,13 @@ class CameraFrame:
     def read(self, rows: slice, columns: slice = slice(None)) -> dict[str, NDArray[Any]]:
         """All arrays of a part of the picture."""
         return {name: np.asarray(plane[rows, columns]) for name, plane in self.planes.items()}
+
+    def coloured(self, pixel: Ints, colour: Bytes) -> "CameraFrame":
+        """The frame in colours (r, 3) of pixels (r,), counted row by row; others are black."""
+        shape = self.camera.height_px, self.camera.width_px
+        picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
+        picture[pixel] = colour
+        return replace(self, planes={**self.planes, "colour": picture.reshape(*shape, 3)})
 
     def image(self) -> NDArray[np.uint8]:
         """The picture, (h, w, 3)."""

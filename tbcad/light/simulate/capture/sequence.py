@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.cad.formats.hdf5 import StoredGroup, open_hdf5
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.files import COMPRESSION_LEVEL, chunked, filtered_chunk
+from tbcad.light.simulate.capture.files import create_rays, filtered_chunk
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
 from tbcad.light.simulate.capture.photograph import row_bands, to_bytes
 from tbcad.light.simulate.parallel import chunks, in_threads
@@ -33,7 +33,6 @@ NAME = "sequence.h5"
 SCHEMA = "tbcad-sequence/1"
 AGAIN = "capture again with --frames"
 Found = TypeVar("Found")
-RAYS_PER_CHUNK = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -73,13 +72,9 @@ def create_sequence(
         store.attrs["schema"], store.attrs["facts"] = SCHEMA, json.dumps(dict(facts))
         pixel, colour = {}, {}
         for name, frame in source.frames.items():
-            group, pixel[name] = store.create_group(name), kept_pixels(frame, radius)
-            group.create_dataset(
-                "pixel", data=pixel[name].astype(np.uint32), compression=COMPRESSION_LEVEL
-            )
-            rays = len(pixel[name])
-            chunk = (1, min(RAYS_PER_CHUNK, max(rays, 1)), 3)
-            colour[name] = chunked(group, "colour", "u1", (0, rays, 3), chunk, (None, rays, 3))
+            pixel[name] = kept_pixels(frame, radius)
+            group = store.create_group(name)
+            colour[name] = create_rays(group, "colour", "u1", pixel[name], None)
         yield SequenceWriter(pixel, colour)
 
 
@@ -136,16 +131,9 @@ def _frames(store: StoredGroup, source: LightField, number: int) -> dict[str, Ca
     if not 0 <= number < count:
         raise InputError(f"--frame {number} is not in the sequence: allowed is 0 to {count - 1}")
     return {
-        name: _coloured(frame, pixel[name][:], colour[name][number])
+        name: frame.coloured(pixel[name][:], colour[name][number])
         for name, frame in source.frames.items()
     }
-
-
-def _coloured(frame: CameraFrame, pixel: Ints, colour: Bytes) -> CameraFrame:
-    shape = frame.camera.height_px, frame.camera.width_px
-    picture = np.zeros((shape[0] * shape[1], 3), dtype=np.uint8)
-    picture[pixel] = colour
-    return replace(frame, planes={**frame.planes, "colour": picture.reshape(*shape, 3)})
 
 
 def turns(count: int, whole: float) -> Floats:

@@ -20,10 +20,7 @@ def facet_vectors(points: Floats, faces: Ints) -> Floats:
 
 def first_of_each(faces: Ints) -> Ints:
     """Numbers of the facets that do not have the corners of an earlier one: it is their back."""
-    corners = np.sort(faces, axis=1)
-    order = np.lexsort(corners.T)
-    again = (corners[order][1:] == corners[order][:-1]).all(axis=1)
-    return np.sort(order[np.concatenate([[True], ~again])])
+    return np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
 
 
 def is_closed(points: Floats, faces: Ints) -> bool:

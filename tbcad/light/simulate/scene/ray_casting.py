@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import dot, unit
-from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.object import SceneObject, pattern
 from tbcad.light.simulate.scene.rays import meets_sphere
@@ -180,9 +180,11 @@ def _light(scene: Scene, hits: SurfaceHits) -> Floats:
 
 def colours_along(scene: Scene, origin: Floats, direction: Floats) -> Colours:
     """Colours (n, 3), 0 to 255, along rays (n, 3), in threads."""
-    parts = chunks(len(origin), RAYS_PER_CHUNK)
-    colours = in_threads(lambda part: cast_rays(scene, origin[part], direction[part]).colour, parts)
-    return np.concatenate([np.zeros((0, 3), dtype=np.float32), *colours])
+
+    def colours(part: slice) -> Colours:
+        return cast_rays(scene, origin[part], direction[part]).colour
+
+    return over_chunks(colours, len(origin), RAYS_PER_CHUNK)
 
 
 def object_in_front(

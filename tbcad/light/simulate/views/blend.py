@@ -14,7 +14,7 @@ point follows from the rays of one pixel and its neighbours, without a search.
 import numpy as np
 
 from tbcad.common.compiled import compiled_loop
-from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.views.ray_bundle import (
     RAYS_PER_CHUNK,
     RAYS_PER_RUN,
@@ -177,8 +177,7 @@ def blend_cameras(bundle: RayBundle, targets: Floats, depth: Floats) -> tuple[Fl
         arrays = bundle.points, bundle.tiles, bundle.pinholes, bundle.colour
         return _blend(*arrays, targets[part], depth[part], bundle.limit)
 
-    parts = in_threads(blended, chunks(len(targets), RAYS_PER_CHUNK))
-    result = np.concatenate([np.zeros((0, 4)), *parts])
+    result = over_chunks(blended, len(targets), RAYS_PER_CHUNK)
     return result[:, :3], result[:, 3] > 0
 
 

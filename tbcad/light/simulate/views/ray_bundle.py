@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled
-from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import chunks, in_threads, over_chunks
 from tbcad.light.simulate.views.mirror_tiles import MirrorTile
 from tbcad.types import Bools, Bytes, Floats, Ints
 
@@ -204,8 +204,7 @@ def nearest_rays(bundle: RayBundle, targets: Floats) -> Ints:
         arrays = bundle.points, bundle.tiles, bundle.pinholes, reach
         return _nearest(*arrays, targets[part], bundle.limit)
 
-    parts = in_threads(pixels, chunks(len(targets), RAYS_PER_CHUNK))
-    return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
+    return over_chunks(pixels, len(targets), RAYS_PER_CHUNK)
 
 
 @compiled

@@ -58,14 +58,6 @@ def test_round_trip(file: Path, cameras: Cameras, light_field: LightField) -> No
             assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
 
 
-def test_boxes_hold_all_of_each_mirror(light_field: LightField) -> None:
-    for frame in light_field.frames.values():
-        rows, columns = np.nonzero(frame.planes["mirror"])
-        box = frame.boxes[frame.planes["mirror"][rows, columns].astype(int) - 1]
-        assert ((columns >= box[:, 0]) & (columns < box[:, 1])).all()
-        assert ((rows >= box[:, 2]) & (rows < box[:, 3])).all()
-
-
 def test_compressed_and_the_same_each_time(
     file: Path, tmp_path: Path, cameras: Cameras, knot: Scene
 ) -> None:
