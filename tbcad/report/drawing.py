@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
+from tbcad.output.manifest import read_manifest, written_file
 from tbcad.output.single_files import check_file
 
 SHELL = "shell"
@@ -17,7 +17,7 @@ CLOSE_UPS = ("edges", "seam")
 SUBJECTS = (SHELL, *CLOSE_UPS, *PROTOTYPE)
 SHELL_FILES = ("design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl")
 PROTOTYPE_FILES = ("prototype.json", "balls.csv")
-MESH_SUFFIXES = (".stl", ".glb")
+MESHES = (".stl", ".glb")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
@@ -68,22 +68,14 @@ def _run(command: list[str]) -> None:
 def _check_files(folder: Path, subject: str) -> None:
     """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
     manifest = read_manifest(folder)
-    listed = manifest.files if manifest else {}
     part, needed = "shell", [*SHELL_FILES]
     if subject in PROTOTYPE:
-        meshes = (name for name in listed if name.endswith(MESH_SUFFIXES))
+        meshes = (name for name in (manifest.files if manifest else ()) if name.endswith(MESHES))
         part = "prototype"
         needed = [*PROTOTYPE_FILES, *(name for name in meshes if name not in SHELL_FILES)]
-    for name in (MANIFEST, *needed):
-        if not (folder / name).is_file():
-            raise InputError(
-                f"{folder}: {name} is missing: name a folder that tbcad build wrote with its {part}"
-            )
-    altered = [name for name in needed if not is_listed(folder / name, listed.get(name))]
-    if altered:
-        raise InputError(
-            f"{folder / altered[0]} is not as tbcad wrote it (cut off, or changed since): "
-            "build the export again"
+    for name in needed:
+        written_file(
+            folder, manifest, name, f"name a folder that tbcad build wrote with its {part}"
         )
 
 

@@ -8,8 +8,10 @@ import trimesh
 
 from tbcad.cad.drafting.views import FRONT
 from tbcad.cad.formats.entities import Circle, Text
+from tbcad.cad.formats.glb import ColouredMesh, write_glb
+from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.projection import Segment
-from tbcad.drawings.assembly_sheet import EYES, AssemblyJob, draw_assembly, line_picture
+from tbcad.drawings.assembly_sheet import EYES, assembly_sheets, line_picture
 
 BOX, POST = (40.0, 20.0, 10.0), (5.0, 5.0, 30.0)
 
@@ -50,16 +52,12 @@ def test_edges_of_contact_stay(bodies: dict[str, trimesh.Trimesh]) -> None:
 
 
 def test_each_part_is_called_out_once(bodies: dict[str, trimesh.Trimesh], tmp_path: Path) -> None:
-    scene = trimesh.Scene()
-    for name, mesh in bodies.items():
-        x, y, z = mesh.vertices.T / 1000
-        turned = trimesh.Trimesh(np.stack([x, z, -y], axis=-1), mesh.faces)
-        scene.add_geometry(turned, node_name=name, geom_name=name)
-    scene.add_geometry(turned, node_name="shroud_lid", geom_name="shroud_lid")
-    (tmp_path / "some.glb").write_bytes(scene.export(file_type="glb"))
-    items, quantities = {"BOX-1": 3, "POST-2": 12}, {"BOX-1": 1, "POST-2": 4}
-    parts = {"box": "BOX-1", "post": "POST-2"}
-    sheets = draw_assembly(AssemblyJob(tmp_path / "some.glb", parts, items, quantities, "some"))
+    meshes = bodies | {"shroud_lid": bodies["post"]}
+    path, white = tmp_path / "some.glb", (1.0, 1.0, 1.0, 1.0)
+    shown = {name: Mesh(np.array(one.vertices), one.faces) for name, one in meshes.items()}
+    write_glb(path, "all", [ColouredMesh(name, "g", one, white) for name, one in shown.items()])
+    parts, listed = {"box": "BOX-1", "post": "POST-2"}, {"BOX-1": (3, 1), "POST-2": (12, 4)}
+    sheets = assembly_sheets(path, parts, listed, "some")
     assert [one.name for one in sheets] == ["assembly", "assembly_2", "assembly_3"]
     assert len(sheets) == len(EYES)
     words = [text.text for one in sheets for text in one.entities if isinstance(text, Text)]

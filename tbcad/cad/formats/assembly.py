@@ -1,15 +1,9 @@
-"""Named, coloured solids in groups, as prototype.step (one tree) and prototype.glb (to look at).
+"""Named, coloured solids in groups as one STEP assembly, the same bytes each time."""
 
-Both have the same bytes each time; glTF demands metres and y up.
-"""
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
 
-import numpy as np
-import trimesh
 from OCP.BRep import BRep_Builder
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
@@ -23,31 +17,15 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape, TopoDS_Solid
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from OCP.XSControl import XSControl_WorkSession
-from trimesh.exchange.gltf import export_glb
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
-from tbcad.cad.formats.step import (
-    StepError,
-    finish,
-    kernel_settings,
-    new_document,
-    write_header,
-)
+from tbcad.cad.formats.glb import Colour, ColouredMesh
+from tbcad.cad.formats.step import StepError, finish, kernel_settings, new_document, write_header
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
 from tbcad.cad.kernel.solids import moved, solids
-from tbcad.common.figure_files import srgb_light
 from tbcad.types import Floats
 
-Colour: TypeAlias = tuple[float, float, float, float]
-"""Red, green, blue (sRGB) and opacity, from 0 to 1."""
-
-
 DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25  # of meshes that are only looked at
-# Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
-UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
-METAL, ROUGH = 0.1, 0.6
 
 
 @dataclass(frozen=True)
@@ -73,30 +51,13 @@ class SolidGroup:
     bodies: tuple[ColouredSolid, ...]
 
 
-@dataclass(frozen=True)
-class ColouredMesh:
-    """What is seen of one solid: name and colour as of `ColouredSolid`."""
-
-    name: str
-    mesh: Mesh
-    colour: Colour
-
-
-@dataclass(frozen=True)
-class MeshGroup:
-    """Meshes that belong together."""
-
-    name: str
-    bodies: tuple[ColouredMesh, ...]
-
-
-def mesh_groups(groups: Sequence[SolidGroup]) -> list[MeshGroup]:
+def coloured_meshes(groups: Iterable[SolidGroup]) -> list[ColouredMesh]:
     """What is seen of groups of solids, without shapes of the kernel."""
-    return [MeshGroup(group.name, tuple(map(_drawn, group.bodies))) for group in groups]
-
-
-def _drawn(body: ColouredSolid) -> ColouredMesh:
-    return ColouredMesh(body.name, body.mesh or display_mesh(body.shape), body.colour)
+    return [
+        ColouredMesh(one.name, group.name, one.mesh or display_mesh(one.shape), one.colour)
+        for group in groups
+        for one in group.bodies
+    ]
 
 
 def display_mesh(shape: TopoDS_Solid) -> Mesh:
@@ -206,35 +167,3 @@ def _style(first: int, item: int, colour: Colour) -> Iterator[str]:
             f"#{first + 7},{properties});"
         )
         yield f"#{first + 9}=SURFACE_STYLE_TRANSPARENT({1 - float(opaque):.6f});"
-
-
-def write_glb(path: Path, name: str, groups: Sequence[MeshGroup]) -> None:
-    """Write groups of meshes as a binary glTF 2.0 file, a node for each group and each mesh."""
-    scene = trimesh.Scene(base_frame="world")
-    scene.graph.update(name, "world", matrix=UPRIGHT)
-    for group in groups:
-        scene.graph.update(group.name, name, matrix=np.eye(4))
-        for body in group.bodies:
-            scene.add_geometry(
-                _drawn_in_glb(body),
-                node_name=body.name,
-                geom_name=body.name,
-                parent_node_name=group.name,
-            )
-    # Without normals viewers must shade each facet flat (glTF 2.0, 3.7.2.1), as it is.
-    path.write_bytes(export_glb(scene, include_normals=False))
-
-
-def _drawn_in_glb(body: ColouredMesh) -> trimesh.Trimesh:
-    drawn = trimesh.Trimesh(body.mesh.vertices, body.mesh.triangles, process=False)
-    drawn.visual = TextureVisuals(
-        material=PBRMaterial(
-            name=body.name,
-            # light, not its code (glTF 2.0, 3.9.2)
-            baseColorFactor=[*srgb_light(np.array(body.colour[:3])), body.colour[3]],
-            metallicFactor=METAL,
-            roughnessFactor=ROUGH,
-            alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",
-        )
-    )
-    return drawn

@@ -19,9 +19,9 @@ from tbcad.output.manifest import (
     MANIFEST,
     REPORT,
     REPORT_BEGIN,
-    is_listed,
     is_report,
     read_manifest,
+    written_file,
 )
 from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom import PartsList, read_parts_list
@@ -147,15 +147,8 @@ def _checked_manifest(folder: Path) -> Manifest:
     manifest = read_manifest(folder)
     if manifest is None:
         raise InputError(f"{folder / MANIFEST} is not there: {MISSING}")
-    prototype = PROTOTYPE if PROTOTYPE[0] in manifest.files else ()
-    for name in (*RECORDS, *prototype):
-        if not (folder / name).is_file():
-            raise InputError(f"{folder / name} is not there: {MISSING}")
-        if not is_listed(folder / name, manifest.files.get(name)):
-            raise InputError(
-                f"{folder / name} is not as tbcad wrote it (cut off, or changed since): build the "
-                "export again"
-            )
+    for name in (*RECORDS, *(PROTOTYPE if PROTOTYPE[0] in manifest.files else ())):
+        written_file(folder, manifest, name, MISSING)
     return manifest
 
 
