@@ -23,10 +23,8 @@ from tbcad.cad.drafting.sheet import (
     placed,
     table,
 )
-from tbcad.cad.drafting.views import as_entities
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.cad.formats.glb import read_glb
-from tbcad.cad.kernel.projection import Segment
 from tbcad.drawings.export import DrawnExport
 from tbcad.report.exploded import EDGE, RADIUS, Callout, place_callouts
 from tbcad.types import Bools, Floats, Ints
@@ -60,7 +58,7 @@ Called: TypeAlias = Mapping[str, tuple[int, int, Point]]
 class LinePicture:
     """What is seen of bodies from a direction."""
 
-    lines: tuple[Segment, ...]  # visible edges, x to the right and y up, mm
+    lines: tuple[Line, ...]  # visible edges, x to the right and y up, mm
     # of each body that is seen: a visible point in its middle, mm
     anchors: dict[str, Point]
 
@@ -76,12 +74,12 @@ def line_picture(bodies: Mapping[str, trimesh.Trimesh], axes: Floats, piece: flo
     names = sorted(bodies)
     whole = trimesh.util.concatenate([bodies[name] for name in names])
     rays = RayMeshIntersector(whole)
-    lines: set[Segment] = set()
+    lines: set[Line] = set()
     for name in names:
         lines.update(_visible(_pieces(bodies[name], axes[2], piece), rays, axes))
     found = {name: _anchor(bodies[name], rays, axes) for name in names}
     anchors = {name: anchor for name, anchor in found.items() if anchor is not None}
-    return LinePicture(tuple(sorted(lines)), anchors)
+    return LinePicture(tuple(sorted(lines, key=lambda one: (one.start, one.end))), anchors)
 
 
 def _pieces(mesh: trimesh.Trimesh, eye: Floats, piece: float) -> Floats:
@@ -107,13 +105,14 @@ def _split(ends: Floats, out: Floats, count: Ints) -> Floats:
     return np.stack([start, start + along, out[which]], axis=1)
 
 
-def _visible(pieces: Floats, rays: RayMeshIntersector, axes: Floats) -> list[Segment]:
+def _visible(pieces: Floats, rays: RayMeshIntersector, axes: Floats) -> list[Line]:
     if not len(pieces):
         return []
     start = pieces[:, :2].mean(axis=1) + OFF_MM * (pieces[:, 2] + axes[2])
     seen = ~_blocked(rays, start, axes[2])
     flat = np.round(pieces[seen, :2] @ axes[:2].T, DIGITS) + 0.0
-    return [Segment(*sorted(((ax, ay), (bx, by)))) for (ax, ay), (bx, by) in flat.tolist()]
+    pairs = (sorted(map(tuple, pair)) for pair in flat.tolist())
+    return [Line(Layer.CUT, start, end) for start, end in pairs]
 
 
 def _blocked(rays: RayMeshIntersector, start: Floats, eye: Floats) -> Bools:
@@ -196,7 +195,7 @@ def _sheet(picture: LinePicture, shown: Called, design: str, k: int) -> Sheet:
     rows = sorted((item, quantity, part) for part, (item, quantity, _) in shown.items())
     cells = [(str(item), str(quantity), part) for item, quantity, part in rows]
     drawn = [
-        *placed(as_entities(picture.lines, Layer.CUT), origin, scale),
+        *placed(picture.lines, origin, scale),
         *_balloons(shown, room, scale, origin),
         *table((column + BESIDE_MM, high), WIDTHS_MM, (HEAD, *cells)),
     ]
@@ -206,7 +205,7 @@ def _sheet(picture: LinePicture, shown: Called, design: str, k: int) -> Sheet:
 
 def _fitted(picture: LinePicture, room: Box) -> tuple[float, Point]:
     """Scale and place of a picture between two columns of numbers."""
-    points = np.array([end for line in picture.lines for end in line])
+    points = np.array([end for line in picture.lines for end in (line.start, line.end)])
     low, high = points.min(axis=0), points.max(axis=0)
     edge = 2 * EDGE / PIXELS
     space = room[2] - room[0] - 2 * edge, room[3] - room[1] - 2 * BESIDE_MM

@@ -21,12 +21,11 @@ from tbcad.cad.drafting.sheet import (
     placed,
     table,
 )
-from tbcad.cad.drafting.views import View, as_entities, straight
+from tbcad.cad.drafting.views import Curve, Shape, View, section, straight
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Point, Text
 from tbcad.cad.formats.pdf import drawable, write_pdf
 from tbcad.cad.formats.step import read_named_solid
 from tbcad.cad.kernel.features import round_faces
-from tbcad.cad.kernel.projection import Shape, section
 from tbcad.cad.kernel.solids import faces
 from tbcad.core.spec.csv_rows import read_toml
 from tbcad.core.spec.design import Spec
@@ -49,7 +48,7 @@ FIGURE_WIDTHS = (40.0, 20.0, 23.0, 20.0, 75.0)
 FIGURE_HEAD = ("figure", "limit", "limit of 2 sigma", "chain, 2 sigma", "verdict")
 ANY, WORDS = "any", "order_page.toml"
 Holes = list[tuple[str, DrawnHole]]
-Cut = list[list[Entity]]
+Cut = list[tuple[Curve, ...]]
 """What a view cuts of each solid, in mm of the part."""
 
 
@@ -94,7 +93,7 @@ def _cut(letter: str, shapes: Sequence[Shape], holes: Sequence[Holes]) -> Cut:
     for shape, numbered in zip(shapes, holes, strict=True):
         seen = (hole.cylinder for _, hole in numbered if hole.view == letter)
         level = next((float(axes[2] @ (one.start + one.end) / 2) for one in seen), 0.0)
-        cut.append([*as_entities(section(shape, axes, level), Layer.CUT)])
+        cut.append(section(shape, axes, level))
     return cut
 
 

@@ -24,11 +24,10 @@ from tbcad.cad.drafting.sheet import (
     choose_scale,
     drawing_room,
 )
-from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
+from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT, Shape, View, isometric, project, straight
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Point, Text
 from tbcad.cad.formats.pdf import text_width
 from tbcad.cad.kernel.features import RoundFace, bounds, cylinders, plane_levels
-from tbcad.cad.kernel.projection import Shape, project
 from tbcad.drawings.tables import (
     HEAD,
     VIEWS,

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from tbcad.cad.drafting.sheet import Sheet, TitleBlock
+from tbcad.cad.drafting.views import Shape
 from tbcad.cad.formats.step import read_named_solid
 from tbcad.cad.kernel.features import RoundFace, bounds, cylinders
-from tbcad.cad.kernel.projection import Shape
 from tbcad.cad.kernel.solids import moved
 from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.part_sheet import part_sheets

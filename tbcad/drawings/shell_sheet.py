@@ -7,10 +7,9 @@ import numpy as np
 
 from tbcad.cad.drafting.dimensions import across, upward
 from tbcad.cad.drafting.sheet import A3, Sheet, TitleBlock, choose_scale, drawing_room, placed
-from tbcad.cad.drafting.views import FRONT, as_entities, straight
+from tbcad.cad.drafting.views import FRONT, section, straight
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point
 from tbcad.cad.formats.step import read_named_solid
-from tbcad.cad.kernel.projection import section
 from tbcad.drawings.export import DrawnExport
 from tbcad.drawings.tables import mm
 from tbcad.records.design import MandrelRecord
@@ -34,7 +33,7 @@ def draw_shell(export: DrawnExport, name: str) -> list[Sheet]:
         view="section y = 0",
         tolerances="of tbcad order",
     )
-    flat = [*as_entities(section(read_named_solid(export.file(step)).shape, FRONT, 0.0), Layer.CUT)]
+    flat = section(read_named_solid(export.file(step)).shape, FRONT, 0.0)
     points = np.array(straight(flat)).reshape(-1, 2)
     low, high = points.min(axis=0), points.max(axis=0)
     left, bottom, right, top = drawing_room(A3)

@@ -12,10 +12,9 @@ from typing import TypeAlias
 import numpy as np
 
 from tbcad.cad.drafting.sheet import TABLE_ROW_MM, is_legible, table
-from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT
+from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT, Shape
 from tbcad.cad.formats.entities import Entity, Point
 from tbcad.cad.kernel.features import HOLE_DEG, SLOT_DEG, RoundFace, distance
-from tbcad.cad.kernel.projection import Shape
 from tbcad.prototype.purchased.parts import PurchasedPart
 from tbcad.types import Floats
 

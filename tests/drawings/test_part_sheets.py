@@ -10,10 +10,10 @@ import pytest
 from OCP.TopoDS import TopoDS_Shape
 
 from tbcad.cad.drafting.sheet import BORDER_MM, TITLE_MM, Sheet, TitleBlock
-from tbcad.cad.drafting.views import ABOVE, FRONT
+from tbcad.cad.drafting.views import ABOVE, FRONT, Curve, project, section
+from tbcad.cad.formats.entities import Circle, Layer, Line
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.features import bounds, cylinders, plane_levels
-from tbcad.cad.kernel.projection import Round, Segment, project, section
 from tbcad.cad.kernel.solids import cut, cylinder, faces, moved, one_solid, polygon, prism
 from tbcad.drawings.part_sheet import part_sheets
 from tbcad.drawings.printed_parts import part_datum
@@ -61,6 +61,10 @@ def sheet(bracket: Solid) -> Sheet:
     return only
 
 
+def ends(curves: tuple[Curve, ...]) -> list[tuple[float, float]]:
+    return [end for one in curves if isinstance(one, Line) for end in (one.start, one.end)]
+
+
 def test_bounds_and_levels(bracket: Solid) -> None:
     assert bounds(bracket.shape) == pytest.approx(np.array([np.zeros(3), SIZE]), abs=1e-6)
     assert [level for level, _ in plane_levels(bracket.shape, Z)] == [0.0, 3.0, 8.0]
@@ -85,30 +89,22 @@ def test_holes_are_found_with_their_ends(bracket: Solid) -> None:
 
 def test_a_view_from_above_has_the_holes_as_circles(bracket: Solid) -> None:
     seen = project(bracket.shape, ABOVE)
-    circles = {
-        (one.centre, one.radius)
-        for one in seen.visible
-        if isinstance(one, Round) and one.end_deg - one.start_deg == 360.0
-    }
+    circles = {(one.centre, one.radius) for one in seen.visible if isinstance(one, Circle)}
     assert circles == {(THROUGH, 2.5), (BLIND, 3.0)}
-    edges = [one for one in seen.visible if isinstance(one, Segment)]
-    assert Segment((0.0, 0.0), (0.0, 40.0)) in edges
-    assert Segment((0.0, 0.0), (60.0, 0.0)) in edges
+    for end in ((0.0, 40.0), (60.0, 0.0)):
+        assert Line(Layer.CUT, (0.0, 0.0), end) in seen.visible
 
 
 def test_a_blind_hole_is_hidden_from_the_front(bracket: Solid) -> None:
     seen = project(bracket.shape, FRONT)
-    hidden = [one for one in seen.hidden if isinstance(one, Segment)]
-    bottom = [x for one in hidden for x, z in one if abs(z - 3.0) < 1e-4 and x > 40]
+    bottom = [x for x, z in ends(seen.hidden) if abs(z - 3.0) < 1e-4 and x > 40]
     assert (min(bottom), max(bottom)) == pytest.approx((47.0, 53.0), abs=1e-4)
-    levels = {round(z, 4) for one in seen.visible if isinstance(one, Segment) for _, z in one}
-    assert levels == {0.0, 8.0}
+    assert {round(z, 4) for _, z in ends(seen.visible)} == {0.0, 8.0}
 
 
 def test_a_section_is_where_the_plane_cuts(bracket: Solid) -> None:
     cuts = section(bracket.shape, FRONT, -10.0)  # y = 10, through the hole and the slot
-    levels = {end[0] for one in cuts if isinstance(one, Segment) for end in (one.start, one.end)}
-    assert levels == {0.0, 7.5, 12.5, 23.0, 37.0, 60.0}
+    assert {x for x, _ in ends(cuts)} == {0.0, 7.5, 12.5, 23.0, 37.0, 60.0}
 
 
 def test_lengths_and_table_are_the_solids(sheet: Sheet) -> None:

@@ -127,24 +127,14 @@ def packed_outlines(facets: Facets, arrays: PackedArrays) -> Record:
     }
 
 
-def axis(pinhole: Floats) -> list[float]:
-    """Unit vector of the axis that the base turns about."""
-    return [float(value) for value in pinhole / np.linalg.norm(pinhole)]
-
-
-def camera_distance(export: ExportedDesign) -> float:
-    """Distance of every virtual camera from the object, mm."""
-    pinhole = export.reflectors[0].camera.pinhole
-    return Ellipsoid(pinhole, export.spec.optics.semi_minor_mm).camera_distance
-
-
 def prototype_bodies(folder: Path) -> Iterator[Body]:
     """All bodies of prototype.glb, in millimetres and z up."""
     record = Prototype.read(folder / NAME)
     drawn = read_glb(folder / record.assembly.glb)
     turning = {part.name for part in record.with_role("base", "cap")}
     turning |= {f"ball_{seat.ball}" for seat in record.seats}
-    turning |= {one.name for one in (*record.bought, *record.fasteners) if one.turns}
+    turning |= {one.name for one in record.bought if one.turns}
+    turning |= {one.name for one in record.fasteners if one.turns}
     apart = _apart(record, drawn)
     for one in drawn:
         mesh, turns = one.mesh, one.name in turning

@@ -13,6 +13,7 @@ from tbcad_verify.report.as_made import AsMade
 from tbcad.cad.formats.checked_files import Row
 from tbcad.common.atomic_files import replace_files
 from tbcad.common.web_page import web_page
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.output.manifest import (
@@ -167,11 +168,12 @@ def _data(
     drawn = bodies.packed_shells(export, facets, arrays) if shells else []
     if PROTOTYPE[0] in manifest.files:
         drawn += [bodies.packed_body(one, arrays) for one in bodies.prototype_bodies(folder)]
-    a = export.reflectors[0]
+    pinhole = export.reflectors[0].camera.pinhole
+    ellipsoid = Ellipsoid(pinhole, export.spec.optics.semi_minor_mm)
     record = {
         "target": export.capture_mm,
-        "axis": bodies.axis(a.camera.pinhole),
-        "distance": bodies.camera_distance(export),
+        "axis": ellipsoid.axis.tolist(),
+        "distance": ellipsoid.camera_distance,
         "cameras": [
             {"id": one.camera_id, "pinhole": one.camera.pinhole.tolist()}
             for one in export.reflectors

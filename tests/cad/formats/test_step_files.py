@@ -15,11 +15,8 @@ from tbcad_verify.mesh.threemf import _corners
 from tbcad.cad.formats import assembly
 from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
 from tbcad.cad.formats.mesh_files import write_3mf, write_stl
-from tbcad.cad.formats.step import write_step
-from tbcad.cad.formats.step_mirror import NoMirrorImageError, mirrored_step
-from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.cad.kernel.solids import cylinder, sphere
+from tbcad.cad.kernel.solids import sphere
 
 GREY, CLEAR = (0.5, 0.5, 0.5, 1.0), (0.1, 0.2, 0.3, 0.4)
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -60,15 +57,6 @@ def test_the_same_bytes_after_a_file_with_tolerances(tmp_path: Path) -> None:
     Interface_Static.SetCVal_s("write.step.schema", "AP242DIS")  # as such a file leaves it
     write_assembly(tmp_path / "second.step", "prototype", groups)
     assert (tmp_path / "first.step").read_bytes() == (tmp_path / "second.step").read_bytes()
-
-
-def test_a_mirror_image_without_a_rule_is_refused(tmp_path: Path) -> None:
-    rod = Solid("rod", cylinder(np.zeros(3), np.eye(3)[2], 1.0, 2.0), ())
-    write_step(tmp_path / "rod.step", rod)
-    text = (tmp_path / "rod.step").read_text()
-    assert mirrored_step(text, {}) != text
-    with pytest.raises(NoMirrorImageError, match="no rule for the mirror image of OFFSET_SURFACE"):
-        mirrored_step(text.replace("PLANE(", "OFFSET_SURFACE("), {})
 
 
 def box() -> Mesh:
