@@ -5,21 +5,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from OCP.BRep import BRep_Builder
-from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
-from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from OCP.STEPControl import STEPControl_Writer
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
-from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
-from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_Label
+from OCP.TCollection import TCollection_HAsciiString
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape, TopoDS_Solid
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
-from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.formats.glb import Colour, ColouredMesh
-from tbcad.cad.formats.step import StepError, finish, kernel_settings, new_document, write_header
+from tbcad.cad.formats.step import (
+    StepError,
+    document_writer,
+    finish,
+    kernel_settings,
+    new_document,
+    set_name,
+    write_header,
+)
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
 from tbcad.cad.kernel.solids import moved, solids
@@ -72,12 +76,7 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     The kernel writes colours in the order of addresses in memory, so they are written here.
     StepError if the kernel fails, OSError if the file cannot be written in full.
     """
-    document = _document(name, groups)
-    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
-    writer.SetColorMode(False)
-    writer.SetNameMode(True)
-    if not writer.Transfer(document, STEPControl_AsIs):
-        raise StepError(f"{path.name}: the kernel cannot translate the assembly")
+    writer = document_writer(path, _document(name, groups))
     step_writer = writer.ChangeWriter()
     _number_occurrences(step_writer)
     write_header(step_writer, name)
@@ -90,21 +89,16 @@ def _document(name: str, groups: Sequence[SolidGroup]) -> TDocStd_Document:
     document = new_document()
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     tool.SetAutoNaming_s(False)
-    top = _named(tool.NewShape(), name)
+    top = set_name(tool.NewShape(), name)
     for group in groups:
-        branch = _named(tool.NewShape(), group.name)
+        branch = set_name(tool.NewShape(), group.name)
         for body in group.bodies:
-            part = _named(tool.NewShape(), body.name)
+            part = set_name(tool.NewShape(), body.name)
             tool.SetShape(part, _compound(body.shape))
-            _named(tool.AddComponent(branch, part, TopLoc_Location()), body.name)
+            set_name(tool.AddComponent(branch, part, TopLoc_Location()), body.name)
         tool.AddComponent(top, branch, TopLoc_Location())
     tool.UpdateAssemblies()
     return document
-
-
-def _named(label: TDF_Label, name: str) -> TDF_Label:
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-    return label
 
 
 def _compound(shape: TopoDS_Shape) -> TopoDS_Compound:
