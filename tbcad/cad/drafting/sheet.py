@@ -116,20 +116,15 @@ def drawing_room(paper: Point) -> Box:
     return LEFT_MM, BORDER_MM + TITLE_MM[1], paper[0] - BORDER_MM, paper[1] - BORDER_MM
 
 
-def sheet_frame(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
-    """Border and title block; without a scale nothing is to scale."""
-    yield rectangle((LEFT_MM, BORDER_MM, paper[0] - BORDER_MM, paper[1] - BORDER_MM), Layer.FRAME)
-    yield from title_block(paper, scale, block)
-
-
 def rectangle(box: Box, layer: Layer) -> Polyline:
     """The outline of a box."""
     left, low, right, high = box
     return Polyline(layer, ((left, low), (right, low), (right, high), (left, high)))
 
 
-def title_block(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
-    """The title block in the lower right corner; without a scale nothing is to scale."""
+def sheet_frame(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
+    """Border, and title block in the lower right corner; without a scale nothing is to scale."""
+    yield rectangle((LEFT_MM, BORDER_MM, paper[0] - BORDER_MM, paper[1] - BORDER_MM), Layer.FRAME)
     shown = f"{scale_text(scale)} on {paper_name(paper)}" if scale else "not to scale"
     seen = ("Single view", block.view) if block.view else ("Projection", FIRST_ANGLE)
     rows = (
