@@ -125,7 +125,7 @@ def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str
     """Each mirror's cell lies on its own sphere and all of them add up to what rays see."""
     options = [f"n={n}", f"camera_mm=[{x}, 0, {z}]", f"radius_rule={rule}"]
     try:
-        with patch("tbcad.core.mirrors.array.check_clearance"):  # the object may stand in the light
+        with patch("tbcad.core.mirrors.array._check_clearance"):  # the object may stand in the light
             cells = mirror_array(*options).cells
     except SpecError:
         assume(False)
