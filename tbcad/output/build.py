@@ -75,11 +75,12 @@ def write_export(
         try:
             export = replace(export, spec=export_prototype(design, folder, progress, submit_file))
         except (SpecError, InvalidSolidError) as error:
-            if SHELL not in parts or not (optional_prototype or isinstance(error, SpecError)):
-                raise
-            if not optional_prototype:
+            if SHELL in parts and optional_prototype:
+                export = Export(design.spec, (SHELL,), f"no prototype: {error}")
+            elif SHELL in parts and isinstance(error, SpecError):
                 raise only_shell_remains(error) from None
-            export = Export(design.spec, (SHELL,), f"no prototype: {error}")
+            else:
+                raise
         if SHELL in parts:
             progress("shells")
     if mandrel:
