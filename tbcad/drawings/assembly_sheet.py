@@ -6,6 +6,7 @@ Hidden edges are removed by rays on meshes, in seconds; exact removal takes minu
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
@@ -14,19 +15,17 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from tbcad.cad.drafting.sheet import (
     A3,
     BESIDE_MM,
+    Box,
     Sheet,
     TitleBlock,
+    choose_scale,
     drawing_room,
-    notes_beside_title,
     placed,
-    sheet_frame,
     table,
 )
-from tbcad.cad.drafting.views import as_entities
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
-from tbcad.cad.kernel.projection import Segment
+from tbcad.cad.formats.glb import read_glb
 from tbcad.drawings.export import DrawnExport
-from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.report.exploded import EDGE, RADIUS, Callout, place_callouts
 from tbcad.types import Bools, Floats, Ints
 
@@ -36,6 +35,10 @@ DIGITS = 3
 NAME = "assembly"
 # Toward the eye: from the camera's side, from behind the uprights, from below to the balls.
 EYES = ((1.0, -1.0, 0.6), (-1.0, -1.0, 0.6), (0.6, -1.0, -0.35))
+NOTES = (
+    "Numbers are those of the parts list, bom.csv.",
+    "What is hidden here is on another sheet; what is nowhere is inside others or has no body.",
+)
 VIEWS = (
     "from the camera's side, without shroud",
     "from behind, without shroud",
@@ -47,15 +50,17 @@ PIXELS = RADIUS / BALLOON_MM  # of the call-outs' own unit, 1/mm
 SCALES = (0.5, 0.4, 0.2, 0.1)
 PIECE_MM = 2.0  # edges are tested in pieces as long
 HEAD, WIDTHS_MM = ("no.", "qty", "part"), (9.0, 9.0, 42.0)
+Called: TypeAlias = Mapping[str, tuple[int, int, Point]]
+"""Number and quantity of parts, and a point of each in a picture, mm."""
 
 
 @dataclass(frozen=True)
 class LinePicture:
     """What is seen of bodies from a direction."""
 
-    lines: tuple[Segment, ...]  # visible edges, x to the right and y up, mm
+    lines: tuple[Line, ...]  # visible edges, x to the right and y up, mm
     # of each body that is seen: a visible point in its middle, mm
-    anchors: dict[str, tuple[float, float]]
+    anchors: dict[str, Point]
 
 
 def line_picture(bodies: Mapping[str, trimesh.Trimesh], axes: Floats, piece: float) -> LinePicture:
@@ -69,12 +74,12 @@ def line_picture(bodies: Mapping[str, trimesh.Trimesh], axes: Floats, piece: flo
     names = sorted(bodies)
     whole = trimesh.util.concatenate([bodies[name] for name in names])
     rays = RayMeshIntersector(whole)
-    lines: set[Segment] = set()
+    lines: set[Line] = set()
     for name in names:
         lines.update(_visible(_pieces(bodies[name], axes[2], piece), rays, axes))
     found = {name: _anchor(bodies[name], rays, axes) for name in names}
     anchors = {name: anchor for name, anchor in found.items() if anchor is not None}
-    return LinePicture(tuple(sorted(lines)), anchors)
+    return LinePicture(tuple(sorted(lines, key=lambda one: (one.start, one.end))), anchors)
 
 
 def _pieces(mesh: trimesh.Trimesh, eye: Floats, piece: float) -> Floats:
@@ -100,22 +105,21 @@ def _split(ends: Floats, out: Floats, count: Ints) -> Floats:
     return np.stack([start, start + along, out[which]], axis=1)
 
 
-def _visible(pieces: Floats, rays: RayMeshIntersector, axes: Floats) -> list[Segment]:
+def _visible(pieces: Floats, rays: RayMeshIntersector, axes: Floats) -> list[Line]:
     if not len(pieces):
         return []
     start = pieces[:, :2].mean(axis=1) + OFF_MM * (pieces[:, 2] + axes[2])
     seen = ~_blocked(rays, start, axes[2])
     flat = np.round(pieces[seen, :2] @ axes[:2].T, DIGITS) + 0.0
-    return [Segment(*sorted(((ax, ay), (bx, by)))) for (ax, ay), (bx, by) in flat.tolist()]
+    pairs = (sorted(map(tuple, pair)) for pair in flat.tolist())
+    return [Line(Layer.CUT, start, end) for start, end in pairs]
 
 
 def _blocked(rays: RayMeshIntersector, start: Floats, eye: Floats) -> Bools:
     return np.asarray(rays.intersects_any(start, np.broadcast_to(eye, start.shape)))
 
 
-def _anchor(
-    mesh: trimesh.Trimesh, rays: RayMeshIntersector, axes: Floats
-) -> tuple[float, float] | None:
+def _anchor(mesh: trimesh.Trimesh, rays: RayMeshIntersector, axes: Floats) -> Point | None:
     """The visible point of a body that is nearest to the middle of all visible ones."""
     facing = mesh.face_normals @ axes[2] > 0
     points = mesh.triangles_center[facing]
@@ -130,53 +134,40 @@ def _anchor(
     return x, y
 
 
-@dataclass(frozen=True)
-class AssemblyJob:
-    """What the assembly's sheets follow from."""
-
-    path: Path  # GLB file of all bodies
-    parts: dict[str, str]  # part of each body
-    items: dict[str, int]  # number of each part
-    quantities: dict[str, int]  # of each part
-    title: str  # of the design
-
-
-def assembly_job(export: DrawnExport, machine: AssembledMachine) -> AssemblyJob:
-    """What is needed to draw the assembly.
-
-    InputError: its file is missing, or not as it was written.
-    """
+def draw_assembly(export: DrawnExport) -> list[Sheet]:
+    """A sheet for each side of the machine. InputError: its file is not as it was written."""
+    machine = export.machine
+    assert machine is not None
     path = export.file(machine.record.assembly.glb)
-    fasteners = {one.name: one.part for one in machine.fasteners}
-    return AssemblyJob(
-        path, {**machine.bodies, **fasteners}, machine.items, machine.quantities, export.title
-    )
+    parts = {**machine.bodies, **{one.name: one.part for one in machine.fasteners}}
+    listed = {part: (item, machine.quantities[part]) for part, item in machine.items.items()}
+    return assembly_sheets(path, parts, listed, export.title)
 
 
-def draw_assembly(job: AssemblyJob) -> list[Sheet]:
-    """A sheet for each side of the machine, with the numbers of what is seen there first."""
-    bodies = _bodies(job.path)
-    pictures = [line_picture(bodies, _axes(eye), PIECE_MM) for eye in EYES]
+def assembly_sheets(
+    path: Path, parts: Mapping[str, str], listed: Mapping[str, tuple[int, int]], design: str
+) -> list[Sheet]:
+    """A sheet for each side, with the numbers of what is seen there first.
+
+    From the GLB file of all bodies, the part of each, and each part's number and quantity.
+    """
+    bodies = {
+        one.name: trimesh.Trimesh(one.mesh.vertices, one.mesh.triangles)
+        for one in read_glb(path)
+        if not one.name.startswith(LEFT_OUT)
+    }
     sheets, seen = list[Sheet](), set[str]()
-    for k, picture in enumerate(pictures):
-        anchors = _anchors(job, picture, seen)
+    for k, eye in enumerate(EYES):
+        picture = line_picture(bodies, _axes(eye), PIECE_MM)
+        anchors: dict[str, Point] = {}  # of each part that has no number yet: its first body's
+        for body, point in picture.anchors.items():
+            part = parts.get(body, "")
+            if part in listed and part not in seen:
+                anchors.setdefault(part, point)
         seen |= anchors.keys()
-        sheets.append(_sheet(job, picture, anchors, k))
+        shown = {part: (*listed[part], point) for part, point in anchors.items()}
+        sheets.append(_sheet(picture, shown, design, k))
     return sheets
-
-
-def _bodies(path: Path) -> dict[str, trimesh.Trimesh]:
-    """Bodies in mm and z up by their names."""
-    scene = trimesh.load_scene(path)
-    bodies = {}
-    for name in sorted(scene.graph.nodes_geometry):
-        if name.startswith(LEFT_OUT):
-            continue
-        place, geometry = scene.graph[name]
-        mesh = scene.geometry[geometry]
-        x, y, z = (1000 * trimesh.transform_points(mesh.vertices, place)).T
-        bodies[name] = trimesh.Trimesh(np.stack([x, -z, y], axis=-1), mesh.faces)
-    return bodies
 
 
 def _axes(eye: Sequence[float]) -> Floats:
@@ -186,27 +177,14 @@ def _axes(eye: Sequence[float]) -> Floats:
     return np.stack([right, np.cross(toward, right), toward])
 
 
-def _anchors(
-    job: AssemblyJob, picture: LinePicture, seen: set[str]
-) -> dict[str, tuple[float, float]]:
-    """A point of each part that has no number yet: of its first body that is seen."""
-    anchors: dict[str, tuple[float, float]] = {}
-    for body, point in picture.anchors.items():
-        part = job.parts.get(body, "")
-        if part in job.items and part not in seen:
-            anchors.setdefault(part, point)
-    return anchors
-
-
-def _sheet(
-    job: AssemblyJob, picture: LinePicture, anchors: Mapping[str, tuple[float, float]], k: int
-) -> Sheet:
+def _sheet(picture: LinePicture, shown: Called, design: str, k: int) -> Sheet:
     left, low, right, high = drawing_room(A3)
     column = right - sum(WIDTHS_MM) - BESIDE_MM
-    scale, origin = _fitted(picture, (left, low, column, high))
+    room = left, low, column, high
+    scale, origin = _fitted(picture, room)
     block = TitleBlock(
         title="general assembly",
-        design=job.title,
+        design=design,
         item="all",
         quantity=1,
         material="see the parts list",
@@ -214,50 +192,36 @@ def _sheet(
         sheet=f"{k + 1} of {len(EYES)}",
         tolerances="none",
     )
-    rows = sorted((job.items[part], job.quantities[part], part) for part in anchors)
+    rows = sorted((item, quantity, part) for part, (item, quantity, _) in shown.items())
     cells = [(str(item), str(quantity), part) for item, quantity, part in rows]
-    drawn = placed(as_entities(picture.lines, Layer.CUT), origin, scale)
-    text = (
-        "Numbers are those of the parts list, bom.csv.",
-        "What is hidden here is on another sheet; what is nowhere is inside others or has no body.",
-    )
-    entities = [
-        *sheet_frame(A3, scale, block),
-        *drawn,
-        *_balloons(job, anchors, (left, low, column, high), scale, origin),
+    drawn = [
+        *placed(picture.lines, origin, scale),
+        *_balloons(shown, room, scale, origin),
         *table((column + BESIDE_MM, high), WIDTHS_MM, (HEAD, *cells)),
-        *notes_beside_title(A3, text),
     ]
     name = NAME if k == 0 else f"{NAME}_{k + 1}"
-    return Sheet(name, block.title, NAME, A3, scale, origin, tuple(entities))
+    return Sheet.framed((name, NAME), block, A3, scale, origin, drawn, NOTES)
 
 
-def _fitted(picture: LinePicture, room: tuple[float, float, float, float]) -> tuple[float, Point]:
+def _fitted(picture: LinePicture, room: Box) -> tuple[float, Point]:
     """Scale and place of a picture between two columns of numbers."""
-    points = np.array([end for line in picture.lines for end in line])
+    points = np.array([end for line in picture.lines for end in (line.start, line.end)])
     low, high = points.min(axis=0), points.max(axis=0)
     edge = 2 * EDGE / PIXELS
-    space = np.array([room[2] - room[0] - 2 * edge, room[3] - room[1] - 2 * BESIDE_MM])
-    fitting = (one for one in SCALES if (one * (high - low) <= space).all())
-    scale = next(fitting, SCALES[-1])
+    space = room[2] - room[0] - 2 * edge, room[3] - room[1] - 2 * BESIDE_MM
+    scale = choose_scale((high - low).tolist(), space, SCALES)
     middle = np.array([room[0] + room[2], room[1] + room[3]]) / 2 - scale * (low + high) / 2
     return scale, (float(middle[0]), float(middle[1]))
 
 
-def _balloons(
-    job: AssemblyJob,
-    anchors: Mapping[str, tuple[float, float]],
-    room: tuple[float, float, float, float],
-    scale: float,
-    origin: Point,
-) -> Iterator[Entity]:
+def _balloons(shown: Called, room: Box, scale: float, origin: Point) -> Iterator[Entity]:
     """Circles with numbers, and lines to the parts that do not cross."""
     left, low, right, high = room
     callouts = []
-    for part, (x, y) in anchors.items():
+    for number, _, (x, y) in shown.values():
         on_paper = origin[0] + scale * x, origin[1] + scale * y
         pixel = (on_paper[0] - left) * PIXELS, (high - on_paper[1]) * PIXELS
-        callouts.append(Callout(job.items[part], 1, pixel))
+        callouts.append(Callout(number, 1, pixel))
     size = round((right - left) * PIXELS), round((high - low) * PIXELS)
     for callout, place in place_callouts(callouts, size):
         x, y = left + place[0] / PIXELS, high - place[1] / PIXELS

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tbcad.cad.formats.checked_files import Row
 from tbcad.errors import InputError
-from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
+from tbcad.output.manifest import MANIFEST, read_manifest, written_file
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.records.design import NAME as DESIGN
 from tbcad.records.design import DesignRecord
@@ -14,9 +14,9 @@ from tbcad.records.document import Manifest
 from tbcad.records.prototype import NAME as PROTOTYPE
 from tbcad.records.prototype import PrintedPartRecord
 
-SHELLS = ("shell_a", "shell_b")
-MANDRELS = ("mandrel_a", "mandrel_b")
+SOLIDS = ("shell_a", "shell_b", "mandrel_a", "mandrel_b")
 PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
+AGAIN = "build the export again"
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,11 @@ class DrawnExport:
     manifest: Manifest  # its files
     design: DesignRecord  # design.json
     machine: AssembledMachine | None  # its prototype, None where it has none
-    shells: tuple[str, ...]  # names of the shells that it has
 
     @property
-    def mandrels(self) -> tuple[str, ...]:
-        """Names of the shells' negatives that it has."""
-        return tuple(name for name in MANDRELS if f"{name}.step" in self.manifest.files)
+    def shells(self) -> list[str]:
+        """Names of the shells and of their negatives that it has."""
+        return [name for name in SOLIDS if f"{name}.step" in self.manifest.files]
 
     @property
     def title(self) -> str:
@@ -46,48 +45,30 @@ class DrawnExport:
 
     def row(self, part: PrintedPartRecord) -> Row:
         """A printed part's row in the parts list. InputError: it has none."""
-        name = part.listed_name
-        rows = self.machine.rows if self.machine else ()
-        row = next((one for one in rows if one["part"] == name), None)
-        if row is None:
-            raise InputError(f"{self.folder / 'bom.csv'} has no {name}: build the export again")
-        return row
+        for row in self.machine.rows if self.machine else ():
+            if row["part"] == part.listed_name:
+                return row
+        raise InputError(f"{self.folder / 'bom.csv'} has no {part.listed_name}: {AGAIN}")
 
     def file(self, name: str) -> Path:
         """A file of the export as it was written. InputError: it is missing, or another."""
-        return _written(self.folder, self.manifest, name)
+        return written_file(self.folder, self.manifest, name, AGAIN)
 
-    def digest(self, name: str) -> str:
-        """The beginning of a file's SHA-256."""
-        return self.manifest.files[name].sha256[:12]
+    def source(self, step: str) -> tuple[str, str]:
+        """Two lines of notes: the file of a shape, and the beginning of its SHA-256."""
+        digest = self.manifest.files[step].sha256[:12]
+        return f"Shape and what has no size here: {step},", f"sha256 {digest}..."
 
 
 def read_export(folder: Path) -> DrawnExport:
-    """The export in a folder.
-
-    InputError: there is none, or a file is missing or not as it was written.
-    """
+    """The export in a folder. InputError: none, or a file is missing or not as it was written."""
     manifest = read_manifest(folder)
     if manifest is None:
         raise InputError(
             f"{folder / MANIFEST} is missing or no manifest: name a folder that tbcad build wrote"
         )
-    shells = tuple(name for name in SHELLS if f"{name}.step" in manifest.files)
-    design = DesignRecord.read(_written(folder, manifest, DESIGN))
-    if PROTOTYPE not in manifest.files:
-        return DrawnExport(folder, manifest, design, None, shells)
-    for name in PROTOTYPE_FILES:
-        _written(folder, manifest, name)
-    return DrawnExport(folder, manifest, design, read_machine(folder), shells)
-
-
-def _written(folder: Path, manifest: Manifest, name: str) -> Path:
-    """A file as its manifest has it."""
-    path = folder / name
-    if not path.is_file():
-        raise InputError(f"{path} is missing: build the export again")
-    if not is_listed(path, manifest.files.get(name)):
-        raise InputError(
-            f"{path} is not as tbcad wrote it (cut off, or changed since): build the export again"
-        )
-    return path
+    prototype = PROTOTYPE in manifest.files
+    for name in (DESIGN, *(PROTOTYPE_FILES if prototype else ())):
+        written_file(folder, manifest, name, AGAIN)
+    machine = read_machine(folder) if prototype else None
+    return DrawnExport(folder, manifest, DesignRecord.read(folder / DESIGN), machine)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -14,9 +13,7 @@ from tbcad.cad.drafting.sheet import (
     TitleBlock,
     choose_scale,
     drawing_room,
-    notes_beside_title,
     placed,
-    sheet_frame,
     table,
 )
 from tbcad.cad.drafting.views import straight
@@ -34,6 +31,7 @@ IN_PLANE = 1e-9  # of a direction's y
 HEAD, WIDTHS_MM = ("symbol", "what", "value"), (16.0, 58.0, 30.0)
 NAMES = ("P", "C", "V")  # apex, centre and virtual camera of the mirror that is named
 ELLIPSE_POINTS = 361
+SIDES = (np.array([1, 1]), np.array([-1, 1]))  # camera a's, and mirrored for b
 AROUND_MM = 12.0  # room round the drawing
 CROSS_MM, DOT_MM = 1.5, 0.7  # on paper: half a cross of a virtual camera; radius of a place
 BEYOND = 1.6  # of the capture radius: where reflected rays end
@@ -49,79 +47,50 @@ NOTES = (
 
 
 @dataclass(frozen=True)
-class LayoutMirrors:
-    """Mirrors of camera a whose directions are in the plane y = 0, by their angle."""
+class Layout:
+    """The plane y = 0: x and z, mm; mirrors of camera a by their angle, over m of them."""
 
-    apex: Floats  # x and z, mm, (m, 2)
-    centre: Floats  # x and z of the sphere, mm, (m, 2)
-    radius: Floats  # mm, (m,); PLANAR_MM for planar ones
-    direction: Floats  # x and z of u, (m, 2)
-    theta: Floats  # theta_0 and theta_1, deg, (m, 2)
-    ids: tuple[str, ...]  # numbers of the mirrors
+    optics: OpticsSpec
+    rows: tuple[MirrorRow, ...]  # of all mirrors
+    flat: tuple[MirrorRow, ...]  # of those whose directions are in the plane, (m,)
+    pinhole: Floats  # of camera a, (2,)
+    major: float  # semi-major axis of the ellipsoid
+    apex: Floats  # of the mirrors, (m, 2)
+    centre: Floats  # of their spheres, (m, 2)
+    radius: Floats  # of them, (m,); PLANAR_MM for planar mirrors
+    virtual: Floats  # virtual cameras, (m, 2)
+    edges: Floats  # where neighbours' circles meet, nearest to their apices, (m - 1, 2)
 
-    def edges(self) -> Floats:
-        """Where neighbours' circles meet, nearest to their apices, mm, (m - 1, 2)."""
-        pairs = pairwise(range(len(self.radius)))
-        return np.array([self._meeting(i, j) for i, j in pairs]).reshape(-1, 2)
+    @property
+    def traced(self) -> list[int]:
+        """The first, the middle and the last whole mirror; the middle one's points have names."""
+        last = len(self.flat) - 2
+        return sorted({1, (1 + last) // 2, last}) if last >= 1 else []
 
-    def _meeting(self, i: int, j: int) -> Floats:
-        between = self.centre[j] - self.centre[i]
-        distance = float(np.hypot(*between))
-        along = (distance**2 + self.radius[i] ** 2 - self.radius[j] ** 2) / (2 * distance)
-        height = math.sqrt(max(self.radius[i] ** 2 - along**2, 0.0))
-        unit = between / distance
-        foot, across_it = self.centre[i] + along * unit, np.array([-unit[1], unit[0]])
-        middle = (self.apex[i] + self.apex[j]) / 2
-        ends = np.stack([foot + height * across_it, foot - height * across_it])
-        return np.asarray(ends[np.argmin(np.hypot(*(ends - middle).T))])
+    @property
+    def named(self) -> int | None:
+        """The mirror whose points have names."""
+        return self.traced[len(self.traced) // 2] if self.traced else None
 
 
-def layout_sheet(design: DesignRecord, rows: Sequence[MirrorRow], title: str) -> list[Sheet]:
-    """The sheet of a design and the rows of its mirrors.csv; title: its name."""
-    optics = design.spec.optics
-    pinhole = np.array(optics.camera_mm)[[0, 2]]
-    mirrors, minor = _mirrors(rows), optics.semi_minor_mm
-    half_distance = _half(optics)
-    major = math.hypot(minor, half_distance)
-    capture = optics.capture_diameter_mm / 2
-    reach = 2 * major
-    left, low, right, high = drawing_room(A3)
-    column = right - sum(WIDTHS_MM)
-    size = 2 * reach, reach - min(float(pinhole[1]), -capture)
-    room = column - left - 2 * AROUND_MM, high - low - 2 * AROUND_MM - LEVEL_MM
-    scale = choose_scale(size, room)
-    middle = (left + column) / 2, high - AROUND_MM - reach * scale
-    drawn = [
-        *_ellipses(pinhole, major, minor),
-        Circle(Layer.CUT, (0.0, 0.0), capture),
-        Arc(Layer.CENTRE, (0.0, 0.0), reach, 0.0, 180.0),
-        *_mirror_arcs(mirrors),
-        *_rays(mirrors, pinhole, capture),
-    ]
-    on_paper = placed(drawn, middle, scale)
-    block = TitleBlock(
-        "optical layout", title, "-", 1, "-", "section y = 0", tolerances="nominal sizes"
+def _layout(optics: OpticsSpec, rows: Sequence[MirrorRow]) -> Layout:
+    flat = [row for row in rows if row.camera == "a" and abs(row.uy) < IN_PLANE]
+    flat.sort(key=lambda row: math.atan2(row.ux, row.uz))
+    major = math.hypot(optics.semi_minor_mm, _half(optics))
+    apex, radius = columns(flat, "px pz"), np.array([row.radius_mm or PLANAR_MM for row in flat])
+    centre = apex - radius[:, np.newaxis] * columns(flat, "nx nz")
+    return Layout(
+        optics,
+        tuple(rows),
+        tuple(flat),
+        np.array(optics.camera_mm)[[0, 2]],
+        major,
+        apex,
+        centre,
+        radius,
+        2 * major * columns(flat, "ux uz"),
+        _edges(apex, centre, radius),
     )
-    entities = [
-        *sheet_frame(A3, scale, block),
-        *on_paper,
-        *_places(mirrors, pinhole, reach, middle, scale, on_paper),
-        *_capture_length(capture, pinhole, middle, scale),
-        *table((column, high), WIDTHS_MM, (HEAD, *_values(rows, mirrors, optics, major))),
-        *notes_beside_title(A3, NOTES),
-    ]
-    return [Sheet(NAME, block.title, NAME, A3, scale, middle, tuple(entities))]
-
-
-def layout_rows(export: DrawnExport) -> list[MirrorRow]:
-    """Rows of the export's mirrors.csv. InputError: it is not as it was written."""
-    export.file(MirrorRow.FILE)
-    return MirrorRow.read(export.folder)
-
-
-def has_layout(design: DesignRecord) -> bool:
-    """Whether the pinholes are in the plane y = 0, which the layout is drawn in."""
-    return abs(design.spec.optics.camera_mm[1]) < IN_PLANE
 
 
 def _half(optics: OpticsSpec) -> float:
@@ -129,45 +98,77 @@ def _half(optics: OpticsSpec) -> float:
     return float(np.linalg.norm(optics.camera_mm)) / 2
 
 
-def _mirrors(rows: Sequence[MirrorRow]) -> LayoutMirrors:
-    flat = [row for row in rows if row.camera == "a" and abs(row.uy) < IN_PLANE]
-    flat.sort(key=lambda row: math.atan2(row.ux, row.uz))
-    apex, normal = columns(flat, "px pz"), columns(flat, "nx nz")
-    radius = np.array([row.radius_mm or PLANAR_MM for row in flat])
-    return LayoutMirrors(
-        apex=apex,
-        centre=apex - radius[:, np.newaxis] * normal,
-        radius=radius,
-        direction=columns(flat, "ux uz"),
-        theta=columns(flat, "theta0_deg theta1_deg"),
-        ids=tuple(row.id for row in flat),
+def _edges(apex: Floats, centre: Floats, radius: Floats) -> Floats:
+    between = np.diff(centre, axis=0)
+    distance = np.hypot(*between.T)
+    along = (distance**2 + radius[:-1] ** 2 - radius[1:] ** 2) / (2 * distance)
+    height = np.sqrt(np.maximum(radius[:-1] ** 2 - along**2, 0.0))
+    unit = between / distance[:, np.newaxis]
+    foot = centre[:-1] + along[:, np.newaxis] * unit
+    across_it = height[:, np.newaxis] * np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    away = ((foot - (apex[:-1] + apex[1:]) / 2) * across_it).sum(axis=1) > 0
+    return np.asarray(foot + np.where(away, -1, 1)[:, np.newaxis] * across_it)
+
+
+def draw_layout(export: DrawnExport) -> list[Sheet]:
+    """The sheet of an export. InputError: its mirrors.csv is not as it was written."""
+    export.file(MirrorRow.FILE)
+    optics = export.design.spec.optics
+    layout, capture = _layout(optics, MirrorRow.read(export.folder)), optics.capture_diameter_mm / 2
+    pinhole, reach = layout.pinhole, 2 * layout.major
+    left, low, right, high = drawing_room(A3)
+    column = right - sum(WIDTHS_MM)
+    size = 2 * reach, reach - min(float(pinhole[1]), -capture)
+    room = column - left - 2 * AROUND_MM, high - low - 2 * AROUND_MM - LEVEL_MM
+    scale = choose_scale(size, room)
+    middle = (left + column) / 2, high - AROUND_MM - reach * scale
+    flat = [
+        *_ellipses(layout),
+        Circle(Layer.CUT, (0.0, 0.0), capture),
+        Arc(Layer.CENTRE, (0.0, 0.0), reach, 0.0, 180.0),
+        *_mirror_arcs(layout),
+        *_rays(layout, capture),
+    ]
+    on_paper = placed(flat, middle, scale)
+    block = TitleBlock(
+        "optical layout", export.title, "-", 1, "-", "section y = 0", tolerances="nominal sizes"
     )
+    drawn = [
+        *on_paper,
+        *_places(layout, middle, scale, on_paper),
+        *_capture_length(layout.pinhole, capture, middle, scale),
+        *table((column, high), WIDTHS_MM, (HEAD, *_values(layout))),
+    ]
+    return [Sheet.framed((NAME, NAME), block, A3, scale, middle, drawn, NOTES)]
 
 
-def _ellipses(pinhole: Floats, major: float, minor: float) -> Iterator[Entity]:
+def has_layout(design: DesignRecord) -> bool:
+    """Whether the pinholes are in the plane y = 0, which the layout is drawn in."""
+    return abs(design.spec.optics.camera_mm[1]) < IN_PLANE
+
+
+def _ellipses(layout: Layout) -> Iterator[Entity]:
     """Both ellipses, and lines through their foci."""
+    pinhole, major = layout.pinhole, layout.major
     axis = pinhole / np.hypot(*pinhole)
     angle = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS)[:-1]
-    side = np.array([-axis[1], axis[0]])
-    points = (
-        pinhole / 2 + major * np.outer(np.cos(angle), axis) + minor * np.outer(np.sin(angle), side)
-    )
-    for sign in (1, -1):
-        corners = tuple((sign * x, z) for x, z in np.round(points, 4).tolist())
+    side = layout.optics.semi_minor_mm * np.outer(np.sin(angle), np.array([-axis[1], axis[0]]))
+    points = pinhole / 2 + major * np.outer(np.cos(angle), axis) + side
+    for flip in SIDES:
+        corners = tuple((x, z) for x, z in (flip * np.round(points, 4)).tolist())
         yield Polyline(Layer.DIMENSIONS, corners)
-        ends = np.stack([pinhole / 2 - major * axis, pinhole / 2 + major * axis]) * [sign, 1]
+        ends = np.stack([pinhole / 2 - major * axis, pinhole / 2 + major * axis]) * flip
         (x, z), (right, high) = ends.tolist()
         yield Line(Layer.CENTRE, (x, z), (right, high))
 
 
-def _mirror_arcs(mirrors: LayoutMirrors) -> Iterator[Entity]:
+def _mirror_arcs(layout: Layout) -> Iterator[Entity]:
     """Arcs of whole mirrors in the plane, for camera a and mirrored for b."""
-    edges = mirrors.edges()
-    for k in range(1, len(mirrors.radius) - 1):
-        for sign in (1, -1):
-            flip = np.array([sign, 1])
-            (x, z), radius = (flip * mirrors.centre[k]).tolist(), float(mirrors.radius[k])
-            if radius == PLANAR_MM:
+    edges = layout.edges
+    for k in range(1, len(layout.flat) - 1):
+        for flip in SIDES:
+            (x, z), radius = (flip * layout.centre[k]).tolist(), float(layout.radius[k])
+            if layout.radius[k] == PLANAR_MM:
                 (a, b), (c, d) = (flip * edges[k - 1 : k + 1]).tolist()
                 yield Line(Layer.CUT, (a, b), (c, d))
                 continue
@@ -179,33 +180,21 @@ def _mirror_arcs(mirrors: LayoutMirrors) -> Iterator[Entity]:
             yield Arc(Layer.CUT, (x, z), radius, first % 360, last % 360)
 
 
-def _rays(mirrors: LayoutMirrors, pinhole: Floats, capture: float) -> Iterator[Entity]:
+def _rays(layout: Layout, capture: float) -> Iterator[Entity]:
     """From the pinhole to edges of three mirrors, reflected, and on past the capture sphere."""
-    edges = mirrors.edges()
-    for k in _traced(mirrors):
-        for edge in (edges[k - 1], edges[k]):
-            incoming = edge - pinhole
-            normal = (edge - mirrors.centre[k]) / mirrors.radius[k]
+    for k in layout.traced:
+        for edge in layout.edges[k - 1 : k + 1]:
+            incoming = edge - layout.pinhole
+            normal = (edge - layout.centre[k]) / layout.radius[k]
             out = incoming - 2 * (incoming @ normal) * normal
             out /= np.hypot(*out)
             end = edge + (-(edge @ out) + BEYOND * capture) * out
-            corners = [tuple(point) for point in np.round([pinhole, edge, end], 4).tolist()]
-            yield Polyline(Layer.RAYS, ((corners[0]), corners[1], corners[2]), closed=False)
-
-
-def _traced(mirrors: LayoutMirrors) -> list[int]:
-    """The first, the middle and the last whole mirror of the plane."""
-    last = len(mirrors.radius) - 2
-    return sorted({1, (1 + last) // 2, last}) if last >= 1 else []
+            a, b, c = (tuple(point) for point in np.round([layout.pinhole, edge, end], 4).tolist())
+            yield Polyline(Layer.RAYS, (a, b, c), closed=False)
 
 
 def _places(
-    mirrors: LayoutMirrors,
-    pinhole: Floats,
-    reach: float,
-    middle: Point,
-    scale: float,
-    drawn: Sequence[Entity],
+    layout: Layout, middle: Point, scale: float, drawn: Sequence[Entity]
 ) -> Iterator[Entity]:
     """Dots with names, and crosses of virtual cameras."""
 
@@ -213,25 +202,24 @@ def _places(
         x, z = point.tolist()
         return middle[0] + scale * x, middle[1] + scale * z
 
-    for virtual in mirrors.direction:
-        for x, y in {at(reach * virtual), at(reach * virtual * [-1, 1])}:
+    for virtual in layout.virtual:
+        for x, y in {at(virtual), at(virtual * [-1, 1])}:
             yield Line(Layer.DIMENSIONS, (x - CROSS_MM, y), (x + CROSS_MM, y))
             yield Line(Layer.DIMENSIONS, (x, y - CROSS_MM), (x, y + CROSS_MM))
-    named = {"O": np.zeros(2), "A": pinhole, "B": pinhole * [-1, 1]}
-    if traced := _traced(mirrors):
-        k = traced[len(traced) // 2]
-        shown = (mirrors.apex[k], mirrors.centre[k], reach * mirrors.direction[k])
+    named = {"O": np.zeros(2), "A": layout.pinhole, "B": layout.pinhole * [-1, 1]}
+    if (k := layout.named) is not None:
+        shown = (layout.apex[k], layout.centre[k], layout.virtual[k])
         named |= dict(zip(NAMES, shown, strict=True))
-        if mirrors.radius[k] == PLANAR_MM:
+        if layout.radius[k] == PLANAR_MM:
             del named["C"]
-        yield Line(Layer.CENTRE, middle, at(reach * mirrors.direction[k]))
+        yield Line(Layer.CENTRE, middle, at(layout.virtual[k]))
     dots = [Circle(Layer.CUT, at(point), DOT_MM) for point in named.values()]
     yield from dots
     yield from labels(dots, list(named), straight(drawn))
 
 
 def _capture_length(
-    capture: float, pinhole: Floats, middle: Point, scale: float
+    pinhole: Floats, capture: float, middle: Point, scale: float
 ) -> Iterator[Entity]:
     """The capture sphere's diameter, and the distance of the pinholes."""
     x, y = middle
@@ -245,36 +233,28 @@ def _capture_length(
     yield across(left, right, low - LEVEL_MM, f"{2 * reach:g}")
 
 
-def _values(
-    rows: Sequence[MirrorRow], mirrors: LayoutMirrors, optics: OpticsSpec, major: float
-) -> list[tuple[str, ...]]:
+def _values(layout: Layout) -> Iterator[tuple[str, ...]]:
     """Symbols, what they are, and their values."""
+    optics, rows = layout.optics, layout.rows
     radii = [row.radius_mm for row in rows if row.radius_mm]
     span = f"{min(radii):.3f} to {max(radii):.3f}" if radii else "all planar"
     x, y, z = optics.camera_mm
-    half, minor = _half(optics), optics.semi_minor_mm
     counted = " + ".join(str(sum(row.camera == one for row in rows)) for one in "ab")
-    values: list[tuple[str, ...]] = [
-        ("n", "subdivision", f"{optics.n}"),
-        ("", "mirrors of camera a + b", counted),
-        ("2 R", "diameter of the capture sphere, mm", f"{optics.capture_diameter_mm:g}"),
-        ("A", "pinhole of camera a, mm", f"({x:g}, {y:g}, {z:g})"),
-        ("B", "pinhole of camera b, mm", f"({-x:g}, {y:g}, {z:g})"),
-        ("a", "semi-major axis of the ellipsoid, mm", f"{major:.4f}"),
-        ("b", "semi-minor axis, mm", f"{minor:g}"),
-        ("2 c", "distance of the foci O and A, mm", f"{2 * half:.4f}"),
-        ("d = 2 a", "from O to a virtual camera V, mm", f"{2 * major:.4f}"),
-        ("r", "radii of the mirrors, mm", span),
-    ]
-    if traced := _traced(mirrors):
-        k = traced[len(traced) // 2]
-        (x, z), (first, second) = mirrors.apex[k].tolist(), mirrors.theta[k].tolist()
-        own = "planar" if mirrors.radius[k] == PLANAR_MM else f"{mirrors.radius[k]:.3f}"
-        values += [
-            ("", "the mirror that is named", mirrors.ids[k]),
-            ("P", "its apex (x, z), mm", f"({x:.3f}, {z:.3f})"),
-            ("r", "its radius, C = P - r N, mm", own),
-            ("theta_0", "half angle of the flat mirror, deg", f"{first:.3f}"),
-            ("theta_1", "half angle wanted (eq. 1), deg", f"{second:.3f}"),
-        ]
-    return values
+    yield "n", "subdivision", f"{optics.n}"
+    yield "", "mirrors of camera a + b", counted
+    yield "2 R", "diameter of the capture sphere, mm", f"{optics.capture_diameter_mm:g}"
+    yield "A", "pinhole of camera a, mm", f"({x:g}, {y:g}, {z:g})"
+    yield "B", "pinhole of camera b, mm", f"({-x:g}, {y:g}, {z:g})"
+    yield "a", "semi-major axis of the ellipsoid, mm", f"{layout.major:.4f}"
+    yield "b", "semi-minor axis, mm", f"{optics.semi_minor_mm:g}"
+    yield "2 c", "distance of the foci O and A, mm", f"{2 * _half(optics):.4f}"
+    yield "d = 2 a", "from O to a virtual camera V, mm", f"{2 * layout.major:.4f}"
+    yield "r", "radii of the mirrors, mm", span
+    if (k := layout.named) is not None:
+        row = layout.flat[k]
+        yield "", "the mirror that is named", row.id
+        yield "P", "its apex (x, z), mm", f"({row.px:.3f}, {row.pz:.3f})"
+        own = "planar" if layout.radius[k] == PLANAR_MM else f"{layout.radius[k]:.3f}"
+        yield "r", "its radius, C = P - r N, mm", own
+        yield "theta_0", "half angle of the flat mirror, deg", f"{row.theta0_deg:.3f}"
+        yield "theta_1", "half angle wanted (eq. 1), deg", f"{row.theta1_deg:.3f}"

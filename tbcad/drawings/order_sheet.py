@@ -1,6 +1,8 @@
 """The sheet of an order: on one page what a workshop asks before it makes the shells."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from importlib.resources import files
 from itertools import chain, repeat
 from pathlib import Path
 from textwrap import wrap
@@ -14,22 +16,23 @@ from tbcad.cad.drafting.sheet import (
     BESIDE_MM,
     TABLE_ROW_MM,
     Sheet,
+    TitleBlock,
     drawing_room,
     placed,
-    sheet_frame,
     table,
 )
-from tbcad.cad.drafting.views import View, as_entities, straight
+from tbcad.cad.drafting.views import Curve, Shape, View, section, straight
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Point, Text
-from tbcad.cad.formats.pdf import write_pdf
+from tbcad.cad.formats.pdf import drawable, write_pdf
 from tbcad.cad.formats.step import read_named_solid
 from tbcad.cad.kernel.features import round_faces
-from tbcad.cad.kernel.projection import Shape, section
 from tbcad.cad.kernel.solids import faces
+from tbcad.core.spec.csv_rows import read_toml
 from tbcad.core.spec.design import Spec
-from tbcad.drawings.holes import HEAD, VIEWS, WIDTHS_MM, DrawnHole, numbered_holes, table_rows
-from tbcad.drawings.order_words import FIGURE_HEAD, figure_rows, lines, title_block
 from tbcad.drawings.shell_sheet import hatching
+from tbcad.drawings.tables import HEAD, VIEWS, WIDTHS_MM, DrawnHole, numbered_holes, table_rows
+from tbcad.mirror_limits.held import IN_STATISTICS
+from tbcad.mirror_limits.measuring import UNCERTAINTY_SHARE
 from tbcad.types import Floats
 
 PREFIX = {"shell_a": "", "mandrel_a": "M"}  # of the numbers of holes
@@ -42,8 +45,10 @@ WORDS_MM, LINE = 20.0, 1.9  # width of heads, from line to line by the height of
 TEXTS_MM = np.geomspace(2.5, 1.0, 20).tolist()  # heights of texts, tried in turn
 WIDE = 0.72  # of a character by the height of capitals
 FIGURE_WIDTHS = (40.0, 20.0, 23.0, 20.0, 75.0)
+FIGURE_HEAD = ("figure", "limit", "limit of 2 sigma", "chain, 2 sigma", "verdict")
+ANY, WORDS = "any", "order_page.toml"
 Holes = list[tuple[str, DrawnHole]]
-Cut = list[list[Entity]]
+Cut = list[tuple[Curve, ...]]
 """What a view cuts of each solid, in mm of the part."""
 
 
@@ -68,19 +73,18 @@ def order_sheet(export: Path, record: dict[str, Any], spec: Spec) -> Sheet:
         for number, hole in of_solid
     ]
     rows = [row[:-1] for number, hole in numbered for row in table_rows(number, hole)]
-    figures = [FIGURE_HEAD, *figure_rows(record)]
+    figures = [FIGURE_HEAD, *_figure_rows(record)]
     below = high - BESIDE_MM - (len(figures) + 1) * TABLE_ROW_MM
-    block = title_block(record, spec)
-    entities = [
-        *sheet_frame(A3, views[0].scale, block),
+    block = _title_block(record, spec)
+    drawn = [
         *chain.from_iterable(map(_drawn, views, cuts, VIEWS, repeat(numbered))),
         *_datums(views, holes[0], record["foot_z_mm"]),
         *table(_beside(views[1], box), WIDTHS_MM[:-1], [HEAD[:-1], *rows]),
         *table((edge[0], high - BESIDE_MM), FIGURE_WIDTHS, figures),
-        *_words(edge, (low + BESIDE_MM, below), list(lines(record, spec, rows))),
+        *_words(edge, (low + BESIDE_MM, below), list(_lines(record, spec, rows))),
     ]
     scale, origin = views[0].scale, views[0].origin
-    return Sheet("order", block.title, block.item, A3, scale, origin, tuple(entities))
+    return Sheet.framed(("order", block.item), block, A3, scale, origin, drawn)
 
 
 def _cut(letter: str, shapes: Sequence[Shape], holes: Sequence[Holes]) -> Cut:
@@ -89,7 +93,7 @@ def _cut(letter: str, shapes: Sequence[Shape], holes: Sequence[Holes]) -> Cut:
     for shape, numbered in zip(shapes, holes, strict=True):
         seen = (hole.cylinder for _, hole in numbered if hole.view == letter)
         level = next((float(axes[2] @ (one.start + one.end) / 2) for one in seen), 0.0)
-        cut.append([*as_entities(section(shape, axes, level), Layer.CUT)])
+        cut.append(section(shape, axes, level))
     return cut
 
 
@@ -175,3 +179,63 @@ def _wrapped(told: Sequence[tuple[str, str]], characters: int) -> list[tuple[str
         for head, text in told
         for k, line in enumerate(wrap(text, characters))
     ]
+
+
+def _title_block(record: dict[str, Any], spec: Spec) -> TitleBlock:
+    """What the title block says."""
+    named = [step["material"]["value"] for step in record["chain"]["steps"] if "material" in step]
+    return TitleBlock(
+        title=f"Order: shells by {record['chain']['name']}",
+        design=f"{spec.name}, n = {spec.optics.n}",
+        item="shell_a as drawn; shell_b mirrored at x = 0",
+        quantity=len(record["samples"]["mirrors"]),
+        material=named[-1] if named else "as agreed with the workshop",
+        tolerances="of *_tolerances.step",
+    )
+
+
+def _figure_rows(record: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Each figure with its limits and what the chain holds."""
+    return [
+        (
+            f"{one['name']}, {one['unit']}",
+            *(ANY if one[key] is None else f"{one[key]:.3g}" for key in ("limit", "statistics")),
+            f"{one['chain']:.3g}",
+            one["verdict"],
+        )
+        for one in record["chain"]["figures"]
+    ]
+
+
+def _lines(
+    record: dict[str, Any], spec: Spec, holes: Sequence[tuple[str, ...]]
+) -> Iterator[tuple[str, str]]:
+    """All that is told in words, heads and texts, from order_page.toml; holes are rows."""
+    chain, ids = record["chain"], record["samples"]["mirrors"][0]
+    fillet, mandrel = chain["figures"][-1], chain["mandrel_cutter_mm"] is not None
+    in_statistics = any(one["verdict"] == IN_STATISTICS for one in chain["figures"])
+    true = {"mandrel": mandrel, "no mandrel": not mandrel, "statistics": in_statistics}
+    values = record | {
+        "spec": spec,
+        "allowed": ANY if fillet["limit"] is None else f"{fillet['limit']:.3g} {fillet['unit']}",
+        "rounded": f"{fillet['chain']:.3g} {fillet['unit']}",
+        "steps": [_step(k, step) for k, step in enumerate(chain["steps"], 1)],
+        "rq_uncertainty": UNCERTAINTY_SHARE * record["finish"]["rq_nm"],
+        "seat_uncertainty": UNCERTAINTY_SHARE * record["limits"]["seat_um"],
+        "holes": ", ".join(
+            f"{n} x Ø {size}" for size, n in Counter(row[1] for row in holes).items()
+        ),
+        "ids": " ".join(ids),
+        "count": len(ids),
+        "both": 2 * len(ids),
+    }
+    for line in read_toml(files("tbcad.drawings").joinpath(WORDS), WORDS, "words")["line"]:
+        if true.get(line.get("when"), True):
+            for k, item in enumerate(values[line["each"]] if "each" in line else [{}]):
+                head = "" if k else line.get("head", "")
+                yield head, drawable(line["text"].format(**(values | item)))
+
+
+def _step(number: int, step: dict[str, Any]) -> dict[str, Any]:
+    facts = [step[key]["value"] for key in ("material", "treatment") if key in step]
+    return {"number": number, "words": ": ".join(filter(None, (step["title"], "; ".join(facts))))}

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -20,22 +21,24 @@ from tbcad.cad.drafting.sheet import (
     TABLE_ROW_MM,
     Sheet,
     TitleBlock,
+    choose_scale,
     drawing_room,
-    notes_beside_title,
-    sheet_frame,
 )
-from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT, View, isometric, straight
+from tbcad.cad.drafting.views import ABOVE, FRONT, LEFT, Shape, View, isometric, project, straight
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Point, Text
 from tbcad.cad.formats.pdf import text_width
 from tbcad.cad.kernel.features import RoundFace, bounds, cylinders, plane_levels
-from tbcad.cad.kernel.projection import Shape, project
-from tbcad.drawings.fits import Mate, SheetTable, drawn, fits_table, in_columns
-from tbcad.drawings.holes import (
+from tbcad.drawings.tables import (
     HEAD,
     VIEWS,
     WIDTHS_MM,
     DrawnHole,
     Fastener,
+    Mate,
+    SheetTable,
+    drawn,
+    fits_table,
+    in_columns,
     mm,
     numbered_holes,
     table_rows,
@@ -56,15 +59,6 @@ SAME_MM = 0.01
 
 
 @dataclass(frozen=True)
-class PartText:
-    """What a part's sheets say besides its shape."""
-
-    name: str  # of the files
-    block: TitleBlock  # title block, its sheet open
-    notes: tuple[str, ...]  # lines
-
-
-@dataclass(frozen=True)
 class _Frame:
     """Where the views are on paper."""
 
@@ -76,18 +70,22 @@ class _Frame:
 
 
 def part_sheets(
+    name: str,
     shape: Shape,
+    block: TitleBlock,
+    words: Sequence[str],
     fasteners: Sequence[Fastener],
-    text: PartText,
     mates: Sequence[Mate] = (),
     others: Sequence[SheetTable] = (),
 ) -> list[Sheet]:
     """All sheets of a part: views and what fits of the tables, then the rest of the tables.
 
     Args:
+        name: of the part and its files.
         shape: in the drawing's frame, x to the right and z up in view A, its origin the datum.
+        block: title block, its sheet open.
+        words: lines of notes.
         fasteners: that go into it, in the same frame.
-        text: what is written.
         mates: what fits into its holes, in the same frame.
         others: tables besides those of holes and fits.
     """
@@ -98,23 +96,26 @@ def part_sheets(
     frame = _frame(box, sum(len(one.rows) for one in tables))
     first, *columns = in_columns(tables, _rows(frame.paper), _rows(A4))
     pages = [columns[k : k + 2] for k in range(0, len(columns), 2)]
-    block = replace(text.block, sheet=f"1 of {1 + len(pages)}")
     lengths = [*_overall(frame, found)]
+    _, _, right, high = drawing_room(frame.paper)
     entities = [
-        *sheet_frame(frame.paper, frame.scale, block),
         *(one for letter in VIEWS for one in _view(shape, frame, letter, holes, straight(lengths))),
         *_picture(shape, frame),
         *_levels(shape, frame),
         *lengths,
-        *_column(frame.paper, first),
-        *notes_beside_title(frame.paper, text.notes),
+        *drawn((right - sum(WIDTHS_MM), high), first),
     ]
     origin = frame.views["A"].origin
-    sheet = Sheet(
-        text.name, block.title, text.name, frame.paper, frame.scale, origin, tuple(entities)
-    )
-    rest = [_table_sheet(text, page, k, 1 + len(pages)) for k, page in enumerate(pages, start=2)]
-    return [sheet, *rest]
+    count = 1 + len(pages)
+    of = replace(block, sheet=f"1 of {count}")
+    sheets = [Sheet.framed((name, name), of, frame.paper, frame.scale, origin, entities, words)]
+    left, _, _, high = drawing_room(A4)
+    places = [(left + BESIDE_MM + k * (sum(WIDTHS_MM) + BESIDE_MM), high) for k in range(2)]
+    for number, page in enumerate(pages, start=2):  # what is left of the tables
+        rest = chain.from_iterable(map(drawn, places, page))
+        of = replace(block, sheet=f"{number} of {count}")
+        sheets.append(Sheet.framed((f"{name}_{number}", name), of, A4, None, (0.0, 0.0), rest))
+    return sheets
 
 
 def _frame(box: Floats, rows: int) -> _Frame:
@@ -140,13 +141,8 @@ def _scale(paper: Point, box: Floats, rows: int) -> float:
     left, low, right, high = _room(paper, rows)
     width, depth, height = (box[1] - box[0]).tolist()
     taken = BEFORE_MM + BETWEEN_MM + BEHIND_MM
-    fitting = (
-        one
-        for one in SCALES
-        if one * (width + depth) + taken <= right - left
-        and one * (height + depth) + taken <= high - low
-    )
-    return next(fitting, SCALES[-1])
+    size, room = (width + depth, height + depth), (right - left - taken, high - low - taken)
+    return choose_scale(size, room, SCALES)
 
 
 def _room(paper: Point, rows: int) -> tuple[float, float, float, float]:
@@ -259,27 +255,3 @@ def _rows(paper: Point) -> int:
     """Rows that a column has room for."""
     _, low, _, high = drawing_room(paper)
     return int((high - low - BESIDE_MM) / TABLE_ROW_MM)
-
-
-def _column(paper: Point, tables: Sequence[SheetTable]) -> Iterator[Entity]:
-    _, _, right, high = drawing_room(paper)
-    yield from drawn((right - sum(WIDTHS_MM), high), tables)
-
-
-def _table_sheet(
-    text: PartText, columns: Sequence[Sequence[SheetTable]], number: int, count: int
-) -> Sheet:
-    """What is left of the tables."""
-    block = replace(text.block, sheet=f"{number} of {count}")
-    left, _, _, high = drawing_room(A4)
-    step = sum(WIDTHS_MM) + BESIDE_MM
-    entities = [
-        *sheet_frame(A4, None, block),
-        *(
-            entity
-            for k, tables in enumerate(columns)
-            for entity in drawn((left + BESIDE_MM + k * step, high), tables)
-        ),
-    ]
-    name = f"{text.name}_{number}"
-    return Sheet(name, block.title, text.name, A4, 1.0, (0.0, 0.0), tuple(entities), to_scale=False)

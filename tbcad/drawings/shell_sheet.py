@@ -2,27 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from tbcad.cad.drafting.dimensions import across, upward
-from tbcad.cad.drafting.sheet import (
-    A3,
-    Sheet,
-    TitleBlock,
-    drawing_room,
-    notes_beside_title,
-    placed,
-    sheet_frame,
-)
-from tbcad.cad.drafting.views import FRONT, as_entities, straight
+from tbcad.cad.drafting.sheet import A3, Sheet, TitleBlock, choose_scale, drawing_room, placed
+from tbcad.cad.drafting.views import FRONT, section, straight
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point
 from tbcad.cad.formats.step import read_named_solid
-from tbcad.cad.kernel.projection import Curve, section
 from tbcad.drawings.export import DrawnExport
-from tbcad.drawings.holes import mm
+from tbcad.drawings.tables import mm
 from tbcad.records.design import MandrelRecord
 from tbcad.types import Floats
 
@@ -32,52 +21,8 @@ HATCH_MM = 2.0  # from line to line, on paper, at 45 degrees (ISO 128-3)
 UP_DEG = 45.0
 
 
-@dataclass(frozen=True)
-class ShellJob:
-    """What the sheet of a shell follows from."""
-
-    path: Path  # STEP file
-    block: TitleBlock  # title block
-    notes: tuple[str, ...]  # lines
-    name: str  # of the shell
-
-
-def shell_job(export: DrawnExport, name: str) -> ShellJob:
-    """What is needed to draw a shell. InputError: its file is missing, or not as it was written."""
-    wall, camera = export.design.spec.shell.wall_mm, name[-1]
-    text = (
-        f"Wall {wall:g} mm behind the deepest valley of the mirrors.",
-        f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
-        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad order.",
-        "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
-    )
-    return _job(export, name, text)
-
-
-def mandrel_job(export: DrawnExport, name: str) -> ShellJob:
-    """What is needed to draw a shell's negative.
-
-    InputError: its file is missing, or not as it was written.
-    """
-    coat, camera = export.design.spec.mirrors.coating_um, name[-1]
-    record = next(one for one in export.design.mandrels if one.name == name)
-    text = (
-        f"Negative of shell_{camera}. Concave mirrors, of the same names: centres and radii, the",
-        f"latter with the coat of {coat:g} um, in mirrors.csv (camera {camera}).",
-        _release(record),
-        "x = 0 and z = foot flat; blind holes. Dot: O, centre of the capture sphere.",
-    )
-    return _job(export, name, text)
-
-
-def _release(record: MandrelRecord) -> str:
-    if record.draft_deg < 0:
-        return "Undercut: the shell cannot be drawn off; dissolve the mandrel, or melt it out."
-    pull = " ".join(f"{one + 0.0:.3f}" for one in record.pull)
-    return f"The shell is drawn along ({pull}), draft {record.draft_deg:.1f} degrees."
-
-
-def _job(export: DrawnExport, name: str, notes: tuple[str, ...]) -> ShellJob:
+def draw_shell(export: DrawnExport, name: str) -> list[Sheet]:
+    """The sheet of a shell or a negative. InputError: its file is not as it was written."""
     step = f"{name}.step"
     block = TitleBlock(
         title=name.replace("_", " "),
@@ -88,46 +33,59 @@ def _job(export: DrawnExport, name: str, notes: tuple[str, ...]) -> ShellJob:
         view="section y = 0",
         tolerances="of tbcad order",
     )
-    where = (
-        f"Shape and what has no size here: {step},",
-        f"sha256 {export.digest(step)}...",
-    )
-    return ShellJob(export.file(step), block, (*notes, *where), name)
-
-
-def draw_shell(job: ShellJob) -> list[Sheet]:
-    """The sheet of a shell."""
-    curves = section(read_named_solid(job.path).shape, FRONT, 0.0)
-    low, high = _extent(curves)
+    flat = section(read_named_solid(export.file(step)).shape, FRONT, 0.0)
+    points = np.array(straight(flat)).reshape(-1, 2)
+    low, high = points.min(axis=0), points.max(axis=0)
     left, bottom, right, top = drawing_room(A3)
-    room = np.array([right - left, top - bottom]) - 2 * AROUND_MM
-    size = np.maximum(high, 0.0) - np.minimum(low, 0.0)  # with the origin
-    scale = next((one for one in SCALES if (one * size <= room).all()), SCALES[-1])
-    middle = (np.maximum(high, 0.0) + np.minimum(low, 0.0)) / 2
-    origin = (
-        (left + right) / 2 - scale * float(middle[0]),
-        (bottom + top) / 2 - scale * float(middle[1]),
-    )
-    outline = placed(as_entities(curves, Layer.CUT), origin, scale)
-    entities = [
-        *sheet_frame(A3, scale, job.block),
+    least, most = np.minimum(low, 0.0), np.maximum(high, 0.0)  # with the origin
+    room = right - left - 2 * AROUND_MM, top - bottom - 2 * AROUND_MM
+    scale = choose_scale((most - least).tolist(), room, SCALES)
+    x, y = ((most + least) / 2).tolist()
+    origin = (left + right) / 2 - scale * x, (bottom + top) / 2 - scale * y
+    outline = placed(flat, origin, scale)
+    drawn = [
         *hatching(outline),
         *outline,
         Circle(Layer.DIMENSIONS, origin, DOT_MM),
         *_lengths(low, high, origin, scale),
-        *notes_beside_title(A3, job.notes),
     ]
-    return [Sheet(job.name, job.block.title, job.name, A3, scale, origin, tuple(entities))]
+    words = (*_notes(export, name), *export.source(step))
+    return [Sheet.framed((name, name), block, A3, scale, origin, drawn, words)]
+
+
+def _notes(export: DrawnExport, name: str) -> tuple[str, ...]:
+    spec, camera = export.design.spec, name[-1]
+    for record in export.design.mandrels:
+        if record.name == name:
+            coat = spec.mirrors.coating_um
+            return (
+                f"Negative of shell_{camera}. Concave mirrors, of the same names: centres and "
+                "radii, the",
+                f"latter with the coat of {coat:g} um, in mirrors.csv (camera {camera}).",
+                _release(record),
+                "x = 0 and z = foot flat; blind holes. Dot: O, centre of the capture sphere.",
+            )
+    return (
+        f"Wall {spec.shell.wall_mm:g} mm behind the deepest valley of the mirrors.",
+        f"Mirrors: centres and radii in mirrors.csv (camera {camera}); limits of each in",
+        f"inspection_{camera}.csv and {name}_tolerances.step, by tbcad order.",
+        "Mirror side polished and coated. Dot: O, centre of the capture sphere.",
+    )
+
+
+def _release(record: MandrelRecord) -> str:
+    if record.draft_deg < 0:
+        return "Undercut: the shell cannot be drawn off; dissolve the mandrel, or melt it out."
+    pull = " ".join(f"{one + 0.0:.3f}" for one in record.pull)
+    return f"The shell is drawn along ({pull}), draft {record.draft_deg:.1f} degrees."
 
 
 def hatching(outline: Sequence[Entity]) -> list[Entity]:
     """Lines at 45 degrees inside closed outlines, by where each crosses them (even-odd rule)."""
     pieces = np.array(straight(outline)).reshape(-1, 2, 2)
     turn = math.radians(UP_DEG)
-    along, up = (
-        np.array([math.cos(turn), math.sin(turn)]),
-        np.array([-math.sin(turn), math.cos(turn)]),
-    )
+    along = np.array([math.cos(turn), math.sin(turn)])
+    up = np.array([-math.sin(turn), math.cos(turn)])
     s, t = pieces @ along, pieces @ up
     first = math.ceil(t.min() / HATCH_MM) if len(pieces) else 0
     last = math.floor(t.max() / HATCH_MM) if len(pieces) else -1
@@ -141,11 +99,6 @@ def hatching(outline: Sequence[Entity]) -> list[Entity]:
             (x, y), (right, high) = ((at * along + level * up).tolist() for at in (a, b))
             lines.append(Line(Layer.HATCH, (x, y), (right, high)))
     return lines
-
-
-def _extent(curves: Sequence[Curve]) -> tuple[Floats, Floats]:
-    points = np.array([end for one in straight(as_entities(curves, Layer.CUT)) for end in one])
-    return points.min(axis=0), points.max(axis=0)
 
 
 def _lengths(low: Floats, high: Floats, origin: Point, scale: float) -> list[Entity]:

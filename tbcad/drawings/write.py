@@ -5,14 +5,16 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from difflib import get_close_matches
+from functools import partial
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
-from tbcad.cad.drafting.sheet import Sheet, paper_name, scale_text
+from tbcad.cad.drafting.sheet import paper_name, scale_text
 from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.common.schedule import background_processes
 from tbcad.drawings.export import DrawnExport, read_export
-from tbcad.drawings.optical_layout import has_layout, layout_rows, layout_sheet
+from tbcad.drawings.optical_layout import draw_layout, has_layout
 from tbcad.errors import InputError
 from tbcad.output.single_files import check_file
 from tbcad.types import Progress
@@ -37,15 +39,6 @@ class WrittenSheet:
         return [self.name + suffix for suffix in SUFFIXES]
 
 
-@dataclass(frozen=True)
-class Job:
-    """Sheets that one process draws."""
-
-    name: str  # of the part, or of what is drawn
-    draw: Callable[..., list[Sheet]]  # function of a module
-    arguments: tuple[Any, ...]  # of it
-
-
 def write_drawings(
     folder: Path,
     out: Path,
@@ -64,15 +57,14 @@ def write_drawings(
     """
     export = read_export(folder)
     names = _chosen(export, only)
-    jobs = [_job(export, name) for name in names]
-    for job in jobs:
-        for suffix in SUFFIXES:
-            check_file(out / f"{job.name}{suffix}", force)
+    for name, suffix in product(names, SUFFIXES):
+        check_file(out / f"{name}{suffix}", force)
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
-        results = _results(jobs, Path(place), progress, min(workers, len(jobs)))
-        drawings = sorted((one for done in results for one in done), key=lambda one: one.name)
+        work = partial(draw, export, Path(place))
+        done = _results(work, names, progress, min(workers, len(names)))
+        drawings = sorted(chain.from_iterable(done), key=lambda one: one.name)
         files = sorted(Path(place).iterdir())
         for file in files:
             check_file(out / file.name, force)
@@ -84,13 +76,8 @@ def drawable(export: DrawnExport) -> list[str]:
     """Names of all that can be drawn of an export, those that take longest first."""
     parts = sorted(export.parts, key=lambda name: (not name.startswith("carrier"), name))
     whole = [ASSEMBLY] if export.machine else []
-    return [
-        *export.shells,
-        *export.mandrels,
-        *whole,
-        *parts,
-        *([OPTICAL_LAYOUT] if has_layout(export.design) else []),
-    ]
+    layout = [OPTICAL_LAYOUT] if has_layout(export.design) else []
+    return [*export.shells, *whole, *parts, *layout]
 
 
 def _chosen(export: DrawnExport, only: Sequence[str]) -> list[str]:
@@ -110,41 +97,39 @@ def _chosen(export: DrawnExport, only: Sequence[str]) -> list[str]:
     return [name for name in names if name in only or not only]
 
 
-def _job(export: DrawnExport, name: str) -> Job:
-    from tbcad.drawings.assembly_sheet import assembly_job, draw_assembly
-    from tbcad.drawings.printed_parts import draw_part, part_job
-    from tbcad.drawings.shell_sheet import draw_shell, mandrel_job, shell_job
-
-    if name == ASSEMBLY and export.machine:
-        return Job(name, draw_assembly, (assembly_job(export, export.machine),))
-    if name in export.shells:
-        return Job(name, draw_shell, (shell_job(export, name),))
-    if name in export.mandrels:
-        return Job(name, draw_shell, (mandrel_job(export, name),))
-    if name == OPTICAL_LAYOUT:
-        rows = layout_rows(export)
-        return Job(name, layout_sheet, (export.design, rows, export.title))
-    return Job(name, draw_part, (part_job(export, export.parts[name]),))
-
-
 def _results(
-    jobs: Sequence[Job], place: Path, progress: Progress, workers: int
+    work: Callable[[str], list[WrittenSheet]],
+    names: Sequence[str],
+    progress: Progress,
+    workers: int,
 ) -> Iterator[list[WrittenSheet]]:
     if workers == 1:
-        for job in jobs:
-            yield draw(job, place)
-            progress(job.name)
+        for name in names:
+            yield work(name)
+            progress(name)
         return
     with background_processes(workers) as submit:
-        futures = {submit(draw, job, place): job.name for job in jobs}
+        futures = {submit(work, name): name for name in names}
         for future in as_completed(futures):
             yield future.result()
             progress(futures[future])
 
 
-def draw(job: Job, place: Path) -> list[WrittenSheet]:
-    """Draw and write all sheets of a job into a folder."""
-    sheets = job.draw(*job.arguments)
+def draw(export: DrawnExport, place: Path, name: str) -> list[WrittenSheet]:
+    """Draw all sheets of a part, or of what has another name, and write them into a folder.
+
+    InputError: a file that is drawn is missing or not as it was written.
+    """
+    from tbcad.drawings.assembly_sheet import draw_assembly
+    from tbcad.drawings.printed_parts import draw_part
+    from tbcad.drawings.shell_sheet import draw_shell
+
+    if name in export.parts:
+        sheets = draw_part(export, export.parts[name])
+    elif name in export.shells:
+        sheets = draw_shell(export, name)
+    else:
+        sheets = (draw_assembly if name == ASSEMBLY else draw_layout)(export)
     for sheet in sheets:
         sheet.write(place)
     return [

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -64,10 +63,26 @@ def write_export(
 
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
-    write_prototype = partial(export_prototype, design, folder, progress, submit_file)
-    export = _write_parts(
-        design, folder, parts, progress, submit_file, write_prototype, optional_prototype
-    )
+    export = Export(design.spec, tuple(part for part in PARTS if part in parts))
+    if SHELL in parts:
+        envelope = shell_envelope(design)  # refuses flanges that do not fit
+        submit_file(write_shell_meshes, design, envelope, folder)
+        if PROTOTYPE in parts:
+            submit_file(write_shell_solids, design, envelope, folder)
+        else:
+            write_shell_solids(design, envelope, folder, progress)
+    if PROTOTYPE in parts:
+        try:
+            export = replace(export, spec=export_prototype(design, folder, progress, submit_file))
+        except (SpecError, InvalidSolidError) as error:
+            if SHELL in parts and optional_prototype:
+                export = Export(design.spec, (SHELL,), f"no prototype: {error}")
+            elif SHELL in parts and isinstance(error, SpecError):
+                raise only_shell_remains(error) from None
+            else:
+                raise
+        if SHELL in parts:
+            progress("shells")
     if mandrel:
         submit_file(write_mandrels, design, mandrel, folder)
     write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
@@ -83,31 +98,4 @@ def write_export(
     write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
     progress("manifest")
     write_manifest(folder, "build")
-    return export
-
-
-def _write_parts(
-    design: MirrorDesign,
-    folder: Path,
-    parts: Sequence[str],
-    progress: Progress,
-    submit: Submit,
-    write_prototype: Callable[[], Spec],
-    optional_prototype: bool,
-) -> Export:
-    if SHELL not in parts:
-        return Export(write_prototype(), (PROTOTYPE,))
-    envelope = shell_envelope(design)  # refuses flanges that do not fit
-    submit(write_shell_meshes, design, envelope, folder)
-    if PROTOTYPE not in parts:
-        write_shell_solids(design, envelope, folder, progress)
-        return Export(design.spec, (SHELL,))
-    submit(write_shell_solids, design, envelope, folder)
-    try:
-        export = Export(write_prototype(), PARTS)
-    except (SpecError, InvalidSolidError) as error:
-        if not optional_prototype:
-            raise (only_shell_remains(error) if isinstance(error, SpecError) else error) from None
-        export = Export(design.spec, (SHELL,), f"no prototype: {error}")
-    progress("shells")
     return export

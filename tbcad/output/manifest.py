@@ -70,6 +70,18 @@ def is_listed(path: Path, entry: Entry | None) -> bool:
     )
 
 
+def written_file(folder: Path, manifest: Manifest | None, name: str, remedy: str) -> Path:
+    """A file as it was written. InputError: it is missing, with a remedy, or it is another."""
+    path = folder / name
+    if not path.is_file():
+        raise InputError(f"{path} is missing: {remedy}")
+    if not is_listed(path, manifest.files.get(name) if manifest else None):
+        raise InputError(
+            f"{path} is not as tbcad wrote it (cut off, or changed since): build the export again"
+        )
+    return path
+
+
 def is_report(path: Path) -> bool:
     """Tell a page of `tbcad report` from any other file."""
     begin = REPORT_BEGIN.encode()

@@ -10,7 +10,7 @@ from tbcad.common.atomic_files import replace_files, write_errors_as_input_error
 from tbcad.output.single_files import check_file
 from tbcad.prototype.assembly_steps.machine import RESISTORS, AssembledMachine
 from tbcad.prototype.assembly_steps.steps import Step
-from tbcad.report.drawing import check_prototype_files, draw_apart
+from tbcad.report.drawing import check_drawn_files, draw_apart
 
 NAME = "assembly.html"
 MODULE = "assembly_pictures"
@@ -149,7 +149,7 @@ def _list(texts: Iterable[str], kind: str = "ul", attribute: str = "") -> str:
 
 def _drawn(folder: Path) -> dict[str, bytes]:
     """Pictures by keys of steps."""
-    check_prototype_files(folder)
+    check_drawn_files(folder)
     with tempfile.TemporaryDirectory(prefix="tbcad-assembly-") as place:
         draw_apart(MODULE, str(folder), place)
         return {path.stem: path.read_bytes() for path in sorted(Path(place).glob("*.png"))}

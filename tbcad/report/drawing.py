@@ -8,16 +8,18 @@ import tempfile
 from pathlib import Path
 
 from tbcad.errors import InputError
-from tbcad.output.manifest import MANIFEST, is_listed, read_manifest
+from tbcad.output.manifest import read_manifest, written_file
 from tbcad.output.single_files import check_file
 
 SHELL = "shell"
-PROTOTYPE = ("rig", "sides", "base", "seat", "exploded")
 CLOSE_UPS = ("edges", "seam")
-SUBJECTS = (SHELL, *CLOSE_UPS, *PROTOTYPE)
+PROTOTYPE = ("rig", "sides", "base", "seat", "exploded")
+# Programs of this room by what they draw.
+SUBJECTS = {SHELL: "shell_pictures"} | dict.fromkeys(CLOSE_UPS, "close_ups")
+SUBJECTS |= dict.fromkeys(PROTOTYPE, "prototype_pictures")
 SHELL_FILES = ("design.json", "mirrors.csv", "shell_a.stl", "shell_b.stl")
 PROTOTYPE_FILES = ("prototype.json", "balls.csv")
-MESH_SUFFIXES = (".stl", ".glb")
+MESHES = (".stl", ".glb")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
@@ -28,86 +30,49 @@ def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False)
     """
     if subject not in SUBJECTS:
         raise InputError(f"{subject!r} cannot be drawn: name one of {', '.join(SUBJECTS)}")
-    _check_files(folder, subject)
+    check_drawn_files(folder, subject)
     if file.suffix.lower() != ".png" or not file.parent.is_dir():
         raise InputError(f"{file}: name a .png file in a folder that exists")
     check_file(file, force)
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=".tbcad-picture-") as place:
         drawn = Path(place) / "picture.png"
-        _run(child_command(folder, drawn, subject))
+        draw_apart(SUBJECTS[subject], str(folder), subject, str(drawn))
         if not drawn.is_file():
             raise InputError("drawing failed (no picture): see tbcad doctor")
         drawn.replace(file)
 
 
+def check_drawn_files(folder: Path, subject: str = PROTOTYPE[0]) -> None:
+    """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
+    manifest = read_manifest(folder)
+    part, needed = "shell", [*SHELL_FILES]
+    if subject in PROTOTYPE:
+        meshes = (name for name in (manifest.files if manifest else ()) if name.endswith(MESHES))
+        part = "prototype"
+        needed = [*PROTOTYPE_FILES, *(name for name in meshes if name not in SHELL_FILES)]
+    for name in needed:
+        written_file(
+            folder, manifest, name, f"name a folder that tbcad build wrote with its {part}"
+        )
+
+
 def draw_apart(module: str, *arguments: str) -> None:
-    """Run a module of tbcad.report as a program in a process of its own.
+    """Run a module of tbcad.report in a process of its own, under a virtual screen where needed.
 
     InputError: there is no screen, or drawing fails.
     """
-    _run(_on_screen([sys.executable, "-m", f"tbcad.report.{module}", *arguments]))
-
-
-def check_prototype_files(folder: Path) -> None:
-    """Refuse an export whose prototype is missing or not as it was written.
-
-    InputError: it names the file.
-    """
-    _check_files(folder, PROTOTYPE[0])
-
-
-def _run(command: list[str]) -> None:
+    command = [sys.executable, "-m", f"tbcad.report.{module}", *arguments]
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        virtual = shutil.which("xvfb-run")
+        if virtual is None:
+            raise InputError(
+                "pictures need a screen, or a virtual one: install it (Debian: apt-get install "
+                "xvfb xauth libgl1-mesa-dri) and try again"
+            )
+        command = [virtual, "-a", *command]
     done = subprocess.run(
         command, capture_output=True, encoding="utf-8", errors="replace", check=False
     )
     if done.returncode != 0:
         last = (done.stderr.strip() or "the process crashed").splitlines()[-1]
         raise InputError(f"drawing failed ({last[:200]}): see tbcad doctor")
-
-
-def _check_files(folder: Path, subject: str) -> None:
-    """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
-    manifest = read_manifest(folder)
-    listed = manifest.files if manifest else {}
-    part, needed = "shell", [*SHELL_FILES]
-    if subject in PROTOTYPE:
-        meshes = (name for name in listed if name.endswith(MESH_SUFFIXES))
-        part = "prototype"
-        needed = [*PROTOTYPE_FILES, *(name for name in meshes if name not in SHELL_FILES)]
-    for name in (MANIFEST, *needed):
-        if not (folder / name).is_file():
-            raise InputError(
-                f"{folder}: {name} is missing: name a folder that tbcad build wrote with its {part}"
-            )
-    altered = [name for name in needed if not is_listed(folder / name, listed.get(name))]
-    if altered:
-        raise InputError(
-            f"{folder / altered[0]} is not as tbcad wrote it (cut off, or changed since): "
-            "build the export again"
-        )
-
-
-def child_command(folder: Path, picture: Path, subject: str = SHELL) -> list[str]:
-    """The command that draws in a process of its own, under a virtual screen where needed.
-
-    InputError: there is neither a screen nor a virtual one.
-    """
-    module, what = "shell_pictures", []
-    if subject != SHELL:
-        module, what = "close_ups" if subject in CLOSE_UPS else "prototype_pictures", [subject]
-    return _on_screen(
-        [sys.executable, "-m", f"tbcad.report.{module}", str(folder), *what, str(picture)]
-    )
-
-
-def _on_screen(command: list[str]) -> list[str]:
-    """A command, under a virtual screen where needed; refused where there is neither."""
-    if os.environ.get("DISPLAY") or sys.platform != "linux":
-        return command
-    virtual = shutil.which("xvfb-run")
-    if virtual is None:
-        raise InputError(
-            "pictures need a screen, or a virtual one: install it (Debian: apt-get install xvfb "
-            "xauth libgl1-mesa-dri) and try again"
-        )
-    return [virtual, "-a", *command]

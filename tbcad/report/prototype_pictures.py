@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pyvista
-import trimesh
 
-from tbcad.common.figure_files import shown_colour
+from tbcad.cad.formats.glb import read_glb
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.records.tables import BallRow
 from tbcad.types import Floats
@@ -26,9 +25,6 @@ class Drawn(NamedTuple):
     mesh: pyvista.PolyData
     colour: Floats
 
-
-# From glTF's metres and y up to millimetres and z up.
-SHELL_FRAME = 1e3 * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 SIZE = (1600, 800)
 ANGLE_DEG = 30.0
@@ -157,6 +153,10 @@ def placed_mesh(folder: Path, part: PrintedPartRecord) -> pyvista.PolyData:
     mesh = pyvista.read(folder / part.stl)
     axes, origin = np.array(part.axes), np.array(part.origin_mm)
     mesh.points = (np.asarray(mesh.points, dtype=np.float64) - origin) @ axes.T
+    return _smooth(mesh)
+
+
+def _smooth(mesh: pyvista.PolyData) -> pyvista.PolyData:
     return mesh.compute_normals(split_vertices=True, feature_angle=30.0)
 
 
@@ -180,17 +180,11 @@ def _add_balls(plotter: pyvista.Plotter, folder: Path, only: int = 0) -> None:
 
 def assembly_bodies(folder: Path, record: Prototype) -> list[Drawn]:
     """All bodies of prototype.glb, in millimetres and z up."""
-    scene = trimesh.load_scene(folder / record.assembly.glb)
     drawn = []
-    for name in sorted(scene.graph.nodes_geometry):
-        place, geometry = scene.graph[name]
-        mesh = scene.geometry[geometry]
-        points = trimesh.transform_points(mesh.vertices, place) @ SHELL_FRAME
-        faces = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces])
-        surface = pyvista.PolyData(points, faces.ravel()).clean()
-        surface = surface.compute_normals(split_vertices=True, feature_angle=30.0)
-        colour = np.array(shown_colour(mesh.visual.material.baseColorFactor))
-        drawn.append(Drawn(name, scene.graph.transforms.parents[name], surface, colour))
+    for one in read_glb(folder / record.assembly.glb):
+        faces = np.insert(one.mesh.triangles, 0, 3, axis=1)
+        surface = _smooth(pyvista.PolyData(one.mesh.vertices, faces.ravel()).clean())
+        drawn.append(Drawn(one.name, one.group, surface, np.array(one.colour)))
     return drawn
 
 

@@ -1,13 +1,12 @@
 """Pictures and sections of the shells, from an export's STL files and mirrors.csv.
 
-Run as a program, `python -m tbcad.report.shell_pictures DIR FILE`: drawing without a screen may
-crash the process, so the command starts it as a child.
+Run as a program, `python -m tbcad.report.shell_pictures DIR shell FILE`: drawing without a screen
+may crash the process, so the command starts it as a child.
 """
 
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pyvista
@@ -16,6 +15,7 @@ from scipy.spatial import cKDTree
 from tbcad.cad.formats.checked_files import columns
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.pedestals.cells import PedestalCells
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.records.design import NAME, DesignRecord
 from tbcad.records.tables import MirrorRow
@@ -38,15 +38,6 @@ ON_MIRROR_MM = 0.005  # facets are nearer than this to the spheres
 SAME_MM = 0.02  # rims nearer than this are one edge
 ROUNDS = 20
 BEYOND = 0.35  # shown beyond the outer apices, of the distance of apices
-
-
-class ModelledMirrors(NamedTuple):
-    """One camera's m mirrors as they are modelled, mm: surface under the coat."""
-
-    apex: Floats
-    normal: Floats
-    curvature: Floats
-    polar: Floats
 
 
 def draw(folder: Path, picture: Path) -> None:
@@ -99,10 +90,10 @@ def camera_that_shows(points: Floats, direction: Floats) -> tuple[Floats, Floats
 def coloured(folder: Path, camera: str) -> pyvista.PolyData:
     """A shell with mirrors in the colour of their polar angle, alternating in brightness."""
     shell = pyvista.read(folder / f"shell_{camera}.stl")
-    mirrors = read_modelled(folder, camera)
+    mirrors, polar = read_modelled(folder, camera)
     corners = np.asarray(shell.points, dtype=np.float64)[shell.regular_faces]
     mirror, on_mirror = mirror_of_facets(corners, mirrors)
-    share = (mirrors.polar - mirrors.polar.min()) / np.ptp(mirrors.polar)
+    share = (polar - polar.min()) / np.ptp(polar)
     colour = np.column_stack([0.25 + 0.7 * share, 0.5 + 0.25 * share, 0.95 - 0.65 * share])
     colour *= np.where(np.arange(len(colour)) % 3 == 0, 0.85, 1.0)[:, None]
     rgb = np.where(on_mirror[:, None], 255 * colour[mirror], STRUCTURE_GREY)
@@ -110,35 +101,30 @@ def coloured(folder: Path, camera: str) -> pyvista.PolyData:
     return shell
 
 
-def mirror_of_facets(corners: Floats, mirrors: ModelledMirrors) -> tuple[Ints, Bools]:
+def mirror_of_facets(corners: Floats, mirrors: Surfaces) -> tuple[Ints, Bools]:
     """The mirror that each facet (f, 3, 3) is of, and whether it is a mirror's, (f,) each."""
     middle = corners.mean(axis=1)
     facing = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    ranks = range(1, min(TRIED, len(mirrors.apex)) + 1)
+    ranks = range(1, min(TRIED, len(mirrors)) + 1)
     nearest = np.asarray(cKDTree(mirrors.apex).query(middle, k=ranks)[1])
     best = np.zeros(len(corners), dtype=np.int64)
     smallest = np.full(len(corners), np.inf)
     for tried in nearest.T:
-        one = ModelledMirrors(*(values[tried] for values in mirrors))
-        # Heights to the first order, (|p - centre|^2 - r^2) / 2r: the plane's at no curvature.
-        offset = corners - one.apex[:, None]
-        curved = one.curvature[:, None] * dot(offset, offset) / 2
-        distance = np.abs(dot(offset, one.normal[:, None]) + curved).max(axis=1)
-        outward = unit(one.normal + one.curvature[:, None] * (middle - one.apex))
-        distance[dot(facing, outward) < FACING_COS] = np.inf
+        # Values are heights to the first order, (|p - centre|^2 - r^2) / 2r.
+        distance = np.abs(mirrors.value(tried[:, None], corners)).max(axis=1)
+        distance[dot(facing, unit(mirrors.gradient(tried, middle))) < FACING_COS] = np.inf
         better = distance < smallest
         best[better], smallest[better] = tried[better], distance[better]
     return best, smallest < CORNER_TOLERANCE_MM
 
 
-def read_modelled(folder: Path, camera: str) -> ModelledMirrors:
-    """One camera's mirrors of an export."""
+def read_modelled(folder: Path, camera: str) -> tuple[Surfaces, Floats]:
+    """One camera's m mirrors as they are modelled, under the coat; polar angles, degrees, (m,)."""
     coat = DesignRecord.read(folder / NAME).coating_mm
     rows = [row for row in MirrorRow.read(folder) if row.camera == camera]
-    apex, normal = columns(rows, "px py pz"), columns(rows, "nx ny nz")
-    radius = np.array([row.radius_mm or np.inf for row in rows])
-    polar = columns(rows, "polar_deg")[:, 0]
-    return ModelledMirrors(apex - coat * normal, normal, 1 / (radius - coat), polar)
+    curvature = np.array([1 / row.radius_mm if row.radius_mm else 0.0 for row in rows])
+    coated = Surfaces(columns(rows, "px py pz"), columns(rows, "nx ny nz"), curvature)
+    return coated.offset(-coat), columns(rows, "polar_deg")[:, 0]
 
 
 @dataclass(frozen=True)
@@ -250,4 +236,4 @@ def _words(outline: Floats, left: Floats, right: Floats, lowest: int) -> str:
 
 
 if __name__ == "__main__":
-    draw(Path(sys.argv[1]), Path(sys.argv[2]))
+    draw(Path(sys.argv[1]), Path(sys.argv[3]))

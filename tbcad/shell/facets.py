@@ -23,7 +23,7 @@ from tbcad.shell.cell_outlines import (
     strip_points,
     strip_widths,
 )
-from tbcad.types import Bools, Floats, Ints
+from tbcad.types import Floats, Ints
 
 ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked for again from there
 
@@ -105,75 +105,43 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     width = strip_widths(spec.mesh.ray_error_mm, mirrors.radius, distance, middle)
     strip = mirrors.projected(cell, strip_points(outlines, middle, outside, width))
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * mirrors.radius))
-    return _RingMesh(outlines, mirrors, middle, strip, rings.astype(np.int64)).facets()
+    return _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
 
 
-@dataclass(frozen=True)
-class _Ring:
-    """One ring of vertices in each cell that has so many."""
+def _ringed(
+    outlines: CellOutlines, mirrors: Surfaces, middle: Floats, strip: Floats, count: Ints
+) -> Facets:
+    """Quads between rings of vertices from the outline of each cell, then a fan about its middle.
 
-    place: Ints  # in the outlines, of each place of the ring, (p,)
-    vertex: Ints  # at each place, (p,)
-    following: Ints  # next place of the same cell's ring, (p,)
-
-    def inner(self, kept: Bools, vertex: Ints) -> "_Ring":
-        """The next ring, in the cells kept."""
-        renumbered = np.cumsum(kept) - 1
-        return _Ring(self.place[kept], vertex, renumbered[self.following[kept]])
-
-
-@dataclass(frozen=True)
-class _RingMesh:
-    """Rings of vertices from the outline of each cell to its middle."""
-
-    outlines: CellOutlines  # the outer rings
-    mirrors: Surfaces  # surfaces of the m cells
-    middle: Floats  # middle point of each cell, (m, 3)
-    strip: Floats  # points of the second ring, by place in the outlines, (b, 3)
-    count: Ints  # rings inside the outline, the strip's included, at least 1, (m,)
-
-    def facets(self) -> Facets:
-        """Quads between the rings, and a fan about the middle."""
-        outlines, cell = self.outlines, self.outlines.cell
-        points = np.concatenate([outlines.vertices, self.middle])
-        hub = len(outlines.vertices) + np.arange(len(self.middle))
-        ring = _Ring(np.arange(len(cell)), outlines.vertex, outlines.following)
-        triangles, mirror = [], []
-        for k in range(int(self.count.max()) + 1):
-            kept = self.count[cell[ring.place]] > k
-            ended = cell[ring.place[~kept]]
-            last = ring.vertex[ring.following[~kept]]
-            triangles.append(np.column_stack([ring.vertex[~kept], last, hub[ended]]))
-            inner_points = self._ring_points(k, ring.place[kept])
-            inner = ring.inner(kept, len(points) + np.arange(len(inner_points)))
-            points = np.concatenate([points, inner_points])
-            triangles += self._quads(k, ring, kept, inner, points)
-            mirror += [ended, cell[inner.place], cell[inner.place]]
-            ring = inner
-        # Collected counter-clockwise from outside; the solid's outside is the light's side.
-        every = np.concatenate(triangles)[:, ::-1]
-        return Facets(points, every, np.concatenate(mirror), outlines)
-
-    def _ring_points(self, k: int, place: Ints) -> Floats:
-        if k == 0:
-            return self.strip[place]
-        cell = self.outlines.cell[place]
-        share = (1 - k / self.count[cell])[:, None]
-        middle = self.middle[cell]
-        return self.mirrors.projected(cell, middle + share * (self.strip[place] - middle))
-
-    def _quads(self, k: int, outer: _Ring, kept: Bools, inner: _Ring, points: Floats) -> list[Ints]:
-        """Two triangles for each quad; beyond the strip the shorter diagonal avoids obtuse angles.
-
-        In the strip the right angle on the outline is at the segment's end, or its start at a
-        corner.
-        """
-        a, b = outer.vertex[kept], outer.vertex[outer.following][kept]
-        c, d = inner.vertex[inner.following], inner.vertex
-        if k == 0:
-            crossed = self.outlines.last_segment[inner.place]
-        else:
+    Cells have counts (m,) of rings inside the outline, at least 1: the first through points of the
+    strip (b, 3), by place in the outlines.
+    """
+    cell = outlines.cell
+    points = np.concatenate([outlines.vertices, middle])
+    hub = len(outlines.vertices) + np.arange(len(middle))
+    # Of a ring: places in the outlines, vertex at each place, next place of the same cell's ring.
+    place, vertex, following = np.arange(len(cell)), outlines.vertex, outlines.following
+    triangles, mirror = [], []
+    for k in range(int(count.max()) + 1):
+        kept = count[cell[place]] > k
+        ended = cell[place[~kept]]
+        triangles.append(np.column_stack([vertex[~kept], vertex[following[~kept]], hub[ended]]))
+        a, b = vertex[kept], vertex[following[kept]]
+        place, following = place[kept], (np.cumsum(kept) - 1)[following[kept]]
+        own, inner = cell[place], strip[place]
+        if k > 0:
+            share = (1 - k / count[own])[:, None]
+            inner = mirrors.projected(own, middle[own] + share * (inner - middle[own]))
+        vertex = len(points) + np.arange(len(place))
+        points = np.concatenate([points, inner])
+        c, d = vertex[following], vertex
+        # In the strip the right angle on the outline is at the segment's end, or its start at a
+        # corner; beyond it the shorter diagonal avoids obtuse angles.
+        crossed = outlines.last_segment[place]
+        if k > 0:
             crossed = norm(points[b] - points[d]) < norm(points[a] - points[c])
-        first = np.column_stack([a, b, np.where(crossed, d, c)])
-        second = np.column_stack([np.where(crossed, b, a), c, d])
-        return [first, second]
+        triangles.append(np.column_stack([a, b, np.where(crossed, d, c)]))
+        triangles.append(np.column_stack([np.where(crossed, b, a), c, d]))
+        mirror += [ended, own, own]
+    # Collected counter-clockwise from outside; the solid's outside is the light's side.
+    return Facets(points, np.concatenate(triangles)[:, ::-1], np.concatenate(mirror), outlines)

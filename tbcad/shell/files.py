@@ -10,7 +10,6 @@ from OCP.TopoDS import TopoDS_Face
 
 from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
-from tbcad.cad.formats.step_mirror import mirrored_step
 from tbcad.cad.kernel.brep import Maker, Ring, Solid, hole_faces
 from tbcad.cad.kernel.checks import (
     FaceIntegrals,
@@ -61,29 +60,11 @@ def write_shell_solids(
     known, symmetric = None, design.spec.optics.camera_mm[1] == 0
     for array in design.arrays:
         files = part_files("shell", array)
-        if known and symmetric and not design.spec.step.pcurves:
-            progress(f"{files['name']}: files")
-            _write_mirrored(folder, design.arrays[0], array)
-            continue
         progress(f"{files['name']}: solid")
         solid = camera_solid(design, array, envelope)
         progress(f"{files['name']}: files")
         known = known.mirrored() if known and symmetric else shell_properties(solid, array)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
-
-
-def _write_mirrored(folder: Path, original: MirrorArray, array: MirrorArray) -> None:
-    """Write the STEP file of camera b's half as the mirror image of that of camera a's.
-
-    Readers find in both the same figures to the last digit, which the kernel's own file of the
-    mirrored solid would not give: it cuts numbers that are long, and a minus sign is a character.
-    """
-    one, other = part_files("shell", original), part_files("shell", array)
-    names = [wall_names(some.ids, original.modelled_cells) for some in (original, array)]
-    renamed = {one["name"]: other["name"], **dict(zip(original.ids, array.ids, strict=True))}
-    renamed |= dict(zip(*names, strict=True))
-    text = (folder / one["step"]).read_bytes().decode("ascii")
-    (folder / other["step"]).write_bytes(mirrored_step(text, renamed).encode("ascii"))
 
 
 def shell_envelope(design: MirrorDesign) -> Envelope:

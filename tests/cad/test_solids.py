@@ -90,11 +90,15 @@ def box(width: float, height: float) -> TopoDS_Shape:
     return prism(polygon(base), height * UP)
 
 
-def test_volumes_of_bodies() -> None:
+def test_volumes_of_bodies_and_their_sets() -> None:
     assert volume(box(2.0, 3.0)) == pytest.approx(12)
     assert volume(pyramid(6 * UP, BASE)) == pytest.approx(8)
     ring = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
     assert volume(revolved_polygon(ring, 0.3, np.pi)) == pytest.approx(1.5 * np.pi)
+    one, other = cylinder(ORIGIN, UP, 2.0, 5.0), cylinder(ORIGIN, UP, 1.0, 9.0)
+    assert volume(fused([one, other])) == pytest.approx(24 * np.pi)
+    assert volume(cut(one, [other])) == pytest.approx(15 * np.pi)
+    assert volume(common(one, other)) == pytest.approx(5 * np.pi)
 
 
 def test_facets_in_any_order_and_sense_close_a_solid() -> None:
@@ -103,13 +107,6 @@ def test_facets_in_any_order_and_sense_close_a_solid() -> None:
     facets += [corners[k] for k in ([2, 6, 7, 3], [4, 6, 2, 0], [1, 5, 7, 3])]
     for sides in (facets, [facet[::-1] for facet in facets[::-1]]):
         assert volume(polyhedron(sides)) == pytest.approx(24)
-
-
-def test_sets_of_two_bodies() -> None:
-    one, other = cylinder(ORIGIN, UP, 2.0, 5.0), cylinder(ORIGIN, UP, 1.0, 9.0)
-    assert volume(fused([one, other])) == pytest.approx(24 * np.pi)
-    assert volume(cut(one, [other])) == pytest.approx(15 * np.pi)
-    assert volume(common(one, other)) == pytest.approx(5 * np.pi)
 
 
 def test_bytes_of_a_solid_give_it_again() -> None:
@@ -224,7 +221,7 @@ def test_a_rod_is_in_its_place() -> None:
 
 def rod_with_gap(gap: float) -> TopoDS_Solid:
     """A rod whose round edges are off its faces, mm, and whose tolerances are SLACK_MM."""
-    rod = one_solid("rod", cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 5.0, 20.0))
+    rod = one_solid("rod", cylinder(ORIGIN, UP, 5.0, 20.0))
     for edge in edges(rod):
         curve = BRepAdaptor_Curve(edge)
         if curve.GetType() == GeomAbs_Circle:
@@ -251,38 +248,26 @@ def test_gaps_are_found_as_a_reader_of_the_file_finds_them(gap: float) -> None:
         one_solid("rod", without_slack(rod))
 
 
-def test_a_cylinder() -> None:
-    found = properties(cylinder(PLACE, UP, 2.0, 5.0))
-    assert found.volume == pytest.approx(20 * np.pi, rel=1e-12)
-    assert found.area == pytest.approx(28 * np.pi, rel=1e-12)
-    assert found.centroid == pytest.approx((1.0, 2.0, 5.5), abs=1e-12)
-
-
 def test_a_sphere() -> None:
     ball = sphere(PLACE, 7.0)
     assert volume(ball) == pytest.approx(4 / 3 * np.pi * 7**3, rel=1e-9)
     assert properties(ball).area == pytest.approx(4 * np.pi * 49, rel=1e-9)
 
 
-def test_a_rotated_solid_has_its_centroid_where_the_kernel_finds_it() -> None:
+def test_a_cylinder_also_turned_and_by_its_faces_about_any_origin() -> None:
     solid, axes = cylinder(PLACE, UP, 2.0, 5.0), np.roll(np.eye(3), 1, axis=1)
-    found, expected = properties(solid).rotated(axes), properties(moved(solid, axes, np.zeros(3)))
-    assert found.centroid == pytest.approx((5.5, 1.0, 2.0), abs=1e-12)
-    assert found.centroid == pytest.approx(expected.centroid, abs=1e-12)
-    assert (found.volume, found.area) == pytest.approx((expected.volume, expected.area))
-
-
-@pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (10.0, -4.0, 2.0)])
-def test_faces_add_up_to_their_solid(origin: tuple[float, float, float]) -> None:
-    solid = cylinder(PLACE, UP, 2.0, 5.0)
-    first, *others = (face_integrals(face, np.array(origin)) for face in faces(solid))
-    total = first
-    for one in others:
-        total = total + one
-    found, expected = total.properties, properties(solid)
-    assert found.volume == pytest.approx(expected.volume, rel=1e-9)
-    assert found.area == pytest.approx(expected.area, rel=1e-9)
-    assert found.centroid == pytest.approx(expected.centroid, abs=1e-8)
+    found = {"as it is": properties(solid)}
+    found["turned"] = properties(solid).rotated(axes)
+    found["by the kernel"] = properties(moved(solid, axes, np.zeros(3)))
+    for origin in (ORIGIN, np.array([10.0, -4.0, 2.0])):
+        side, *ends = (face_integrals(face, origin) for face in faces(solid))
+        found[f"about {origin}"] = (side + ends[0] + ends[1]).properties
+    for name, one in found.items():
+        turned = name in {"turned", "by the kernel"}
+        assert one.volume == pytest.approx(20 * np.pi, rel=1e-9), name
+        assert one.area == pytest.approx(28 * np.pi, rel=1e-9), name
+        place = (5.5, 1.0, 2.0) if turned else (1.0, 2.0, 5.5)
+        assert one.centroid == pytest.approx(place, abs=1e-8), name
 
 
 def test_plane_faces_through_points() -> None:

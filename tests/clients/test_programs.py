@@ -5,6 +5,7 @@ import math
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,8 @@ from tbcad.app.cli import run
 from tests.exported_files import read_csv
 
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
+
+Damage = Callable[[bytes], bytes]
 
 SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
 PROGRAMS = {
@@ -61,18 +64,12 @@ def wanted(export: Path, relative: float) -> list[ExpectedPart]:
     record = export / "prototype.json"
     made = json.loads(record.read_text()) if record.exists() else {"parts": []}
     found = []
-    for part in [*design["parts"], *made["parts"]]:
+    for part in [*design["parts"], *design.get("mandrels", ()), *made["parts"]]:
         volume = float(trimesh.load_mesh(export / part["stl"]).volume)
         files = {kind: part[kind] for kind in ("step", "stl", "3mf")}
         spheres = mirrors(export, part["camera"]) if "camera" in part else None
         found.append(ExpectedPart(part["name"], files, spheres, volume, relative * volume))
     return found
-
-
-def trimesh_volume(stl: Path) -> float:
-    import trimesh
-
-    return float(trimesh.load_mesh(stl).volume)
 
 
 def mirrors(export: Path, camera: str) -> int:
@@ -89,21 +86,33 @@ def of(program: str, checks: Iterable[Check]) -> list[Check]:
     return mine
 
 
+def built(out: Path, *options: str) -> Path:
+    """The paper's design with options."""
+    assert run(["build", "--out", str(out), *options, "--no-verify"]) == 0
+    return out
+
+
 @pytest.fixture(scope="module")
 def mandrels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The paper's shells with their negatives."""
     out = tmp_path_factory.mktemp("clients") / "mandrels"
-    options = ["--parts", "shell", "--set", "shell.negative=true", "--no-verify"]
-    assert run(["build", "--out", str(out), *options]) == 0
-    return out
+    return built(out, "--parts", "shell", "--set", "shell.negative=true")
+
+
+@pytest.fixture(scope="module")
+def pedestals(tmp_path_factory: pytest.TempPathFactory) -> list[Check]:
+    """What programs say of both halves on pedestals."""
+    out = tmp_path_factory.mktemp("clients") / "pedestals"
+    built(out, "--parts", "shell", "--set", "shell.edges=pedestal")
+    parts = wanted(out, 5e-3)
+    assert [part.name for part in parts] == ["shell_a", "shell_b"]
+    return check_with_programs(out, parts)
 
 
 @pytest.fixture(scope="module")
 def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The paper's design, both halves and the prototype."""
-    out = tmp_path_factory.mktemp("clients") / "exports"
-    assert run(["build", "--out", str(out), "--no-verify"]) == 0
-    return out
+    return built(tmp_path_factory.mktemp("clients") / "exports")
 
 
 @pytest.fixture(scope="module")
@@ -149,85 +158,72 @@ def test_meshes_are_fine(export: Path) -> None:
     assert all((export / f"shell_{c}.stl").stat().st_size > 50 * 100_000 for c in "ab")
 
 
-@pytest.mark.parametrize("camera", ["a", "b"])
-def test_freecad_sees_bolt_and_dowel_holes(export: Path, camera: str) -> None:
-    command = on_path("freecadcmd", "FreeCADCmd")
-    if not command:
-        pytest.skip("freecadcmd is not installed")
-    with sandbox(command, export, f"shell_{camera}.step", "step", Limits()) as given:
-        (given.folder / "look.py").write_text(KINDS)
-        done = given.run(given.folder / "look.py")
-        assert done.code == 0, done
-        kinds = json.loads((given.folder / "kinds.json").read_text())
-    assert kinds["Sphere"] == 847
-    assert kinds["Cylinder"] == 15
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_each_program_takes_shells_on_pedestals(pedestals: list[Check], program: str) -> None:
+    mine = of(program, pedestals)
+    assert {check.name for check in mine} == {f"{program} {one}" for one in PROGRAMS[program]}
+    for check in mine:
+        assert check.passed is True, check
 
 
 @pytest.mark.parametrize("program", ["freecad", "gmsh", "admesh"])
 def test_each_program_passes_a_mandrel(mandrels: Path, program: str) -> None:
-    volume = trimesh_volume(mandrels / "mandrel_a.stl")
-    files = {kind: f"mandrel_a.{kind}" for kind in ("step", "stl", "3mf")}
-    part = ExpectedPart("mandrel_a", files, 847, volume, 1e-3 * volume)
+    (part,) = (one for one in wanted(mandrels, 1e-3) if one.name == "mandrel_a")
     for check in of(program, check_with_programs(mandrels, [part])):
         assert check.passed is True, check
         assert check.measured is not None, check
 
 
 @pytest.mark.parametrize("camera", ["a", "b"])
-def test_freecad_sees_a_mandrels_blind_holes(mandrels: Path, camera: str) -> None:
+@pytest.mark.parametrize("body", ["shell", "mandrel"])
+def test_freecad_sees_bolt_and_dowel_holes(mandrels: Path, body: str, camera: str) -> None:
+    """Those of a mandrel are blind."""
     command = on_path("freecadcmd", "FreeCADCmd")
     if not command:
         pytest.skip("freecadcmd is not installed")
-    with sandbox(command, mandrels, f"mandrel_{camera}.step", "step", Limits()) as given:
+    with sandbox(command, mandrels, f"{body}_{camera}.step", "step", Limits()) as given:
         (given.folder / "look.py").write_text(KINDS)
         done = given.run(given.folder / "look.py")
         assert done.code == 0, done
         kinds = json.loads((given.folder / "kinds.json").read_text())
-    assert kinds == {"Sphere": 847, "Cylinder": 15, "Plane": 2 + 15}
+    assert (kinds["Sphere"], kinds["Cylinder"]) == (847, 15)
+    if body == "mandrel":
+        assert kinds == {"Sphere": 847, "Cylinder": 15, "Plane": 2 + 15}
 
 
-def cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+def cut(data: bytes) -> bytes:
+    return data[: len(data) // 2]
 
 
-def rubbish(path: Path) -> None:
-    path.write_text(
-        "ISO-10303-21;\nHEADER;\nthis is no STEP file, and no STL file either\n" * 9,
-        encoding="utf-8",
-    )
+def rubbish(_: bytes) -> bytes:
+    return b"ISO-10303-21;\nHEADER;\nthis is no STEP file, and no STL file either\n" * 9
 
 
-def empty(path: Path) -> None:
-    path.write_bytes(b"")
+def empty(_: bytes) -> bytes:
+    return b""
 
 
-def without_a_facet(path: Path) -> None:
-    data = bytearray(path.read_bytes()[:-50])
-    data[80:84] = (int.from_bytes(data[80:84], "little") - 1).to_bytes(4, "little")
-    path.write_bytes(data)
+def without_a_facet(data: bytes) -> bytes:
+    count = int.from_bytes(data[80:84], "little") - 1
+    return data[:80] + count.to_bytes(4, "little") + data[84:-50]
 
 
-def turned_facet(path: Path) -> None:
+def turned_facet(data: bytes) -> bytes:
     """Two corners of the last one swapped."""
-    data = path.read_bytes()
-    first, second = data[-38:-26], data[-26:-14]
-    path.write_bytes(data[:-38] + second + first + data[-14:])
+    return data[:-38] + data[-26:-14] + data[-38:-26] + data[-14:]
 
 
-def without_a_face(path: Path) -> None:
+def without_a_face(data: bytes) -> bytes:
     """The shell lists a face less, and so is open."""
-    head, mark, tail = path.read_text(encoding="utf-8").partition("CLOSED_SHELL('',(")
+    head, mark, tail = data.partition(b"CLOSED_SHELL('',(")
     assert mark
-    path.write_text(head + mark + tail.partition(",")[2], encoding="utf-8")
+    return head + mark + tail.partition(b",")[2]
 
 
-def an_inch(path: Path) -> None:
+def an_inch(data: bytes) -> bytes:
     """Another unit, all else as it was."""
-    text = path.read_text(encoding="utf-8")
-    assert "SI_UNIT(.MILLI.,.METRE.)" in text
-    path.write_text(
-        text.replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)"), encoding="utf-8"
-    )
+    assert b"SI_UNIT(.MILLI.,.METRE.)" in data
+    return data.replace(b"SI_UNIT(.MILLI.,.METRE.)", b"SI_UNIT(.CENTI.,.METRE.)")
 
 
 @pytest.fixture
@@ -235,28 +231,36 @@ def sample(tmp_path: Path) -> Path:
     return Path(shutil.copytree(SAMPLE, tmp_path / "sample"))
 
 
-def asked(sample: Path, kind: str, program: str, **others: float) -> dict[str, bool | None]:
-    """Verdicts on shell_a's one file of a kind."""
+def asked(
+    sample: Path, kind: str, program: str, damage: Damage = bytes, **others: float
+) -> dict[str, bool | None]:
+    """Verdicts on shell_a's one file of a kind, damaged."""
+    file = sample / f"shell_a.{kind}"
+    file.write_bytes(damage(file.read_bytes()))
     part = replace(wanted(SAMPLE, 0.02)[0], **others)
     said = of(program, check_with_programs(sample, [part], queries=[READERS[program, kind]]))
     return {check.name.split()[1]: check.passed for check in said}
 
 
-@pytest.mark.parametrize("program", ["freecad", "gmsh"])
-@pytest.mark.parametrize("damage", [cut, rubbish, empty])
-def test_a_broken_step_passes_nothing(
-    sample: Path, program: str, damage: Callable[[Path], None]
+@pytest.mark.parametrize(
+    ("program", "kind", "damage"),
+    [
+        *product(("freecad", "gmsh"), ("step",), (cut, rubbish, empty)),
+        *product(("prusa", "admesh"), ("stl",), (rubbish, empty)),
+        ("prusa", "3mf", cut),
+    ],
+)
+def test_a_broken_file_passes_nothing(
+    sample: Path, program: str, kind: str, damage: Damage
 ) -> None:
-    damage(sample / "shell_a.step")
-    verdicts = asked(sample, "step", program)
-    assert len(verdicts) == len(PROGRAMS[program])
+    verdicts = asked(sample, kind, program, damage)
+    assert kind != "step" or len(verdicts) == len(PROGRAMS[program])
     assert True not in verdicts.values()
 
 
 @pytest.mark.parametrize("program", ["freecad", "gmsh"])
 def test_an_open_step_is_no_solid(sample: Path, program: str) -> None:
-    without_a_face(sample / "shell_a.step")
-    verdicts = asked(sample, "step", program)
+    verdicts = asked(sample, "step", program, without_a_face)
     assert verdicts["solids"] is False
     assert verdicts.get("valid", False) is False
 
@@ -264,8 +268,7 @@ def test_an_open_step_is_no_solid(sample: Path, program: str) -> None:
 @pytest.mark.parametrize("program", ["freecad", "gmsh"])
 def test_a_step_in_another_unit(sample: Path, program: str) -> None:
     assert asked(sample, "step", program)["volume"] is True
-    an_inch(sample / "shell_a.step")
-    verdicts = asked(sample, "step", program)
+    verdicts = asked(sample, "step", program, an_inch)
     assert verdicts["volume"] is False
     assert verdicts["solids"] is True
 
@@ -281,21 +284,6 @@ def test_spheres_that_are_none(sample: Path, program: str) -> None:
 @pytest.mark.parametrize(("program", "question"), [("prusa", "manifold"), ("admesh", "repairs")])
 @pytest.mark.parametrize("damage", [without_a_facet, turned_facet])
 def test_a_holed_or_turned_mesh_fails(
-    sample: Path, program: str, question: str, damage: Callable[[Path], None]
+    sample: Path, program: str, question: str, damage: Damage
 ) -> None:
-    damage(sample / "shell_a.stl")
-    assert asked(sample, "stl", program, volume=math.nan)[question] is False
-
-
-@pytest.mark.parametrize("program", ["prusa", "admesh"])
-@pytest.mark.parametrize("damage", [rubbish, empty])
-def test_a_broken_mesh_passes_nothing(
-    sample: Path, program: str, damage: Callable[[Path], None]
-) -> None:
-    damage(sample / "shell_a.stl")
-    assert True not in asked(sample, "stl", program).values()
-
-
-def test_a_broken_3mf_passes_nothing(sample: Path) -> None:
-    cut(sample / "shell_a.3mf")
-    assert True not in asked(sample, "3mf", "prusa").values()
+    assert asked(sample, "stl", program, damage, volume=math.nan)[question] is False

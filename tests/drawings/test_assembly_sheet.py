@@ -7,9 +7,10 @@ import pytest
 import trimesh
 
 from tbcad.cad.drafting.views import FRONT
-from tbcad.cad.formats.entities import Circle, Text
-from tbcad.cad.kernel.projection import Segment
-from tbcad.drawings.assembly_sheet import EYES, AssemblyJob, draw_assembly, line_picture
+from tbcad.cad.formats.entities import Circle, Layer, Line, Text
+from tbcad.cad.formats.glb import ColouredMesh, write_glb
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.drawings.assembly_sheet import EYES, assembly_sheets, line_picture
 
 BOX, POST = (40.0, 20.0, 10.0), (5.0, 5.0, 30.0)
 
@@ -24,11 +25,12 @@ def bodies() -> dict[str, trimesh.Trimesh]:
 
 def test_what_is_behind_is_hidden(bodies: dict[str, trimesh.Trimesh]) -> None:
     picture = line_picture(bodies, FRONT, 1.0)
-    lengths = [np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in picture.lines]
+    ends = [(one.start, one.end) for one in picture.lines]
+    lengths = [np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in ends]
     post = 15 + 5 + 15 + 5 + 5 + 5  # above the box, and below it
     assert sum(lengths) == pytest.approx(2 * (40 + 10) + post, abs=0.5)
-    assert max(end[1] for line in picture.lines for end in line) == 20.0
-    behind = [line for line in picture.lines if all(abs(x) < 3 and -4 < z < 4 for x, z in line)]
+    assert max(end[1] for line in ends for end in line) == 20.0
+    behind = [line for line in ends if all(abs(x) < 3 and -4 < z < 4 for x, z in line)]
     assert not behind
 
 
@@ -46,20 +48,16 @@ def test_edges_of_contact_stay(bodies: dict[str, trimesh.Trimesh]) -> None:
     eye = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, -0.8, 0.6]])
     drawn = line_picture({"box": bodies["box"], "foot": foot}, eye, 20.0).lines
     x, y = (eye[:2] @ [5.0, -5.0, 5.0]).round(3).tolist()
-    assert Segment((-x, y), (x, y)) in drawn
+    assert Line(Layer.CUT, (-x, y), (x, y)) in drawn
 
 
 def test_each_part_is_called_out_once(bodies: dict[str, trimesh.Trimesh], tmp_path: Path) -> None:
-    scene = trimesh.Scene()
-    for name, mesh in bodies.items():
-        x, y, z = mesh.vertices.T / 1000
-        turned = trimesh.Trimesh(np.stack([x, z, -y], axis=-1), mesh.faces)
-        scene.add_geometry(turned, node_name=name, geom_name=name)
-    scene.add_geometry(turned, node_name="shroud_lid", geom_name="shroud_lid")
-    (tmp_path / "some.glb").write_bytes(scene.export(file_type="glb"))
-    items, quantities = {"BOX-1": 3, "POST-2": 12}, {"BOX-1": 1, "POST-2": 4}
-    parts = {"box": "BOX-1", "post": "POST-2"}
-    sheets = draw_assembly(AssemblyJob(tmp_path / "some.glb", parts, items, quantities, "some"))
+    meshes = bodies | {"shroud_lid": bodies["post"]}
+    path, white = tmp_path / "some.glb", (1.0, 1.0, 1.0, 1.0)
+    shown = {name: Mesh(np.array(one.vertices), one.faces) for name, one in meshes.items()}
+    write_glb(path, "all", [ColouredMesh(name, "g", one, white) for name, one in shown.items()])
+    parts, listed = {"box": "BOX-1", "post": "POST-2"}, {"BOX-1": (3, 1), "POST-2": (12, 4)}
+    sheets = assembly_sheets(path, parts, listed, "some")
     assert [one.name for one in sheets] == ["assembly", "assembly_2", "assembly_3"]
     assert len(sheets) == len(EYES)
     words = [text.text for one in sheets for text in one.entities if isinstance(text, Text)]

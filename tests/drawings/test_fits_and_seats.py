@@ -13,18 +13,20 @@ from tbcad.cad.kernel.features import RoundFace
 from tbcad.cad.kernel.solids import cut, cylinder, faces, one_solid, polygon, prism
 from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import DrawnExport
-from tbcad.drawings.fits import (
+from tbcad.drawings.printed_parts import draw_part
+from tbcad.drawings.tables import (
+    DrawnHole,
     ListedSeat,
     Mate,
     SheetTable,
     fits_table,
     in_columns,
+    numbered_holes,
     purchased_mate,
     reamed_to,
     seats_table,
+    table_rows,
 )
-from tbcad.drawings.holes import DrawnHole, numbered_holes, table_rows
-from tbcad.drawings.printed_parts import draw_part, part_job
 from tbcad.output.manifest import read_manifest, write_manifest
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.files.bom import COLUMNS
@@ -199,12 +201,12 @@ def export(folder: Path, carrier: Solid) -> DrawnExport:
     design = DesignRecord.model_construct(spec=load_spec(None, ["n=6"]))
     manifest = read_manifest(folder)
     assert manifest is not None
-    return DrawnExport(folder, manifest, design, machine, ())
+    return DrawnExport(folder, manifest, design, machine)
 
 
 def test_the_carriers_sheet_has_its_fits_and_seats(carrier: Solid, tmp_path: Path) -> None:
     made = export(tmp_path, carrier)
-    (sheet,) = draw_part(part_job(made, made.parts["carrier"]))
+    (sheet,) = draw_part(made, made.parts["carrier"])
     check_texts(sheet)
     words = [one.text for one in texts(sheet)]
 

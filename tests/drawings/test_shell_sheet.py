@@ -14,7 +14,7 @@ from tbcad.cad.formats.entities import Layer, Polyline, Text
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import read_export
-from tbcad.drawings.shell_sheet import HATCH_MM, draw_shell, hatching, mandrel_job
+from tbcad.drawings.shell_sheet import HATCH_MM, draw_shell, hatching
 from tbcad.drawings.write import drawable
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
@@ -49,7 +49,7 @@ def test_a_mandrels_sheet_says_how_the_shell_comes_off(
     write_export(design(load_spec(None, settings)), tmp_path, [SHELL])
     export = read_export(tmp_path)
     assert {"mandrel_a", "mandrel_b"} <= {*drawable(export)}
-    (sheet,) = draw_shell(mandrel_job(export, "mandrel_b"))
+    (sheet,) = draw_shell(export, "mandrel_b")
     notes = [one for one in sheet.entities if isinstance(one, Text)]
     assert any(one.text.startswith(said) for one in notes)
     frame = [one for one in sheet.entities if isinstance(one, Polyline) and one.closed]

@@ -98,8 +98,10 @@ class TestReplacing:
             assert hidden(out.parent) == []
             for name in ALWAYS_KEPT:
                 (out / name).write_text(name)
+        out.chmod(0o2775)
         with replacing(out, "build", force=False) as new:
             (new / "other.txt").write_text("new")
+        assert out.stat().st_mode & 0o7777 == 0o2775
         assert {path.name for path in out.iterdir()} == {"other.txt", *ALWAYS_KEPT}
         assert all((out / name).read_text() == name for name in ALWAYS_KEPT)
 
@@ -188,12 +190,6 @@ class TestReplacing:
             fill_late(new, out)
         assert version_of(out) == 1
         assert (out / "late.txt").read_text() == "mine"
-
-    def test_keeps_the_folders_mode(self, out: Path) -> None:
-        export(out, 1)
-        out.chmod(0o2775)
-        export(out, 2)
-        assert out.stat().st_mode & 0o7777 == 0o2775
 
     def test_replaces_what_a_link_points_to(self, out: Path, tmp_path: Path) -> None:
         (tmp_path / "disk").mkdir()

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+import tbcad
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
@@ -65,6 +66,17 @@ def test_prices_are_those_of_the_spec(tmp_path: Path, small_design: MirrorDesign
 def replaced_prices(some: MirrorDesign, name: str) -> MirrorDesign:
     prototype = some.spec.prototype.model_copy(update={"prices": (name,)})
     return MirrorDesign(some.spec.model_copy(update={"prototype": prototype}), some.arrays)
+
+
+def test_a_prototype_that_cannot_be_made_is_left_out(tmp_path: Path) -> None:
+    """Camera b is no half turn of camera a: nothing can stand in for both halves."""
+    leaning = tbcad.load_spec(None, ["n=2", "camera_mm=[100, 5, -100]"])
+    built = tbcad.build(leaning, tmp_path / "exports", verify=False)
+    assert built.parts == ("shell",)
+    assert built.note.startswith("no prototype: a prototype needs cameras that a half turn")
+    names = {path.name for path in (tmp_path / "exports").iterdir()}
+    assert {"shell_a.step", "design.json", "manifest.json"} <= names
+    assert "prototype.json" not in names
 
 
 def test_a_mandrel_without_room_is_refused_before_a_build() -> None:

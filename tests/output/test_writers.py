@@ -50,18 +50,14 @@ def test_of_a_dead_writer_are_removed(tmp_path: Path, folder: Path, out: str) ->
     assert not reused.exists()
 
 
-def test_a_name_that_tbcad_does_not_give_is_the_users(tmp_path: Path) -> None:
-    mine = tmp_path / "captures" / ".tbcad-a.new"
+def test_names_that_tbcad_gave_earlier_are_removed_and_others_the_users(tmp_path: Path) -> None:
+    mine, old = tmp_path / "captures" / ".tbcad-a.new", tmp_path / f".tbcad-0123abcd-{DEAD}.new"
     mine.mkdir(parents=True)
+    old.mkdir()
     with pytest.raises(InputError, match=r"did not write \(\.tbcad-a\.new\)"):
         check_replaceable(tmp_path / "captures", "capture", False)
-    assert mine.exists()
-
-
-def test_of_an_earlier_name_are_removed(tmp_path: Path) -> None:
-    old = tmp_path / f".tbcad-0123abcd-{DEAD}.new"
-    old.mkdir()
     check_replaceable(tmp_path / "it", "build", False)
+    assert mine.exists()
     assert not old.exists()
 
 

@@ -21,11 +21,7 @@ from tbcad.prototype.assembly_steps.machine import read_machine
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
 from tbcad.report.exploded import RADIUS as CALLOUT_RADIUS
 from tbcad.report.exploded import Callout, cross, offsets, place_callouts
-from tbcad.report.shell_pictures import (
-    mirror_of_facets,
-    read_modelled,
-    section_of,
-)
+from tbcad.report.shell_pictures import mirror_of_facets, read_modelled, section_of
 from tbcad.shell.facets import mirror_facets
 from tbcad.shell.files import camera_a_mesh
 from tests.exported_files import contents
@@ -33,32 +29,27 @@ from tests.mirror_arrays import mirror_design
 from tests.prototype.assembly_steps.test_steps import LOOSE, belt_design, write
 from tests.shell_meshes import export_with_meshes
 
-GROOVE = 0.3
+GROOVE, EDGES = 0.3, ("valley", "pedestal")
 RADIUS = 30.0
 FACETS_MM = 0.02  # that facets and a crest between two of their corners may be off
 SIZE = (1500, 950)
 ROOT = Path(__file__).parents[2]
 AFTERNOON = ROOT / "designs" / "afternoon-print.toml"
-SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
-
-
-def shells(folder: Path, edges: str) -> ExportedDesign:
-    """Of a small design."""
-    made = mirror_design("n=8", f"shell.edges={edges}", f"shell.groove_mm={GROOVE}")
-    return export_with_meshes(folder, made)
+SAMPLE = ROOT / "docs" / "sample"
 
 
 @pytest.fixture(scope="module")
-def valley(tmp_path_factory: pytest.TempPathFactory) -> ExportedDesign:
-    return shells(tmp_path_factory.mktemp("valley"), "valley")
+def shells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ExportedDesign]:
+    """Of a small design, by the kind of edges."""
+    found = {}
+    for edges in EDGES:
+        made = mirror_design("n=8", f"shell.edges={edges}", f"shell.groove_mm={GROOVE}")
+        found[edges] = export_with_meshes(tmp_path_factory.mktemp(edges), made)
+    return found
 
 
-@pytest.fixture(scope="module")
-def pedestal(tmp_path_factory: pytest.TempPathFactory) -> ExportedDesign:
-    return shells(tmp_path_factory.mktemp("pedestal"), "pedestal")
-
-
-def test_a_valleys_bottom_is_on_both_spheres(valley: ExportedDesign) -> None:
+def test_a_valleys_bottom_is_on_both_spheres(shells: dict[str, ExportedDesign]) -> None:
+    valley = shells["valley"]
     section = section_of(valley, 40)
     mirrors = valley.reflectors[0].mirrors
     for edge, pair in zip(section.edges, (section.mirrors[:2], section.mirrors[1:]), strict=True):
@@ -71,11 +62,10 @@ def test_a_valleys_bottom_is_on_both_spheres(valley: ExportedDesign) -> None:
 
 
 def test_a_groove_is_as_wide_as_the_spec_has_it_and_deep(
-    valley: ExportedDesign, pedestal: ExportedDesign
+    shells: dict[str, ExportedDesign],
 ) -> None:
-    for edge, other in zip(
-        section_of(pedestal, 40).edges, section_of(valley, 40).edges, strict=True
-    ):
+    valley, pedestal = (section_of(shells[edges], 40).edges for edges in EDGES)
+    for edge, other in zip(pedestal, valley, strict=True):
         width = float(edge.words.split()[1])
         assert GROOVE <= width < 2 * GROOVE
         assert edge.depth > other.depth + 3 * GROOVE
@@ -91,11 +81,11 @@ def placed(export: ExportedDesign, mirrors: tuple[int, int, int], point: np.ndar
     return np.asarray(middle + point @ np.stack([along, np.cross(across, along)]))
 
 
-@pytest.mark.parametrize("edges", ["valley", "pedestal"])
+@pytest.mark.parametrize("edges", EDGES)
 def test_halves_aimed_at_the_origin_leave_a_gap_and_built_ones_none(
-    edges: str, request: pytest.FixtureRequest
+    edges: str, shells: dict[str, ExportedDesign]
 ) -> None:
-    export = request.getfixturevalue(edges)
+    export = shells[edges]
     reflector, mirror = export.reflectors[0], seam_mirror(export)
     assert reflector.mirrors.apex[mirror, 0] == pytest.approx(0, abs=1e-9)
     along = np.linspace(-RADIUS, RADIUS, 2001)
@@ -119,17 +109,13 @@ def test_lines_do_not_cross_and_circles_do_not_overlap(seed: int) -> None:
     assert all(0 < one.middle[1] < SIZE[1] for one in placed)
 
 
-def test_bodies_are_moved_against_their_screws(tmp_path: Path) -> None:
+def test_bodies_are_moved_against_their_screws_and_away_from_what_is_there(tmp_path: Path) -> None:
     machine = read_machine(write(tmp_path, belt_design(), LOOSE))
     moved = offsets(machine, frozenset({"wheel", "zero_disc", "M3x16_1"}))
     along = [moved[name][2] for name in ("M3x16_1", "wheel", "zero_disc")]
     assert along == sorted(along)
     assert along[-1] < 0
     assert all(np.all(offset[:2] == 0) for offset in moved.values())
-
-
-def test_what_a_screw_ends_in_is_moved_away_from_what_is_there(tmp_path: Path) -> None:
-    machine = read_machine(write(tmp_path, belt_design(), LOOSE))
     moved = offsets(machine, frozenset({"motor", "M3x12_1"}))
     assert moved["M3x12_1"][2] < 0 < moved["motor"][2]
 
@@ -153,7 +139,7 @@ def test_facets_belong_to_the_mirrors_that_they_were_made_for(
     mesh, array = camera_a_mesh(mirrors), mirrors.arrays[0]
     made = mirror_facets(mirrors.spec, array.modelled_cells, array.apex_distance).mirror
     corners = mesh.vertices.astype(np.float32).astype(np.float64)[mesh.triangles]
-    mirror, found = mirror_of_facets(corners, read_modelled(tmp_path, "a"))
+    mirror, found = mirror_of_facets(corners, read_modelled(tmp_path, "a")[0])
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )

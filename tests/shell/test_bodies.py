@@ -30,14 +30,14 @@ MORE = [["n=6", "radius_rule=paper"]]
 HOLES = ["n=3", "shell.seam_flange.dowels=0", "shell.foot_flange.bolts=12"]
 
 
-def made(edges: str, options: list[str]) -> MirrorDesign:
+def made(edges: str, *options: str) -> MirrorDesign:
     return mirror_design(f"shell.edges={edges}", "shell.negative=true", *options)
 
 
 @EVERY_BODY
 @pytest.mark.parametrize("options", [*OPTIONS, *MORE], ids=str)
 def test_mesh_is_closed_and_oriented(body: str, edges: str, options: list[str]) -> None:
-    mesh = MESH_OF[body](made(edges, options))
+    mesh = MESH_OF[body](made(edges, *options))
     every = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
     assert every.is_watertight
     assert every.is_winding_consistent
@@ -53,7 +53,7 @@ def test_solid_is_valid_and_has_the_volume_of_its_mesh(
 ) -> None:
     """The mesh is built without the kernel: two ways to one volume."""
     fine = ["structure_error_mm=0.002", "chord_error_mm=0.001"]
-    mirrors = made(edges, [*options, *fine])
+    mirrors = made(edges, *options, *fine)
     expected = pytest.approx(MESH_OF[body](mirrors).volume, rel=VOLUME_ERROR[body])
     for array in mirrors.arrays:
         solid = SOLID_OF[body](mirrors, array)
@@ -67,7 +67,7 @@ def test_properties_are_those_that_the_kernel_integrates(
     body: str, edges: str, options: list[str]
 ) -> None:
     """The slow way is the oracle."""
-    mirrors = made(edges, options)
+    mirrors = made(edges, *options)
     for array in mirrors.arrays:
         solid = SOLID_OF[body](mirrors, array)
         fast = shell_properties(solid, array, negative=body == "mandrel")

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from tbcad.cad.kernel.checks import properties
-from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.core.spec.load import spec_dict
+from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_solid
-from tests.exported_files import read_csv
+from tbcad.shell.files import camera_solid, design_mandrel
+from tests.exported_files import contents, read_csv
 from tests.helpers import check_step, read_mesh, read_step
 from tests.mirror_arrays import mirror_design
 from tests.shell.test_bodies import MESH_OF, SOLID_OF
 
+NEGATIVES = {f"mandrel_{camera}.{kind}" for camera in "ab" for kind in ("step", "stl", "3mf")}
 BODIES = pytest.mark.parametrize("body", SOLID_OF)
 
 
@@ -123,3 +124,39 @@ def test_pcurves_on_request(tmp_path: Path) -> None:
         folder.mkdir()
         write_export(mirror_design("n=2", f"step.pcurves={pcurves}"), folder, [SHELL])
         assert ("PCURVE" in (folder / "shell_a.step").read_text()) == (pcurves == "true")
+
+
+def test_negatives_are_in_manifest_and_record(exported: Path, mirrors: MirrorDesign) -> None:
+    manifest = json.loads((exported / "manifest.json").read_text(encoding="utf-8"))
+    assert set(manifest["files"]) >= NEGATIVES
+    record = json.loads((exported / "design.json").read_text(encoding="utf-8"))
+    draft = design_mandrel(mirrors).draft
+    assert [one["name"] for one in record["mandrels"]] == ["mandrel_a", "mandrel_b"]
+    for one, side in zip(record["mandrels"], (1, -1), strict=True):
+        assert one["pull"] == pytest.approx(draft.pull * [side, 1, 1])
+        assert one["draft_deg"] == pytest.approx(np.degrees(draft.angle), abs=1e-6)
+        assert one["draft_deg"] > 15
+
+
+def test_without_negatives_an_export_is_as_it_was(exported: Path, tmp_path: Path) -> None:
+    """All other files have the same bytes, and the record names no mandrels."""
+    write_export(mirror_design("n=4"), tmp_path, [SHELL])
+    plain, full = contents(tmp_path), contents(exported)
+    assert {*full} - {*plain} == NEGATIVES
+    changed = {name for name in plain if plain[name] != full[name]}
+    assert changed == {"design.json", "manifest.json"}
+    assert "mandrels" not in json.loads(plain["design.json"])
+
+
+def test_same_spec_same_bytes(exported: Path, tmp_path: Path) -> None:
+    """Of shells, too; of a mandrel that can be drawn nothing is told."""
+    again = design(load_spec(None, ["n=4", "shell.negative=true"]))
+    assert write_export(again, tmp_path, [SHELL]).note == ""
+    assert contents(tmp_path) == contents(exported)
+
+
+def test_a_mandrel_that_cannot_be_drawn_is_told_with_what_helps(tmp_path: Path) -> None:
+    made = mirror_design("n=4", "shell.negative=true", "shell.edges=pedestal")
+    note = write_export(made, tmp_path, [SHELL]).note
+    assert "undercut by up to 30 degrees" in note
+    assert "shell.edges to valley" in note

@@ -12,13 +12,9 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.shell.files import design_mandrel, mandrel_solid
 from tbcad.shell.mandrel import best_pull, distances, draft_of
 from tests.helpers import bounds
-from tests.mirror_arrays import mirror_design
+from tests.shell.test_bodies import made
 
 EDGES = ["valley", "pedestal"]
-
-
-def made(edges: str, *options: str) -> MirrorDesign:
-    return mirror_design(f"shell.edges={edges}", "shell.negative=true", *options)
 
 
 @pytest.mark.parametrize("edges", EDGES)
@@ -69,10 +65,8 @@ def test_distances_are_those_of_spheres_and_planes() -> None:
 
 
 class TestPull:
-    def test_of_a_corner_is_its_diagonal(self) -> None:
+    def test_of_a_corner_is_its_diagonal_and_of_a_cone_its_axis(self) -> None:
         assert best_pull(np.eye(3)) == pytest.approx(np.full(3, 3**-0.5), abs=1e-12)
-
-    def test_of_a_cone_is_its_axis(self) -> None:
         angle = np.linspace(0, 2 * np.pi, 40)
         normals = np.column_stack([np.cos(angle), np.sin(angle), np.full(40, 0.2)])
         assert best_pull(unit(normals)) == pytest.approx([0, 0, 1], abs=1e-9)

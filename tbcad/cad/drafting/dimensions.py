@@ -1,7 +1,7 @@
 """Dimensions, leaders, centre lines and labels on paper (ISO 129-1); all lengths in mm."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -34,22 +34,21 @@ LEAST_MM = 1e-9  # lines across x or y are taken for as much oblique
 
 def across(start: Point, end: Point, level: float, size: str, form: str = "<>") -> Dimension:
     """A horizontal dimension between two points, its line at a level; <> stands for the size."""
-    return _length(start, end, lambda point: (point[0], level), 0.0, size, form)
+    return _length(start, end, ((start[0], level), (end[0], level)), 0.0, size, form)
 
 
 def upward(start: Point, end: Point, level: float, size: str, form: str = "<>") -> Dimension:
     """A vertical dimension between two points, its line at a level; <> stands for the size."""
-    return _length(start, end, lambda point: (level, point[1]), 90.0, size, form)
+    return _length(start, end, ((level, start[1]), (level, end[1])), 90.0, size, form)
 
 
 def _length(
-    start: Point, end: Point, at: Callable[[Point], Point], turn: float, size: str, form: str
+    start: Point, end: Point, line: tuple[Point, Point], turn: float, size: str, form: str
 ) -> Dimension:
-    """A dimension between two points, each with its place on the line."""
-    feet = [_extended(point, at(point)) for point in (start, end)]
-    measured = _measured(at(start), at(end), form.replace("<>", size), turn)
+    feet = _extended(start, line[0]), _extended(end, line[1])
+    measured = _measured(*line, form.replace("<>", size), turn)
     kind, layer, drawn = Measured.LENGTH, Layer.DIMENSIONS, (*feet, *measured)
-    return Dimension(layer, kind, start, end, at(end), turn, size, form, drawn)
+    return Dimension(layer, kind, start, end, line[1], turn, size, form, drawn)
 
 
 def _extended(point: Point, line: Point) -> Line:
@@ -80,10 +79,8 @@ def _measured(start: Point, end: Point, text: str, turn: float) -> Iterator[Simp
 def _beyond(point: Point, other: Point, sign: int = 1) -> Point:
     """A place an arrow and a half beyond a point, seen from another; or as much before it."""
     share = sign * 1.5 * ARROW_MM / math.dist(point, other)
-    return (
-        point[0] + share * (point[0] - other[0]),
-        point[1] + share * (point[1] - other[1]),
-    )
+    (x, y), (from_x, from_y) = point, other
+    return x + share * (x - from_x), y + share * (y - from_y)
 
 
 def arrow(tip: Point, tail: Point) -> Polyline:
@@ -92,12 +89,8 @@ def arrow(tip: Point, tail: Point) -> Polyline:
     x, y = (tail[0] - tip[0]) / length, (tail[1] - tip[1]) / length
     half = ARROW_WIDTH_MM / 2
     foot = tip[0] + ARROW_MM * x, tip[1] + ARROW_MM * y
-    corners = (
-        tip,
-        (foot[0] - half * y, foot[1] + half * x),
-        (foot[0] + half * y, foot[1] - half * x),
-    )
-    return Polyline(Layer.DIMENSIONS, corners)
+    sides = (foot[0] - half * y, foot[1] + half * x), (foot[0] + half * y, foot[1] - half * x)
+    return Polyline(Layer.DIMENSIONS, (tip, *sides))
 
 
 def leader(tip: Point, corner: Point, text: str) -> Iterator[Simple]:

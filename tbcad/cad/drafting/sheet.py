@@ -64,6 +64,27 @@ class Sheet:
     entities: tuple[Entity, ...]  # on paper, mm
     to_scale: bool = True  # whether anything is
 
+    @classmethod
+    def framed(
+        cls,
+        names: tuple[str, str],
+        block: TitleBlock,
+        paper: Point,
+        scale: float | None,
+        origin: Point,
+        drawn: Iterable[Entity],
+        words: Sequence[str] = (),
+    ) -> "Sheet":
+        """A sheet with its frame and words beside the title; names are of its files and part.
+
+        Without a scale nothing is to scale.
+        """
+        beside = notes_beside_title(paper, words) if words else ()
+        entities = (*sheet_frame(paper, scale, block), *drawn, *beside)
+        name, part = names
+        on_paper = paper, scale or 1.0, origin, entities, scale is not None
+        return cls(name, block.title, part, *on_paper)
+
     def full_size(self) -> list[Entity]:
         """All entities with the part at full size and its origin at (0, 0)."""
         return [moved(entity, self.origin, 1 / self.scale) for entity in self.entities]
@@ -74,10 +95,10 @@ class Sheet:
         write_dxf(folder / f"{self.name}.dxf", self.full_size())
 
 
-def choose_scale(size: Point, room: Point) -> float:
-    """The largest scale at which a size (mm) fits into a room on paper (mm)."""
-    fitting = (one for one in SCALES if size[0] * one <= room[0] and size[1] * one <= room[1])
-    return next(fitting, SCALES[-1])
+def choose_scale(size: Point, room: Point, scales: Sequence[float] = SCALES) -> float:
+    """The first, largest scale at which a size (mm) fits into a room on paper (mm), or the last."""
+    fitting = (one for one in scales if size[0] * one <= room[0] and size[1] * one <= room[1])
+    return next(fitting, scales[-1])
 
 
 def scale_text(scale: float) -> str:
@@ -95,20 +116,15 @@ def drawing_room(paper: Point) -> Box:
     return LEFT_MM, BORDER_MM + TITLE_MM[1], paper[0] - BORDER_MM, paper[1] - BORDER_MM
 
 
-def sheet_frame(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
-    """Border and title block; without a scale nothing is to scale."""
-    yield rectangle((LEFT_MM, BORDER_MM, paper[0] - BORDER_MM, paper[1] - BORDER_MM), Layer.FRAME)
-    yield from title_block(paper, scale, block)
-
-
 def rectangle(box: Box, layer: Layer) -> Polyline:
     """The outline of a box."""
     left, low, right, high = box
     return Polyline(layer, ((left, low), (right, low), (right, high), (left, high)))
 
 
-def title_block(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
-    """The title block in the lower right corner; without a scale nothing is to scale."""
+def sheet_frame(paper: Point, scale: float | None, block: TitleBlock) -> Iterator[Entity]:
+    """Border, and title block in the lower right corner; without a scale nothing is to scale."""
+    yield rectangle((LEFT_MM, BORDER_MM, paper[0] - BORDER_MM, paper[1] - BORDER_MM), Layer.FRAME)
     shown = f"{scale_text(scale)} on {paper_name(paper)}" if scale else "not to scale"
     seen = ("Single view", block.view) if block.view else ("Projection", FIRST_ANGLE)
     rows = (

@@ -1,53 +1,35 @@
-"""Named, coloured solids in groups, as prototype.step (one tree) and prototype.glb (to look at).
+"""Named, coloured solids in groups as one STEP assembly, the same bytes each time."""
 
-Both have the same bytes each time; glTF demands metres and y up.
-"""
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
 
-import numpy as np
-import trimesh
 from OCP.BRep import BRep_Builder
-from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
-from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+from OCP.STEPControl import STEPControl_Writer
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
-from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
-from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_Label
+from OCP.TCollection import TCollection_HAsciiString
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape, TopoDS_Solid
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
-from OCP.XSControl import XSControl_WorkSession
-from trimesh.exchange.gltf import export_glb
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
+from tbcad.cad.formats.glb import Colour, ColouredMesh
 from tbcad.cad.formats.step import (
     StepError,
+    document_writer,
     finish,
     kernel_settings,
     new_document,
+    set_name,
     write_header,
 )
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
 from tbcad.cad.kernel.solids import moved, solids
-from tbcad.common.figure_files import srgb_light
 from tbcad.types import Floats
 
-Colour: TypeAlias = tuple[float, float, float, float]
-"""Red, green, blue (sRGB) and opacity, from 0 to 1."""
-
-
 DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25  # of meshes that are only looked at
-# Rows: what metres along glTF's x, y and z are in millimetres of the frame of the shell.
-UPRIGHT = np.array([[1e-3, 0, 0, 0], [0, 0, 1e-3, 0], [0, -1e-3, 0, 0], [0, 0, 0, 1.0]])
-METAL, ROUGH = 0.1, 0.6
 
 
 @dataclass(frozen=True)
@@ -73,30 +55,13 @@ class SolidGroup:
     bodies: tuple[ColouredSolid, ...]
 
 
-@dataclass(frozen=True)
-class ColouredMesh:
-    """What is seen of one solid: name and colour as of `ColouredSolid`."""
-
-    name: str
-    mesh: Mesh
-    colour: Colour
-
-
-@dataclass(frozen=True)
-class MeshGroup:
-    """Meshes that belong together."""
-
-    name: str
-    bodies: tuple[ColouredMesh, ...]
-
-
-def mesh_groups(groups: Sequence[SolidGroup]) -> list[MeshGroup]:
+def coloured_meshes(groups: Iterable[SolidGroup]) -> list[ColouredMesh]:
     """What is seen of groups of solids, without shapes of the kernel."""
-    return [MeshGroup(group.name, tuple(map(_drawn, group.bodies))) for group in groups]
-
-
-def _drawn(body: ColouredSolid) -> ColouredMesh:
-    return ColouredMesh(body.name, body.mesh or display_mesh(body.shape), body.colour)
+    return [
+        ColouredMesh(one.name, group.name, one.mesh or display_mesh(one.shape), one.colour)
+        for group in groups
+        for one in group.bodies
+    ]
 
 
 def display_mesh(shape: TopoDS_Solid) -> Mesh:
@@ -111,12 +76,7 @@ def write_assembly(path: Path, name: str, groups: Sequence[SolidGroup]) -> None:
     The kernel writes colours in the order of addresses in memory, so they are written here.
     StepError if the kernel fails, OSError if the file cannot be written in full.
     """
-    document = _document(name, groups)
-    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
-    writer.SetColorMode(False)
-    writer.SetNameMode(True)
-    if not writer.Transfer(document, STEPControl_AsIs):
-        raise StepError(f"{path.name}: the kernel cannot translate the assembly")
+    writer = document_writer(path, _document(name, groups))
     step_writer = writer.ChangeWriter()
     _number_occurrences(step_writer)
     write_header(step_writer, name)
@@ -129,21 +89,16 @@ def _document(name: str, groups: Sequence[SolidGroup]) -> TDocStd_Document:
     document = new_document()
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     tool.SetAutoNaming_s(False)
-    top = _named(tool.NewShape(), name)
+    top = set_name(tool.NewShape(), name)
     for group in groups:
-        branch = _named(tool.NewShape(), group.name)
+        branch = set_name(tool.NewShape(), group.name)
         for body in group.bodies:
-            part = _named(tool.NewShape(), body.name)
+            part = set_name(tool.NewShape(), body.name)
             tool.SetShape(part, _compound(body.shape))
-            _named(tool.AddComponent(branch, part, TopLoc_Location()), body.name)
+            set_name(tool.AddComponent(branch, part, TopLoc_Location()), body.name)
         tool.AddComponent(top, branch, TopLoc_Location())
     tool.UpdateAssemblies()
     return document
-
-
-def _named(label: TDF_Label, name: str) -> TDF_Label:
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-    return label
 
 
 def _compound(shape: TopoDS_Shape) -> TopoDS_Compound:
@@ -206,35 +161,3 @@ def _style(first: int, item: int, colour: Colour) -> Iterator[str]:
             f"#{first + 7},{properties});"
         )
         yield f"#{first + 9}=SURFACE_STYLE_TRANSPARENT({1 - float(opaque):.6f});"
-
-
-def write_glb(path: Path, name: str, groups: Sequence[MeshGroup]) -> None:
-    """Write groups of meshes as a binary glTF 2.0 file, a node for each group and each mesh."""
-    scene = trimesh.Scene(base_frame="world")
-    scene.graph.update(name, "world", matrix=UPRIGHT)
-    for group in groups:
-        scene.graph.update(group.name, name, matrix=np.eye(4))
-        for body in group.bodies:
-            scene.add_geometry(
-                _drawn_in_glb(body),
-                node_name=body.name,
-                geom_name=body.name,
-                parent_node_name=group.name,
-            )
-    # Without normals viewers must shade each facet flat (glTF 2.0, 3.7.2.1), as it is.
-    path.write_bytes(export_glb(scene, include_normals=False))
-
-
-def _drawn_in_glb(body: ColouredMesh) -> trimesh.Trimesh:
-    drawn = trimesh.Trimesh(body.mesh.vertices, body.mesh.triangles, process=False)
-    drawn.visual = TextureVisuals(
-        material=PBRMaterial(
-            name=body.name,
-            # light, not its code (glTF 2.0, 3.9.2)
-            baseColorFactor=[*srgb_light(np.array(body.colour[:3])), body.colour[3]],
-            metallicFactor=METAL,
-            roughnessFactor=ROUGH,
-            alphaMode="BLEND" if body.colour[3] < 1 else "OPAQUE",
-        )
-    )
-    return drawn

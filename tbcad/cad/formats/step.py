@@ -5,17 +5,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
-from typing import TypeAlias
 
-import numpy as np
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
-from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
 from OCP.gp import gp_Pnt
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
 from OCP.StepBasic import StepBasic_Product
+from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_ValidationProps
 from OCP.STEPControl import (
     STEPControl_AsIs,
@@ -23,32 +20,28 @@ from OCP.STEPControl import (
     STEPControl_Reader,
     STEPControl_Writer,
 )
-from OCP.StepGeom import StepGeom_Plane, StepGeom_SphericalSurface
 from OCP.StepShape import StepShape_AdvancedFace, StepShape_ManifoldSolidBrep
 from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Solid
 from OCP.Transfer import Transfer_FinderProcess
 from OCP.XCAFApp import XCAFApp_Application
-from scipy.spatial import cKDTree
+from OCP.XSControl import XSControl_WorkSession
 
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.checks import SolidProperties, properties
 from tbcad.cad.kernel.solids import faces
 from tbcad.errors import InputError
-from tbcad.types import Floats, Ints
 
 TAIL_BYTES = 64  # of a file, in which its last mark must be
 SURFACE_CURVES = "write.surfacecurve.mode"
 _SETTINGS = RLock()
 END = b"END-ISO-10303-21;"  # of every STEP file
 TIME_STAMP = "2022-11-01T00:00:00"  # fixed: the file's bytes depend on the design alone
-Place: TypeAlias = tuple[float, ...]  # kind, location (mm) and axis of a surface
-PLANE, SPHERE = 1.0, 2.0
-OTHER: Place = (0.0,) * 7
-# Below any distance of surfaces, above what is left of a direction that is made a unit vector.
-SAME = 1e-6
+ANY_RESULT = 1  # of a translation, not the last one alone
 
 
 def incomplete(path: Path) -> OSError:
@@ -177,7 +170,24 @@ def new_document() -> TDocStd_Document:
     return document
 
 
-def finish(path: Path, writer: STEPControl_Writer, entities: Callable[[str], str]) -> None:
+def document_writer(path: Path, document: TDocStd_Document) -> STEPCAFControl_Writer:
+    """A writer that has translated a document with its names and tolerances, without colours."""
+    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
+    writer.SetDimTolMode(True)
+    writer.SetColorMode(False)
+    writer.SetNameMode(True)
+    if not writer.Transfer(document, STEPControl_AsIs):
+        raise StepError(f"{path.name}: the kernel cannot translate the solids")
+    return writer
+
+
+def set_name(label: TDF_Label, name: str) -> TDF_Label:
+    """The label of a document, named."""
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+    return label
+
+
+def finish(path: Path, writer: STEPCAFControl_Writer, entities: Callable[[str], str]) -> None:
     """Write a file, and at its end what entities are for its text; OSError if not in full."""
     if writer.Write(str(path)) != IFSelect_RetDone:
         raise incomplete(path)
@@ -198,63 +208,21 @@ def write_header(writer: STEPControl_Writer, name: str) -> None:
 
 @kernel_settings()
 def read_named_solid(path: Path) -> Solid:
-    """Read a file of one solid; InputError if it cannot be read, or is not one."""
-    reader = STEPControl_Reader()
-    if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() != 1:
-        raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")
-    shape = reader.OneShape()
-    named, found = _face_entities(reader), faces(shape)
-    if shape.ShapeType() != TopAbs_ShapeEnum.TopAbs_SOLID or len(found) != len(named):
-        raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")
-    ordered = _as_in_file(
-        np.array([_of_entity(one) for one in named]), np.array([_of_face(one) for one in found])
-    )
-    names = (one.Name().ToCString() for one in named)
-    pairs = tuple((name, found[k]) for name, k in zip(names, ordered.tolist(), strict=True))
-    return Solid(path.stem, TopoDS.Solid_s(shape), pairs)
+    """Read a file of one solid; InputError if it cannot be read, or is not one.
 
-
-def _face_entities(reader: STEPControl_Reader) -> list[StepShape_AdvancedFace]:
-    model = reader.WS().Model()
-    entities = (model.Value(k) for k in range(1, model.NbEntities() + 1))
-    return [one for one in entities if isinstance(one, StepShape_AdvancedFace)]
-
-
-def _as_in_file(file: Floats, shape: Floats) -> Ints:
-    """Which of a shape's faces each face of the file is, by their places (f, 7) each.
-
-    The kernel lets each face touch one before it: where the file does not, it changes the order.
-    Those on one surface keep theirs.
+    Faces are in the order of the file, which the kernel changes where neighbours do not touch.
     """
-    tree = cKDTree(file)
-    same = np.array([np.min(near) for near in tree.query_ball_point(file, SAME)])
-    apart, nearest = map(np.asarray, tree.query(shape))
-    found = same[nearest]
-    if apart.max() > SAME or not np.array_equal(np.sort(found), np.sort(same)):
-        raise StepError("the kernel reads other surfaces than the file has")
-    order = np.empty(len(file), dtype=np.int64)
-    order[np.argsort(same, kind="stable")] = np.argsort(found, kind="stable")
-    return order
-
-
-def _of_entity(face: StepShape_AdvancedFace) -> Place:
-    """Kind, location and axis of a plane or sphere; of others nothing."""
-    surface = face.FaceGeometry()
-    if not isinstance(surface, StepGeom_Plane | StepGeom_SphericalSurface):
-        return OTHER
-    at, axis = surface.Position().Location(), surface.Position().Axis()
-    location = (at.CoordinatesValue(k) for k in (1, 2, 3))
-    kind = PLANE if isinstance(surface, StepGeom_Plane) else SPHERE
-    return (kind, *location, *(axis.DirectionRatiosValue(k) for k in (1, 2, 3)))
-
-
-def _of_face(face: TopoDS_Face) -> Place:
-    """The same of the kernel's face."""
-    surface = BRepAdaptor_Surface(face)
-    if surface.GetType() == GeomAbs_Plane:
-        kind, at = PLANE, surface.Plane().Position()
-    elif surface.GetType() == GeomAbs_Sphere:
-        kind, at = SPHERE, surface.Sphere().Position()
-    else:
-        return OTHER
-    return (kind, *at.Location().Coord(), *at.Direction().Coord())
+    reader = STEPControl_Reader()
+    read = reader.ReadFile(str(path)) == IFSelect_RetDone and reader.TransferRoots() == 1
+    shape = reader.OneShape() if read else None
+    if shape is None or shape.ShapeType() != TopAbs_ShapeEnum.TopAbs_SOLID:
+        raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")
+    model, entity_of = reader.WS().Model(), reader.WS().TransferReader().EntityFromShapeResult
+    entities = [model.Value(k) for k in range(1, model.NbEntities() + 1)]
+    # The same entity is the same object here, while it is kept.
+    found = {id(entity_of(face, ANY_RESULT)): face for face in faces(shape)}
+    named = [one for one in entities if isinstance(one, StepShape_AdvancedFace)]
+    if found.keys() != {id(one) for one in named}:
+        raise InputError(f"{path} is no STEP file of one solid: run tbcad build again")
+    pairs = tuple((one.Name().ToCString(), found[id(one)]) for one in named)
+    return Solid(path.stem, TopoDS.Solid_s(shape), pairs)

@@ -14,11 +14,9 @@ from typing import TypeAlias
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
+from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.STEPConstruct import STEPConstruct
-from OCP.STEPControl import STEPControl_AsIs
-from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
-from OCP.TDataStd import TDataStd_Name
+from OCP.TCollection import TCollection_HAsciiString
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopoDS import TopoDS
@@ -37,9 +35,16 @@ from OCP.XCAFDoc import (
     XCAFDoc_GeomTolerance,
     XCAFDoc_ShapeTool,
 )
-from OCP.XSControl import XSControl_WorkSession
 
-from tbcad.cad.formats.step import StepError, finish, kernel_settings, new_document, write_header
+from tbcad.cad.formats.step import (
+    StepError,
+    document_writer,
+    finish,
+    kernel_settings,
+    new_document,
+    set_name,
+    write_header,
+)
 from tbcad.cad.kernel.brep import Solid
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -68,12 +73,7 @@ def write_tolerances(path: Path, solid: Solid, given: FaceTolerances) -> None:
 
     StepError if the kernel fails, OSError if the file cannot be written in full.
     """
-    writer = STEPCAFControl_Writer(XSControl_WorkSession(), False)
-    writer.SetDimTolMode(True)
-    writer.SetColorMode(False)
-    writer.SetNameMode(True)
-    if not writer.Transfer(_document(solid, given), STEPControl_AsIs):
-        raise StepError(f"{path.name}: the kernel cannot translate the solid")
+    writer = document_writer(path, _document(solid, given))
     finder = writer.ChangeWriter().WS().TransferWriter().FinderProcess()
     for name, face in solid.faces:
         STEPConstruct.FindEntity_s(finder, face).SetName(TCollection_HAsciiString(name))
@@ -85,8 +85,7 @@ def _document(solid: Solid, given: FaceTolerances) -> TDocStd_Document:
     document = new_document()
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     tool = XCAFDoc_DocumentTool.DimTolTool_s(document.Main())
-    part = shapes.AddShape(solid.shape, False)
-    TDataStd_Name.Set_s(part, TCollection_ExtendedString(solid.name))
+    part = set_name(shapes.AddShape(solid.shape, False), solid.name)
     label = {name: shapes.AddSubShape(part, face) for name, face in solid.faces}
     ordered = enumerate(given.datums.items(), 1)
     datums = [_datum(tool, name, label[face], k) for k, (name, face) in ordered]

@@ -1,6 +1,7 @@
 """Numbers in relief, made of squares: no font, so the same shape on every computer."""
 
 import numpy as np
+from manifold3d import CrossSection, OpType
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
@@ -29,6 +30,7 @@ SIGNS = {
     ".": (" ", " ", " ", " ", "#"),
 }
 GAP = 1  # squares between signs
+STRAIGHT = 0.1  # corners less off the line of their neighbours than this are none
 
 
 def text_width(text: str) -> int:
@@ -81,40 +83,15 @@ def _area(points: Floats) -> float:
 
 def loops(rows: tuple[str, ...]) -> list[list[Corner]]:
     """Corners of the outlines of a sign's squares: the outer to the left, holes to the right."""
-    sides, outlines = _border(rows), []
-    while sides:
-        start = corner = min(sides)
-        loop = []
-        while corner in sides:
-            loop.append(corner)
-            corner = sides.pop(corner)
-        assert corner == start
-        outlines.append(_corners(loop))
-    return outlines
-
-
-def _border(rows: tuple[str, ...]) -> dict[Corner, Corner]:
-    """Sides of squares that no other square shares, each from its start to its end."""
-    filled = {
-        (x, ROWS - 1 - y) for y, row in enumerate(rows) for x, sign in enumerate(row) if sign == "#"
-    }
-    border: dict[Corner, Corner] = {}
-    for x, y in sorted(filled):
-        sides = {
-            (x, y - 1): ((x, y), (x + 1, y)),
-            (x + 1, y): ((x + 1, y), (x + 1, y + 1)),
-            (x, y + 1): ((x + 1, y + 1), (x, y + 1)),
-            (x - 1, y): ((x, y + 1), (x, y)),
-        }
-        border |= {start: end for other, (start, end) in sides.items() if other not in filled}
-    return border
-
-
-def _corners(loop: list[Corner]) -> list[Corner]:
-    """A loop without the points at which it goes straight on."""
-    turns = []
-    for k, (x, y) in enumerate(loop):
-        before, after = loop[k - 1], loop[(k + 1) % len(loop)]
-        if (x - before[0], y - before[1]) != (after[0] - x, after[1] - y):
-            turns.append((x, y))
-    return turns
+    squares = [
+        CrossSection.square((1, 1)).translate((x, ROWS - 1 - y))
+        for y, row in enumerate(rows)
+        for x, sign in enumerate(row)
+        if sign == "#"
+    ]
+    found = []
+    for outline in CrossSection.batch_boolean(squares, OpType.Add).simplify(STRAIGHT).to_polygons():
+        corners = [(round(x), round(y)) for x, y in outline.tolist()]
+        first = corners.index(min(corners))
+        found.append(corners[first:] + corners[:first])
+    return sorted(found)

@@ -22,7 +22,7 @@ from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from tbcad.cad.formats.assembly import UPRIGHT
+from tbcad.cad.formats.glb import UPRIGHT
 from tbcad.common.figure_files import srgb_light
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.field import Field

@@ -8,16 +8,15 @@ import numpy as np
 from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.formats.assembly import (
-    Colour,
     ColouredSolid,
     SolidGroup,
+    coloured_meshes,
     display_mesh,
-    mesh_groups,
     write_assembly,
-    write_glb,
 )
 from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.formats.dxf import write_dxf
+from tbcad.cad.formats.glb import Colour, write_glb
 from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
@@ -91,7 +90,7 @@ def export_prototype(
         submit(cap_sheet(title, built.base, built.layout, one).write, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
-    submit(write_glb, folder / GLB, "prototype", mesh_groups(groups))
+    submit(write_glb, folder / GLB, "prototype", coloured_meshes(groups))
     write_assembly(folder / STEP, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)

@@ -1,13 +1,13 @@
 """What the 3D view shows: the shells, drawn from the record, and the bodies of prototype.glb."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from tbcad.cad.formats.glb import ColouredMesh, read_glb
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.common.figure_files import shown_colour
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
@@ -31,8 +31,6 @@ STEPS = 65_535  # of positions along a body's longest side
 # against their direction, shells apart by this share of their width.
 APART, LIFTED, FASTENER_MM, SHELLS_APART = 0.7, 1.5, 30.0, 0.6
 STATIC = ("stage", "frame", "bought", "shroud")
-# From glTF's metres and y up to millimetres and z up.
-SHELL_FRAME = 1e3 * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 SHELL_COLOUR = (0.80, 0.80, 0.80, 1.0)
 
 
@@ -129,28 +127,19 @@ def packed_outlines(facets: Facets, arrays: PackedArrays) -> Record:
     }
 
 
-def axis(pinhole: Floats) -> list[float]:
-    """Unit vector of the axis that the base turns about."""
-    return [float(value) for value in pinhole / np.linalg.norm(pinhole)]
-
-
-def camera_distance(export: ExportedDesign) -> float:
-    """Distance of every virtual camera from the object, mm."""
-    pinhole = export.reflectors[0].camera.pinhole
-    return Ellipsoid(pinhole, export.spec.optics.semi_minor_mm).camera_distance
-
-
 def prototype_bodies(folder: Path) -> Iterator[Body]:
     """All bodies of prototype.glb, in millimetres and z up."""
     record = Prototype.read(folder / NAME)
-    drawn = list(_drawn(folder / record.assembly.glb))
+    drawn = read_glb(folder / record.assembly.glb)
     turning = {part.name for part in record.with_role("base", "cap")}
     turning |= {f"ball_{seat.ball}" for seat in record.seats}
     turning |= {one.name for one in record.bought if one.turns}
     turning |= {one.name for one in record.fasteners if one.turns}
     apart = _apart(record, drawn)
-    for name, group, points, faces, colour in drawn:
-        yield Body(name, group, points, faces, colour, apart[name], name in turning)
+    for one in drawn:
+        mesh, turns = one.mesh, one.name in turning
+        points, faces = mesh.vertices, mesh.triangles
+        yield Body(one.name, one.group, points, faces, one.colour, apart[one.name], turns)
 
 
 def _coarse(spec: Spec) -> Spec:
@@ -161,33 +150,18 @@ def _short(vector: Floats) -> list[float]:
     return [round(float(value), 4) + 0.0 for value in vector]
 
 
-def _drawn(
-    file: Path,
-) -> Iterator[tuple[str, str, Floats, Ints, tuple[float, ...]]]:
-    """Name, group, vertices, triangles and colour of each body of an assembly."""
-    import trimesh
-
-    scene = trimesh.load_scene(file)
-    for name in sorted(scene.graph.nodes_geometry):
-        place, geometry = scene.graph[name]
-        mesh = scene.geometry[geometry]
-        points = trimesh.transform_points(mesh.vertices, place) @ SHELL_FRAME
-        colour = shown_colour(mesh.visual.material.baseColorFactor)
-        group = str(scene.graph.transforms.parents[name])
-        yield name, group, np.asarray(points), np.asarray(mesh.faces), colour
-
-
-def _apart(record: Prototype, drawn: list[Any]) -> Mapping[str, Floats]:
+def _apart(record: Prototype, drawn: Sequence[ColouredMesh]) -> Mapping[str, Floats]:
     """By how much each body is moved in the exploded view, mm, (3,)."""
     radius = record.target_mm / 2
     seats = {f"ball_{seat.ball}": np.array(seat.axis) for seat in record.seats}
     seats |= {part.name: seats[f"ball_{part.ball}"] for part in record.with_role("cap")}
     moved = {}
-    for name, group, points, *_ in drawn:
+    for one in drawn:
+        points = one.mesh.vertices
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        away = APART * middle if group in STATIC else np.zeros(3)
-        moved[name] = away - LIFTED * radius * seats.get(name, np.zeros(3))
-    for one in record.fasteners:
-        held = moved.get(one.through[0] if one.through else "", np.zeros(3))
-        moved[one.name] = held - FASTENER_MM * np.array(one.along)
+        away = APART * middle if one.group in STATIC else np.zeros(3)
+        moved[one.name] = away - LIFTED * radius * seats.get(one.name, np.zeros(3))
+    for screw in record.fasteners:
+        held = moved.get(screw.through[0] if screw.through else "", np.zeros(3))
+        moved[screw.name] = held - FASTENER_MM * np.array(screw.along)
     return moved

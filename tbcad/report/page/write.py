@@ -13,15 +13,16 @@ from tbcad_verify.report.as_made import AsMade
 from tbcad.cad.formats.checked_files import Row
 from tbcad.common.atomic_files import replace_files
 from tbcad.common.web_page import web_page
+from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.output.manifest import (
     MANIFEST,
     REPORT,
     REPORT_BEGIN,
-    is_listed,
     is_report,
     read_manifest,
+    written_file,
 )
 from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom import PartsList, read_parts_list
@@ -147,15 +148,8 @@ def _checked_manifest(folder: Path) -> Manifest:
     manifest = read_manifest(folder)
     if manifest is None:
         raise InputError(f"{folder / MANIFEST} is not there: {MISSING}")
-    prototype = PROTOTYPE if PROTOTYPE[0] in manifest.files else ()
-    for name in (*RECORDS, *prototype):
-        if not (folder / name).is_file():
-            raise InputError(f"{folder / name} is not there: {MISSING}")
-        if not is_listed(folder / name, manifest.files.get(name)):
-            raise InputError(
-                f"{folder / name} is not as tbcad wrote it (cut off, or changed since): build the "
-                "export again"
-            )
+    for name in (*RECORDS, *(PROTOTYPE if PROTOTYPE[0] in manifest.files else ())):
+        written_file(folder, manifest, name, MISSING)
     return manifest
 
 
@@ -174,11 +168,12 @@ def _data(
     drawn = bodies.packed_shells(export, facets, arrays) if shells else []
     if PROTOTYPE[0] in manifest.files:
         drawn += [bodies.packed_body(one, arrays) for one in bodies.prototype_bodies(folder)]
-    a = export.reflectors[0]
+    pinhole = export.reflectors[0].camera.pinhole
+    ellipsoid = Ellipsoid(pinhole, export.spec.optics.semi_minor_mm)
     record = {
         "target": export.capture_mm,
-        "axis": bodies.axis(a.camera.pinhole),
-        "distance": bodies.camera_distance(export),
+        "axis": ellipsoid.axis.tolist(),
+        "distance": ellipsoid.camera_distance,
         "cameras": [
             {"id": one.camera_id, "pinhole": one.camera.pinhole.tolist()}
             for one in export.reflectors

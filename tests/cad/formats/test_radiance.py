@@ -67,16 +67,13 @@ def test_exposures_and_colour_corrections_are_undone() -> None:
     assert read(ONE, b"-Y 1 +X 1", lines)[0, 0] == pytest.approx(np.array([1, 1 / 2, 1 / 4]) / 8)
 
 
-def test_xyz_becomes_red_green_and_blue() -> None:
+def test_xyz_becomes_red_green_and_blue_and_primaries_of_rec_709_pass() -> None:
     """Y of Radiance's green is 0.670 (its color.h: CIE_gf); equal X, Y, Z are white."""
     data = file(ONE + bytes([0, 128, 0, 129]), b"-Y 1 +X 2").replace(b"rgbe", b"xyze")
     white, only_y = hdr_picture(data, "light.hdr")[0]
     assert white == pytest.approx([1, 1, 1])
     assert only_y[1] > 1
     assert only_y[[0, 2]] == pytest.approx([0, 0])  # negative, which no light is
-
-
-def test_primaries_of_rec_709_pass() -> None:
     lines = b"PRIMARIES=0.640 0.330 0.300 0.600 0.150 0.060 0.3127 0.3290\n"
     assert read(ONE, b"-Y 1 +X 1", lines)[0, 0] == pytest.approx([1, 1, 1])
 

@@ -39,35 +39,33 @@ def at(along: float, out: float) -> np.ndarray:
     return np.array([[along, out]])
 
 
-@pytest.mark.parametrize("margin", [0.0, 4.0])
-def test_two_balls_of_one_height_touch_at_the_chord(margin: float) -> None:
-    """Closed form: 2 * 80 * sin(angle / 2) = 15 + 9 and the margin."""
-    balls = spheres(at(-20, 80), np.array([15.0])).grown(margin)
-    angle = contact_angle(at(-20, 80), np.array([9.0]), balls)[0, 0]
-    assert angle == pytest.approx(2 * np.arcsin((24 + margin) / 160), rel=1e-12)
+def cone(start: np.ndarray, end: np.ndarray, first: float, last: float) -> RoundCones:
+    return RoundCones(start, end, np.array([first]), np.array([last]))
 
 
-def test_balls_far_apart_along_the_axis_never_meet() -> None:
-    assert contact_angle(at(30, 80), np.array([9.0]), spheres(at(-20, 80), np.array([15.0]))) == 0
+BALL, ROD = spheres(at(-20, 80), np.array([15.0])), cone(at(20, 0), at(-20, 0), 1.0, 1.0)
 
 
-def test_ball_over_the_axis_is_always_met() -> None:
-    cone = RoundCones(at(0, 0), at(0, 50), np.array([5.0]), np.array([1.0]))
-    assert contact_angle(at(0, 4), np.array([2.0]), cone)[0, 0] == np.pi
-
-
-def test_rod_on_the_axis_is_met_between_its_ends() -> None:
-    """Neither end is within reach of the ball, the middle is at every angle."""
-    rod = RoundCones(at(20, 0), at(-20, 0), np.array([1.0]), np.array([1.0]))
-    assert contact_angle(at(0, 1.9), np.array([1.0]), rod)[0, 0] == np.pi
-    assert contact_angle(at(0, 2.1), np.array([1.0]), rod)[0, 0] == 0
-
-
-def test_capsule_across_the_orbit_is_met_at_the_tangent() -> None:
-    """A ray out from the axis at the ball's height: sin(angle) * out = sum of radii."""
-    cone = RoundCones(at(0, 0), at(0, 1000), np.array([3.0]), np.array([3.0]))
-    angle = contact_angle(at(0, 100), np.array([7.0]), cone)[0, 0]
-    assert angle == pytest.approx(np.arcsin(10 / 100), rel=1e-9)
+@pytest.mark.parametrize(
+    ("cones", "place", "radius", "expected"),
+    [
+        # Two balls of one height touch at the chord: 2 * 80 * sin(angle / 2) = 15 + 9 and a margin.
+        (BALL, at(-20, 80), 9.0, 2 * np.arcsin(24 / 160)),
+        (BALL.grown(4.0), at(-20, 80), 9.0, 2 * np.arcsin(28 / 160)),
+        (BALL, at(30, 80), 9.0, 0.0),  # far apart along the axis
+        (cone(at(0, 0), at(0, 50), 5.0, 1.0), at(0, 4), 2.0, np.pi),  # over the axis
+        # Neither end of a rod on the axis is within reach of the ball, the middle is or is not.
+        (ROD, at(0, 1.9), 1.0, np.pi),
+        (ROD, at(0, 2.1), 1.0, 0.0),
+        # A ray out from the axis at the ball's height: sin(angle) * out = sum of radii.
+        (cone(at(0, 0), at(0, 1000), 3.0, 3.0), at(0, 100), 7.0, np.arcsin(10 / 100)),
+    ],
+)
+def test_angles_of_contact(
+    cones: RoundCones, place: np.ndarray, radius: float, expected: float
+) -> None:
+    found = contact_angle(place, np.array([radius]), cones)[0, 0]
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
 @settings(max_examples=100)
@@ -76,10 +74,9 @@ def test_against_many_spheres(
     start: tuple[float, ...], end: tuple[float, ...], ball: tuple[float, ...]
 ) -> None:
     """The hull as a row of 1001 spheres, the ball at 361 angles."""
-    ends = (np.array([point[:2]]) for point in (start, end))
-    cone = RoundCones(*ends, np.array([start[2]]), np.array([end[2]]))
+    hull = cone(at(*start[:2]), at(*end[:2]), start[2], end[2])
     height, distance, size = ball
-    angle = contact_angle(at(height, distance), np.array([size]), cone)[0, 0]
+    angle = contact_angle(at(height, distance), np.array([size]), hull)[0, 0]
     share = np.linspace(0, 1, 1001)[:, None]
     along, out, radius = (p + share * (q - p) for p, q in zip(start, end, strict=True))
     rotation = np.linspace(0, np.pi, 361)
@@ -139,9 +136,6 @@ def test_volume_of_convex_bodies(body: Primitive, rounding: float) -> None:
 def test_rotations_about_axes_against_quaternions() -> None:
     expected = Rotation.from_rotvec(ANGLES[:, None] * AXES).apply(VECTORS)
     assert rotated(VECTORS, AXES, ANGLES) == pytest.approx(expected, abs=1e-14)
-
-
-def test_rotation_about_the_first_axis() -> None:
     turned = rotated_about_x(VECTORS, ANGLES)
     x = np.array([1.0, 0.0, 0.0])
     assert turned == pytest.approx(rotated(VECTORS, x, ANGLES), abs=1e-14)

@@ -55,30 +55,19 @@ def test_no_small_tilt_does_better(paper_array: MirrorArray) -> None:
             assert other.fill(corners) >= best - 1e-9
 
 
-@pytest.fixture
-def points() -> np.ndarray:
+def test_a_camera_projects_as_opencv_and_back_and_as_designed() -> None:
     rng = np.random.default_rng(3)
     pixels = rng.uniform([0, 0], [1279, 959], size=(200, 2))
     distance = rng.uniform(50, 400, size=(200, 1))
-    return CAMERA.pinhole + distance * CAMERA.directions(pixels)
-
-
-def test_as_opencv_projects(points: np.ndarray) -> None:
+    points = CAMERA.pinhole + distance * CAMERA.directions(pixels)
     matrix = np.array([[1000.0, 0, 630], [0, 1010, 480], [0, 0, 1]])
     turn, _ = cv2.Rodrigues(CAMERA.axes)
     shift = -CAMERA.axes @ CAMERA.pinhole
     expected, _ = cv2.projectPoints(points, turn, shift, matrix, CAMERA.distortion)
     assert CAMERA.project(points) == pytest.approx(expected[:, 0], abs=1e-8)
-
-
-def test_directions_undo_the_projection(points: np.ndarray) -> None:
     along = unit(points - CAMERA.pinhole)
     assert CAMERA.directions(CAMERA.project(points)) == pytest.approx(along, abs=1e-10)
-
-
-def test_the_designed_camera_projects_alike(points: np.ndarray) -> None:
-    axes = CAMERA.axes
-    designed = Camera(CAMERA.pinhole, axes[2], axes[0], 1280, 960, 1.2)
+    designed = Camera(CAMERA.pinhole, CAMERA.axes[2], CAMERA.axes[0], 1280, 960, 1.2)
     found = without_distortion(designed).project(points)
     assert found == pytest.approx(designed.project(points), abs=1e-9)
 

@@ -99,17 +99,8 @@ def test_coverage_against_brute_force() -> None:
         assert brute_force == pytest.approx(array.coverage[i], rel=4e-3)
 
 
-@pytest.fixture(scope="module")
-def traced() -> MirrorArray:
-    return mirror_array("n=6")
-
-
-@pytest.fixture(scope="module")
-def paper() -> MirrorArray:
-    return mirror_array("n=6", "radius_rule=paper")
-
-
-def test_a_mirror_is_aimed_at_a_point_of_the_x_axis(paper: MirrorArray) -> None:
+def test_a_mirror_is_aimed_at_a_point_of_the_x_axis() -> None:
+    paper = mirror_array("n=6", "radius_rule=paper")
     wanted = np.linspace(0, 3, len(paper))
     turned = aimed(paper.mirrors, paper.ellipsoid.pinhole, wanted)
     ray = reflected_rays(paper.ellipsoid.pinhole, turned.apex, turned.normal)
@@ -119,15 +110,17 @@ def test_a_mirror_is_aimed_at_a_point_of_the_x_axis(paper: MirrorArray) -> None:
     assert (turned.normal[0] == paper.mirrors.normal[0]).all()
 
 
-def test_halves_overlap_by_the_margin(traced: MirrorArray) -> None:
+def test_halves_overlap_by_the_margin() -> None:
     """Over the object and its margin each half sees half the margin beyond x = 0, no more."""
+    traced = mirror_array("n=6")
     position = cut_positions(traced.cells, traced.ellipsoid.pinhole, 30.3)
     assert position[traced.cells.halved] == pytest.approx(-0.3, abs=1e-4)
     assert (position[~traced.cells.halved] == -np.inf).all()
     assert not seam_gaps(traced.cells, traced.ellipsoid.pinhole, 30.0).any()
 
 
-def test_a_gap_counts_against_coverage(paper: MirrorArray) -> None:
+def test_a_gap_counts_against_coverage() -> None:
+    paper = mirror_array("n=6", "radius_rule=paper")
     gap = seam_gaps(paper.cells, paper.ellipsoid.pinhole, 30.0)
     halved = paper.cells.halved
     assert not gap[~halved].any()

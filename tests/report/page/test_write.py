@@ -92,10 +92,6 @@ def test_shell_is_drawn_where_the_file_has_it(export: Path) -> None:
     assert image == {**image, "name": "shell_b", "mirrored": "shell_a"}
 
 
-def test_same_bytes_each_time(export: Path) -> None:
-    assert page(export) == page(export)
-
-
 def test_verdict_is_on_top(export: Path) -> None:
     yields = ProcessYield("diamond", 0.74, 60.1, 50), ProcessYield("<fdm>", 0.0, 42.0, 5)
     made = AsMade(50, yields)
@@ -122,8 +118,9 @@ def test_text_of_files_is_escaped(export: Path) -> None:
     assert text.count("<script") == 2
 
 
-def test_page_asks_for_nothing_outside(export: Path) -> None:
+def test_page_asks_for_nothing_outside_and_has_the_same_bytes_each_time(export: Path) -> None:
     text = page(export)
+    assert page(export) == text
     assert "default-src 'none'" in text
     assert re.findall(r"https?://[^\"'\s]*", text) == ["http://www.w3.org/2000/svg"]
     assert not re.findall(r"<(?:link|script|img|iframe)[^>]* (?:src|href)=\"(?!data:)", text)
@@ -165,22 +162,20 @@ def test_a_page_of_the_user_is_kept(export: Path, capsys: pytest.CaptureFixture[
     assert run(["report", str(export)]) == 0  # its own is replaced unasked
 
 
-@pytest.mark.parametrize("name", ["mirrors.csv", "design.json"])
-def test_an_altered_file_is_refused(export: Path, name: str) -> None:
-    (export / name).write_bytes((export / name).read_bytes() + b"\n")
-    with pytest.raises(InputError, match="is not as tbcad wrote it"):
-        page(export)
-
-
-def test_a_folder_without_manifest_is_refused(export: Path) -> None:
-    (export / "manifest.json").unlink()
-    with pytest.raises(InputError, match=r"manifest\.json is not there"):
-        page(export)
-
-
-def test_a_damaged_verdict_is_refused(export: Path) -> None:
-    (export / "verify.json").write_text('{"pass": true}')
-    with pytest.raises(InputError, match=r"verify\.json: target_mm: field required"):
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("mirrors.csv", "other", r"mirrors\.csv is not as tbcad wrote it"),
+        ("design.json", "other", r"design\.json is not as tbcad wrote it"),
+        ("manifest.json", None, r"manifest\.json is not there"),
+        ("verify.json", '{"pass": true}', r"verify\.json: target_mm: field required"),
+    ],
+)
+def test_a_damaged_export_is_refused(
+    export: Path, name: str, content: str | None, words: str
+) -> None:
+    (export / name).unlink() if content is None else (export / name).write_text(content)
+    with pytest.raises(InputError, match=words):
         page(export)
 
 

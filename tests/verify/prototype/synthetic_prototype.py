@@ -17,7 +17,7 @@ import manifold3d
 import numpy as np
 import trimesh
 
-from tbcad.cad.formats.assembly import ColouredMesh, MeshGroup, write_glb
+from tbcad.cad.formats.glb import ColouredMesh, write_glb
 from tbcad.cad.kernel.mesh import Mesh
 from tests.verify.synthetic_export import (
     PIN,
@@ -374,9 +374,9 @@ def glb(spec: SyntheticPrototype, drawn: dict[str, np.ndarray]) -> bytes:
     for name, corners in drawn.items():
         points = np.add(corners, [spec.drawn_off.get(name, 0.0), 0, 0]).reshape(-1, 3)
         mesh = Mesh(points, np.arange(len(points)).reshape(-1, 3))
-        bodies.append(ColouredMesh(name, mesh, (0.5, 0.5, 0.5, 1.0)))
+        bodies.append(ColouredMesh(name, "all", mesh, (0.5, 0.5, 0.5, 1.0)))
     with tempfile.TemporaryDirectory() as room:
-        write_glb(Path(room) / "whole.glb", "prototype", [MeshGroup("all", tuple(bodies))])
+        write_glb(Path(room) / "whole.glb", "prototype", bodies)
         return (Path(room) / "whole.glb").read_bytes()
 
 

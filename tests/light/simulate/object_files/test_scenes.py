@@ -11,7 +11,7 @@ import trimesh
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from tbcad.cad.formats.assembly import ColouredMesh, MeshGroup, write_glb
+from tbcad.cad.formats.glb import ColouredMesh, write_glb
 from tbcad.cad.formats.mesh_files import write_3mf
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.errors import InputError
@@ -64,8 +64,8 @@ def read(folder: Path, changed: dict[str, Any]) -> ObjectFile:
 def test_own_prototype_reads_back(tmp_path: Path) -> None:
     box = trimesh.creation.box((10, 20, 30))
     mesh = Mesh(np.add(box.vertices, [1, 2, 3]), np.asarray(box.faces))
-    body = ColouredMesh("box", mesh, (1.0, 0.5, 0.25, 1.0))
-    write_glb(tmp_path / "a.glb", "whole", [MeshGroup("group", [body])])
+    body = ColouredMesh("box", "group", mesh, (1.0, 0.5, 0.25, 1.0))
+    write_glb(tmp_path / "a.glb", "whole", [body])
     found = read_gltf(tmp_path / "a.glb")
     (part,) = found.parts
     assert (found.unit, found.up) == ("m", "y")

@@ -1,0 +1,121 @@
+"""PrusaSlicer on printed parts: its supports stay off the pads, coupons take an afternoon."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tbcad
+from tbcad.app.cli import run
+from tbcad.cad.formats.mesh_files import write_stl
+from tbcad.core.mirrors.array import design
+from tbcad.prototype.arrangement import arrange
+from tbcad.prototype.base.coupon import coupon_plates
+from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
+from tbcad.prototype.printed import PrintedPart, part_mesh
+
+pytestmark = [
+    *(pytest.mark.clients, pytest.mark.slow),
+    pytest.mark.skipif(not shutil.which("prusa-slicer"), reason="prusa-slicer is not installed"),
+]
+
+LIMIT_H = 4.5  # an afternoon; coupons of all sizes took 12 h, bars too thin to print 4.0
+FILAMENT_MM3 = 68.0 / 1.27e-3  # a third of the 203 g that coupons of all sizes took
+FILAMENT_MM = 1.75
+HOURS = {"d": 24.0, "h": 1.0, "m": 1 / 60, "s": 1 / 3600}
+
+SMALL = ("optics.n=4", "prototype.k=3", "mesh.structure_error_mm=0.1")
+BED_MIDDLE = 200.0
+# docs/assembly.md: layers of 0.2 mm, supports below slopes of 40 degrees, on the build plate only.
+SETTINGS = (
+    *("--nozzle-diameter", "0.4", "--skirts", "0"),
+    *("--layer-height", "0.2", "--first-layer-height", "0.2"),
+    *("--support-material", "--support-material-threshold", "40"),
+    "--support-material-buildplate-only",
+)
+CARRIER = "--bed-shape", "0x0,400x0,400x400,0x400", "--fill-density", "10%"
+COUPON = (
+    *("--bed-shape", "0x0,1000x0,1000x1000,0x1000", "--filament-diameter", str(FILAMENT_MM)),
+    *("--perimeters", "4", "--top-solid-layers", "5", "--bottom-solid-layers", "5"),
+    *("--fill-density", "25%", "--fill-pattern", "gyroid"),
+)
+NEAR_MM = (0.0, 1.0)  # in front of a pad
+BESIDE_MM = 0.3  # its edge
+STEP_MM = 0.5
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("supports") / "export"
+    options = [word for key in SMALL for word in ("--set", key)]
+    words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
+    assert run(words) == 0
+    return folder
+
+
+def sliced(file: Path, *settings: str) -> str:
+    """What PrusaSlicer makes of a mesh."""
+    home, code = file.parent / "home", file.with_suffix(".gcode")
+    words = ["prusa-slicer", "--datadir", home, "-g", *SETTINGS, *settings, "--output", code, file]
+    subprocess.run(words, check=True, capture_output=True)
+    return code.read_text(encoding="utf-8")
+
+
+def supports(code: str) -> Iterator[np.ndarray]:
+    """Points along the extruded lines of support, mm about the middle of the bed."""
+    kind, place = "", np.zeros(3)
+    for line in code.splitlines():
+        if line.startswith(";TYPE:"):
+            kind = line[6:]
+        elif line.startswith("G1 "):
+            words = dict(re.findall(r"([XYZE])(-?[\d.]+)", line))
+            before = dict(zip("XYZ", place, strict=True))
+            after = np.array([float(words.get(axis, before[axis])) for axis in "XYZ"])
+            if kind.startswith("Support") and float(words.get("E", 0)) > 0:
+                count = max(int(np.linalg.norm(after - place) / STEP_MM), 2)
+                yield np.linspace(place, after, count) - [BED_MIDDLE, BED_MIDDLE, 0.0]
+            place = after
+
+
+def test_supports_on_the_build_plate_touch_no_pad(export: Path) -> None:
+    record = json.loads((export / "prototype.json").read_text())
+    part = next(one for one in record["parts"] if one["name"] == "carrier")
+    lines = list(supports(sliced(export / "carrier.stl", *CARRIER)))
+    assert lines
+    points = np.concatenate(lines)
+    for seat in record["seats"]:
+        normals = np.array(seat["normals"]) @ part["axes"]
+        contacts = np.array(seat["contacts_mm"]) @ part["axes"] + part["origin_mm"]
+        for contact, normal in zip(contacts, normals, strict=True):
+            height = (points - contact) @ normal
+            beside = np.linalg.norm(points - contact - np.outer(height, normal), axis=1)
+            near = (height > NEAR_MM[0]) & (height < NEAR_MM[1])
+            assert not (near & (beside < seat["pad_diameter_mm"] / 2 + BESIDE_MM)).any()
+
+
+def test_the_coupons_take_an_afternoon(tmp_path: Path) -> None:
+    arranged = arrange(design(tbcad.load_spec(None)))
+    base, split, printer = arranged.base, arranged.split, arranged.spec.printer
+    pose = worst_pose(base, split, expected_downs(base, split))
+    hours = filament = 0.0
+    for plate in coupon_plates(base, printer, pose, 0.02):
+        file = tmp_path / f"{plate.name}.stl"
+        write_stl(file, part_mesh(PrintedPart(plate, "tool", "coupon")))
+        text = sliced(file, *COUPON)
+        length = re.search(r"filament used \[mm\] = ([\d.]+)", text)
+        printed = re.search(r"estimated printing time \(normal mode\) = (.*)", text)
+        assert length is not None
+        assert printed is not None
+        filament += float(length[1]) * math.pi / 4 * FILAMENT_MM**2
+        spans = re.findall(r"(\d+)([dhms])", printed[1])
+        hours += sum(int(count) * HOURS[unit] for count, unit in spans)
+    assert 1.0 < hours <= LIMIT_H
+    assert 0 < filament <= FILAMENT_MM3
