@@ -28,8 +28,11 @@ from tbcad.prototype.purchased.parts import Prices, load_parts
 
 DESIGNS = (
     ("n=6",),
-    ("n=4", "base.drive=nema17-direct", "motion.axis=A", "feed_deg_min=600", "microsteps=32"),
-    ("n=5", "base.drive=stage-60", "camera_diameter_mm=0", "trigger=pause"),
+    (
+        *("n=4", "base.drive=nema17-direct", "base.hold=glue", "light.lamp_z_mm=0"),
+        *("motion.axis=A", "feed_deg_min=600", "microsteps=32"),
+    ),
+    ("n=5", "base.drive=stage-60", "camera_diameter_mm=0", "trigger=pause", "stage.leds_mm=[]"),
 )
 # Of the roller of a switch SS-5GL2 from the line of its holes, mm (Omron): free, and when it trips.
 FREE_MM, TRIPS_MM = 19.3, 14.5
@@ -85,7 +88,12 @@ def test_each_body_and_each_line_of_the_wiring_is_bought(model: PrototypeModel) 
         del drawn[lamps.strip.name]
         metres = len(lamps.places) * lamps.strips * lamps.length / 1e3
         assert metres <= list_[lamps.strip.name] < metres + 1
+    drawn += Counter(one.part.name for one in model.fasteners)
     assert {part: list_[part] for part in drawn} == drawn
+    assert len({one.name for one in model.fasteners}) == len(model.fasteners)
+    begins = Counter(name.partition("-")[0] for name in drawn.elements())
+    assert begins["LED"] == len(model.stage.leds)
+    assert (begins["MAGNET"] > 0) == (model.spec.prototype.base.hold == "magnet")
     assert drawn[frame.upright.name] == 2
     assert list_[frame.homing.pin] == 1
     if model.shroud:
@@ -122,6 +130,9 @@ def test_wiring_of_lamps_release_switch_and_motor(model: PrototypeModel) -> None
 def test_screws_reach_into_their_threads(model: PrototypeModel) -> None:
     """By 0.6 diameters at least; in the plate by one, and not through it."""
     some = model.fasteners
+    screws = [one for one in some if one.part.kind in ("screws", "setscrews")]
+    for one in (each for each in some if each.part.kind in THREADED):
+        assert any(holds(one, screw) for screw in screws) or one.part.kind == "nuts", one.name
     for one in (each for each in some if each.part.kind == "screws"):
         thread, length, last = one.part["thread_mm"], one.part["length_mm"], one.through[-1]
         mates = [each for each in some if holds(each, one)]
@@ -231,6 +242,17 @@ def test_both_controllers_are_told_the_same_machine(model: PrototypeModel) -> No
     assert last + 0.5 <= high
     assert low < np.degrees(model.layout.stops.angle[0])
     assert np.degrees(free_base_angles(model.layout)[0]) < angles.switch
+
+
+def test_a_drive_that_yields_by_more_than_a_degree_is_at_fault() -> None:
+    found = set()
+    for drive in load_drives(load_parts()):
+        for gravity in (0.3 * drive.holds_nmm, 0.99 * drive.holds_nmm):
+            loads = drive_loads(drive, BaseTorques(gravity, gravity, gravity))
+            yields = math.degrees(loads.motor_wind_up + loads.belt_wind_up) > 1
+            assert any("yields" in fault for fault in loads.faults()) is yields
+            found.add(yields)
+    assert found == {True, False}
 
 
 @pytest.mark.parametrize(("rise_k", "warm"), [(38.0, False), (42.0, True)])
