@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tbcad.core.mirrors.array import design
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import PrototypeSpec
-from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.electronics import (
@@ -183,45 +180,3 @@ def test_every_row_of_the_list(
     assert summed["mass_g"] == pytest.approx(sum(row["total_mass_g"] for row in rows), abs=0.006)
     euro = sum(row["total_price"] or 0 for row in bought)
     assert summed["bought_price"].get("EUR", 0) == pytest.approx(euro, abs=0.006)
-
-
-@pytest.mark.slow
-@settings(SHARED, max_examples=4, phases=[Phase.generate])
-@given(
-    n=st.integers(2, 6),
-    drive=st.sampled_from(["nema17-belt", "nema17-direct", "stage-60"]),
-    hold=st.sampled_from(["magnet", "glue"]),
-    keys=st.sets(
-        st.sampled_from(["camera_diameter_mm=0", "light.lamp_z_mm=0", "stage.leds_mm=[]"])
-    ),
-)
-def test_what_is_bought_is_what_is_fastened(n: int, drive: str, hold: str, keys: set[str]) -> None:
-    options = [f"n={n}", f"base.drive={drive}", f"base.hold={hold}"]
-    options += [f"prototype.{key}" for key in keys]
-    try:
-        model = arrange(design(load_spec(None, options)))
-    except SpecError:
-        return
-    bought, drawn = model.purchased, Counter(one.part.name for one in model.fasteners)
-    assert all(bought[part] == count for part, count in drawn.items())
-    assert len({one.name for one in model.fasteners}) == len(model.fasteners)
-    begins = Counter(one.part.name.partition("-")[0] for one in model.fasteners)
-    leds = len(model.stage.leds)
-    assert begins["LED"] == leds
-    assert (begins["MAGNET"] > 0) == (model.spec.prototype.base.hold == "magnet")
-    in_plate = [one for one in model.fasteners if one.through[-1] == "plate"]
-    assert len(in_plate) == len(model.frame.holes)
-    # Every insert and T-nut has a screw of its own.
-    threads = [one for one in model.fasteners if one.part.name.startswith(("INSERT-", "TNUT-"))]
-    screws = [one for one in model.fasteners if "x" in one.part.name and one not in threads]
-    for thread in threads:
-        assert any(
-            np.linalg.norm(np.cross(screw.place - thread.place, thread.along)) < 1e-6
-            for screw in screws
-            if screw.through[-1] == thread.through[-1]
-        ), thread.name
-    lamps = model.frame.lamps
-    metres = len(lamps.places) * lamps.strips * lamps.length / 1e3 if lamps else 0.0
-    assert bought.get(lamps.strip.name if lamps else "", 0) == math.ceil(metres - 1e-9)
-    if model.shroud:
-        assert bought[model.shroud.sheet.name] == model.shroud.sheets

@@ -227,7 +227,7 @@ def tightening(machine: AssembledMachine, screw: FastenerRecord) -> tuple[str, s
         return HAND, held_by
     force = min(_head_force(machine, screw, part), _thread_force(machine, thread, held_by))
     torque = NUT_FACTOR * thread / MM_PER_M * force
-    return f"{max(STEP_NM * math.floor(torque / STEP_NM), STEP_NM):.2g} N m", held_by
+    return f"{max(STEP_NM * math.floor(torque / STEP_NM), STEP_NM):.3g} N m", held_by
 
 
 def _kinds_on_axis(machine: AssembledMachine, screw: FastenerRecord, thread: float) -> set[str]:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -197,8 +198,26 @@ def test_torques_follow_what_yields_first(tmp_path: Path) -> None:
     assert "hand tight, in the printed hole" in line
     torques = [line for step in steps for line in step.fits if "N m" in line]
     by_screw = {line.split()[2]: float(line.split(": ")[1].split()[0]) for line in torques}
-    # A bare head on plastic; in an insert; on a washer; 8.8 in steel would bear 5.5 N m.
-    assert 0 < by_screw["M3x12"] < by_screw["M3x16"] < by_screw["M5x16"] < 5.5
+    # N m by K d F: 20 MPa below a bare head and a washer, 8 MPa in shear round an insert.
+    limits = {
+        "M3x12": 0.2 * 3e-3 * 20 * math.pi / 4 * (5.5**2 - 3.5**2),
+        "M3x16": 0.2 * 3e-3 * 8 * math.pi * 4.0 * 5.7,
+        "M5x16": 0.2 * 5e-3 * 20 * math.pi / 4 * (10**2 - 5.5**2),
+    }
+    for screw, limit in limits.items():
+        assert limit - 0.05 < by_screw[screw] <= limit
+
+
+def test_t_nuts_are_in_the_slots_that_their_screws_are_at(tmp_path: Path) -> None:
+    """Screws from the front go against the axis, which leans from the uprights to the camera."""
+    design, uprights = belt_design(), ("upright_left", "upright_right")
+    design["bought"] += [bought(name, "2020-400") for name in uprights]
+    for number, z in enumerate((-1.0, -1.0, 1.0), 1):
+        for side, name in enumerate(uprights):
+            nut = fastener("TNUT-M5-6", 3 * side + number, name, at=number)
+            design["fasteners"].append(nut | {"along": [0.0, 0.0, z]})
+    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
+    assert "2 in the front one (toward the camera) of each and 1 in" in of(steps, "frame").does[0]
 
 
 @pytest.mark.parametrize(
