@@ -31,8 +31,7 @@ from tbcad.core.spec.csv_rows import read_toml
 from tbcad.core.spec.design import Spec
 from tbcad.drawings.shell_sheet import hatching
 from tbcad.drawings.tables import HEAD, VIEWS, WIDTHS_MM, DrawnHole, numbered_holes, table_rows
-from tbcad.mirror_limits.held import IN_STATISTICS
-from tbcad.mirror_limits.measuring import UNCERTAINTY_SHARE
+from tbcad.mirror_limits.held import IN_STATISTICS, UNCERTAINTY_SHARE
 from tbcad.types import Floats
 
 PREFIX = {"shell_a": "", "mandrel_a": "M"}  # of the numbers of holes
