@@ -393,8 +393,9 @@ def test_errors_of_neighbours_cost_less_than_where_spheres_meet(
 
 def test_every_build_says_how_it_would_be_made() -> None:
     """Good processes by all builds, others by the first ones of which three failed."""
-    cameras = reflectors(small("pedestal"))
-    found = as_made(cameras, small.spec)
+    made = small("pedestal")
+    cameras = reflectors(made)
+    found = as_made(cameras, made.spec)
     assert found.reason == ""
     assert {one.process for one in found.processes} == set(BUILT_IN)
     assert {one.builds for one in found.processes} >= {5, 50}
