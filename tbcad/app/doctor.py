@@ -18,74 +18,17 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, distributions, metadata, requires
 from importlib.util import find_spec
-from pathlib import Path
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 _TIMEOUT_S = 180  # the first import on a cold disk reads 1 GB
-_MIN_MEMORY_GB = 2.0
-_MIN_DISK_GB = 1.0
 _NO_CORE_DUMP = """
 try:
     import resource
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 except ImportError:  # no POSIX
     pass
-"""
-
-_KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
-_MACHINE = (
-    *("pyserial", "gphoto2", "opencv-python-headless"),
-    *("rawpy", "imagecodecs", "openexr"),
-)
-_VTKS = ("vtk", "cadquery-vtk")
-_INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
-
-_KERNEL = "import OCP; print(OCP.__version__)"
-_PART = """
-import build123d
-volume = build123d.Box(1, 2, 3).volume
-assert abs(volume - 6) < 1e-9, volume
-print("a box has its volume")
-try:
-    import cadquery
-except ModuleNotFoundError:
-    pass
-else:
-    assert abs(cadquery.Shape.cast(build123d.Box(1, 2, 3).wrapped).Volume() - 6) < 1e-9
-    print("cadquery shares its kernel")
-"""
-_EMBREE = """
-import numpy as np
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
-scene = rtcore_scene.EmbreeScene()
-TriangleMesh(scene, np.array([[[-1, -1, 2], [1, -1, 2], [0, 1, 2]]], np.float32))
-ray = np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32)
-assert abs(scene.run(*ray, output=1)["tfar"][0] - 2) < 1e-6
-print("a ray hits where it should")
-"""
-_MANIFOLD = """
-from manifold3d import Manifold
-assert abs(Manifold.cube((1, 2, 3)).volume() - 6) < 1e-6
-print("a box has its volume")
-"""
-_LIB3MF = """
-from lib3mf import get_wrapper
-print("version", ".".join(map(str, get_wrapper().GetLibraryVersion())))
-"""
-_NUMBA = """
-from numba import njit
-assert njit(lambda x: x + 1)(41) == 42
-print("a loop is compiled")
-"""
-_H5PY = """
-import h5py, numpy as np
-with h5py.File("doctor", "w", driver="core", backing_store=False) as file:
-    file.create_dataset("a", data=np.arange(9), compression=1)
-    assert file["a"][8] == 8
-print("version", h5py.version.hdf5_version)
 """
 _PICTURE = """
 import vtkmodules.vtkRenderingOpenGL2
@@ -97,17 +40,22 @@ window.Render()
 print("drawn")
 """
 
-
-# Name, program and distributions; the first of these is installed again if the program fails.
-_LIBRARIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("OCP", _KERNEL, _KERNELS),
-    ("build123d", _PART, _KERNELS),
-    ("embreex", _EMBREE, ("embreex",)),
-    ("manifold3d", _MANIFOLD, ("manifold3d",)),
-    ("lib3mf", _LIB3MF, ("lib3mf",)),
-    ("numba", _NUMBA, ("numba", "llvmlite")),
-    ("h5py", _H5PY, ("h5py",)),
-)
+_KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
+_VTKS = ("vtk", "cadquery-vtk")
+_MACHINE = "machine"  # the extra that a real machine needs
+_INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
+# By name, what loads its shared libraries, and the distributions that own it; the first of these is
+# installed again if it cannot be loaded.
+_LIBRARIES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "OCP": ("import OCP.gp", _KERNELS),
+    "build123d": ("import build123d", _KERNELS),
+    "embreex": ("import embreex.rtcore_scene", ("embreex",)),
+    "manifold3d": ("import manifold3d", ("manifold3d",)),
+    "lib3mf": ("import lib3mf; lib3mf.get_wrapper()", ("lib3mf",)),
+    "numba": ("import numba", ("numba", "llvmlite")),
+    "h5py": ("import h5py", ("h5py",)),
+}
+_LOADED = "\nprint('can be loaded')"
 
 
 @dataclass(frozen=True)
@@ -120,25 +68,23 @@ class Finding:
     remedy: str = ""
 
 
-def diagnose(folder: Path = Path()) -> list[Finding]:
-    """Check everything that a build needs, and the free space of the exports' folder."""
-    needs = _requirements()
-    attempts: list[Callable[[], Finding]] = [pictures]
-    for name, program, owners in reversed(_LIBRARIES):
-        first = f"{_INSTALL_X11}; if that is not it: " if program is _KERNEL else ""
+def diagnose() -> list[Finding]:
+    """Check everything that a build needs."""
+    needs, installed = _requirements(), _installed()
+    attempts: list[Callable[[], Finding]] = []
+    for name, (program, owners) in _LIBRARIES.items():
+        first = f"{_INSTALL_X11}; if that is not it: " if owners is _KERNELS else ""
         remedy = first + _reinstall(owners, owners[0], needs)
-        attempts.insert(0, partial(attempt, name, program, remedy))
+        attempts.append(partial(attempt, name, program + _LOADED, remedy))
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        findings = list(pool.map(lambda check: check(), attempts))
+        findings = list(pool.map(lambda check: check(), [*attempts, pictures]))
     return [
         python_version(platform.python_version()),
-        one_of("CAD kernel", _KERNELS, _installed(), needs),
-        one_of("VTK", _VTKS, _installed(), needs),
-        versions(needs, _installed()),
-        machine_libraries(_installed()),
+        one_of("CAD kernel", _KERNELS, installed, needs),
+        one_of("VTK", _VTKS, installed, needs),
+        versions(needs, installed),
+        machine_libraries(_requirements(_MACHINE), installed),
         *findings,
-        memory(available_memory_gb()),
-        disk(folder),
     ]
 
 
@@ -187,15 +133,18 @@ def versions(needs: Sequence[Requirement], installed: Iterable[tuple[str, str]])
     return Finding("versions", False, told, f"{_pip('install')} {_quoted(wrong)}")
 
 
-def machine_libraries(installed: Iterable[tuple[str, str]]) -> Finding:
+def machine_libraries(
+    needs: Sequence[Requirement], installed: Iterable[tuple[str, str]]
+) -> Finding:
     """Say which libraries for a real machine are there; a build needs none of them."""
     present = dict(installed)
-    seen = [f"{name} {present[name]}" for name in _MACHINE if name in present]
-    missing = [name for name in _MACHINE if name not in present]
-    detail = ", ".join([*seen, *(f"no {name}" for name in missing)])
-    users = "tbcad run and calibrate, raw files and OpenEXR"
-    remedy = f"only {users} need them: {_pip('install')} 'tbcad[machine]'"
-    return Finding("machine (optional)", True, detail, remedy if missing else "")
+    names = [canonicalize_name(need.name) for need in needs]
+    detail = ", ".join(f"{one} {present[one]}" if one in present else f"no {one}" for one in names)
+    remedy = f"only tbcad run and calibrate, raw files and OpenEXR need them: {_pip('install')}"
+    missing = not all(one in present for one in names)
+    return Finding(
+        "machine (optional)", True, detail, f"{remedy} 'tbcad[{_MACHINE}]'" if missing else ""
+    )
 
 
 def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) -> Finding:
@@ -240,46 +189,18 @@ def pictures() -> Finding:
     return replace(under_x, detail=f"{under_x.detail}, under xvfb-run")
 
 
-def memory(available_gb: float | None) -> Finding:
-    """Compare the free memory with what the largest build takes."""
-    if available_gb is None:
-        return Finding("memory", True, "unknown on this system")
-    ok = available_gb >= _MIN_MEMORY_GB
-    remedy = "" if ok else f"close other programs: {_MIN_MEMORY_GB:g} GB are needed"
-    return Finding("memory", ok, f"{available_gb:.1f} GB free", remedy)
-
-
-def disk(folder: Path) -> Finding:
-    """Compare the free space where a folder is or would be with what exports take."""
-    absolute = folder.absolute()
-    existing = next(path for path in (absolute, *absolute.parents) if path.exists())
-    free = shutil.disk_usage(existing).free / 1e9
-    ok = free >= _MIN_DISK_GB
-    remedy = "" if ok else f"free some space: {_MIN_DISK_GB:g} GB are needed"
-    return Finding("disk", ok, f"{free:.1f} GB free at {existing}", remedy)
-
-
-def available_memory_gb() -> float | None:
-    """Memory that new work may take; None where the system does not say."""
-    try:
-        text = Path("/proc/meminfo").read_text(encoding="ascii")
-    except OSError:
-        return None
-    match = re.search(r"^MemAvailable:\s+(\d+) kB", text, re.MULTILINE)
-    return int(match[1]) * 1024 / 1e9 if match else None
-
-
 def _installed() -> list[tuple[str, str]]:
     return sorted({(canonicalize_name(d.name), d.version) for d in distributions() if d.name})
 
 
-def _requirements() -> list[Requirement]:
-    """Return what the installed tbcad requires here, without extras."""
+def _requirements(extra: str = "") -> list[Requirement]:
+    """Return what the installed tbcad requires here; or what an extra does, and nothing else."""
     try:
         needs = [Requirement(text) for text in requires("tbcad") or ()]
     except PackageNotFoundError:
         return []
-    return [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
+    every = [one for one in needs if not one.marker or one.marker.evaluate({"extra": extra})]
+    return [one for one in every if not extra or (one.marker and "extra" in str(one.marker))]
 
 
 def _reinstall(remove: Sequence[str], add: str, needs: Sequence[Requirement]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -224,8 +225,6 @@ def pixels(source: LightField) -> int:
 
 def check_memory(source: LightField, options: ReconstructOptions) -> None:
     """Refuse what this computer has no memory for."""
-    from tbcad.app.doctor import available_memory_gb
-
     count = pixels(source)
     needed = (PIXEL_BYTES * count + NODE_BYTES * options.nodes**3) / 1e9
     free = available_memory_gb()
@@ -234,6 +233,16 @@ def check_memory(source: LightField, options: ReconstructOptions) -> None:
             f"memory is short: {needed:.1f} GB are needed for {count} pixels and --nodes "
             f"{options.nodes}, {free:.1f} GB are free: end other programs, or take fewer nodes"
         )
+
+
+def available_memory_gb() -> float | None:
+    """Memory that new work may take; None where the system does not say."""
+    try:
+        text = Path("/proc/meminfo").read_text(encoding="ascii")
+    except OSError:
+        return None
+    match = re.search(r"^MemAvailable:\s+(\d+) kB", text, re.MULTILINE)
+    return int(match[1]) * 1024 / 1e9 if match else None
 
 
 def _meshes(

@@ -99,7 +99,7 @@ def test_memory_that_is_not_there(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("tbcad.app.doctor.available_memory_gb", lambda: 1.0)
+    monkeypatch.setattr("tbcad.app.api.reconstructions.available_memory_gb", lambda: 1.0)
     words = ["reconstruct", str(ball), "--nodes", "500", "--out", str(tmp_path / "f.npz")]
     assert run(words) == 2
     assert "memory is short: " in capsys.readouterr().err
