@@ -13,7 +13,6 @@ from tbcad.output import writers
 from tbcad.output.folder import check_replaceable, replacing
 
 ROOT = Path(__file__).parents[2]
-DEAD = 2**22 + 1  # past the largest number of a process
 OLD = 1_600_000_000
 
 
@@ -23,35 +22,23 @@ def folder(tmp_path: Path) -> Path:
     return writers.new_folder(tmp_path / "captures" / "knot")
 
 
-def left(folder: Path, process: int | str = "", start: str = "", host: str = "") -> Path:
-    """A hidden folder as its writer left it; what is not given is as of this process."""
-    begin, digest, *own = folder.stem.split("-")
-    told = [str(given or mine) for given, mine in zip((process, start, host), own, strict=True)]
-    path = folder.with_name("-".join([begin, digest, *told]) + ".new")
+def left(folder: Path, host: str = "") -> Path:
+    """A hidden folder as its writer left it, of this host if no other is given."""
+    path = folder.with_name(f"{folder.stem.rpartition('-')[0]}-{host}.new") if host else folder
     path.mkdir(parents=True)
     (path / "half.h5").touch()
     return path
 
 
-@pytest.fixture(params=["locks", "no locks"])
-def locks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    if request.param == "no locks":
-        monkeypatch.setattr(writers, "fcntl", None)
-    return str(request.param)
-
-
-@pytest.mark.usefixtures("locks")
 @pytest.mark.parametrize("out", ["captures/bunny", "captures", "captures/knot"])
 def test_of_a_dead_writer_are_removed(tmp_path: Path, folder: Path, out: str) -> None:
-    """Also where another process has its number now."""
-    dead, reused = left(folder, DEAD), left(folder, start="7")
+    dead = left(folder)
     check_replaceable(tmp_path / out, "capture", False)
     assert not dead.exists()
-    assert not reused.exists()
 
 
 def test_names_that_tbcad_gave_earlier_are_removed_and_others_the_users(tmp_path: Path) -> None:
-    mine, old = tmp_path / "captures" / ".tbcad-a.new", tmp_path / f".tbcad-0123abcd-{DEAD}.new"
+    mine, old = tmp_path / "captures" / ".tbcad-a.new", tmp_path / ".tbcad-0123abcd-7.new"
     mine.mkdir(parents=True)
     old.mkdir()
     with pytest.raises(InputError, match=r"did not write \(\.tbcad-a\.new\)"):
@@ -71,23 +58,17 @@ def test_that_are_locked_stay(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "captures").iterdir()] == ["knot"]
 
 
-def test_without_locks_those_of_a_living_process_stay(
-    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("unseen", ["another host", "no locks"])
+def test_whose_locks_cannot_be_seen_stay_while_they_change(
+    tmp_path: Path, folder: Path, unseen: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(writers, "fcntl", None)
-    living = left(folder)
-    check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
-    assert living.exists()
-    with pytest.raises(InputError, match="being written by another tbcad"):
-        check_replaceable(tmp_path / "captures" / "knot", "capture", False)
-
-
-@pytest.mark.usefixtures("locks")
-def test_of_another_host_stay_while_they_change(tmp_path: Path, folder: Path) -> None:
-    """Its processes and its locks may not be seen from here."""
-    far = left(folder, DEAD, host="00000000")
+    if unseen == "no locks":
+        monkeypatch.setattr(writers, "fcntl", None)
+    far = left(folder, host="00000000" if unseen == "another host" else "")
     check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
     assert far.exists()
+    with pytest.raises(InputError, match=r"another tbcad: .*remove"):
+        check_replaceable(tmp_path / "captures" / "knot", "capture", False)
     for path in (far / "half.h5", far):
         os.utime(path, (OLD, OLD))
     check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
