@@ -17,7 +17,8 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
 from tbcad.report.exploded import Callout, draw_callouts, offsets, place_callouts
-from tbcad.report.prototype_pictures import assembly_bodies, placed_mesh
+from tbcad.report.page.bodies import prototype_bodies
+from tbcad.report.prototype_pictures import surface
 from tbcad.types import Bytes, Floats, Ints
 
 SIZE, SMALL = (1500, 950), (375, 238)
@@ -88,9 +89,11 @@ class _Scene:
 def draw(folder: Path, pictures: Path) -> None:
     """Draw a PNG file for each step that has bodies, named by its key, into a folder."""
     machine = read_machine(folder)
-    bodies = {body.name: body.mesh for body in assembly_bodies(folder, machine.record)}
-    for tool in machine.record.with_role("tool"):  # which are not in the assembly
-        bodies[tool.name] = placed_mesh(folder, tool)
+    bodies = {one.name: surface(one.vertices, one.triangles) for one in prototype_bodies(folder)}
+    for tool in machine.record.with_role("tool"):  # which are not in the assembly: on the bed
+        mesh = pyvista.read(folder / tool.stl)
+        points = np.asarray(mesh.points, dtype=np.float64) - tool.origin_mm
+        bodies[tool.name] = surface(points @ np.array(tool.axes).T, mesh.regular_faces)
     for step in assembly_steps(machine):
         if new := {name for use in step.parts for name in use.bodies} & bodies.keys():
             _picture(machine, step, bodies, frozenset(new)).save(pictures / f"{step.key}.png")
