@@ -27,6 +27,7 @@ from tbcad.cad.formats.pdf import drawable, write_pdf
 from tbcad.cad.formats.step import read_named_solid
 from tbcad.cad.kernel.features import round_faces
 from tbcad.cad.kernel.solids import faces
+from tbcad.common.told import told
 from tbcad.core.spec.csv_rows import read_toml
 from tbcad.core.spec.design import Spec
 from tbcad.drawings.shell_sheet import hatching
@@ -213,8 +214,10 @@ def _lines(
     chain, ids = record["chain"], record["samples"]["mirrors"][0]
     fillet, mandrel = chain["figures"][-1], chain["mandrel_cutter_mm"] is not None
     in_statistics = any(one["verdict"] == IN_STATISTICS for one in chain["figures"])
-    true = {"mandrel": mandrel, "no mandrel": not mandrel, "statistics": in_statistics}
     values = record | {
+        "mandrel": mandrel,
+        "no mandrel": not mandrel,
+        "statistics": in_statistics,
         "spec": spec,
         "allowed": ANY if fillet["limit"] is None else f"{fillet['limit']:.3g} {fillet['unit']}",
         "rounded": f"{fillet['chain']:.3g} {fillet['unit']}",
@@ -228,11 +231,9 @@ def _lines(
         "count": len(ids),
         "both": 2 * len(ids),
     }
-    for line in read_toml(files("tbcad.drawings").joinpath(WORDS), WORDS, "words")["line"]:
-        if true.get(line.get("when"), True):
-            for k, item in enumerate(values[line["each"]] if "each" in line else [{}]):
-                head = "" if k else line.get("head", "")
-                yield head, drawable(line["text"].format(**(values | item)))
+    lines = read_toml(files("tbcad.drawings").joinpath(WORDS), WORDS, "words")["line"]
+    for head, text in told(lines, values):
+        yield head, drawable(text)
 
 
 def _step(number: int, step: dict[str, Any]) -> dict[str, Any]:

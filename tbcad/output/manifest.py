@@ -96,39 +96,23 @@ def is_file(path: Path) -> bool:
     return stat.S_ISREG(path.lstat().st_mode)
 
 
-# The record of each kind, by which a folder is known whose manifest tells no kind.
-RECORDS: dict[Kind, str] = {
-    "build": "design.json",
-    "run": "run.json",
-    "calibration": "calibration.json",
-    "capture": "capture.json",
-    "dataset": "dataset.json",
-    "order": "order.json",
-    "as-built": "as_built.json",
-}
+RUN_RECORD, RUN_SCHEMA = "run.json", "tbcad-run/"  # of a run, which has no manifest
 WORDS: dict[str, str] = {
     "order": "an order",
     "as-built": "solids as built",
     "": "content of tbcad of an unknown kind",
 }
 COSTLY: tuple[Kind, ...] = ("capture", "merged run", "calibration")  # hours, and read by others
-MERGED_FROM = "based_on"  # what capture.json of a merged run has, and that of a capture has not
 RUNS = ("[!.]*/run.json", "[!.]*/[!.]*/run.json")
 _MAX_RECORD_BYTES = 64_000_000
 
 
 def kind_of(folder: Path) -> str | None:
     """The kind of content that tbcad wrote; "" where it is unknown, None for other folders."""
+    if str(_record(folder / RUN_RECORD).get("schema", "")).startswith(RUN_SCHEMA):
+        return "run"
     manifest = read_manifest(folder)
-    if manifest and manifest.kind:
-        return manifest.kind
-    for kind, name in RECORDS.items():
-        record = _record(folder / name)
-        if str(record.get("schema", "")).startswith("tbcad-") or (
-            manifest and name in manifest.files
-        ):
-            return "merged run" if kind == "capture" and MERGED_FROM in record else kind
-    return "" if manifest else None
+    return manifest.kind if manifest else None
 
 
 def refuse_other_content(out: Path, target: Path, kind: Kind, force: bool) -> None:

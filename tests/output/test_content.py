@@ -10,12 +10,11 @@ import pytest
 
 from tbcad.errors import InputError
 from tbcad.output.folder import check_replaceable, replacing
-from tbcad.output.manifest import COSTLY, RECORDS, fingerprint, kind_of, write_manifest
+from tbcad.output.manifest import COSTLY, fingerprint, kind_of, write_manifest
 from tbcad.records.document import Kind
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ASKED = ("capture", "merged run", "calibration")
-SCHEMAS = {"as-built": "tbcad-as-built/1", "merged run": "tbcad-capture/1"}
 
 
 @pytest.fixture(autouse=True)
@@ -25,20 +24,13 @@ def _versions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path / "work")
 
 
-def fake(folder: Path, kind: Kind, *, told: bool = True) -> Path:
-    """A folder of a kind with its record; with a manifest that tells the kind, or not."""
+def fake(folder: Path, kind: Kind) -> Path:
+    """A folder of a kind with a record, and a manifest but for runs."""
     folder.mkdir(parents=True)
-    record: dict[str, object] = {"schema": SCHEMAS.get(kind, f"tbcad-{kind}/1")}
-    if kind == "merged run":
-        record["based_on"] = {}
-    name = RECORDS["capture" if kind == "merged run" else kind]
-    (folder / name).write_text(json.dumps(record))
+    name = "run.json" if kind == "run" else "design.json"
+    (folder / name).write_text(json.dumps({"schema": f"tbcad-{kind}/1"}))
     if kind != "run":
         write_manifest(folder, kind)
-    if kind != "run" and not told:
-        manifest = json.loads((folder / "manifest.json").read_text())
-        assert manifest.pop("kind") == kind
-        (folder / "manifest.json").write_text(json.dumps(manifest))
     return folder
 
 
@@ -46,17 +38,12 @@ def tree(folder: Path) -> dict[str, bytes]:
     return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize("told", [True, False], ids=["kind told", "older manifest"])
-def test_kinds_are_known(tmp_path: Path, told: bool) -> None:
-    for kind in KINDS:
-        assert kind_of(fake(tmp_path / kind, kind, told=told)) == kind
-
-
 @pytest.mark.parametrize("present", KINDS)
 def test_only_the_same_kind_is_replaced(tmp_path: Path, present: Kind) -> None:
     """And what cost hours only with force; photographs never; and nothing is written into it."""
     folder = fake(tmp_path / "it", present)
     before = tree(tmp_path)
+    assert kind_of(folder) == present
     for kind, force in product(KINDS, (False, True)):
         if kind == present and kind != "run" and (force or kind not in ASKED):
             check_replaceable(folder, kind, force)
@@ -97,8 +84,7 @@ def test_content_of_an_unknown_kind_is_not_replaced(tmp_path: Path) -> None:
 
 
 def test_a_foreign_record_is_no_content_of_tbcad(tmp_path: Path) -> None:
-    for name in RECORDS.values():
-        (tmp_path / name).write_text('{"schema": "somebody else"}')
+    (tmp_path / "run.json").write_text('{"schema": "somebody else"}')
     assert kind_of(tmp_path) is None
     (tmp_path / "run.json").write_text("[" * 100_000)
     assert kind_of(tmp_path) is None

@@ -1,7 +1,9 @@
 """The command `tbcad` itself, and what its subcommands share: how they are added, and print."""
 
-from collections.abc import Callable, Iterable
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
+from importlib.resources import files
 from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
@@ -9,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 import typer
 
 from tbcad.common.screen import paragraph, report_console, stages
+from tbcad.common.told import told
 from tbcad.errors import InputError
 from tbcad.options.call import parameters, tell_options
 from tbcad.options.checks import check_is_export
@@ -32,6 +35,7 @@ app = typer.Typer(
     help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
     "made, verified on the files written. Start with **tbcad build --out exports**.",
 )
+HEAD_COLUMNS = 18
 Told = TypeVar("Told", bound=Callable[..., int])
 Full = Annotated[bool, typer.Option("--full")]
 """Print every check before the summary."""
@@ -99,6 +103,13 @@ def print_result(record: object, lines: Iterable[str], json: bool) -> None:
         return
     for line in lines:
         typer.echo(line)
+
+
+def result_lines(name: str, **values: Any) -> Iterator[str]:
+    """The lines that a command prints, by their name in results.toml."""
+    text = (files("tbcad.app.cli") / "results.toml").read_text(encoding="utf-8")
+    for head, words in told(tomllib.loads(text)[name], values):
+        yield f"{head:{HEAD_COLUMNS}}{words}" if head else words
 
 
 def print_json(record: object) -> None:

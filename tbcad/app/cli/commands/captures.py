@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command, print_result
+from tbcad.app.cli.app import command, print_result, result_lines
 from tbcad.app.cli.endings import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
@@ -75,10 +75,6 @@ WRITTEN = {
     "rays": "rays.npz and rays.h5 with origin, direction, colour and camera of every ray",
     "mitsuba": "camera_a.xml, camera_b.xml and blender.py with their meshes",
 }
-NOTES = {
-    "rms_distance_from_common_point_mm": " RMS",
-    "central_error_at_capture_radius_mm": " at the ends of the capture sphere",
-}
 
 
 @command()
@@ -104,24 +100,14 @@ def export(options: ExportOptions, json: JsonResult = False) -> int:
 
 def _lines(record: dict[str, Any]) -> Iterator[str]:
     """What is written first, then how well pinholes fit."""
-    fit, left_out = record["fit"], len(record["left_out"])
-    size = record.get("size_px")
-    content = f"{record['rays']} rays" if size is None else f"{size} x {size} pixels each"
-    missing = f"; {left_out} mirrors give none" if left_out else ""
-    yield f"{record['virtual_cameras']} virtual cameras, {content}{missing}"
-    for text, name in (
-        ("captured rays miss the pinhole by", "rms_distance_from_common_point_mm"),
-        ("rays of the pinhole are off by", "central_error_at_capture_radius_mm"),
-        ("captured pixels are apart by", "pixel_pitch_mm"),
-    ):
-        note = NOTES.get(name, "")
-        yield f"{text} {fit[name]['median']:.2f} mm (median), {fit[name]['max']:.2f} (worst){note}"
-    errors = record.get("reprojection_error_px")
-    if errors:
-        yield (
-            f"points of the object appear {errors['median']:.3f} pixels off (median), "
-            f"{errors['percentile_95']:.3f} (95 %)"
-        )
+    left_out, size = len(record["left_out"]), record.get("size_px")
+    return result_lines(
+        "export",
+        content=f"{record['rays']} rays" if size is None else f"{size} x {size} pixels each",
+        missing=f"; {left_out} mirrors give none" if left_out else "",
+        reprojected=record.get("reprojection_error_px"),
+        **record,
+    )
 
 
 AllFramesOption = Annotated[bool, typer.Option("--all-frames")]
@@ -163,22 +149,16 @@ def reconstruct(
 def _reconstruction_lines(one: "Reconstructed") -> Iterator[str]:
     """The verdict first."""
     facts: dict[str, Any] = one.field.facts
-    chosen = facts["chosen"]
-    out = facts["mirrors_left_out"]
-    verdict = "no mirror was left out to judge the field by"
-    if out:
-        verdict = f"PSNR {facts['psnr_left_out_db']:.2f} dB on {out} mirrors that were left out"
-    yield f"{verdict}, of {facts['rays']} rays"
-    several = "1 ray" if facts["rays_a_pixel"] == 1 else f"{facts['rays_a_pixel']} rays"
-    yield (
-        f"view dependence of order {chosen['order']}, total variation "
-        f"{chosen['smooth_density']:g}, smoothness of colours {chosen['smooth_colour']:g}, "
-        f"sparsity {chosen['sparse']:g}; {several} a pixel"
+    yield from result_lines(
+        "reconstruct",
+        none_left_out=not facts["mirrors_left_out"],
+        several="1 ray" if facts["rays_a_pixel"] == 1 else f"{facts['rays_a_pixel']} rays",
+        unexplained=100 * facts["unexplained_light"],
+        file=one.file,
+        word="was there already" if one.kept else "written",
+        grids=", ".join(str(level["nodes"]) for level in facts["chosen"]["levels"]),
+        **facts,
     )
-    yield f"{100 * facts['unexplained_light']:.2g} % of the light is outside of the hull"
-    grids = ", ".join(str(level["nodes"]) for level in chosen["levels"])
-    word = "was there already" if one.kept else "written"
-    yield f"{one.file}: {word}, {facts['node_count']} nodes on grids of {grids} along an edge"
     for file, known in one.meshes.items():
         yield f"{file}: {known['triangles']} triangles"
         if "mean_mm" in known:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command, print_result
+from tbcad.app.cli.app import app, command, print_result, result_lines
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import OptimizeOptions, ToleranceOptions
@@ -110,16 +110,15 @@ def _record(result: "SearchResult", files: tuple[Path, ...]) -> dict[str, object
 def _told(result: "SearchResult", out: Path, *others: Path) -> Iterator[str]:
     from tbcad.optimizing.search import comparison
 
-    if result.best.place == result.start.place:
-        yield f"No better one among {len(result.candidates)} candidates within the limits."
-    yield from comparison(result)
-    x, z, semi_minor, *stretch = result.best.place
-    yield (
-        f"camera at x = {x:g}, z = {z:g} mm; semi-minor axis {semi_minor:g} mm; "
-        f"directions stretched by {stretch[0]:g} and {stretch[1]:g}"
+    return result_lines(
+        "optimize",
+        none=result.best.place == result.start.place,
+        candidates=len(result.candidates),
+        compared=[{"line": line} for line in comparison(result)],
+        place=result.best.place,
+        out=out,
+        beside=", ".join(file.name for file in others),
     )
-    beside = ", ".join(file.name for file in others)
-    yield f"{out}: written, with {beside}; build and verify it by tbcad build {out}"
 
 
 AsBuiltOption = Annotated[Path | None, typer.Option("--as-built", metavar="CALIBRATION")]

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from tbcad.app.cli.app import result_lines
 from tbcad.common.screen import Stages
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import spec_dict
-from tbcad.output.overview import Overview, PrintEstimate, PrototypeOverview, overview
+from tbcad.output.overview import Overview, PrintEstimate, overview
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 
 if TYPE_CHECKING:
@@ -41,48 +42,29 @@ def show_overview(
     return 0
 
 
-def overview_lines(figures: Overview, seconds: float) -> list[str]:
+def overview_lines(figures: Overview, seconds: float) -> Iterator[str]:
     """Lines of at most 80 columns; seconds: that the build is expected to take."""
-    radii = "planar"
+    made, radii = figures.prototype, "planar"
     if figures.radius_mm is not None:
         radii = "radius {:.1f} to {:.1f} mm".format(*figures.radius_mm)
-    lines = [
-        f"mirrors           {figures.mirrors} ({figures.virtual_cameras} virtual cameras), {radii}",
-        f"minimum coverage  {figures.minimum_coverage_mm:.2f} mm, of "
-        f"{figures.spec.optics.capture_diameter_mm:g} mm",
-        f"lens              {figures.view_angle_deg:g} degrees across "
-        f"{figures.spec.camera.width_px} pixels",
-    ]
-    if figures.shell_prints:
-        lines.append(f"both shells       {_print_text(figures.shell_prints)}")
-    if figures.prototype:
-        lines += _prototype_lines(figures.prototype)
-    if figures.note:
-        lines.append(figures.note)
-    minutes = max(seconds / MINUTE, 0.1)
-    return [
-        *lines,
-        f"build             about {minutes:.1f} minutes with verification, on two cores",
-    ]
+    return result_lines(
+        "build-dry-run",
+        all=figures,
+        radii=radii,
+        shells=figures.shell_prints and _print_text(figures.shell_prints),
+        prototype=made,
+        caps=f" and {made.caps} caps" if made and made.caps else "",
+        ball_price=made and _price_text(made.ball_price),
+        prints=made and _print_text(made.prints),
+        note=figures.note,
+        minutes=max(seconds / MINUTE, 0.1),
+    )
 
 
 def overview_record(figures: Overview, seconds: float) -> dict[str, Any]:
     """The same for programs: fields of `Overview`, masses in grams, prices by currency."""
     record = asdict(figures) | {"spec": spec_dict(figures.spec)}
     return record | {"build_seconds": round(seconds)}
-
-
-def _prototype_lines(figures: PrototypeOverview) -> Iterator[str]:
-    caps = f" and {figures.caps} caps" if figures.caps else ""
-    yield f"prototype         {figures.balls} balls{caps}, {figures.stops} stops, " + (
-        f"swing {figures.swing_deg:.0f} degrees"
-    )
-    yield f"  coverage        {figures.minimum_coverage_mm:.2f} mm, " + (
-        f"{figures.kept_share:.0%} of the shell's pixels"
-    )
-    yield f"  balls           {figures.ball_mass_g:.0f} g, {_price_text(figures.ball_price)}"
-    yield f"  turning         {figures.turning_mass_g:.0f} g, driven by {figures.motor}"
-    yield f"  printed parts   {_print_text(figures.prints)}"
 
 
 def _print_text(figures: PrintEstimate) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command, print_result
+from tbcad.app.cli.app import command, print_result, result_lines
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.call import tell_options
@@ -94,23 +94,20 @@ def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
 def _lens_lines(solved: "SolvedLens", file: Path) -> Iterator[str]:
     from tbcad.rig.calibration.intrinsics.checkerboard import EDGE_SHARE
 
-    lens, sigma = solved.lens, solved.sigma
-    yield (
-        f"{solved.boards} boards, {solved.corners} corners ({solved.outliers} outliers left out), "
-        f"RMS {solved.rms_px:.3f} px; focal length {lens.focal[0]:.2f} +- {sigma[0]:.2f} px"
+    unused = paragraph(f"no board found in: {', '.join(solved.unused)}") if solved.unused else ""
+    short = paragraph(
+        f"corners reach {solved.reach:.0%} of the way to the picture's corners: photograph boards "
+        "there too, the distortion is not known beyond"
     )
-    yield (
-        f"principal point {lens.principal[0]:.2f} +- {sigma[2]:.2f}, {lens.principal[1]:.2f} +- "
-        f"{sigma[3]:.2f} px; k1 {lens.distortion[0]:.5f} +- {sigma[4]:.5f}"
+    return result_lines(
+        "intrinsics",
+        solved=solved,
+        lens=solved.lens,
+        sigma=solved.sigma,
+        unused=unused,
+        short=short if solved.reach < EDGE_SHARE else "",
+        file=file,
     )
-    if solved.unused:
-        yield paragraph(f"no board found in: {', '.join(solved.unused)}")
-    if solved.reach < EDGE_SHARE:
-        yield paragraph(
-            f"corners reach {solved.reach:.0%} of the way to the picture's corners: photograph "
-            "boards there too, the distortion is not known beyond"
-        )
-    yield f"{file}: give it to tbcad calibrate --intrinsics"
 
 
 def _lens_record(solved: "SolvedLens", file: Path) -> dict[str, object]:
