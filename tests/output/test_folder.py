@@ -24,7 +24,7 @@ def fill(folder: Path, version: int) -> None:
     """Write an export all of whose files tell its version, as tbcad writes one."""
     for name in NAMES:
         (folder / name).write_text(f"{name} of version {version}\n" * 50)
-    document = {"schema": "tbcad-manifest/1", "files": {}}
+    document = {"schema": "tbcad-manifest/1", "kind": "build", "files": {}}
     document["files"] = {name: fingerprint(folder / name) for name in NAMES}
     (folder / "manifest.json").write_text(json.dumps(document))
     (folder / "verify.json").write_text(str(version))
