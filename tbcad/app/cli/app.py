@@ -13,7 +13,7 @@ import typer
 from tbcad.common.screen import paragraph, report_console, stages
 from tbcad.common.told import told
 from tbcad.errors import InputError
-from tbcad.options.call import parameters, tell_options
+from tbcad.options.call import Call, parameters, tell_options
 from tbcad.options.checks import check_is_export
 from tbcad.options.shared import Design, Exports, JsonResult, Out, PlotFormatOption, Settings
 from tbcad.version import __version__
@@ -84,6 +84,14 @@ def _common(
     ] = False,
 ) -> None:
     del version
+
+
+def on_screen(number: int, function: str, options: Call, *, silent: bool = False) -> Any:
+    """Call a function of the API by its name, about so many stages of it on the screen."""
+    from tbcad.app import api
+
+    with stages(number, silent) as screen:
+        return getattr(api, function)(options.on(screen))
 
 
 def output_mode(full: bool, quiet: bool, json: bool) -> "Output":

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import Full, Json, Quiet, app, command, output_mode, print_json
+from tbcad.app.cli.app import Full, Json, Quiet, app, command, on_screen, output_mode, print_json
 from tbcad.common.screen import report_console, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import BuildOptions, ReportOptions, VerificationOptions
@@ -177,10 +177,7 @@ def report(options: ReportOptions) -> int:
     One file that opens from disk in any browser, without a network. tbcad build writes it too;
     write it again after a new verification, or to add pictures. Exit code 0, or 2 for bad input.
     """
-    from tbcad.app.api import report_page
-
-    with stages(2) as screen:
-        file = report_page(options.on(screen))
+    file: Path = on_screen(2, "report_page", options)
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
     return 0
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command, print_result, result_lines
+from tbcad.app.cli.app import command, on_screen, print_result, result_lines
 from tbcad.app.cli.endings import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
@@ -67,7 +67,6 @@ def _capture_lines(record: dict[str, Any], out: Path, frames: int | None) -> Ite
         yield f"{out / name}: {text}, {(out / name).stat().st_size / 1e6:.0f} MB"
 
 
-STAGES = 4
 WRITTEN = {
     "nerfstudio": "transforms.json, images, masks and points.ply",
     "colmap": "images, masks and the model in sparse/0, binary and text",
@@ -85,10 +84,7 @@ def export(options: ExportOptions, json: JsonResult = False) -> int:
     nearest to, right way round, with a mask. Prints how far rays and pinholes are apart.
     """
     to = options.check()
-    from tbcad.app.api import export as exported
-
-    with stages(STAGES) as screen:
-        record = exported(options.on(screen))
+    record = on_screen(4, "dataset", options)
     figures = "dataset.json" if to == "mitsuba" else "dataset.json, cameras.csv"
     files = f"{options.out}: {WRITTEN[to]}; {figures} with these figures"
     facets = record.get("facets", {})  # of a scene

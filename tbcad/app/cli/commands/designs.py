@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command, print_result, result_lines
+from tbcad.app.cli.app import app, command, on_screen, print_result, result_lines
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.builds import OptimizeOptions, ToleranceOptions
@@ -86,10 +86,7 @@ def optimize(options: OptimizeOptions, json: JsonResult = False) -> int:
     mirrors are solved by exact rays, and pixels counted one by one. Object, sensor, number of
     mirrors and all else stay.
     """
-    from tbcad.app.api import optimize as searched
-
-    with stages(2) as screen:
-        result = searched(options.on(screen))
+    result = on_screen(2, "optimize", options)
     print_result(_record(result, options.files), _told(result, *options.files), json)
     return 0
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tbcad.app.cli.app import command, print_result, result_lines
+from tbcad.app.cli.app import command, on_screen, print_result, result_lines
 from tbcad.common.screen import paragraph, stages
 from tbcad.errors import InputError
 from tbcad.options.call import tell_options
@@ -27,6 +27,7 @@ from tbcad.options.shared import JsonResult, exposures
 
 if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
+    from tbcad.rig.calibration.run import WrittenCalibration
 FAILED = 1  # exit code of a calibration that is not good enough
 FEW_NAMES = 6  # of missing mirrors in a line
 NOT_WHOLE = {
@@ -43,12 +44,9 @@ def simulate_run(options: SimulateRunOptions) -> int:
     Writes the folder that tbcad run writes, with truth.json: the build, which a calibration of
     these photographs should find.
     """
-    from tbcad.app.api import simulate_run as simulate
     from tbcad.rig.machine.machine import truth_file
 
-    with stages(2) as screen:
-        run = simulate(options.on(screen))
-    record = run.record
+    record = on_screen(2, "simulate_run", options).record
     count = len(record.frames) * len(record.phases)
     typer.echo(
         f"{options.out}: {count} photographs of {len(record.frames)} frames, and the build as "
@@ -64,10 +62,7 @@ def calibrate(options: CalibrateOptions, json: JsonResult = False) -> int:
     Writes machine.json, calibration.json, tables of spheres, angles, rays and residuals, the
     covariance and plots. Exits with 1 where the calibration is not good enough.
     """
-    from tbcad.app.api import calibrate as calibrated
-
-    with stages(4) as screen:
-        written = calibrated(options.on(screen))
+    written: WrittenCalibration = on_screen(4, "calibrate", options)
     found = [{"folder": str(one.folder), **one.record} for one in written.every]
     process = options.process or "fdm (the default)"
     told = (f"{one.text}\nprocess: {process}; files: {one.folder}" for one in written.every)
@@ -82,11 +77,7 @@ def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
     Boards may be partly out of the picture. Writes focal lengths, principal point and distortion
     with their standard deviations, for tbcad calibrate --intrinsics.
     """
-    from tbcad.app.api import intrinsics as solve_intrinsics
-
-    out = Path(options.out)
-    with stages(1) as screen:
-        solved = solve_intrinsics(options.on(screen))
+    out, solved = Path(options.out), on_screen(1, "intrinsics", options)
     print_result(_lens_record(solved, out), _lens_lines(solved, out), json)
     return 0
 
@@ -129,11 +120,7 @@ def merge(options: MergeOptions, json: JsonResult = False) -> int:
     with the rays of the calibrated machine, for view, refocus and the studies. Mirrors without a
     usable photograph are left out and named.
     """
-    from tbcad.app.api import merge as merged
-
-    with stages(2) as screen:
-        record = merged(options.on(screen))
-    out = options.folder
+    record, out = on_screen(2, "merge", options), options.folder
     files = f"{out}: the light field as lightfield.h5, pictures, capture.json with all of this"
     print_result(record, [*_merge_lines(record), files], json)
     return 0
@@ -177,10 +164,7 @@ def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
     The colour says how far a ball's centre is off, in micrometres; legend.png and deviations.csv
     give the scale and all figures.
     """
-    from tbcad.app.api import as_built as written
-
-    with stages(1) as screen:
-        record = written(options.on(screen))
+    record = on_screen(1, "as_built", options)
     lines = (
         f"{record['balls']} balls: centres off by {record['median_um']:.0f} micrometres (median), "
         f"{record['largest_um']:.0f} at most",

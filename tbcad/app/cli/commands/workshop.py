@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command, print_json, print_result
+from tbcad.app.cli.app import app, command, on_screen, print_json, print_result
 from tbcad.common.screen import stages
 from tbcad.options.builds import OrderOptions
 from tbcad.options.call import tell_options
@@ -60,11 +60,7 @@ def order(options: OrderOptions, json: JsonResult = False) -> int:
     with datums A, B, C, also of the mandrel where the chain has one. Exit code 0: the chain holds
     the design. 1: it does not. 2: bad input.
     """
-    from tbcad.app.api import order as write_order
-
-    out = Path(options.out)
-    with stages(0) as screen:
-        record = write_order(options.on(screen))
+    out, record = Path(options.out), on_screen(0, "order", options)
     chain, told = record["chain"], [f"{record['chain']['name']}: {record['chain']['verdict']}"]
     for one in chain["figures"]:
         limit = "any" if one["limit"] is None else f"{one['limit']:.3g} {one['unit']}"
