@@ -5,6 +5,7 @@ The cluster is a real one: a scheduler and workers as processes of their own, on
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -77,26 +78,6 @@ class TestThreads:
         with pytest.raises(raised):
             run_units(work, range(1000), progress=interrupted, workers=workers)
         assert len(begun) < 500
-
-
-class TestVersions:
-    def test_a_changed_module_is_another_version(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        copied(tmp_path)
-        monkeypatch.setattr(
-            schedule, "__file__", str(tmp_path / "tbcad" / "common" / "schedule.py")
-        )
-        assert schedule._code() == versions()["tbcad's code"]
-        with (tmp_path / "tbcad" / "errors.py").open("a") as module:
-            module.write("\n")
-        assert schedule._code() != versions()["tbcad's code"]
-
-    def test_a_worker_that_came_late_is_asked_too(self) -> None:
-        other = {**versions(), "numpy": "0.1"}
-        with pytest.raises(InputError, match=r"numpy .* allowed is 0\.1 as here: install the same"):
-            schedule._on_worker(drawn, 1, other, "here")
-        assert schedule._on_worker(drawn, 1, versions(), "here") == drawn(1)
 
 
 def copied(folder: Path) -> Path:
@@ -245,18 +226,10 @@ class TestCluster:
 
     def test_what_work_raises_is_raised_here(self, standing: Cluster) -> None:
         def work(unit: int) -> None:
-            from tbcad.errors import InputError
-
-            raise InputError(f"unit {unit}: not allowed")
-
-        with pytest.raises(InputError, match=r"^unit 3: not allowed$"):
-            run_units(work, [3], standing.address)
-
-        def missing(unit: int) -> None:
             raise FileNotFoundError(unit)  # no lost connection, though both are OSError
 
         with pytest.raises(FileNotFoundError, match="3"):
-            run_units(missing, [3], standing.address)
+            run_units(work, [3], standing.address)
 
 
 class TestRefused:
@@ -297,11 +270,14 @@ class TestRefused:
         said = refusal(work, [1], cluster.address, patience=0.3)
         assert f"no worker for 0.3 s: start `dask worker {cluster.address}`" in said
 
-        module = copied(tmp_path / "other") / "version.py"
-        module.write_text(module.read_text().replace(tbcad.__version__, "0.0.1"))
+        with (copied(tmp_path / "other") / "errors.py").open("a") as module:
+            module.write("\n")
         cluster.start(1, {"PYTHONPATH": str(tmp_path / "other")})
         said = refusal(work, [1], cluster.address)
-        assert f"has tbcad 0.0.1, allowed is {tbcad.__version__} as here" in said
+        here = versions()["tbcad's code"]
+        assert re.search(
+            rf"has tbcad's code \w+, allowed is {here} as here: install the same", said
+        )
 
         cluster.workers.pop().kill()
         (tmp_path / "none" / "tbcad").mkdir(parents=True)

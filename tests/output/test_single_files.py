@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.single_files import check_file
@@ -61,28 +60,3 @@ def test_one_that_is_read_is_not_replaced(tmp_path: Path) -> None:
             check_file(file, force=True, inputs=(None, tmp_path / "missing", light))
     with pytest.raises(InputError, match="is a folder"):
         check_file(tmp_path / "none", force=True)
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["init", "it/design.json", "--force"],
-        ["optimize", "--out", "my.toml", "my.toml", "--force"],
-        ["tolerance", "it", "--out", "it"],
-        ["study", "elevation", "--out", "it/study"],
-        ["assembly", "it", "--out", "it/design.json/"],
-    ],
-    ids=lambda words: words[0],
-)
-def test_commands_refuse(
-    build: Path,
-    words: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(build.parent)
-    Path("my.toml").write_text("optics.n = 3\n", encoding="utf-8")
-    before = {path: path.read_bytes() for path in build.parent.rglob("*") if path.is_file()}
-    assert run(words) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
-    assert before == {p: p.read_bytes() for p in build.parent.rglob("*") if p.is_file()}

@@ -77,24 +77,6 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
         assert mirror["coverage_fitted_mm"] == pytest.approx(exact[mirror["id"]], abs=0.3)
 
 
-@pytest.mark.parametrize(
-    "command", [["build", "--for-process"], ["tolerance", "no-such-folder", "--process"]]
-)
-def test_a_broken_process_is_found_before_anything_begins(
-    command: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Before stages, a missing export, and a folder that cannot be replaced."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.toml").write_text('based_on = "sla"\nball_grade = "G7"')
-    assert run([*command, "mine.toml", "--out", "mine.toml/out"]) == 2
-    line = capsys.readouterr().err
-    assert line.startswith("tbcad: mine.toml: ball_grade is 'G7'")
-    assert line.count("\n") == 1
-
-
 def test_an_interrupt_that_native_code_drops_comes_again() -> None:
     """Compilers and event loops call Python, and forget what it raises."""
     from_native = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))

@@ -39,15 +39,3 @@ def test_planar_mirrors_have_no_radius_and_no_prototype() -> None:
     result = run(app, ["build", "--n", "3", "--radius-rule", "flat", "--dry-run"])
     assert "planar" in result.stdout
     assert "prototype" not in result.stdout
-
-
-@pytest.mark.parametrize("dry_run", [["--dry-run"], []])
-@pytest.mark.parametrize("key", ["catalogues", "prices"])
-def test_a_list_that_is_not_there_is_no_reason_to_leave_the_prototype_out(
-    tmp_path: Path, key: str, dry_run: list[str]
-) -> None:
-    options = ["--n", "3", "--set", f'prototype.{key}=["absent.csv"]', *dry_run]
-    result = run(app, ["build", *options])
-    assert f"prototype.{key}: 'absent.csv' is neither" in str(result.exception)
-    assert result.stdout == ""
-    assert list(tmp_path.iterdir()) == []

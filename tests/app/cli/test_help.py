@@ -176,15 +176,3 @@ def test_alone_it_lists_what_there_is(capsys: pytest.CaptureFixture[str]) -> Non
     assert {"term", "section", "key", "check"} <= set(listed)
     for name in (*listed["term"], *listed["key"], *listed["check"])[::20]:
         assert found(capsys, name)
-
-
-def test_an_unknown_name(capsys: pytest.CaptureFixture[str]) -> None:
-    nothing = "tbcad explain lists what there is"
-    for name, hint in {
-        **{"mirrors.margn_mm": "mirrors.margin_mm", "coverage facet": "coverage, facets"},
-        **{"tetha1": "theta_1", "xyzzy": nothing, "\N{SNOWMAN}\n": nothing, "": nothing},
-    }.items():
-        assert run(["explain", name]) == 2
-        shown = capsys.readouterr()
-        assert (shown.out, shown.err.count("\n")) == ("", 1)
-        assert hint in shown.err

