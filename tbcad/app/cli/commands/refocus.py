@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from tbcad.light.reconstruction.field import Field
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.scene.ray_casting import Scene
-    from tbcad.light.simulate.views.refocus import ThinLens
-    from tbcad.types import Bytes, Progress
+    from tbcad.types import Bytes
 
 WIDEST_DEG = 170
 
@@ -208,13 +207,14 @@ def refocus(
         raise InputError("--all-in-focus has no focus to move: leave out --sweep")
     from tbcad.app.api.views import refocused
     from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.photograph import to_bytes
     from tbcad.light.simulate.image_files import (
         ANIMATED_SUFFIXES,
         check_image_path,
         write_animation,
     )
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.light.simulate.views.refocus import ThinLens, refocus_sweep
+    from tbcad.light.simulate.views.refocus import ThinLens, lens_picture, refocus_sweep
     from tbcad.output.single_files import check_file
 
     check_pictures(capture_folder, out, force)
@@ -233,8 +233,11 @@ def refocus(
         screen.stage(names[0])
         picture = refocused(tiles, at, lens, all_in_focus, screen.detail).image
         screen.stage(names[1])
-        samples = 0 if all_in_focus else truth_samples
-        truth = None if scene is None else _truth(scene, at, lens, samples, screen.detail)
+        truth = None
+        if scene is not None and all_in_focus:
+            truth = true_picture(scene, at)
+        elif scene is not None:
+            truth = to_bytes(lens_picture(scene, at, lens, truth_samples, screen.detail))
         if sweep is not None:
             screen.stage("sweep")
             write_animation(sweep, refocus_sweep(tiles, at, aperture, frames, screen.detail))
@@ -242,18 +245,6 @@ def refocus(
     if sweep is not None:
         typer.echo(f"{sweep}: focus from the back of the capture sphere to its front, and back")
     return 0
-
-
-def _truth(
-    scene: "Scene", at: "Camera", lens: "ThinLens", samples: int, progress: "Progress"
-) -> "Bytes":
-    """The ray-traced picture of the lens; of a pinhole without samples of one."""
-    from tbcad.light.simulate.capture.photograph import to_bytes
-    from tbcad.light.simulate.views.refocus import lens_picture
-
-    if samples == 0:
-        return true_picture(scene, at)
-    return to_bytes(lens_picture(scene, at, lens, samples, progress))
 
 
 tell_options(__name__)

@@ -171,23 +171,22 @@ def _truths(
     wanted: "Environment | None",
 ) -> tuple["Bytes | None", "Bytes | None"]:
     """The ray-traced pictures, and in the light of the same lamps, where they are known."""
+    from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene
+    from tbcad.light.simulate.capture import sequence
+
     if scene is None:
         return None, None
-    if relit is not None and wanted is not None:
-        return _lit_truths(scene, at, relit, wanted)
-    return true_picture(*(_turned(scene, at, *turned) if turned else (scene, at))), None
+    if relit is None or wanted is None:
+        if turned is not None:  # object and camera as they are to each other in the frame
+            angle = sequence.turn_of_frame(*turned)
+            scene = sequence.lit_when_turned(scene, angle)
+            at = sequence.camera_before_turn(at, angle)
+        return true_picture(scene, at), None
 
+    def lit_by(lights: "PointLights") -> "Bytes":
+        return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
 
-def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
-    """Object and camera as they are to each other in a frame."""
-    from tbcad.light.simulate.capture.sequence import (
-        camera_before_turn,
-        lit_when_turned,
-        turn_of_frame,
-    )
-
-    angle = turn_of_frame(folder, number)
-    return lit_when_turned(scene, angle), camera_before_turn(at, angle)
+    return lit_by(wanted.far_lights(TRUE_LIGHTS)), lit_by(relit.lamps) if relit.points else None
 
 
 def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":
@@ -195,18 +194,6 @@ def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit"
 
     with open_reflectance(folder) as reflectance:
         return relit(source, reflectance, wanted)
-
-
-def _lit_truths(
-    scene: "Scene", at: "Camera", relit: "Relit", wanted: "Environment"
-) -> tuple["Bytes", "Bytes | None"]:
-    """The ray-traced pictures in that light, and in the light of the same lamps, if points."""
-    from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene
-
-    def truth(lights: "PointLights") -> "Bytes":
-        return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)
-
-    return truth(wanted.far_lights(TRUE_LIGHTS)), truth(relit.lamps) if relit.points else None
 
 
 def _check_light(
