@@ -31,9 +31,13 @@ def report_console() -> Console:
     return Console() if sys.stdout.isatty() else Console(width=WIDTH)
 
 
-def paragraph(text: str) -> str:
-    """Text in lines of WIDTH columns at most, but for words that are longer: paths stay whole."""
-    return textwrap.fill(text, WIDTH, break_long_words=False, break_on_hyphens=False)
+def paragraph(text: str, first: str = "", others: str = "") -> str:
+    """Text in lines of WIDTH columns at most, but for words that are longer: paths stay whole.
+
+    The first line and the others begin with what is given.
+    """
+    never = {"break_long_words": False, "break_on_hyphens": False}
+    return textwrap.TextWrapper(WIDTH, first, others, **never).fill(text)
 
 
 class TimeLeft:

@@ -3,12 +3,12 @@
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
-from dataclasses import asdict, dataclass
 from difflib import get_close_matches
 from functools import partial
 from itertools import chain, product
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from tbcad.cad.drafting.sheet import paper_name, scale_text
 from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
@@ -23,20 +23,8 @@ SUFFIXES = (".pdf", ".dxf")
 OPTICAL_LAYOUT, ASSEMBLY = "optical_layout", "assembly"
 
 
-@dataclass(frozen=True)
-class WrittenSheet:
-    """A sheet that was written."""
-
-    name: str  # of its files
-    title: str  # in its title block
-    part: str  # that it shows
-    paper: str  # A3 or A4
-    scale: str | None  # such as 1:2; None where nothing is to scale
-
-    @property
-    def files(self) -> list[str]:
-        """Names of its files."""
-        return [self.name + suffix for suffix in SUFFIXES]
+WrittenSheet: TypeAlias = dict[str, Any]
+"""A sheet that was written: name, title, part that it shows, paper, scale or None, files."""
 
 
 def write_drawings(
@@ -64,7 +52,7 @@ def write_drawings(
     with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
         work = partial(draw, export, Path(place))
         done = _results(work, names, progress, min(workers, len(names)))
-        drawings = sorted(chain.from_iterable(done), key=lambda one: one.name)
+        drawings = sorted(chain.from_iterable(done), key=itemgetter("name"))
         files = sorted(Path(place).iterdir())
         for file in files:
             check_file(out / file.name, force)
@@ -133,17 +121,13 @@ def draw(export: DrawnExport, place: Path, name: str) -> list[WrittenSheet]:
     for sheet in sheets:
         sheet.write(place)
     return [
-        WrittenSheet(
-            sheet.name,
-            sheet.title,
-            sheet.part,
-            paper_name(sheet.paper),
-            scale_text(sheet.scale) if sheet.to_scale else None,
-        )
+        {
+            "name": sheet.name,
+            "title": sheet.title,
+            "part": sheet.part,
+            "paper": paper_name(sheet.paper),
+            "scale": scale_text(sheet.scale) if sheet.to_scale else None,
+            "files": [sheet.name + suffix for suffix in SUFFIXES],
+        }
         for sheet in sheets
     ]
-
-
-def record(out: Path, drawings: Sequence[WrittenSheet]) -> dict[str, Any]:
-    """What was written, for JSON."""
-    return {"folder": str(out), "sheets": [asdict(one) | {"files": one.files} for one in drawings]}

@@ -9,6 +9,8 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 
+from pydantic import BaseModel, ConfigDict, Field
+
 from tbcad.app.reference.keys import KeySection, key_sections
 from tbcad.errors import InputError
 
@@ -17,8 +19,13 @@ PAGE_HEAD = (
 )
 
 
-@dataclass(frozen=True)
-class Term:
+class Words(BaseModel):
+    """A table of terms.toml."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", str_strip_whitespace=True)
+
+
+class Term(Words):
     """One term; what does not apply to it is empty."""
 
     name: str  # as the documentation has it
@@ -34,20 +41,18 @@ class Term:
     code: tuple[str, ...] = ()  # dotted names of what computes it
 
 
-@dataclass(frozen=True)
-class TermSection:
+class TermSection(Words):
     """Terms of one subject."""
 
     title: str
-    terms: tuple[Term, ...]
+    terms: tuple[Term, ...] = Field(alias="term")
 
 
-@dataclass(frozen=True)
-class Glossary:
+class Glossary(Words):
     """All terms."""
 
     introduction: str
-    sections: tuple[TermSection, ...]
+    sections: tuple[TermSection, ...] = Field(alias="section")
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -59,17 +64,7 @@ class Glossary:
 def glossary() -> Glossary:
     """The record, read."""
     text = (files("tbcad.app.reference") / "terms.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
-    sections = [
-        TermSection(section["title"], tuple(_term(row) for row in section["term"]))
-        for section in table["section"]
-    ]
-    return Glossary(table["introduction"].strip(), tuple(sections))
-
-
-def _term(row: dict[str, object]) -> Term:
-    frozen = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
-    return Term(**frozen)  # type: ignore[arg-type]
+    return Glossary.model_validate(tomllib.loads(text))
 
 
 def glossary_page() -> str:

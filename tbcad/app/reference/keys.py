@@ -4,9 +4,9 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -115,12 +115,8 @@ shown: take the # away to set it. "auto": tbcad chooses, and design.json says wh
 ELSEWHERE = "All keys, with units and ranges: tbcad init. What is not set here has its default."
 
 
-@dataclass
-class Remarks:
-    """Comments of a design: of the whole, and by the dotted name of a key or section."""
-
-    whole: list[str] = field(default_factory=list)
-    by_name: dict[str, list[str]] = field(default_factory=dict)
+Remarks: TypeAlias = dict[str, list[str]]
+"""Comments of a design by the dotted name of a key or section; of the whole by ""."""
 
 
 def design_template(name: str = PAPER) -> str:
@@ -128,7 +124,7 @@ def design_template(name: str = PAPER) -> str:
     file = shipped_designs()[name]
     values = _dotted(read_toml(file, name, "design"))
     remarks = _remarks(read_text(file, name, "design"))
-    whole = "\n".join(remarks.whole).removesuffix(ELSEWHERE).rstrip()
+    whole = "\n".join(remarks.get("", [])).removesuffix(ELSEWHERE).rstrip()
     lines = [f"# {line}".rstrip() for line in (*whole.splitlines(), "", *HEAD.splitlines())]
     for section in key_sections():
         lines += _section_lines(section, values, remarks)
@@ -139,11 +135,11 @@ def _section_lines(section: KeySection, values: Table, remarks: Remarks) -> Iter
     if section.name:
         yield ""
         yield from _comment(section.description)
-        yield from (f"# {line}" for line in remarks.by_name.get(section.name, ()))
+        yield from (f"# {line}" for line in remarks.get(section.name, ()))
         yield f"[{section.name}]"
     for key in section.keys:
         yield ""
-        yield from _key_lines(key, values, remarks.by_name.get(key.name, []))
+        yield from _key_lines(key, values, remarks.get(key.name, []))
 
 
 def _key_lines(key: Key, values: Table, remarks: list[str]) -> Iterator[str]:
@@ -185,7 +181,7 @@ def _dotted(table: Table, prefix: str = "") -> Table:
 
 def _remarks(text: str) -> Remarks:
     """The comments of a design: a block belongs to the line below it, else to the whole."""
-    remarks, section, block = Remarks(), "", list[str]()
+    remarks, section, block = dict[str, list[str]](), "", list[str]()
     for line in [*text.splitlines(), ""]:
         if line.startswith("#"):
             block.append(line.removeprefix("#").removeprefix(" "))
@@ -194,9 +190,8 @@ def _remarks(text: str) -> Remarks:
             section = header[1] + "."
         key = re.match(r"(\w+) = ", line)
         name = header[1] if header else section + key[1] if key else ""
-        if name and block:
-            remarks.by_name[name] = block
-        elif block:
-            remarks.whole += ["", *block] if remarks.whole else block
+        if block:
+            whole = [*remarks[""], ""] if not name and "" in remarks else []
+            remarks[name] = [*whole, *block]
         block = []
     return remarks

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tbcad.cad.formats.pictures import decoded, visible_files
+from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
-from tbcad.types import Bytes
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 MAX_FILE_BYTES = 40_000_000
@@ -94,23 +93,17 @@ def _read(path: Path) -> Picture | None:
             warnings.simplefilter("error")  # of a picture that is far too large
             with Image.open(path, formats=("PNG", "JPEG")) as image:
                 image.draft("RGB", (MAX_SIDE_PX, MAX_SIDE_PX))
-                return _jpeg(path.name, _in_8_bits(_on_white(image), path.name), MAX_SIDE_PX)
+                return _jpeg(path.name, np.asarray(_on_white(image)), MAX_SIDE_PX)
     except (InputError, OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
         return None
 
 
-def _in_8_bits(image: Any, name: str) -> Bytes:
-    pixels = decoded(image, name)
-    return np.asarray(
-        pixels if pixels.dtype == np.uint8 else pixels.astype(np.uint16) >> 8, np.uint8
-    )
-
-
 def _on_white(image: Any) -> Any:
+    """Red, green and blue of 8 bits each; ValueError: it has more."""
     from PIL import Image
 
-    if "A" not in image.getbands() and "transparency" not in image.info:
-        return image
+    if image.mode.startswith(("I", "F")):
+        raise ValueError(image.mode)
     drawn = image.convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
 

@@ -1,13 +1,12 @@
 """The command that explains terms, keys of a design, and checks of the verification."""
 
-import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tbcad.app.cli.app import app, print_result
-from tbcad.common.screen import WIDTH
+from tbcad.common.screen import paragraph
 from tbcad.options.call import tell_options
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def _lines(entry: "ReferenceEntry") -> Iterator[str]:
     for heading, value in entry.facts.items():
         text = value if isinstance(value, str) else ", ".join(value)
         begin = f"  {heading}".ljust(INDENT) + " "
-        yield _wrapped(text, begin, " " * len(begin))
+        yield paragraph(text, begin, " " * len(begin))
 
 
 def _lists(entries: "list[ReferenceEntry]") -> Iterator[str]:
@@ -84,22 +83,11 @@ def _lists(entries: "list[ReferenceEntry]") -> Iterator[str]:
 
 
 def _list(heading: str, names: list[str]) -> str:
-    return f"{heading}:\n{_wrapped('; '.join(names), '  ', '  ')}"
+    return f"{heading}:\n{paragraph('; '.join(names), '  ', '  ')}"
 
 
 def _names(entries: "list[ReferenceEntry]", kind: str) -> list[str]:
     return [entry.name for entry in entries if entry.kind == kind]
-
-
-def _wrapped(text: str, first: str, others: str) -> str:
-    return textwrap.fill(
-        text,
-        WIDTH,
-        initial_indent=first,
-        subsequent_indent=others,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 tell_options(__name__)

@@ -123,7 +123,7 @@ def drawings(
     """
     check_is_export(folder)
     from tbcad.common.schedule import cores
-    from tbcad.drawings.write import record, write_drawings
+    from tbcad.drawings.write import write_drawings
 
     with stages(0, silent=json) as screen:
         written = write_drawings(
@@ -135,7 +135,7 @@ def drawings(
             workers=cores(),
         )
     line = f"{out}: {len(written)} sheets, each as PDF and DXF"
-    print_result(record(out, written), [line], json)
+    print_result({"folder": str(out), "sheets": written}, [line], json)
     return 0
 
 
