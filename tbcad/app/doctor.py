@@ -5,7 +5,6 @@ can end a process without a message.
 """
 
 import os
-import platform
 import re
 import shlex
 import shutil
@@ -16,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import PackageNotFoundError, distributions, metadata, requires
+from importlib.metadata import PackageNotFoundError, distributions, requires
 from importlib.util import find_spec
 
 from packaging.requirements import Requirement
@@ -42,7 +41,6 @@ print("drawn")
 
 _KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
 _VTKS = ("vtk", "cadquery-vtk")
-_MACHINE = "machine"  # the extra that a real machine needs
 _INSTALL_X11 = "apt-get install libgl1 libx11-6 libxrender1 libegl1"
 # By name, what loads its shared libraries, and the distributions that own it; the first of these is
 # installed again if it cannot be loaded.
@@ -79,25 +77,11 @@ def diagnose() -> list[Finding]:
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         findings = list(pool.map(lambda check: check(), [*attempts, pictures]))
     return [
-        python_version(platform.python_version()),
         one_of("CAD kernel", _KERNELS, installed, needs),
         one_of("VTK", _VTKS, installed, needs),
         versions(needs, installed),
-        machine_libraries(_requirements(_MACHINE), installed),
         *findings,
     ]
-
-
-def python_version(version: str) -> Finding:
-    """Compare a Python version with the one that the installed tbcad asks for."""
-    try:
-        wanted = metadata("tbcad")["Requires-Python"]
-    except PackageNotFoundError:
-        return Finding(
-            "Python", False, f"{version}; tbcad is not installed", f"{_pip('install')} ."
-        )
-    ok = Requirement(f"python{wanted}").specifier.contains(version, prereleases=True)
-    return Finding("Python", ok, version, "" if ok else f"make a venv with Python {wanted}")
 
 
 def one_of(
@@ -131,20 +115,6 @@ def versions(needs: Sequence[Requirement], installed: Iterable[tuple[str, str]])
         return Finding("versions", True, f"{len(needs)} libraries as required")
     told = ", ".join(f"{need.name} {seen[need] or 'missing'}" for need in wrong)
     return Finding("versions", False, told, f"{_pip('install')} {_quoted(wrong)}")
-
-
-def machine_libraries(
-    needs: Sequence[Requirement], installed: Iterable[tuple[str, str]]
-) -> Finding:
-    """Say which libraries for a real machine are there; a build needs none of them."""
-    present = dict(installed)
-    names = [canonicalize_name(need.name) for need in needs]
-    detail = ", ".join(f"{one} {present[one]}" if one in present else f"no {one}" for one in names)
-    remedy = f"only tbcad run and calibrate, raw files and OpenEXR need them: {_pip('install')}"
-    missing = not all(one in present for one in names)
-    return Finding(
-        "machine (optional)", True, detail, f"{remedy} 'tbcad[{_MACHINE}]'" if missing else ""
-    )
 
 
 def attempt(name: str, program: str, remedy: str, before: Sequence[str] = ()) -> Finding:
@@ -193,14 +163,13 @@ def _installed() -> list[tuple[str, str]]:
     return sorted({(canonicalize_name(d.name), d.version) for d in distributions() if d.name})
 
 
-def _requirements(extra: str = "") -> list[Requirement]:
-    """Return what the installed tbcad requires here; or what an extra does, and nothing else."""
+def _requirements() -> list[Requirement]:
+    """Return what the installed tbcad requires here, without extras."""
     try:
         needs = [Requirement(text) for text in requires("tbcad") or ()]
     except PackageNotFoundError:
         return []
-    every = [one for one in needs if not one.marker or one.marker.evaluate({"extra": extra})]
-    return [one for one in every if not extra or (one.marker and "extra" in str(one.marker))]
+    return [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
 
 
 def _reinstall(remove: Sequence[str], add: str, needs: Sequence[Requirement]) -> str:

@@ -36,8 +36,14 @@ def paragraph(text: str, first: str = "", others: str = "") -> str:
 
     The first line and the others begin with what is given.
     """
-    never = {"break_long_words": False, "break_on_hyphens": False}
-    return textwrap.TextWrapper(WIDTH, first, others, **never).fill(text)
+    return textwrap.fill(
+        text,
+        WIDTH,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 class TimeLeft:
