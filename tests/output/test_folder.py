@@ -295,22 +295,15 @@ class TestRefused:
     @pytest.mark.parametrize(
         "manifest",
         [
-            b"",
-            b"{",
             b"[" * 100_000,
             b"\xff",
-            b"[]",
             b'{"name": "a web page", "files": {}}',
-            b'{"schema": "tbcad-manifest/1", "files": []}',
             *(
                 b'{"schema": "tbcad-manifest/1", "files": {"%s": {"sha256": "%s", "size": %s}}}'
-                % (name, digest, size)
-                for name, digest, size in (
-                    (b"../a", b"0" * 64, b"1"),
-                    (b"a/../../b", b"0" * 64, b"1"),
-                    (b"/a", b"0" * 64, b"1"),
-                    (b"a", b"0" * 64, b"true"),
-                    (b"a", b"0" * 63, b"1"),
+                % (name, b"0" * digits, size)
+                for name, digits, size in (
+                    *((b"a/../../b", 64, b"1"), (b"/a", 64, b"1")),
+                    *((b"a", 64, b"true"), (b"a", 63, b"1")),
                 )
             ),
             b'{"schema": "tbcad-manifest/1", "files": {}}' + b" " * 4_000_000,

@@ -49,25 +49,6 @@ def test_prototype(small_design: MirrorDesign) -> None:
     assert found.prototype.turning_mass_g == pytest.approx(model.balance.mass_g, rel=0.1)
 
 
-@pytest.mark.slow
-def test_prices_are_those_of_the_spec(tmp_path: Path, small_design: MirrorDesign) -> None:
-    """Each ball at three dollars, filament at ten pounds a kilogram."""
-    mine = tmp_path / "mine.csv"
-    mine.write_text(
-        "part,each,per_kg,currency,date,source\n"
-        "ball *,3,,USD,2026-11,test\nPETG,,10,GBP,2026-11,test\n"
-    )
-    found = overview(replaced_prices(small_design, str(mine))).prototype
-    assert found is not None
-    assert found.ball_price == {"USD": 3.0 * found.balls}
-    assert found.prints.price == {"GBP": pytest.approx(found.prints.mass_g / 100, rel=0.06)}
-
-
-def replaced_prices(some: MirrorDesign, name: str) -> MirrorDesign:
-    prototype = some.spec.prototype.model_copy(update={"prices": (name,)})
-    return MirrorDesign(some.spec.model_copy(update={"prototype": prototype}), some.arrays)
-
-
 def test_a_prototype_that_cannot_be_made_is_left_out(tmp_path: Path) -> None:
     """Camera b is no half turn of camera a: nothing can stand in for both halves."""
     leaning = tbcad.load_spec(None, ["n=2", "camera_mm=[100, 5, -100]"])

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import shutil
 from pathlib import Path
 
 import ezdxf
@@ -106,14 +105,6 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     assert shown.out == ""
     assert shown.err.count("\n") == 1
     return shown.err
-
-
-def test_a_changed_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    export = shutil.copytree(SAMPLE, tmp_path / "exports")
-    design = json.loads((export / "design.json").read_text())
-    (export / "design.json").write_text(json.dumps(design))
-    words = refused(["drawings", str(export), "--out", str(tmp_path / "out")], capsys)
-    assert "design.json is not as tbcad wrote it" in words
 
 
 def test_the_section_of_the_samples_shell(tmp_path: Path) -> None:

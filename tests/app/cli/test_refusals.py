@@ -13,10 +13,11 @@ from tests.ball_captures import ball, four  # noqa: F401
 from tests.light.viewer.fields import write_ball
 
 # A command and a part of its line. RECORD is a build's record, EXPORT one with a prototype, SAMPLE
-# a whole build, KNOT a capture, FIELD one with a field beside it, BALL one of two frames.
+# a whole build, CHANGED one with another bit, KNOT a capture, FIELD one with a field beside it, BALL one of two frames.
 CASES = (Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8")
 LAMP = "x_mm,y_mm,z_mm\n"
 GIVEN = {
+    "old.png": "mine",
     "design.toml": "optics.n = 3\n",
     "mine.toml": 'based_on = "sla"\nball_grade = "G7"',
     "none.csv": LAMP,
@@ -41,8 +42,12 @@ def folders(
     with LightField.open(field) as source:
         write_ball(source, field)
     sample = Path(__file__).parents[3] / "docs" / "sample"
-    names = ("RECORD", "EXPORT", "SAMPLE", "KNOT", "FIELD", "BALL")
-    every = (record, export_with_wind_up, sample, captured, field, ball)
+    changed = shutil.copytree(sample, tmp_path_factory.mktemp("changed") / "exports")
+    data = bytearray((changed / "mirrors.csv").read_bytes())
+    data[len(data) // 2] ^= 1  # one bit: the size is right
+    (changed / "mirrors.csv").write_bytes(data)
+    names = ("RECORD", "EXPORT", "SAMPLE", "CHANGED", "KNOT", "FIELD", "BALL")
+    every = (record, export_with_wind_up, sample, changed, captured, field, ball)
     return dict(zip(names, map(str, every), strict=True))
 
 
