@@ -63,8 +63,13 @@ class Quantity(NamedTuple):
     unit: str  # of the values
     digits: int  # after the point
     values: Floats  # (m,); NaN is unknown
-    on_map: bool = True  # whether the map can show it
+    map: bool = True  # whether the map can show it
     added: bool = False  # whether both halves of a mirror on the seam add up
+
+    def packed(self, arrays: PackedArrays) -> dict[str, Any]:
+        """The figure for the page."""
+        told = {name: value for name, value in self._asdict().items() if name != "values"}
+        return told | {"values": arrays.add(self.values, "Float32Array")}
 
 
 def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) -> dict[str, Any]:
@@ -87,7 +92,7 @@ def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) 
         "pose": arrays.add(columns(rows, "ux uy uz px py pz nx ny nz"), "Float32Array"),
         "radius": arrays.add(np.array([row.radius_mm or np.inf for row in rows]), "Float32Array"),
         "size": arrays.add(columns(rows, "size_mm")[:, 0], "Float32Array"),
-        "quantities": [_packed(one, arrays) for one in known],
+        "quantities": [one.packed(arrays) for one in known],
         "plan": photographs if plan else [],
         "balls": _balls(folder) if plan else [],
     }
@@ -113,18 +118,6 @@ def _designed(rows: Sequence[MirrorRow]) -> Iterator[Quantity]:
     yield Quantity("area", "Area of the cell", "mm²", 2, column("cell_area_mm2"), added=True)
     yield Quantity("polar", "Polar angle about the axis", "°", 2, column("polar_deg"), False)
     yield Quantity("azimuth", "Azimuth about the axis", "°", 2, column("azimuth_deg"), False)
-
-
-def _packed(quantity: Quantity, arrays: PackedArrays) -> dict[str, Any]:
-    return {
-        "key": quantity.key,
-        "label": quantity.label,
-        "unit": quantity.unit,
-        "digits": quantity.digits,
-        "map": quantity.on_map,
-        "added": quantity.added,
-        "values": arrays.add(quantity.values, "Float32Array"),
-    }
 
 
 def _balls(folder: Path) -> list[dict[str, Any]]:

@@ -13,7 +13,8 @@ from tests.ball_captures import ball, four  # noqa: F401
 from tests.light.viewer.fields import write_ball
 
 # A command and a part of its line. RECORD is a build's record, EXPORT one with a prototype, SAMPLE
-# a whole build, CHANGED one with another bit, KNOT a capture, FIELD one with a field beside it, BALL one of two frames.
+# a whole build, CHANGED one with another bit, KNOT a capture, FIELD one with a field beside it,
+# BALL one of two frames.
 CASES = (Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8")
 LAMP = "x_mm,y_mm,z_mm\n"
 GIVEN = {
