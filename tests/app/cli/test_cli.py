@@ -16,22 +16,7 @@ from tests.exported_files import read_csv
 SHELL = ["--parts", "shell"]
 # A quarter of the pixels, all of which a verification traces.
 SENSOR = ["--set", "camera.width_px=1040", "--set", "camera.height_px=776"]
-SMALL = ["build", "--n", "6", "--set", "chord_error_mm=0.05", *SHELL]
 WIDE = ["build", "--n", "6", "--set", "hfov_deg=110", *SENSOR, *SHELL]
-
-
-@pytest.fixture(scope="module")
-def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("cli") / "exports"
-    assert run([*SMALL, "--out", str(out), "--no-verify"]) == 0
-    return out
-
-
-def test_build_without_verification(export: Path) -> None:
-    assert not (export / "verify.json").exists()
-    document = json.loads((export / "design.json").read_text())
-    assert document["spec"]["optics"]["n"] == 6
-    assert document["spec"]["mesh"]["chord_error_mm"] == 0.05
 
 
 @pytest.mark.slow

@@ -149,20 +149,6 @@ class TestWritten:
         assert read["yield"]["share"] == 0
         assert (only["process"], only["builds"], only["yield"]) == ("diamond", 20, 0)
 
-    def test_margins_only_where_asked(self, written: Path, export: Path, tmp_path: Path) -> None:
-        """All else is as with them."""
-        assert run(["tolerance", str(export), *FEW, "--out", str(tmp_path)]) == 0
-        plain, searched = (
-            json.loads((folder / "tolerance.json").read_text()) for folder in (tmp_path, written)
-        )
-        assert plain["margin_needed_mm"] is None
-        assert "--margins" in plain["margin_reason"]
-        assert "argin" not in plain["summary"]
-        for key in plain.keys() - {"summary", "margin_needed_mm", "margin_reason", "processes"}:
-            assert plain[key] == searched[key]
-        for one, other in zip(plain["processes"], searched["processes"], strict=True):
-            assert (one["process"], one["yield"]) == (other["process"], other["yield"])
-
 
 def test_planar_mirrors_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """They have no centre that pictures of made machines could take."""
