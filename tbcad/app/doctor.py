@@ -68,7 +68,9 @@ class Finding:
 
 def diagnose() -> list[Finding]:
     """Check everything that a build needs."""
-    needs, installed = _requirements(), _installed()
+    needs = _requirements()
+    found = {(canonicalize_name(one.name), one.version) for one in distributions() if one.name}
+    installed = sorted(found)
     attempts: list[Callable[[], Finding]] = []
     for name, (program, owners) in _LIBRARIES.items():
         first = f"{_INSTALL_X11}; if that is not it: " if owners is _KERNELS else ""
@@ -157,10 +159,6 @@ def pictures() -> Finding:
         return direct
     under_x = attempt("pictures", _PICTURE, remedy, ["xvfb-run", "-a"])
     return replace(under_x, detail=f"{under_x.detail}, under xvfb-run")
-
-
-def _installed() -> list[tuple[str, str]]:
-    return sorted({(canonicalize_name(d.name), d.version) for d in distributions() if d.name})
 
 
 def _requirements() -> list[Requirement]:

@@ -15,7 +15,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import cache, partial
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from operator import call
 from pathlib import Path
 from time import monotonic
@@ -155,15 +155,8 @@ def _gathered(
 def versions() -> Versions:
     """Return what must be the same here and on every worker for the same figures."""
     python = ".".join(platform.python_version_tuple()[:2])
-    packages = {name: _version(name) for name in _PACKAGES}
+    packages = {name: version(name) for name in _PACKAGES}
     return {"tbcad": __version__, "Python": python, **packages, "tbcad's code": _code()}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "none"
 
 
 def _code() -> str:

@@ -76,10 +76,12 @@ def order_sheet(export: Path, record: dict[str, Any], spec: Spec) -> Sheet:
     figures = [FIGURE_HEAD, *_figure_rows(record)]
     below = high - BESIDE_MM - (len(figures) + 1) * TABLE_ROW_MM
     block = _title_block(record, spec)
+    x, y = views[1].at(box[1])
+    beside = x + BETWEEN_MM, y  # the corner right of the view from above
     drawn = [
         *chain.from_iterable(map(_drawn, views, cuts, VIEWS, repeat(numbered))),
         *_datums(views, holes[0], record["foot_z_mm"]),
-        *table(_beside(views[1], box), WIDTHS_MM[:-1], [HEAD[:-1], *rows]),
+        *table(beside, WIDTHS_MM[:-1], [HEAD[:-1], *rows]),
         *table((edge[0], high - BESIDE_MM), FIGURE_WIDTHS, figures),
         *_words(edge, (low + BESIDE_MM, below), list(_lines(record, spec, rows))),
     ]
@@ -122,12 +124,6 @@ def _views(cuts: Sequence[Cut]) -> tuple[list[View], Floats]:
     places = ((x, y), (x, y + z0 - BETWEEN_MM - y1), (x + x1 + BETWEEN_MM + y1, y))
     views = zip(VIEWS.values(), places, strict=True)
     return [View(axes, place, scale) for axes, place in views], box
-
-
-def _beside(view: View, box: Floats) -> Point:
-    """The upper left corner of what is right of the view from above."""
-    x, y = view.at(box[1])
-    return x + BETWEEN_MM, y
 
 
 def _drawn(

@@ -5,7 +5,7 @@ Sizes are those of the solid and of tbcad's lists of purchased parts.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -241,13 +241,12 @@ def fits_table(holes: Sequence[tuple[str, DrawnHole]], mates: Sequence[Mate]) ->
     for number, hole in holes:
         for cells in sorted({_cells(hole, mate) for mate in mates if _takes(hole, mate)}):
             alike.setdefault(cells, []).append(number)
-    return SheetTable(FITS_HEAD, FITS_WIDTHS_MM, tuple(_rows(alike)))
-
-
-def _rows(alike: Mapping[Row, Sequence[str]]) -> Iterator[Row]:
-    for cells, numbers in alike.items():
-        for start in range(0, len(numbers), NUMBERS):
-            yield " ".join(numbers[start : start + NUMBERS]), *cells
+    rows = [
+        (" ".join(numbers[start : start + NUMBERS]), *cells)
+        for cells, numbers in alike.items()
+        for start in range(0, len(numbers), NUMBERS)
+    ]
+    return SheetTable(FITS_HEAD, FITS_WIDTHS_MM, tuple(rows))
 
 
 def _takes(hole: DrawnHole, mate: Mate) -> bool:

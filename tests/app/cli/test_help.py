@@ -1,12 +1,9 @@
-"""Help of every command, one vocabulary for the options of all, examples, and completion."""
+"""Help of every command, one vocabulary for the options of all, and examples."""
 
 import json
-import os
 import pkgutil
 import re
 import shlex
-import subprocess
-import sys
 from collections import defaultdict
 from importlib import import_module
 from pathlib import Path
@@ -87,23 +84,6 @@ def test_an_option_is_called_and_takes_the_same_everywhere() -> None:
     assert {name for name, found in kinds.items() if len(found) > 1} == SEVERAL_KINDS
     spelled = {name for one in leaves().values() for opt in options(one) for name in opt.opts}
     assert {"--timeout", "--time-limit", "--for-process", "--process"} <= spelled  # old names
-
-
-def completed(place: dict[str, str]) -> str:
-    """What the command prints when a shell asks it, by variables of the environment."""
-    words, environment = [sys.executable, "-m", "tbcad"], {**os.environ, **place}
-    done = subprocess.run(words, env=environment, capture_output=True, encoding="utf-8", check=True)
-    return done.stdout
-
-
-def test_completion() -> None:
-    for typed, expected in (
-        ("tbcad study s", {"ssim"}),
-        ("tbcad build --for", {"--for-process", "--force"}),
-    ):
-        place = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
-        assert set(completed({**place, "_TBCAD_COMPLETE": "complete_bash"}).split()) == expected
-    assert "tbcad" in completed({"_TBCAD_COMPLETE": "source_fish"})
 
 
 def test_a_study_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -136,19 +136,6 @@ class TestWritten:
         mine.unlink()
         assert contents(written) == before
 
-    def test_other_process_and_seed(self, bare: Path, tmp_path: Path) -> None:
-        """A process of one's own: with a change it is no longer the built-in one."""
-        words = "--process diamond --seed 7 --margins --set facets_mm.mean=1 --calibrated-mrad 0"
-        assert run(["tolerance", str(bare), *FEW, *words.split(), "--out", str(tmp_path)]) == 0
-        read = json.loads((tmp_path / "tolerance.json").read_text())
-        assert read["process"]["facets_mm"]["mean"] == 1
-        assert read["process"]["facets_mm"]["source"] == "set by an option"
-        assert (read["seed"], read["ssim"]["calibration_residual_mrad"]) == (7, 0)
-        (only,) = read["processes"]
-        assert only["margin_needed_mm"] == read["margin_needed_mm"] > 1
-        assert read["yield"]["share"] == 0
-        assert (only["process"], only["builds"], only["yield"]) == ("diamond", 20, 0)
-
 
 def test_planar_mirrors_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """They have no centre that pictures of made machines could take."""
