@@ -1,8 +1,10 @@
 """The optical layout: the section through both cameras, with the symbols of docs/glossary.md."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from tbcad.cad.drafting.sheet import (
 from tbcad.cad.drafting.views import straight
 from tbcad.cad.formats.checked_files import columns
 from tbcad.cad.formats.entities import Arc, Circle, Entity, Layer, Line, Point, Polyline
+from tbcad.core.spec.csv_rows import read_toml
 from tbcad.core.spec.sizes import OpticsSpec
 from tbcad.drawings.export import DrawnExport
 from tbcad.records.design import DesignRecord
@@ -36,14 +39,7 @@ AROUND_MM = 12.0  # room round the drawing
 CROSS_MM, DOT_MM = 1.5, 0.7  # on paper: half a cross of a virtual camera; radius of a place
 BEYOND = 1.6  # of the capture radius: where reflected rays end
 LEVEL_MM, LEADER_MM, LEADER_DEG = 8.0, 12.0, 200.0  # of a dimension and of the leader's corner
-NOTES = (
-    "In the plane y = 0, x to the right, z up; all is to scale.",
-    "O: centre of the capture sphere and focus of both ellipses; A, B: pinholes, the others.",
-    "Crosses: virtual cameras, each at d = 2a from O in the direction u of its mirror.",
-    "Rays: from A to both edges of the first, the middle and the last whole mirror in the",
-    "plane, and as they are reflected there, traced exactly.",
-    "Symbols as in docs/glossary.md.",
-)
+WORDS = "optical_layout.toml"
 
 
 @dataclass(frozen=True)
@@ -115,6 +111,7 @@ def draw_layout(export: DrawnExport) -> list[Sheet]:
     export.file(MirrorRow.FILE)
     optics = export.design.spec.optics
     layout, capture = _layout(optics, MirrorRow.read(export.folder)), optics.capture_diameter_mm / 2
+    words = read_toml(files("tbcad.drawings").joinpath(WORDS), WORDS, "words")
     pinhole, reach = layout.pinhole, 2 * layout.major
     left, low, right, high = drawing_room(A3)
     column = right - sum(WIDTHS_MM)
@@ -137,9 +134,9 @@ def draw_layout(export: DrawnExport) -> list[Sheet]:
         *on_paper,
         *_places(layout, middle, scale, on_paper),
         *_capture_length(layout.pinhole, capture, middle, scale),
-        *table((column, high), WIDTHS_MM, (HEAD, *_values(layout))),
+        *table((column, high), WIDTHS_MM, (HEAD, *_values(layout, words))),
     ]
-    return [Sheet.framed((NAME, NAME), block, A3, scale, middle, drawn, NOTES)]
+    return [Sheet.framed((NAME, NAME), block, A3, scale, middle, drawn, words["notes"])]
 
 
 def has_layout(design: DesignRecord) -> bool:
@@ -233,28 +230,21 @@ def _capture_length(
     yield across(left, right, low - LEVEL_MM, f"{2 * reach:g}")
 
 
-def _values(layout: Layout) -> Iterator[tuple[str, ...]]:
+def _values(layout: Layout, words: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     """Symbols, what they are, and their values."""
-    optics, rows = layout.optics, layout.rows
-    radii = [row.radius_mm for row in rows if row.radius_mm]
-    span = f"{min(radii):.3f} to {max(radii):.3f}" if radii else "all planar"
+    optics, k = layout.optics, layout.named
+    radii = [row.radius_mm for row in layout.rows if row.radius_mm]
     x, y, z = optics.camera_mm
-    counted = " + ".join(str(sum(row.camera == one for row in rows)) for one in "ab")
-    yield "n", "subdivision", f"{optics.n}"
-    yield "", "mirrors of camera a + b", counted
-    yield "2 R", "diameter of the capture sphere, mm", f"{optics.capture_diameter_mm:g}"
-    yield "A", "pinhole of camera a, mm", f"({x:g}, {y:g}, {z:g})"
-    yield "B", "pinhole of camera b, mm", f"({-x:g}, {y:g}, {z:g})"
-    yield "a", "semi-major axis of the ellipsoid, mm", f"{layout.major:.4f}"
-    yield "b", "semi-minor axis, mm", f"{optics.semi_minor_mm:g}"
-    yield "2 c", "distance of the foci O and A, mm", f"{2 * _half(optics):.4f}"
-    yield "d = 2 a", "from O to a virtual camera V, mm", f"{2 * layout.major:.4f}"
-    yield "r", "radii of the mirrors, mm", span
-    if (k := layout.named) is not None:
-        row = layout.flat[k]
-        yield "", "the mirror that is named", row.id
-        yield "P", "its apex (x, z), mm", f"({row.px:.3f}, {row.pz:.3f})"
-        own = "planar" if layout.radius[k] == PLANAR_MM else f"{layout.radius[k]:.3f}"
-        yield "r", "its radius, C = P - r N, mm", own
-        yield "theta_0", "half angle of the flat mirror, deg", f"{row.theta0_deg:.3f}"
-        yield "theta_1", "half angle wanted (eq. 1), deg", f"{row.theta1_deg:.3f}"
+    values = {
+        "optics": optics,
+        "counted": " + ".join(str(sum(row.camera == one for row in layout.rows)) for one in "ab"),
+        **{"x": x, "minus_x": -x, "y": y, "z": z},
+        **{"major": layout.major, "virtual": 2 * layout.major, "foci": 2 * _half(optics)},
+        "span": f"{min(radii):.3f} to {max(radii):.3f}" if radii else "all planar",
+    }
+    if k is not None:
+        planar = layout.radius[k] == PLANAR_MM
+        values["mirror"] = layout.flat[k]
+        values["radius"] = "planar" if planar else f"{layout.radius[k]:.3f}"
+    for symbol, what, value in (*words["whole"], *(words["named"] if k is not None else ())):
+        yield symbol, what, value.format(**values)
