@@ -96,15 +96,6 @@ def keywords(
     return decorated
 
 
-def declared(record: type) -> dict[str, Any]:
-    """The options of a record by name: types with what typer makes an option of."""
-    return {
-        name: kind
-        for name, kind in _annotated(record).items()
-        if isinstance(get_args(kind)[1], ParameterInfo)
-    }
-
-
 def _annotated(record: type) -> dict[str, Any]:
     """Types of the fields with an option, or with a text alone: those are keywords of Python."""
     kinds, texts = get_type_hints(record, include_extras=True), field_texts(record)
@@ -165,10 +156,11 @@ def tell_options(module: str) -> None:
 def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
     """What typer makes options of: a record's fields, then what else a command's function takes."""
     first, *own = signature(function, eval_str=True).parameters.values()
-    options = declared(first.annotation)
+    options = _annotated(first.annotation)
     for one in signature(first.annotation).parameters.values():
-        if one.name in options:
-            yield _typed(one.replace(annotation=options[one.name]))
+        kind = options.get(one.name)
+        if kind is not None and isinstance(get_args(kind)[1], ParameterInfo):
+            yield _typed(one.replace(annotation=kind))
     yield from map(_typed, own)
 
 

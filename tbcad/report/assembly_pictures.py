@@ -148,31 +148,27 @@ def _best_eye(scene: _Scene, step: Step) -> Floats:
         scene.look(plotter, eye)
         plotter.render()  # what was drawn before is shown otherwise
         numbers = _numbers(np.array(plotter.screenshot(None, return_img=True)))
-        seen.append(_seen(scene, step, numbers))
+        pixels = _visible(scene, numbers)
+        # Of the best seen body of each kind of part.
+        seen.append([max((pixels.get(n, 0) for n in use.bodies), default=0) for use in step.parts])
     plotter.close()
     area = np.array(seen)
     scores = np.sqrt(area / np.maximum(area.max(axis=0), 1.0)).sum(axis=1)
     return eyes[int(np.argmax(scores * np.array(worth)))]
 
 
-def _seen(scene: _Scene, step: Step, numbers: Ints) -> list[int]:
-    """Visible pixels of the best seen body of each kind of part."""
+def _visible(scene: _Scene, numbers: Ints) -> dict[str, int]:
+    """Visible pixels of each body."""
     counts = np.bincount(numbers.ravel(), minlength=len(scene.names) + 1)
-    return [
-        max((_count(scene, counts, name) for name in use.bodies), default=0) for use in step.parts
-    ]
-
-
-def _count(scene: _Scene, counts: Ints, name: str) -> int:
-    return int(counts[scene.names.index(name) + 1]) if name in scene.meshes else 0
+    return dict(zip(scene.names, counts[1:].tolist(), strict=False))
 
 
 def _callouts(step: Step, scene: _Scene, numbers: Ints) -> Iterable[Callout]:
     """A call-out for each kind of part that is seen, at the middle of its best seen body."""
-    counts = np.bincount(numbers.ravel(), minlength=len(scene.names) + 1)
+    pixels = _visible(scene, numbers)
     for use in step.parts:
-        best = max(use.bodies, key=lambda name: _count(scene, counts, name), default="")
-        if best and _count(scene, counts, best) >= ANCHOR_PX:
+        best = max(use.bodies, key=lambda name: pixels.get(name, 0), default="")
+        if pixels.get(best, 0) >= ANCHOR_PX:
             yield Callout(use.item, use.quantity, _inside(numbers == scene.names.index(best) + 1))
 
 

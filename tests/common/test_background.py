@@ -2,15 +2,11 @@
 
 import os
 import signal
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tbcad_verify.run.processes import at_once
 
-from tbcad.cad.kernel.checks import volume
-from tbcad.cad.kernel.solids import cylinder, fused
 from tbcad.common.schedule import background_processes
 from tbcad.core.spec.errors import SpecError
 
@@ -25,12 +21,6 @@ def refuse(text: str) -> None:
 
 def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
-
-
-def joined_cylinders() -> float:
-    """Volume of a row of cylinders."""
-    up = np.array([0.0, 0.0, 1.0])
-    return volume(fused([cylinder(np.array([i, 0.0, 0.0]), up, 0.8, 1.0) for i in range(16)]))
 
 
 def test_all_is_done_at_the_end_of_the_block(tmp_path: Path) -> None:
@@ -53,14 +43,3 @@ def test_a_process_that_dies_is_told() -> None:
         background_processes() as submit,
     ):
         submit(die)
-
-
-def test_two_threads_have_each_their_own() -> None:
-    """The kernel gives the same there as here."""
-
-    def in_background(_: int) -> float:
-        with background_processes() as submit:
-            return float(submit(joined_cylinders).result(timeout=60))
-
-    with ThreadPoolExecutor(2) as pool:
-        assert [*pool.map(in_background, range(2))] == [joined_cylinders()] * 2

@@ -146,24 +146,10 @@ def test_seats_are_listed_on_the_part_that_has_their_pads(carrier: Solid) -> Non
 def export(folder: Path, carrier: Solid) -> DrawnExport:
     """A machine that is the plate with a cap and a ball, on a shaft of 8 mm."""
     write_step(folder / "carrier.step", carrier, pcurves=False)
-    ball: Row = {
-        "kind": "ball",
-        "size": "16 mm",
-        "body_radius_mm": 8.0,
-        "bx": -25,
-        "by": 10,
-        "bz": 15,
-    }
-    cap: Row = {
-        "kind": "cap",
-        "size": "cap R 40 mm",
-        "body_radius_mm": 9,
-        "bx": 25,
-        "by": 10,
-        "bz": 16,
-    }
     rest = dict.fromkeys(BallRow.columns(), 1)
-    balls: list[Row] = [rest | {"number": 1} | cap, rest | {"number": 2} | ball]
+    names = ("number", "kind", "size", "body_radius_mm", "bx", "by", "bz")
+    cells = (1, "cap", "cap R 40 mm", 9, 25, 10, 16), (2, "ball", "16 mm", 8.0, -25, 10, 15)
+    balls: list[Row] = [rest | dict(zip(names, one, strict=True)) for one in cells]
     write_table(folder / "balls.csv", tuple(rest), balls)
     write_manifest(folder, "build")
     pads = np.array([[4.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 4.5, 0.0]])

@@ -15,7 +15,7 @@ from tbcad.app.cli import run
 from tbcad.app.cli.app import _show
 from tbcad.app.doctor import Finding
 from tbcad.common.results import Figure, Study
-from tbcad.common.screen import WIDTH, TimeLeft, paragraph, stages
+from tbcad.common.screen import WIDTH, TimeLeft, stages
 from tests.exported_files import contents
 from tests.verify.synthetic_export import Design
 from tests.verify.synthetic_export import export as write_export
@@ -79,13 +79,6 @@ def test_study_fits_and_shows_every_word(capsys: pytest.CaptureFixture[str]) -> 
     assert "…" not in text
     assert text.count("n" * 10) > 1
     assert sorted(set(long.split()) - set(text.split())) == []
-
-
-def test_a_paragraph_fits_but_for_paths() -> None:
-    path = "/a" * 60
-    lines = paragraph(f"{path}: " + "tolerance-cameras.csv, " * 9).splitlines()
-    assert lines[0] == f"{path}:"
-    assert max(map(len, lines[1:])) <= WIDTH
 
 
 def test_time_left_follows_the_pace() -> None:
