@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,11 +90,24 @@ def photograph(options: CaptureOptions) -> Photographs:
 
 def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:
     """Take both photographs and replace a folder by their files; return the record of them."""
+    from math import radians
+
+    from tbcad.light.reflectance.lamp_places import (
+        MIRRORS,
+        PROJECTORS,
+        lamps_of_mirrors,
+        read_lamp_places,
+    )
     from tbcad.light.simulate.capture.files import write_capture
+    from tbcad.light.simulate.capture.light_field import LightField
+    from tbcad.light.simulate.capture.sequence import turns, write_turning
+    from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.output.folder import replacing
     from tbcad.output.manifest import write_manifest
 
-    write_field = None if options.lights is None else _field_writer(photographs, options)
+    lights, table = options.lights, None
+    if lights is not None and str(lights) not in (MIRRORS, PROJECTORS):
+        table = read_lamp_places(Path(lights), photographs.capture_mm)  # before long work
     options.progress("photographs and light field")
     out = Path(options.out or "")
     with replacing(out, "capture", options.force, photographs.sources) as folder:
@@ -106,56 +118,24 @@ def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict
             photographs.capture_mm,
             photographs.facts,
         )
-        if write_field is not None:
+        if lights is not None:
+            from tbcad.light.reflectance.transport import write_reflectance
+
             options.progress("a photograph for each lamp")
-            record["reflectance"] = write_field(folder)
+            scene, thrown = prepared_scene(photographs.subject), str(lights) == PROJECTORS
+            with LightField.open(folder) as source:
+                lamps = table or lamps_of_mirrors(source, options.every)
+                record["reflectance"] = write_reflectance(
+                    folder, source, scene, lamps, options.detail, thrown
+                )
         if options.frames is not None:
             options.progress("a photograph for each frame")
-            record["sequence"] = _write_frames(folder, photographs, options.frames, options)
+            scene = prepared_scene(photographs.subject)
+            angles = turns(options.frames, radians(options.turn))
+            with LightField.open(folder) as source:
+                record["sequence"] = write_turning(folder, source, scene, angles, options.detail)
         write_manifest(folder, "capture")
     return record
-
-
-def _write_frames(
-    folder: Path, photographs: Photographs, count: int, options: CaptureOptions
-) -> dict[str, Any]:
-    from math import radians
-
-    from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.capture.sequence import turns, write_turning
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
-
-    angles, scene = turns(count, radians(options.turn)), prepared_scene(photographs.subject)
-    with LightField.open(folder) as source:
-        return write_turning(folder, source, scene, angles, options.detail)
-
-
-def _field_writer(
-    photographs: Photographs, options: CaptureOptions
-) -> Callable[[Path], dict[str, Any]]:
-    """What writes the reflectance field; a table of lamps is read at once, before long work."""
-    from tbcad.light.reflectance.lamp_places import (
-        MIRRORS,
-        PROJECTORS,
-        lamps_of_mirrors,
-        read_lamp_places,
-    )
-    from tbcad.light.reflectance.transport import write_reflectance
-    from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
-
-    table, lights = None, str(options.lights)
-    if lights not in (MIRRORS, PROJECTORS):
-        table = read_lamp_places(Path(lights), photographs.capture_mm)
-
-    def write(folder: Path) -> dict[str, Any]:
-        with LightField.open(folder) as source:
-            lamps = table or lamps_of_mirrors(source, options.every)
-            scene = prepared_scene(photographs.subject)
-            thrown = lights == PROJECTORS
-            return write_reflectance(folder, source, scene, lamps, options.detail, thrown)
-
-    return write
 
 
 def relight(
