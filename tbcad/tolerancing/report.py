@@ -10,6 +10,7 @@ import numpy as np
 
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.analysis import Analysis
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
@@ -187,14 +188,23 @@ def spread_dict(analysis: Analysis) -> dict[str, Any]:
     """The spread of rays by waviness, for tolerance.json; pixels share the target's disc."""
     waviness = analysis.process.waviness_um.magnitude * MICROMETRE
     spread = np.concatenate([_mirror_spreads(model, waviness) for model in analysis.edge_models])
-    pixels = np.median(analysis.result.pixels)
+    numbers = virtual_camera_numbers(analysis.edge_models[1].halved)
+    pixels = np.bincount(numbers, np.concatenate([*map(_picture_sizes, analysis.cameras)]))
     return {
         "median": float(np.median(spread)),
         "largest": float(spread.max()),
-        "pixel_width_median": (
-            float(analysis.target * np.sqrt(np.pi / 4 / pixels)) if pixels else 0.0
-        ),
+        "pixel_width_median": float(analysis.target * np.sqrt(np.pi / 4 / np.median(pixels))),
     }
+
+
+def _picture_sizes(at: Reflector) -> Floats:
+    """Size of each cell's picture as designed, by the polygon of its corners, pixels, (m,)."""
+    arcs, corner = at.cells.arcs, at.camera.project(at.cells.corners)
+    (x, y), (next_x, next_y) = corner[arcs.start].T, corner[arcs.end].T
+    area, total = (x * next_y - next_x * y) / 2, np.zeros(len(at.cells.surfaces))
+    np.add.at(total, arcs.left, area)
+    np.subtract.at(total, arcs.right, area)
+    return np.abs(total[: len(at)])
 
 
 def _mirror_spreads(model: EdgeModel, waviness: float) -> Floats:

@@ -138,8 +138,8 @@ def test_tolerances_that_are_not_as_given_are_refused(
     for changed, message in (
         ((*rest, replace(first, value=first.value / 2), second), "read otherwise"),
         ((*given.each[:-1], replace(radius, radius=radius.radius + 1)), "read otherwise"),
-        ((*rest, *swapped), "not those"),
-        (rest, "not those"),
+        ((*rest, *swapped), "are not those"),
+        (rest, "are not those"),
     ):
         with pytest.raises(StepError, match=message):
             check_read_back(file, replace(given, each=changed))

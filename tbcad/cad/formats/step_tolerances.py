@@ -188,7 +188,7 @@ def check_read_back(path: Path, given: FaceTolerances) -> None:
     meant = {_key(one): one for one in given.each}
     if sorted(map(_key, meant.values())) != sorted(_key(one) for one, _ in read):
         raise StepError(
-            f"{path.name}: {len(read)} tolerances are read, not the {len(meant)} written"
+            f"{path.name}: {len(read)} tolerances read are not those {len(meant)} given"
         )
     for one, datums in read:
         wanted = meant[_key(one)]

@@ -71,7 +71,6 @@ class CoverageResult(CameraCoverage):
 class ShellResult(CoverageResult):
     """Coverage and pointing errors in s builds of the shell."""
 
-    pixels: Floats  # sizes of the pictures, (s, v)
     angle: Floats  # pointing errors of an uncalibrated build, radians, (s, 2 m)
 
 
@@ -109,13 +108,12 @@ class MonteCarloCase(ShellCase):
     def __call__(self, builds: range) -> ShellResult:
         """Result of the builds of these numbers."""
         draws = self.draws(builds)
-        diameter, pixels = coverage(self.edge_models, draws)
         rays = [
             pointing(edge_model, drawn)
             for edge_model, drawn in zip(self.edge_models, draws, strict=True)
         ]
         angle, offset = (np.concatenate(errors, axis=1) for errors in zip(*rays, strict=True))
-        return ShellResult(diameter, offset, pixels, angle)
+        return ShellResult(coverage(self.edge_models, draws), offset, angle)
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,7 @@ class CoverageCase(ShellCase):
 
     def __call__(self, builds: range) -> CameraCoverage:
         """Result of the builds of these numbers."""
-        return CameraCoverage(coverage(self.edge_models, self.draws(builds), self.worst_only)[0])
+        return CameraCoverage(coverage(self.edge_models, self.draws(builds), self.worst_only))
 
 
 def simulate(
