@@ -187,9 +187,7 @@ def check_read_back(path: Path, given: FaceTolerances) -> None:
     frame, read = tuple(given.datums), read_tolerances(path)
     meant = {_key(one): one for one in given.each}
     if sorted(map(_key, meant.values())) != sorted(_key(one) for one, _ in read):
-        raise StepError(
-            f"{path.name}: {len(read)} tolerances read are not those {len(meant)} given"
-        )
+        raise StepError(f"{path.name}: {len(read)} tolerances are not those {len(meant)} given")
     for one, datums in read:
         wanted = meant[_key(one)]
         off = max(abs(one.value - wanted.value), abs(one.radius - wanted.radius))
