@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import trimesh
 from OCP.Bnd import Bnd_Box
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
@@ -17,10 +18,9 @@ from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
 from tbcad.cad.kernel.solids import faces
-from tbcad.types import Bools, Floats
+from tbcad.types import Floats
 
 SAME_MM, SAME_COS = 1e-3, 1e-6
 HOLE_DEG, SLOT_DEG = 200.0, 150.0  # least angles of the wall of a hole, and of the end of a slot
@@ -92,24 +92,12 @@ def cylinders(shape: TopoDS_Shape) -> list[RoundFace]:
         reach = np.array([PROBE_MM * found[k].axis for k in holes])
         ends = np.array([[found[k].start, found[k].end] for k in holes])
         beyond = ends + np.stack([-reach, reach], axis=1)
-        is_open = ~_inside(meshed(shape, MESH_MM), beyond.reshape(-1, 3)).reshape(-1, 2)
+        mesh = meshed(shape, MESH_MM)
+        whole = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+        is_open = ~whole.contains(beyond.reshape(-1, 3)).reshape(-1, 2)
         for k, (start, end) in zip(holes, is_open.tolist(), strict=True):
             found[k] = replace(found[k], open_start=start, open_end=end)
     return found
-
-
-def _inside(mesh: Mesh, points: Floats) -> Bools:
-    """Whether points are inside a closed mesh, by solid angles (van Oosterom, Strackee, 1983)."""
-    inside = []
-    for point in points:
-        corner = mesh.vertices[mesh.triangles] - point
-        a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
-        na, nb, nc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-        up = np.einsum("ij,ij->i", a, np.cross(b, c))
-        ab, bc, ca = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
-        down = na * nb * nc + ab * nc + bc * na + ca * nb
-        inside.append(abs(2 * np.arctan2(up, down).sum()) > 2 * np.pi)
-    return np.array(inside)
 
 
 def plane_levels(shape: TopoDS_Shape, direction: Floats) -> list[tuple[float, float]]:
