@@ -5,7 +5,6 @@ Of mirrors that meet in valleys and of those on pedestals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -188,66 +187,6 @@ def test_larger_build_covers_more_in_proportion(halves: EdgeModels, size: float)
     assert angle.max() < 1e-12
 
 
-def lever(half: EdgeModel, start: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First-order offset and angle of rays to apices P moved by start and turned by (m, 3).
-
-    A ray along d that meets the tangent plane x off the apex finds the normal turned by x k
-    there, so that it leaves turned by the mirror image of its own turn and by
-    -2 ((d . x k) N + (d . N) x k), and arrives |P| farther at x and |P| times that, across itself.
-    """
-    apex, normal, curvature = np.split(half.table[:-2], [3, 6], axis=1)
-    way = apex - half.view.pinhole
-    far = np.linalg.norm(way, axis=1)[:, None]
-    d = way / far
-
-    def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.sum(a * b, axis=1)[:, None]
-
-    x = start + far * turn
-    x = x - d * dot(x, normal) / dot(d, normal)
-    bent = -2 * curvature * (dot(d, x) * normal + dot(d, normal) * x)
-    bent += turn - 2 * dot(turn, normal) * normal
-    out = d - 2 * dot(d, normal) * normal
-    moved = x + np.linalg.norm(apex, axis=1)[:, None] * bent
-    moved = moved - dot(moved, out) * out
-    return np.linalg.norm(moved, axis=1), np.linalg.norm(bent, axis=1)
-
-
-def shifted(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
-    shift = size * row(1.0, 2.0, -1.0)
-    return replace(perfect(half), camera_shift=shift), shift, np.zeros((1, 3))
-
-
-def tilted(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
-    turn = size / 100 * row(1.0, 2.0, -1.0)
-    way = half.table[:-2, :3] - half.view.pinhole
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    return replace(perfect(half), camera_tilt=turn), np.zeros((1, 3)), np.cross(turn, way)
-
-
-def longer(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
-    """A pixel then stands for an angle of lesser tangent from the optical axis."""
-    way = half.table[:-2, :3] - half.view.pinhole
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    forward = half.view.forward
-    radial = way - (way @ forward)[:, None] * forward
-    turn = -size / 100 * (radial - np.sum(radial * way, axis=1)[:, None] * way)
-    return replace(perfect(half), focal=np.array([1 + size / 100])), np.zeros((1, 3)), turn
-
-
-@pytest.mark.parametrize("error", [shifted, tilted, longer])
-def test_pointing_error_is_the_lever_of_a_curved_mirror(
-    halves: EdgeModels,
-    error: Callable[[EdgeModel, float], tuple[ShellDraws, np.ndarray, np.ndarray]],
-) -> None:
-    for array in halves:
-        draws, start, turn = error(array, 1e-4)
-        offset, angle = lever(array, start, turn)
-        found_angle, found_offset = pointing(array, draws)
-        assert found_offset[0] == pytest.approx(offset, rel=1e-3, abs=1e-8)
-        assert found_angle[0] == pytest.approx(angle, rel=1e-3, abs=1e-10)
-
-
 def test_radius_of_one_mirror_alone(halves: EdgeModels) -> None:
     """Its own coverage by brute force; its neighbours see less or more, all others the same."""
     half, alone = small("valley").arrays[0], 40
@@ -354,15 +293,16 @@ def test_moved_walls_and_uneven_scale_against_brute_force(parted: EdgeModels) ->
     assert abs(found - mirror_coverage(parted[1], one).diameter[0, mirror]) > 0.02
 
 
-def test_warped_builds_against_displaced_material(parted: EdgeModels) -> None:
+@pytest.mark.parametrize("edges", ["valley", "pedestal"])
+def test_warped_builds_against_displaced_material(edges: str) -> None:
     """Halves whose every point is displaced: walls go along with the mirrors that they end."""
-    length, builds = SLA.warp.length, 1
-    chosen = pivots(parted[0].apex, length)
-    fields = [smooth_field(half.apex, length, chosen) for half in parted]
-    shapes = shell_error_shapes(len(parted[0]), len(chosen))
+    halves, length, builds = models(edges), SLA.warp.length, 1
+    chosen = pivots(halves[0].apex, length)
+    fields = [smooth_field(half.apex, length, chosen) for half in halves]
+    shapes = shell_error_shapes(len(halves[0]), len(chosen))
     numbers = draw_kinds(SLA, 7, range(builds), shapes)["warp"]
-    draws = drawn(parted, SLA, range(builds))
-    for side, (half, array) in enumerate(zip(parted, small("pedestal").arrays, strict=True)):
+    draws = drawn(halves, SLA, range(builds))
+    for side, (half, array) in enumerate(zip(halves, small(edges).arrays, strict=True)):
         fast = mirror_coverage(half, draws[side]).diameter
         fixed = replace(draws[side], wall=np.zeros_like(draws[side].wall))
         without = mirror_coverage(half, fixed).diameter
@@ -371,7 +311,8 @@ def test_warped_builds_against_displaced_material(parted: EdgeModels) -> None:
             exact = displaced_coverage(array, fields[side], numbers[k, side])
             assert fast[k].min() == pytest.approx(exact.min(), abs=0.05)
             assert np.abs(fast[k] - exact)[whole].max() < 0.05
-            assert np.abs(without[k] - exact)[whole].max() > 0.2
+            if edges == "pedestal":
+                assert np.abs(without[k] - exact)[whole].max() > 0.2
 
 
 def test_errors_of_neighbours_cost_less_than_where_spheres_meet(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.cells import Cells, cell_areas, cells_of
 from tbcad.core.optics.geodesic import geodesic, icosahedron, stretched
 from tbcad.core.optics.power_diagram import bounded_triangulation, lowest_value
@@ -76,23 +76,6 @@ def test_no_corner_and_no_arc_is_inside_any_mirror(n: int, rule: str) -> None:
     assert lowest_value(cells.surfaces, points.reshape(-1, 3)) > -1e-9
     corners = len(np.unique([cells.arcs.start, cells.arcs.end]))
     assert corners - len(cells.arcs) + cells.mirrors == 1  # of a disc of cells
-
-
-@pytest.mark.parametrize("rule", RULES)
-def test_areas_against_monte_carlo(rule: str) -> None:
-    """Area of a cell = integral of distance^2 / cos over the rays that meet it."""
-    cells = mirror_array("n=3", f"radius_rule={rule}").cells
-    rng = np.random.default_rng(5)
-    count = 400_000
-    ray = unit(rng.normal(size=(count, 3)))
-    mirror, point = within(cells, ray)
-    distance = norm(point)
-    cosine = -dot(point, cells.surfaces.gradient(mirror, point)) / distance
-    weight = 4 * np.pi / count * distance**2 / cosine
-    estimate = np.bincount(mirror, weights=weight, minlength=cells.mirrors)
-    error = np.sqrt(np.bincount(mirror, weights=weight**2, minlength=cells.mirrors))
-    assert (np.abs(estimate - cell_areas(cells)) < 5 * error).all()
-    assert (error < 0.05 * cell_areas(cells)).all()
 
 
 @pytest.mark.parametrize("diagonal", [0, 1])
