@@ -40,6 +40,7 @@ from tbcad.tolerancing.prototype.windows import (
 )
 from tbcad.types import Floats
 
+NOT_SEARCHED = Margin(None, 0.0, "not searched for: add --margins")
 SEARCH_BUILDS = 100  # in each step of a search; the process itself has as many as asked for
 PHOTOGRAPHED_BUILDS = 2  # builds whose pictures are simulated
 
@@ -50,7 +51,7 @@ class ProcessOption:
 
     name: str
     estimate: YieldEstimate  # yield with the design as it is
-    margin: Margin | None = None  # that it needs for the wanted yield; None: not searched for
+    margin: Margin = NOT_SEARCHED  # that it needs for the wanted yield
     builds: int = SEARCH_BUILDS
 
 

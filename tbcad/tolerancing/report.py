@@ -11,8 +11,7 @@ import numpy as np
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.tolerancing.analysis import Analysis
-from tbcad.tolerancing.margin import Margin
+from tbcad.tolerancing.analysis import NOT_SEARCHED, Analysis
 from tbcad.tolerancing.montecarlo.builds import (
     FACTOR_TOLERANCE,
     CoverageResult,
@@ -28,7 +27,6 @@ from tbcad.tolerancing.process.chain import MICROMETRE, ErrorSpec
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"
-NOT_SEARCHED = Margin(None, 0.0, "not searched for: add --margins")
 QUANTILES = (0.01, 0.05, 0.5)
 LOW_SHARE = 0.05  # share of the builds whose coverage lies below what table and map show
 NOTES = (
@@ -125,7 +123,7 @@ def _wanted(analysis: Analysis) -> str:
 
 def _margins_sentence(analysis: Analysis) -> str:
     options = analysis.process_options
-    margins = {one.name: (one.margin or NOT_SEARCHED).mm for one in options}
+    margins = {one.name: one.margin.mm for one in options}
     enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
     none = [name for name, mm in margins.items() if mm is None]
     text = f"Margins needed for {_wanted(analysis)}: {', '.join(enough) or 'none found'}"
@@ -278,8 +276,8 @@ def _process_table(analysis: Analysis) -> Table:
             "yield": option.estimate.share,
             "yield_low": option.estimate.low,
             "yield_high": option.estimate.high,
-            "margin_needed_mm": (option.margin or NOT_SEARCHED).mm,
-            "reason": (option.margin or NOT_SEARCHED).reason,
+            "margin_needed_mm": option.margin.mm,
+            "reason": option.margin.reason,
         }
         for option in analysis.process_options
     ]

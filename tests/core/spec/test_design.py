@@ -182,16 +182,9 @@ class TestValue:
     def test_whole_numbers_are_numbers(self) -> None:
         assert load_spec(None, ["wall_mm=4"]).shell.wall_mm == 4
 
-    @pytest.mark.parametrize("value", ["3", "true", "2.0", "'2'"])
+    @pytest.mark.parametrize("value", ["1", "3", "true", "2.0", "'2'"])
     def test_of_another_schema(self, value: str) -> None:
-        assert re.search(
-            "schema.* allowed is (the whole number )?2", refusal(None, f"schema={value}")
-        )
-
-    def test_of_the_schema_before_the_printer(self, file: Path) -> None:
-        text = refused(file, "schema = 1\n[prototype.base]\nbed_mm = [200, 200, 200]\n")
-        assert text.startswith("schema: 1 is the version before the section [printer]: move bed_mm")
-        assert "set schema to 2" in text
+        assert re.search("schema.* allowed is (a whole number|2)", refusal(None, f"schema={value}"))
 
     @pytest.mark.parametrize(("given", "said"), REFUSED.items())
     def test_what_a_key_takes_in_words(self, given: str, said: str) -> None:
