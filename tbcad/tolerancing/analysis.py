@@ -17,8 +17,8 @@ from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,
     Case,
     CoverageCase,
+    CoverageResult,
     MonteCarloCase,
-    ShellResult,
     SingleErrorEffect,
     WorstCoverage,
     YieldEstimate,
@@ -64,7 +64,7 @@ class Analysis:
     target: float  # minimum coverage of a good build, mm
     cameras: tuple[Reflector, Reflector]  # camera a and b as designed
     edge_models: EdgeModels  # the same for the fast model
-    result: ShellResult
+    result: CoverageResult
     single_errors: tuple[SingleErrorEffect, ...]  # each kind by itself, the largest loss first
     process_options: tuple[ProcessOption, ...]  # every built-in process, or this one alone
     margin: Margin | None  # that this process needs; None where it was not searched for

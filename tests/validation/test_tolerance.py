@@ -152,14 +152,12 @@ def test_what_moves_together_changes_nothing(halves: EdgeModels) -> None:
     moved = replace(still, shell_tilt=turn, camera_tilt=turn, camera_shift=shift[None])
     before, after = mirror_coverage(halves[0], still), mirror_coverage(halves[0], moved)
     assert after.diameter == pytest.approx(before.diameter, abs=1e-9)
-    angle, offset = pointing(halves[0], moved)
+    offset = pointing(halves[0], moved)
     way, nearest = designed_rays(halves[0])
-    turned = np.arccos(np.einsum("mx,mx->m", way, rotation.apply(way)))
     # Of a mirror on the seam the object's point that its ray was aimed at has not moved.
     left = np.cross(rotation.apply(nearest) - nearest, rotation.apply(way))
     assert offset[0] == pytest.approx(np.linalg.norm(left, axis=1), abs=1e-9)
     assert offset[0, ~halves[0].halved].max() < 1e-9
-    assert angle[0] == pytest.approx(turned, abs=1e-9)
 
 
 def test_moved_shell_is_moved_camera_and_object(halves: EdgeModels) -> None:
@@ -169,8 +167,7 @@ def test_moved_shell_is_moved_camera_and_object(halves: EdgeModels) -> None:
     together = replace(still, shell_shift=shift, camera_shift=shift)
     way, _ = designed_rays(halves[0])
     across = shift - np.einsum("mx,kx->mk", way, shift) * way
-    assert pointing(halves[0], together)[1][0] == pytest.approx(np.linalg.norm(across, axis=1))
-    assert pointing(halves[0], together)[0].max() < 1e-12
+    assert pointing(halves[0], together)[0] == pytest.approx(np.linalg.norm(across, axis=1))
 
 
 @pytest.mark.parametrize("size", [0.98, 1.03])
@@ -180,11 +177,10 @@ def test_larger_build_covers_more_in_proportion(halves: EdgeModels, size: float)
     larger = replace(still, scale=row(size, size, size), camera_shift=(size - 1) * pinhole[None])
     before, after = mirror_coverage(halves[0], still), mirror_coverage(halves[0], larger)
     assert after.diameter == pytest.approx(size * before.diameter, abs=1e-9)
-    angle, offset = pointing(halves[0], larger)
+    offset = pointing(halves[0], larger)
     # The rays of mirrors on the seam, which are aimed beside the middle, keep their proportion too.
     beside = np.linalg.norm(designed_rays(halves[0])[1], axis=1)
     assert offset[0] == pytest.approx(abs(size - 1) * beside, abs=1e-12)
-    assert angle.max() < 1e-12
 
 
 def test_radius_of_one_mirror_alone(halves: EdgeModels) -> None:

@@ -68,13 +68,6 @@ class CoverageResult(CameraCoverage):
 
 
 @dataclass(frozen=True)
-class ShellResult(CoverageResult):
-    """Coverage and pointing errors in s builds of the shell."""
-
-    angle: Floats  # pointing errors of an uncalibrated build, radians, (s, 2 m)
-
-
-@dataclass(frozen=True)
 class YieldEstimate:
     """Share of builds whose every virtual camera covers enough."""
 
@@ -105,15 +98,11 @@ class ShellCase:
 class MonteCarloCase(ShellCase):
     """Simulates builds of the shell."""
 
-    def __call__(self, builds: range) -> ShellResult:
+    def __call__(self, builds: range) -> CoverageResult:
         """Result of the builds of these numbers."""
         draws = self.draws(builds)
-        rays = [
-            pointing(edge_model, drawn)
-            for edge_model, drawn in zip(self.edge_models, draws, strict=True)
-        ]
-        angle, offset = (np.concatenate(errors, axis=1) for errors in zip(*rays, strict=True))
-        return ShellResult(coverage(self.edge_models, draws), offset, angle)
+        offsets = list(map(pointing, self.edge_models, draws))
+        return CoverageResult(coverage(self.edge_models, draws), np.concatenate(offsets, axis=1))
 
 
 @dataclass(frozen=True)

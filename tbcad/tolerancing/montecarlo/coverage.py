@@ -88,14 +88,13 @@ def coverage(
     return np.where(surrounds, np.maximum(diameter, 0.0), 0.0)
 
 
-def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
-    """Errors of the ray of each mirror's centre pixel, for s builds of one edge_model.
+def pointing(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """How far the ray of each mirror's centre pixel is off at the object, mm, (s, m).
 
     The centre pixel shows the apex, and its designed ray goes through the object's centre, for a
     mirror on the seam past it. A pixel is a fixed place on the sensor: moved and tilted cameras and
-    wrong focal lengths count. The errors are the angle between the designed and the built ray after
-    the mirror, radians, and the distance of the built ray from the point where the designed one is
-    nearest to the object's centre, mm, (s, m) each; NaN where it misses the sphere.
+    wrong focal lengths count. It is the distance of the ray of s builds after the mirror from the
+    point where the designed one is nearest to the object's centre; NaN where it misses the sphere.
     """
     pinhole, middle, scale, _ = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
     ray = _pixel_rays(edge_model, draws)
@@ -106,9 +105,7 @@ def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
     nearest = edge_model.apex - dot(edge_model.apex, designed)[:, None] * designed
     shells = [Rotation.from_rotvec(turn) for turn in draws.shell_tilt]
     aim = middle + np.stack([shell.apply(nearest, inverse=True) for shell in shells])
-    offset = norm(np.cross(point * scale - aim, out))
-    built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
-    return np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset
+    return norm(np.cross(point * scale - aim, out))
 
 
 def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws) -> Floats:

@@ -102,6 +102,6 @@ def test_planar_mirrors_with_a_thick_coat_move_and_stay_planar() -> None:
     flat = design(load_spec(None, ["n=4", "radius_rule=flat"]))
     a, b = (edge_model(at) for at in reflectors(flat))
     bare = coverage((a, b), draw(Errors(), 1, range(1), len(a)))
-    coated, _ = coverage((a, b), draw(Errors(coating=Error(0, 0.05)), 1, range(1), len(a)))
+    coated = coverage((a, b), draw(Errors(coating=Error(0, 0.05)), 1, range(1), len(a)))
     assert bare[0, : len(a)] == pytest.approx(flat.arrays[0].coverage, abs=1e-5)
     assert 0 < np.abs(coated - bare).max() < 1
