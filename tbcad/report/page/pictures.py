@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tbcad.cad.formats.pictures import decoded, visible_files
+from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
 from tbcad.types import Bytes
 
@@ -94,16 +94,16 @@ def _read(path: Path) -> Picture | None:
             warnings.simplefilter("error")  # of a picture that is far too large
             with Image.open(path, formats=("PNG", "JPEG")) as image:
                 image.draft("RGB", (MAX_SIDE_PX, MAX_SIDE_PX))
-                return _jpeg(path.name, _in_8_bits(_on_white(image), path.name), MAX_SIDE_PX)
-    except (InputError, OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
+                return _jpeg(path.name, _in_8_bits(_on_white(image)), MAX_SIDE_PX)
+    except (OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
         return None
 
 
-def _in_8_bits(image: Any, name: str) -> Bytes:
-    pixels = decoded(image, name)
-    return np.asarray(
-        pixels if pixels.dtype == np.uint8 else pixels.astype(np.uint16) >> 8, np.uint8
-    )
+def _in_8_bits(image: Any) -> Bytes:
+    """Grey (h, w) or red, green, blue (h, w, 3)."""
+    if image.mode.startswith("I;16"):
+        return np.asarray(np.asarray(image) >> 8, np.uint8)
+    return np.asarray(image.convert("L" if image.mode in {"1", "L"} else "RGB"))
 
 
 def _on_white(image: Any) -> Any:

@@ -61,7 +61,7 @@ def minimum_miss_distances(
                 samples[MISS, k] = _miss(direction, camera, ball, radius[i])
                 samples[RIGHT, k], samples[DOWN, k] = dot(direction, right), dot(direction, down)
             crossings += _crossings(samples)
-            best = np.argmin(samples[MISS])
+            best = int(np.argmin(samples[MISS]))
             fall = MAX_FALL * rise_beside(samples[MISS], COARSE_SAMPLES, best)
             least = samples[MISS, best]
             if least == inf or not least - fall > minimum:

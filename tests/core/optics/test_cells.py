@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.cells import Cells, cell_areas, cells_of
-from tbcad.core.optics.geodesic import geodesic, icosahedron, stretched
+from tbcad.core.optics.geodesic import geodesic, stretched
 from tbcad.core.optics.power_diagram import bounded_triangulation, lowest_value
 from tbcad.core.optics.surfaces import Surfaces, planes
 from tbcad.core.spec.errors import SpecError
@@ -116,14 +116,6 @@ def test_cells_tile_without_gap_or_overlap(n: int, x: float, z: float, rule: str
     assert (cell_areas(cells) > 0).all()
     arc, t = np.broadcast_arrays(np.arange(len(cells.arcs))[:, None], np.linspace(0, 1, 5))
     assert lowest_value(cells.surfaces, cells.arcs.at(arc, t).reshape(-1, 3)) > -1e-7
-
-
-def test_icosahedron_is_regular_and_z_is_a_two_fold_axis() -> None:
-    vertices, faces = icosahedron()
-    sides = norm(vertices[faces] - vertices[np.roll(faces, -1, axis=1)])
-    assert np.ptp(sides) < 1e-15
-    turned = vertices * [-1, -1, 1]
-    assert {tuple(v) for v in np.round(turned, 12)} == {tuple(v) for v in np.round(vertices, 12)}
 
 
 @pytest.mark.parametrize("n", [*range(1, 7), 31, 60])
