@@ -32,11 +32,11 @@ REFUSED = {
     "shell=3": "shell is a section: set one of shell.wall_mm",
     "bolts=3": "shell.foot_flange.bolts or shell.seam_flange.bolts",
     **dict.fromkeys(
-        ("prototype.k=0", "prototype.k=1.0"), "give a whole number from 1 to 1000, or auto"
+        ("prototype.k=0", "prototype.k=1.0"), "allowed is a whole number from 1 to 1000, or auto"
     ),
     **dict.fromkeys(
         ("prototype.prices=estimates", "prototype.prices=[1]"),
-        'give a list such as ["my_prices.csv", "estimates"]',
+        "allowed is texts in brackets",
     ),
     **dict.fromkeys(("", "n", "=4", " =4"), "not key=value"),
     **{
