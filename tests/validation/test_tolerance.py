@@ -50,7 +50,7 @@ COARSE = Errors(
 )
 POSED = replace(COARSE, shell_shift=Error(0.2), shell_tilt=Error(0.002))
 SLA = Errors(warp=Error(0.0346, length=50.0))
-WIDE = 16.0  # mm, of a mirror about its apex: see test_warp
+WIDE = 16.0  # mm, of a mirror about its apex; wider ones bend as no sphere with astigmatism does
 PEDESTAL = "shell.edges=pedestal"
 
 
