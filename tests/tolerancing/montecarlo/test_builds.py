@@ -238,12 +238,3 @@ def test_builds_with_the_factor_just_do(halves: EdgeModels, kind: str, error: Er
         for by in (1 - 2 * FACTOR_TOLERANCE, 1 + 2 * FACTOR_TOLERANCE)
     )
     assert more < 0.9 <= less
-
-
-def test_camera_that_turns_about_its_pinhole_is_harmless(halves: EdgeModels) -> None:
-    """Coverage hangs on places of pinhole and mirrors alone."""
-    one = one_at_a_time(
-        Errors(camera_tilt=Error(0.003)), "camera_tilt", 0.9, TARGET, real(halves, 10)
-    )
-    assert one.loss == pytest.approx(0, abs=1e-9)
-    assert one.tolerable_factor == np.inf
