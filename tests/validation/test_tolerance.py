@@ -1,4 +1,4 @@
-"""The fast model of simulated builds against closed forms, slow tracing and the verification.
+"""The fast model of simulated builds against closed forms, slow tracing and brute force.
 
 Of mirrors that meet in valleys and of those on pedestals.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, scaled, simulate
-from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, pointing
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import (
     ShellDraws,
     draw,
@@ -34,10 +33,7 @@ from tests.tolerancing.exact_builds import (
     bisected_coverage,
     displaced_coverage,
     last_inside,
-    read_record_of,
     traced_coverage,
-    verified_coverage,
-    write_meshes,
 )
 
 # What a careless maker might leave; even scale only, as the slow means know no other.
@@ -322,32 +318,3 @@ def test_every_build_says_how_it_would_be_made() -> None:
         bad = np.append(0, (every < 60).cumsum())  # of the first k
         assert bad[50] < 3 if one.share >= 0.95 else bad[one.builds] >= 3 > bad[one.builds - 5]
         assert round(one.share * one.builds) == one.builds - bad[one.builds]
-
-
-# Verification of the files of builds
-
-
-@pytest.mark.parametrize(
-    ("edges", "errors", "build", "least"),
-    [
-        ("valley", COARSE, 0, 59.0),
-        ("valley", POSED, 20, 59.0),
-        ("pedestal", scaled(COARSE, 0.3), 0, 60.3),
-    ],
-)
-def test_random_builds_against_the_verification_of_their_meshes(
-    tmp_path: Path, edges: str, errors: Errors, build: int, least: float
-) -> None:
-    """Both shells meshed, written, read, mirrors found and measured: within 0.05 mm.
-
-    The verification takes x = 0 for the seam, so mirrors halved by a moved seam are left out.
-    """
-    made, halves, record = small(edges), models(edges), read_record_of(small(edges), tmp_path)
-    draws = drawn(halves, errors, range(build, build + 1))
-    fast = coverage(halves, draws)
-    kept = np.ones(fast.shape[1], dtype=bool)
-    kept[: len(halves[0])] = (errors is not POSED) | ~halves[0].halved
-    write_meshes(made, draws, 0, record.folder)
-    shifts = {name: one.camera_shift[0] for name, one in zip("ab", draws, strict=True)}
-    assert np.abs(fast[0] - verified_coverage(record, shifts))[kept].max() < 0.05
-    assert fast.min() < least  # the meshes are not the design's
